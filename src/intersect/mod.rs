@@ -1,0 +1,105 @@
+//! The nearest intersection of a ray with a scene: on facets (octree, BVH) or on the exact spline.
+//!
+//! All intersectors answer through [`Intersector`]; all of them always count what they do in a [`Cost`].
+
+use crate::math::{FaceId, Ray, Uv, Vector};
+
+/// Finds the nearest hit of a ray.
+pub trait Intersector: Sync {
+    /// Nearest hit with `t` in `[ray.t_min, ray.t_max]`, `None` for a miss.
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit>;
+
+    /// The same for many rays; an implementation may reorder them inside. `hits` is as long as `rays`.
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.intersect(ray, cost);
+        }
+    }
+
+    /// What the structure holds and what it took to build.
+    fn footprint(&self) -> Footprint;
+}
+
+/// The nearest intersection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, mm.
+    pub t: f64,
+    /// Unit normal to shade with, outward: how it was got is the intersector's [`NormalMode`].
+    pub normal: Vector,
+    /// Unit normal of the geometry that was hit, outward: of the flat facet, or of the spline.
+    pub geometric_normal: Vector,
+    /// The placed face.
+    pub face: FaceId,
+    /// The intersector's primitive: a facet of the mesh, or a patch of the spline model.
+    pub primitive: u32,
+    /// Parameters on the face's surface.
+    pub uv: Uv,
+    /// How sure it is.
+    pub certainty: Certainty,
+}
+
+/// How sure a hit is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Certainty {
+    /// Hit on a facet: exact for the facets, within their sag for the spline.
+    Facet,
+    /// Moved from a facet to the spline by Newton steps; not proved to be the first hit.
+    Polished,
+    /// Proved to be the first hit on the spline.
+    Certified,
+    /// The ray touches the spline within 1e-9 mm; whether it hits is a matter of rounding.
+    Tangent,
+    /// Found on the spline, but not proved to be the first.
+    Uncertified,
+}
+
+/// Work done, summed over rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Rays asked.
+    pub rays: u64,
+    /// Nodes of the structure visited.
+    pub nodes: u64,
+    /// Facets or patches tested.
+    pub tests: u64,
+    /// Rays whose answer could not be certified or polished, and fell back.
+    pub fallbacks: u64,
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, o: Self) {
+        self.rays += o.rays;
+        self.nodes += o.nodes;
+        self.tests += o.tests;
+        self.fallbacks += o.fallbacks;
+    }
+}
+
+/// Size of a structure and the time it took to build.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Footprint {
+    /// Bytes held, without the mesh or model itself.
+    pub bytes: usize,
+    /// Facets or patches.
+    pub primitives: usize,
+    /// Seconds.
+    pub build_seconds: f64,
+}
+
+/// How the normal at a facet hit is got.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum NormalMode {
+    /// Of the flat triangle.
+    Flat,
+    /// Of the nearest corner.
+    Nearest,
+    /// Bilinear in the facet's own parameters.
+    #[default]
+    Bilinear,
+    /// From a cubic patch through corners and normals.
+    Cubic,
+    /// From the spline, by polishing the hit.
+    Exact,
+}

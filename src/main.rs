@@ -1,0 +1,3 @@
+//! The `lampyris` command.
+
+fn main() {}

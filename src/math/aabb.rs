@@ -1,0 +1,126 @@
+use super::{Point, Ray, Vector};
+
+/// An axis-aligned box `[min, max]`; empty when any `min > max`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lower corner, mm.
+    pub min: Point,
+    /// Upper corner, mm.
+    pub max: Point,
+}
+
+impl Aabb {
+    /// The box that contains nothing and is neutral to [`Aabb::union`].
+    pub const EMPTY: Self = Self { min: Point::INFINITY, max: Point::NEG_INFINITY };
+
+    /// The smallest box around the points; [`Aabb::EMPTY`] without any.
+    pub fn around(points: impl IntoIterator<Item = Point>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    /// The smallest box around both.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// The common part; empty when they do not meet.
+    pub fn intersection(self, other: Self) -> Self {
+        Self { min: self.min.max(other.min), max: self.max.min(other.max) }
+    }
+
+    /// Whether the box contains no point.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// Whether the point lies inside or on the boundary.
+    pub fn contains(&self, p: Point) -> bool {
+        self.min.cmple(p).all() && p.cmple(self.max).all()
+    }
+
+    /// Centre of the box.
+    pub fn center(&self) -> Point {
+        0.5 * (self.min + self.max)
+    }
+
+    /// Edge lengths; negative for an empty box.
+    pub fn size(&self) -> Vector {
+        self.max - self.min
+    }
+
+    /// Length of the diagonal, 0 when empty.
+    pub fn diagonal(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.size().length() }
+    }
+
+    /// Half the surface area (the measure of the surface-area heuristic), 0 when empty.
+    pub fn half_area(&self) -> f64 {
+        if self.is_empty() {
+            return 0.0;
+        }
+        let s = self.size();
+        s.x * s.y + s.y * s.z + s.z * s.x
+    }
+
+    /// The box grown by `margin` mm on every side.
+    pub fn grown(self, margin: f64) -> Self {
+        Self { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// The eight corners.
+    pub fn corners(&self) -> [Point; 8] {
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };
+            Point::new(
+                pick(0, self.min.x, self.max.x),
+                pick(1, self.min.y, self.max.y),
+                pick(2, self.min.z, self.max.z),
+            )
+        })
+    }
+
+    /// The range of `t` in which the ray is inside, cut to the ray's own range; `None` for a miss.
+    ///
+    /// Conservative: the range is widened by a few ulp so that rounding never loses a box that is touched.
+    pub fn clip(&self, ray: &Ray) -> Option<(f64, f64)> {
+        let (mut near, mut far) = (ray.t_min, ray.t_max);
+        for axis in 0..3 {
+            let (o, d) = (ray.origin[axis], ray.direction[axis]);
+            if d == 0.0 {
+                if o < self.min[axis] || o > self.max[axis] {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((self.min[axis] - o) / d, (self.max[axis] - o) / d);
+            let (a, b) = if a <= b { (a, b) } else { (b, a) };
+            near = near.max(a - a.abs() * 4.0 * f64::EPSILON);
+            far = far.min(b + b.abs() * 4.0 * f64::EPSILON);
+        }
+        (near <= far).then_some((near, far))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clip_of_a_unit_box() {
+        let b = Aabb { min: Point::ZERO, max: Point::ONE };
+        let through = Ray::new(Point::new(0.5, 0.5, -2.0), Vector::Z);
+        let (near, far) = b.clip(&through).unwrap();
+        assert!((near - 2.0).abs() < 1e-14 && (far - 3.0).abs() < 1e-14);
+        assert!(b.clip(&Ray::new(Point::new(1.5, 0.5, -2.0), Vector::Z)).is_none());
+        assert!(b.clip(&Ray::new(Point::new(1.0, 0.5, -2.0), Vector::Z)).is_some(), "a ray in a wall touches");
+        assert!(b.clip(&through.within(0.0, 1.0)).is_none());
+    }
+
+    #[test]
+    fn empty_is_neutral() {
+        let b = Aabb::around([Point::ONE, Point::new(2.0, 0.0, 3.0)]);
+        assert_eq!(Aabb::EMPTY.union(b), b);
+        assert!(Aabb::EMPTY.is_empty() && Aabb::EMPTY.half_area() == 0.0);
+        assert_eq!(b.corners().len(), 8);
+    }
+}

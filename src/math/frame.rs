@@ -1,0 +1,134 @@
+use super::{Point, Vector};
+
+/// A similarity placement `x ↦ origin + scale · (x·X + y·Y + z·Z)`: right- or left-handed axes of unit length.
+///
+/// Placements of parts, and positions of analytic surfaces, are frames; `scale` is 1 for the latter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Image of the origin.
+    pub origin: Point,
+    /// Image of the x direction, unit length.
+    pub x: Vector,
+    /// Image of the y direction, unit length.
+    pub y: Vector,
+    /// Image of the z direction, unit length; `-x × y` for a mirrored frame.
+    pub z: Vector,
+    /// Uniform scale, positive.
+    pub scale: f64,
+}
+
+impl Frame {
+    /// Leaves everything where it is.
+    pub const IDENTITY: Self = Self { origin: Point::ZERO, x: Vector::X, y: Vector::Y, z: Vector::Z, scale: 1.0 };
+
+    /// A shift.
+    pub fn translation(by: Vector) -> Self {
+        Self { origin: by, ..Self::IDENTITY }
+    }
+
+    /// A right-handed frame from its axis and an approximate x direction, as in STEP's AXIS2_PLACEMENT_3D.
+    ///
+    /// Missing or parallel `x_hint` falls back to a perpendicular of the axis; a zero axis falls back to `Z`.
+    pub fn from_axis(origin: Point, axis: Vector, x_hint: Option<Vector>) -> Self {
+        let z = axis.try_normalize().unwrap_or(Vector::Z);
+        let x = x_hint
+            .and_then(|h| h.try_normalize())
+            .map(|h| h - z * h.dot(z))
+            .filter(|p| p.length_squared() > 1e-24)
+            .and_then(|p| p.try_normalize())
+            .unwrap_or_else(|| {
+                let pick = if z.x.abs() < 0.9 { Vector::X } else { Vector::Y };
+                (pick - z * pick.dot(z)).normalize()
+            });
+        Self { origin, x, y: z.cross(x), z, scale: 1.0 }
+    }
+
+    /// The image of a point.
+    pub fn point(&self, p: Point) -> Point {
+        self.origin + self.vector(p)
+    }
+
+    /// The image of a difference of points, scaled.
+    pub fn vector(&self, v: Vector) -> Vector {
+        self.scale * self.direction(v)
+    }
+
+    /// The image of a direction, not scaled.
+    pub fn direction(&self, v: Vector) -> Vector {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+
+    /// The image of a unit normal: mirrored placements keep outward normals outward.
+    pub fn normal(&self, n: Vector) -> Vector {
+        self.direction(n)
+    }
+
+    /// Coordinates of a point in this frame: the inverse of [`Frame::point`].
+    pub fn local_point(&self, p: Point) -> Point {
+        self.local_direction(p - self.origin) / self.scale
+    }
+
+    /// Coordinates of a direction in this frame: the inverse of [`Frame::direction`].
+    pub fn local_direction(&self, v: Vector) -> Vector {
+        Vector::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+    }
+
+    /// `self ∘ inner`: first `inner`, then `self`.
+    pub fn compose(&self, inner: &Self) -> Self {
+        Self {
+            origin: self.point(inner.origin),
+            x: self.direction(inner.x),
+            y: self.direction(inner.y),
+            z: self.direction(inner.z),
+            scale: self.scale * inner.scale,
+        }
+    }
+
+    /// The placement that undoes this one.
+    pub fn inverse(&self) -> Self {
+        let row = |i: usize| Vector::new(self.x[i], self.y[i], self.z[i]);
+        let turned = Self { origin: Point::ZERO, x: row(0), y: row(1), z: row(2), scale: 1.0 / self.scale };
+        Self { origin: -turned.vector(self.origin), ..turned }
+    }
+
+    /// Whether the placement turns right hands into left hands.
+    pub fn is_mirrored(&self) -> bool {
+        self.x.cross(self.y).dot(self.z) < 0.0
+    }
+
+    /// Whether the placement moves nothing.
+    pub fn is_identity(&self) -> bool {
+        *self == Self::IDENTITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn odd_frame() -> Frame {
+        Frame { scale: 25.4, ..Frame::from_axis(Point::new(3.0, -2.0, 7.0), Vector::new(1.0, 2.0, -0.5), None) }
+    }
+
+    #[test]
+    fn inverse_undoes() {
+        let f = odd_frame();
+        let p = Point::new(0.3, 11.0, -5.0);
+        assert!((f.inverse().point(f.point(p)) - p).length() < 1e-13);
+        assert!((f.local_point(f.point(p)) - p).length() < 1e-13);
+    }
+
+    #[test]
+    fn composition_is_application_in_turn() {
+        let (f, g) = (odd_frame(), Frame::translation(Vector::new(1.0, 0.0, 2.0)));
+        let p = Point::new(-4.0, 0.5, 2.0);
+        assert!((f.compose(&g).point(p) - f.point(g.point(p))).length() < 1e-12);
+    }
+
+    #[test]
+    fn an_x_hint_along_the_axis_is_replaced() {
+        let f = Frame::from_axis(Point::ZERO, Vector::X, Some(Vector::X));
+        assert!(f.x.dot(f.z).abs() < 1e-15 && (f.x.length() - 1.0).abs() < 1e-15);
+        assert!(!f.is_mirrored());
+    }
+}

@@ -1,0 +1,61 @@
+//! Points, rays, boxes, frames, intervals and roots: what every other room stands on.
+//!
+//! Lengths are millimetres, angles radians, all numbers `f64`. The vector types are glam's; the room adds
+//! nothing to them but names that say what a triple means.
+
+mod aabb;
+mod frame;
+mod interval;
+mod ray;
+mod roots;
+pub mod units;
+
+pub use aabb::Aabb;
+pub use frame::Frame;
+pub use interval::Interval;
+pub use ray::{Departure, Ray};
+pub use roots::{quadratic_roots, safe_newton};
+
+/// A position, mm.
+pub type Point = glam::DVec3;
+/// A direction or difference of positions; unit length where the name says `normal` or `direction`.
+pub type Vector = glam::DVec3;
+/// A pair of surface parameters.
+pub type Uv = glam::DVec2;
+/// A homogeneous point `(w·x, w·y, w·z, w)`.
+pub type Homogeneous = glam::DVec4;
+
+/// Identifies one placed face of a model: its position in [`crate::model::Model::placed_faces`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FaceId(pub u32);
+
+impl FaceId {
+    /// The id as an index into a slice of placed faces.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// Two unit vectors that complete the unit vector `n` to a right-handed frame `(a, b, n)`.
+///
+/// Branch-free and continuous except at `n.z = 0⁻`: Duff et al., *Building an Orthonormal Basis, Revisited*, JCGT 2017.
+pub fn orthonormal_pair(n: Vector) -> (Vector, Vector) {
+    let sign = 1f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    (Vector::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vector::new(b, sign + n.y * n.y * a, -n.y))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orthonormal_pair_is_right_handed() {
+        for n in [Vector::Z, -Vector::Z, Vector::X, Vector::new(0.6, -0.48, 0.64), Vector::new(0.6, 0.8, -0.0)] {
+            let (a, b) = orthonormal_pair(n);
+            assert!((a.cross(b) - n).length() < 1e-15, "{n}");
+            assert!(a.dot(n).abs() < 1e-15 && b.dot(n).abs() < 1e-15);
+        }
+    }
+}

@@ -1,0 +1,55 @@
+use super::{FaceId, Point, Uv, Vector};
+
+/// A half-line or segment `origin + t·direction`, `t` in `[t_min, t_max]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where `t = 0`.
+    pub origin: Point,
+    /// Unit length, so that `t` is a distance in mm.
+    pub direction: Vector,
+    /// Smallest accepted `t`, mm; honoured exactly.
+    pub t_min: f64,
+    /// Largest accepted `t`, mm; may be infinite.
+    pub t_max: f64,
+    /// The surface point the ray starts on, if it starts on one. An intersector excludes that very point by
+    /// identity and geometry, never by a global epsilon.
+    pub from: Option<Departure>,
+}
+
+/// A point on a surface that a ray leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Departure {
+    /// The placed face.
+    pub face: FaceId,
+    /// The intersector's own primitive: `Hit::primitive` of the hit that the ray leaves.
+    pub primitive: u32,
+    /// Surface parameters of the point on its face.
+    pub uv: Uv,
+}
+
+impl Ray {
+    /// A ray in free space with `t` in `[0, ∞)`. `direction` must be of unit length.
+    pub fn new(origin: Point, direction: Vector) -> Self {
+        Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY, from: None }
+    }
+
+    /// A ray through two points, with `t` in `[0, ∞)`; `None` when they coincide.
+    pub fn through(origin: Point, target: Point) -> Option<Self> {
+        (target - origin).try_normalize().map(|direction| Self::new(origin, direction))
+    }
+
+    /// The same ray, leaving a known surface point.
+    pub fn leaving(self, departure: Departure) -> Self {
+        Self { from: Some(departure), ..self }
+    }
+
+    /// The same ray with another range of `t`.
+    pub fn within(self, t_min: f64, t_max: f64) -> Self {
+        Self { t_min, t_max, ..self }
+    }
+
+    /// The point at distance `t`.
+    pub fn at(&self, t: f64) -> Point {
+        self.origin + self.direction * t
+    }
+}

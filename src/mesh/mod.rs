@@ -1,0 +1,129 @@
+//! Quad facets with vertex normals: what the tessellator makes and the tracers trace.
+//!
+//! A facet has four corners on the surface. As traced it is the two flat triangles `(0, 1, 2)` and `(0, 2, 3)`,
+//! so that neighbours meet exactly; its own parameters are `(0,0), (1,0), (1,1), (0,1)` at the corners. A triangle is a
+//! facet whose last two corners are the same vertex. Positions are shared across faces, normals are each face's own,
+//! so creases stay sharp.
+
+use crate::math::{Aabb, FaceId, Point, Uv, Vector};
+
+/// A mesh of quad facets; a triangle is a quad whose last two corners coincide.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FacetMesh {
+    /// Distinct points, mm; bit-equal where faces meet.
+    pub positions: Vec<Point>,
+    /// Corners of facets, each of one face.
+    pub vertices: Vec<MeshVertex>,
+    /// The facets, those of a face together.
+    pub facets: Vec<Facet>,
+    /// Upper bound of the distance between each facet as traced and its piece of the spline, mm; infinite where
+    /// none could be proved, empty when the mesh comes from no spline.
+    pub sag: Vec<f64>,
+}
+
+/// A corner of facets: a position with the normal and parameters that one face has there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshVertex {
+    /// Index into [`FacetMesh::positions`].
+    pub position: u32,
+    /// Outward unit normal of the spline.
+    pub normal: Vector,
+    /// Parameters on the face's surface.
+    pub uv: Uv,
+}
+
+/// One quad, counter-clockwise seen from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facet {
+    /// Indices into [`FacetMesh::vertices`]; the traced diagonal runs from the first to the third.
+    pub vertices: [u32; 4],
+    /// The placed face it belongs to.
+    pub face: FaceId,
+}
+
+impl Facet {
+    /// Whether the last two corners coincide.
+    pub fn is_triangle(&self) -> bool {
+        self.vertices[2] == self.vertices[3]
+    }
+}
+
+impl FacetMesh {
+    /// The four corner positions of a facet.
+    pub fn corners(&self, facet: usize) -> [Point; 4] {
+        self.facets[facet].vertices.map(|v| self.positions[self.vertices[v as usize].position as usize])
+    }
+
+    /// Indices of the four corner positions of a facet.
+    pub fn corner_positions(&self, facet: usize) -> [u32; 4] {
+        self.facets[facet].vertices.map(|v| self.vertices[v as usize].position)
+    }
+
+    /// A box around all positions.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.positions.iter().copied())
+    }
+
+    /// Area of the facets as traced, mm².
+    pub fn area(&self) -> f64 {
+        (0..self.facets.len()).map(|f| self.facet_area(f)).sum()
+    }
+
+    /// Area of one facet as traced, mm².
+    pub fn facet_area(&self, facet: usize) -> f64 {
+        let [a, b, c, d] = self.corners(facet);
+        0.5 * ((b - a).cross(c - a).length() + (c - a).cross(d - a).length())
+    }
+
+    /// Volume enclosed by the facets as traced, mm³, positive when normals point outward; meaningful only for a closed mesh.
+    pub fn volume(&self) -> f64 {
+        let origin = self.bounds().center();
+        let signed = |a: Point, b: Point, c: Point| (a - origin).dot((b - origin).cross(c - origin)) / 6.0;
+        (0..self.facets.len())
+            .map(|f| {
+                let [a, b, c, d] = self.corners(f);
+                signed(a, b, c) + if c == d { 0.0 } else { signed(a, c, d) }
+            })
+            .sum()
+    }
+
+    /// Number of facets with four distinct corners.
+    pub fn quad_count(&self) -> usize {
+        self.facets.iter().filter(|f| !f.is_triangle()).count()
+    }
+
+    /// Bytes held by the mesh.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.positions)
+            + size_of_val(&*self.vertices)
+            + size_of_val(&*self.facets)
+            + size_of_val(&*self.sag)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cube_of_quads_has_its_area_and_volume() {
+        let positions: Vec<Point> = Aabb { min: Point::ZERO, max: Point::splat(2.0) }.corners().into();
+        let sides = [
+            ([0, 2, 3, 1], -Vector::Z),
+            ([4, 5, 7, 6], Vector::Z),
+            ([0, 1, 5, 4], -Vector::Y),
+            ([2, 6, 7, 3], Vector::Y),
+            ([0, 4, 6, 2], -Vector::X),
+            ([1, 3, 7, 5], Vector::X),
+        ];
+        let mut mesh = FacetMesh { positions, ..FacetMesh::default() };
+        for (face, (corners, normal)) in sides.into_iter().enumerate() {
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(corners.map(|position| MeshVertex { position, normal, uv: Uv::ZERO }));
+            mesh.facets.push(Facet { vertices: [0, 1, 2, 3].map(|k| first + k), face: FaceId(face as u32) });
+        }
+        assert_eq!(mesh.quad_count(), 6);
+        assert!((mesh.area() - 24.0).abs() < 1e-14);
+        assert!((mesh.volume() - 8.0).abs() < 1e-14);
+    }
+}

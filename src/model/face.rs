@@ -1,0 +1,131 @@
+use super::EdgeId;
+use crate::math::{Frame, Uv};
+use crate::mesh::FacetMesh;
+use crate::nurbs::{Surface, UvCurve};
+
+/// Red, green, blue in `[0, 1]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colour(pub [f64; 3]);
+
+/// What a surface was before it became a spline, kept for closed-form inversion and for users.
+///
+/// Frames and lengths are in the part's coordinates, mm; parameters follow [`crate::nurbs::sweep`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Analytic {
+    /// `frame.origin + u·x + v·y`.
+    Plane {
+        /// Position.
+        frame: Frame,
+    },
+    /// About the z axis of the frame.
+    Cylinder {
+        /// Position.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+    },
+    /// `radius` at height 0, growing by `tan(half_angle)` per mm along z.
+    Cone {
+        /// Position.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+        /// Radians.
+        half_angle: f64,
+    },
+    /// About the frame's origin.
+    Sphere {
+        /// Position.
+        frame: Frame,
+        /// mm.
+        radius: f64,
+    },
+    /// About the z axis of the frame.
+    Torus {
+        /// Position.
+        frame: Frame,
+        /// mm.
+        major: f64,
+        /// mm.
+        minor: f64,
+    },
+    /// A curve turned about an axis.
+    Revolution,
+    /// A curve moved along a direction.
+    Extrusion,
+    /// Fitted to an offset of another surface.
+    Offset,
+    /// A B-spline with all weights equal.
+    Bspline,
+    /// A rational B-spline.
+    Rational,
+    /// Anything else.
+    Other,
+}
+
+/// A trimmed surface.
+#[derive(Clone, Debug)]
+pub struct Face {
+    /// Name in the file, empty when it had none.
+    pub name: String,
+    /// The `#id` of the face in its file, when it came from one.
+    pub entity: Option<u64>,
+    /// Colour of the face itself; parts have one too.
+    pub colour: Option<Colour>,
+    /// The surface as a rational B-spline.
+    pub surface: Surface,
+    /// What it was in the file.
+    pub analytic: Analytic,
+    /// Whether the outward normal is `-(Su × Sv)`.
+    pub reversed: bool,
+    /// Trimming loops; without any, the face is the whole domain of its surface.
+    pub loops: Vec<TrimLoop>,
+    /// Largest measured distance between an edge in space and its uv curve on the surface, mm.
+    pub gap: f64,
+}
+
+/// A closed chain of edge uses in the parameter plane.
+#[derive(Clone, Debug, Default)]
+pub struct TrimLoop {
+    /// In order of traversal, each ending where the next begins.
+    pub uses: Vec<EdgeUse>,
+}
+
+/// One side of an edge, as a face's loop runs along it.
+#[derive(Clone, Debug)]
+pub struct EdgeUse {
+    /// The edge; `None` for a synthesised seam or a pole, which exists in the parameter plane alone.
+    pub edge: Option<EdgeId>,
+    /// Whether the loop runs against the edge's parameter.
+    pub reversed: bool,
+    /// The edge in the parameter plane, over the edge's own parameter interval (never reversed).
+    pub uv: UvCurve,
+}
+
+impl EdgeUse {
+    /// Where the loop enters this use.
+    pub fn start(&self) -> Uv {
+        let [t0, t1] = self.uv.domain();
+        self.uv.evaluate(if self.reversed { t1 } else { t0 })
+    }
+
+    /// Where the loop leaves this use.
+    pub fn end(&self) -> Uv {
+        let [t0, t1] = self.uv.domain();
+        self.uv.evaluate(if self.reversed { t0 } else { t1 })
+    }
+}
+
+/// A face that the file gives as a ready mesh (AP242 tessellated geometry), without a surface.
+#[derive(Clone, Debug)]
+pub struct TessellatedFace {
+    /// Name in the file, empty when it had none.
+    pub name: String,
+    /// The `#id` of the face in its file.
+    pub entity: Option<u64>,
+    /// Colour of the face itself.
+    pub colour: Option<Colour>,
+    /// The facets, all of face 0.
+    pub mesh: FacetMesh,
+}

@@ -1,0 +1,18 @@
+//! The CAD model: parts of shells of trimmed rational B-spline faces, placed by instances. Always millimetres.
+//!
+//! What every consumer may rely on, whoever built the model:
+//!
+//! * each face's surface is clamped, and its domain contains every trimming loop: no period, no seam crossing. Whoever builds a
+//!   face on a closed surface moves the seam away from the face, or cuts the face open along it;
+//! * loops are closed in the parameter plane, the face's material lies on their left (outer loops
+//!   counter-clockwise, holes clockwise in `(u, v)`), and they include pole edges of zero length in space;
+//! * an edge's uv curve has the edge's own parameter: `surface(uv(t)) ≈ curve(t)` within [`Face::gap`];
+//! * `Su × Sv`, turned around when [`Face::reversed`], points out of the solid.
+
+mod face;
+mod part;
+mod placed;
+
+pub use face::{Analytic, Colour, EdgeUse, Face, TessellatedFace, TrimLoop};
+pub use part::{Edge, EdgeId, Part, PartId, Shell, VertexId};
+pub use placed::{Instance, Model, PlacedFace};

@@ -1,0 +1,63 @@
+use super::{Colour, Face, TessellatedFace};
+use crate::math::Point;
+use crate::nurbs::Curve;
+
+/// Index into [`Part::edges`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EdgeId(pub u32);
+
+/// Index into [`Part::vertices`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct VertexId(pub u32);
+
+/// Index into [`super::Model::parts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PartId(pub u32);
+
+/// A shape in its own coordinates: faces share its edges and vertices.
+#[derive(Clone, Debug, Default)]
+pub struct Part {
+    /// Name of the product, empty when it had none.
+    pub name: String,
+    /// Colour of the whole part.
+    pub colour: Option<Colour>,
+    /// Positions of the vertices, mm.
+    pub vertices: Vec<Point>,
+    /// Edges, each used by one, two or more faces.
+    pub edges: Vec<Edge>,
+    /// Connected sets of faces.
+    pub shells: Vec<Shell>,
+    /// Faces that are meshes in the file.
+    pub tessellated: Vec<TessellatedFace>,
+}
+
+/// An edge in space, cut to its ends.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// The curve; its domain is the edge's parameter interval.
+    pub curve: Curve,
+    /// Vertices at the start and end of the domain; equal for a closed edge.
+    pub vertices: [VertexId; 2],
+    /// The `#id` of the edge in its file, when it came from one.
+    pub entity: Option<u64>,
+}
+
+/// A set of faces.
+#[derive(Clone, Debug, Default)]
+pub struct Shell {
+    /// The faces, in the file's order.
+    pub faces: Vec<Face>,
+    /// Whether the file says that the shell is closed (bounds a solid or a void).
+    pub closed: bool,
+    /// Colour of the shell or solid.
+    pub colour: Option<Colour>,
+    /// Name of the shell or solid, empty when it had none.
+    pub name: String,
+}
+
+impl Part {
+    /// Number of faces, tessellated ones included.
+    pub fn face_count(&self) -> usize {
+        self.shells.iter().map(|s| s.faces.len()).sum::<usize>() + self.tessellated.len()
+    }
+}

@@ -1,0 +1,157 @@
+use super::{Colour, Face, Part, PartId, TessellatedFace};
+use crate::math::{FaceId, Frame};
+
+/// A CAD model: distinct parts, and where they stand.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// Name of the model or file.
+    pub name: String,
+    /// Distinct shapes.
+    pub parts: Vec<Part>,
+    /// Placed uses of the parts; a part without an instance is not in the scene.
+    pub instances: Vec<Instance>,
+}
+
+/// One placed use of a part.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name of the occurrence; the part's name when it had none.
+    pub name: String,
+    /// What is placed.
+    pub part: PartId,
+    /// From the part's coordinates to the model's.
+    pub placement: Frame,
+    /// Colour given to this occurrence.
+    pub colour: Option<Colour>,
+}
+
+/// A face where it stands. Either `face` (a surface) or `tessellated` (a ready mesh) is given.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedFace<'a> {
+    /// Position in [`Model::placed_faces`].
+    pub id: FaceId,
+    /// Index into [`Model::instances`].
+    pub instance: usize,
+    /// The part.
+    pub part: PartId,
+    /// Index into [`Part::shells`]; `None` for a tessellated face.
+    pub shell: Option<usize>,
+    /// The trimmed surface, in the part's coordinates.
+    pub face: Option<&'a Face>,
+    /// The ready mesh, in the part's coordinates.
+    pub tessellated: Option<&'a TessellatedFace>,
+    /// From the part's coordinates to the model's.
+    pub placement: &'a Frame,
+}
+
+impl Model {
+    /// A model of one part that stands where it is.
+    pub fn from_part(part: Part) -> Self {
+        let name = part.name.clone();
+        let instance = Instance { name: name.clone(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
+        Self { name, parts: vec![part], instances: vec![instance] }
+    }
+
+    /// The part of an instance.
+    pub fn part(&self, id: PartId) -> &Part {
+        &self.parts[id.0 as usize]
+    }
+
+    /// Every placed face in the order that defines [`FaceId`]: instance by instance, in each the faces shell by shell,
+    /// then the tessellated faces.
+    pub fn placed_faces(&self) -> impl Iterator<Item = PlacedFace<'_>> {
+        self.instances
+            .iter()
+            .enumerate()
+            .flat_map(move |(i, instance)| {
+                let part = self.part(instance.part);
+                let surfaces = part
+                    .shells
+                    .iter()
+                    .enumerate()
+                    .flat_map(|(s, shell)| shell.faces.iter().map(move |f| (Some(s), Some(f), None)));
+                let ready = part.tessellated.iter().map(|t| (None, None, Some(t)));
+                surfaces.chain(ready).map(move |(shell, face, tessellated)| (i, instance, shell, face, tessellated))
+            })
+            .enumerate()
+            .map(|(id, (i, instance, shell, face, tessellated))| PlacedFace {
+                id: FaceId(id as u32),
+                instance: i,
+                part: instance.part,
+                shell,
+                face,
+                tessellated,
+                placement: &instance.placement,
+            })
+    }
+
+    /// Number of placed faces.
+    pub fn placed_face_count(&self) -> usize {
+        self.instances.iter().map(|i| self.part(i.part).face_count()).sum()
+    }
+
+    /// The id of the first face of an instance.
+    pub fn first_face(&self, instance: usize) -> FaceId {
+        FaceId(self.instances[..instance].iter().map(|i| self.part(i.part).face_count()).sum::<usize>() as u32)
+    }
+}
+
+impl PlacedFace<'_> {
+    /// Name of the face, empty when it had none.
+    pub fn name(&self) -> &str {
+        self.face.map(|f| f.name.as_str()).or(self.tessellated.map(|t| t.name.as_str())).unwrap_or("")
+    }
+
+    /// The `#id` of the face in its file.
+    pub fn entity(&self) -> Option<u64> {
+        self.face.and_then(|f| f.entity).or(self.tessellated.and_then(|t| t.entity))
+    }
+
+    /// The colour that shows: of the face, the shell, the instance or the part, the first that is given.
+    pub fn colour(&self, model: &Model) -> Option<Colour> {
+        let part = model.part(self.part);
+        let own = self.face.and_then(|f| f.colour).or(self.tessellated.and_then(|t| t.colour));
+        let shell = self.shell.and_then(|s| part.shells[s].colour);
+        own.or(shell).or(model.instances[self.instance].colour).or(part.colour)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+    use crate::model::{Analytic, Shell};
+    use crate::nurbs::sweep;
+
+    fn square(name: &str) -> Face {
+        Face {
+            name: name.into(),
+            entity: None,
+            colour: None,
+            surface: sweep::plane(&Frame::IDENTITY, [[0.0, 1.0], [0.0, 1.0]]),
+            analytic: Analytic::Plane { frame: Frame::IDENTITY },
+            reversed: false,
+            loops: Vec::new(),
+            gap: 0.0,
+        }
+    }
+
+    #[test]
+    fn face_ids_run_through_the_instances() {
+        let shell = Shell { faces: vec![square("a"), square("b")], ..Shell::default() };
+        let mut model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+        model.instances.push(Instance {
+            name: "second".into(),
+            part: PartId(0),
+            placement: Frame::translation(Vector::Z),
+            colour: Some(Colour([1.0, 0.0, 0.0])),
+        });
+        let faces: Vec<_> = model.placed_faces().collect();
+        assert_eq!(faces.len(), model.placed_face_count());
+        assert_eq!(faces[3].id, FaceId(3));
+        assert_eq!(faces[3].name(), "b");
+        assert_eq!(faces[3].placement.point(Point::ZERO), Point::Z);
+        assert_eq!(faces[3].colour(&model), Some(Colour([1.0, 0.0, 0.0])));
+        assert_eq!(model.first_face(1), FaceId(2));
+    }
+}

@@ -1,0 +1,107 @@
+/// Highest polynomial degree the program handles; real files go to 13.
+pub const MAX_DEGREE: usize = 25;
+
+/// Values of the `degree + 1` non-zero basis functions and of their first two derivatives.
+pub(super) struct Basis {
+    /// `value[k][i]`: k-th derivative of the i-th non-zero basis function.
+    pub(super) value: [[f64; MAX_DEGREE + 1]; 3],
+}
+
+/// Index `k` of the knot span `[knots[k], knots[k + 1])` that holds `t`, never an empty one.
+///
+/// `t` outside the domain gives the first or last span; the end of the domain belongs to the last span.
+pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
+    let last = knots.len() - degree - 2;
+    let mut k = knots[degree..=last].partition_point(|&x| x <= t) + degree;
+    k = k.saturating_sub(1).clamp(degree, last);
+    while k > degree && knots[k] == knots[k + 1] {
+        k -= 1;
+    }
+    while k < last && knots[k] == knots[k + 1] {
+        k += 1;
+    }
+    k
+}
+
+/// Basis functions and derivatives up to `order` (at most 2) in a span: *The NURBS Book*, A2.3.
+pub(super) fn basis(knots: &[f64], degree: usize, span: usize, t: f64, order: usize) -> Basis {
+    let p = degree;
+    let mut table = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
+    let (mut left, mut right) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
+    table[0][0] = 1.0;
+    for j in 1..=p {
+        left[j] = t - knots[span + 1 - j];
+        right[j] = knots[span + j] - t;
+        let mut saved = 0.0;
+        for r in 0..j {
+            // Lower triangle: knot differences; upper triangle: basis functions.
+            table[j][r] = right[r + 1] + left[j - r];
+            let term = table[r][j - 1] / table[j][r];
+            table[r][j] = saved + right[r + 1] * term;
+            saved = left[j - r] * term;
+        }
+        table[j][j] = saved;
+    }
+    let mut value = [[0.0; MAX_DEGREE + 1]; 3];
+    for r in 0..=p {
+        value[0][r] = table[r][p];
+    }
+    let order = order.min(p);
+    for r in 0..=p {
+        let mut a = [[0.0; MAX_DEGREE + 1]; 2];
+        let (mut s1, mut s2) = (0, 1);
+        a[0][0] = 1.0;
+        for k in 1..=order {
+            let mut d = 0.0;
+            let pk = p - k;
+            if r >= k {
+                a[s2][0] = a[s1][0] / table[pk + 1][r - k];
+                d = a[s2][0] * table[r - k][pk];
+            }
+            let j1 = if r + 1 >= k { 1 } else { k - r };
+            let j2 = if r <= pk + 1 { k - 1 } else { p - r };
+            for j in j1..=j2 {
+                a[s2][j] = (a[s1][j] - a[s1][j - 1]) / table[pk + 1][r + j - k];
+                d += a[s2][j] * table[r + j - k][pk];
+            }
+            if r <= pk {
+                a[s2][k] = -a[s1][k - 1] / table[pk + 1][r];
+                d += a[s2][k] * table[r][pk];
+            }
+            value[k][r] = d;
+            std::mem::swap(&mut s1, &mut s2);
+        }
+    }
+    let mut factor = p as f64;
+    for k in 1..=order {
+        for x in &mut value[k][..=p] {
+            *x *= factor;
+        }
+        factor *= (p - k) as f64;
+    }
+    Basis { value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_are_never_empty() {
+        let knots = [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+        for (t, k) in [(-1.0, 2), (0.0, 2), (0.5, 2), (1.0, 4), (1.5, 4), (2.0, 4), (3.0, 4)] {
+            assert_eq!(find_span(&knots, 2, t), k, "t = {t}");
+        }
+    }
+
+    #[test]
+    fn basis_sums_to_one_and_its_derivatives_to_zero() {
+        let knots = [0.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.7, 1.0, 1.0, 1.0, 1.0];
+        for i in 0..=20 {
+            let t = i as f64 / 20.0;
+            let b = basis(&knots, 3, find_span(&knots, 3, t), t, 2);
+            let sum = |k: usize| b.value[k][..4].iter().sum::<f64>();
+            assert!((sum(0) - 1.0).abs() < 1e-14 && sum(1).abs() < 1e-12 && sum(2).abs() < 1e-11);
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Circular arcs as rational quadratics whose knots are angles, and the closed form between angle and parameter.
+
+use super::{ControlPoint, Curve};
+use crate::math::{Frame, Homogeneous, Point};
+use std::f64::consts::FRAC_PI_2;
+
+/// Breakpoints of an arc: pieces of at most 90°.
+fn breakpoints([a, b]: [f64; 2]) -> Vec<f64> {
+    let pieces = ((b - a) / FRAC_PI_2 - 1e-9).ceil().max(1.0) as usize;
+    (0..=pieces).map(|i| if i == pieces { b } else { a + (b - a) * i as f64 / pieces as f64 }).collect()
+}
+
+/// The arc `radius·(cos φ, sin φ, 0)` in a frame, `φ` in `[a, b]` with `a < b ≤ a + 2π`; its domain is `[a, b]`.
+///
+/// At every breakpoint the parameter is the angle; between them see [`parameter_of_angle`].
+pub fn arc(frame: &Frame, radius: f64, range: [f64; 2]) -> Curve {
+    let (knots, local) = unit_arc(range);
+    let points = local
+        .iter()
+        .map(|&(x, y, w)| Homogeneous::weighted(frame.point(radius * Point::new(x, y, 0.0)), w))
+        .collect();
+    Curve { degree: 2, knots, points }
+}
+
+/// Knots, and control points `(x, y, weight)` of the unit arc in the plane.
+pub(super) fn unit_arc(range: [f64; 2]) -> (Vec<f64>, Vec<(f64, f64, f64)>) {
+    let breaks = breakpoints(range);
+    let mut knots = vec![breaks[0]; 3];
+    let mut points = vec![(breaks[0].cos(), breaks[0].sin(), 1.0)];
+    for (k, pair) in breaks.windows(2).enumerate() {
+        let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
+        let w = half.cos();
+        points.push((middle.cos() / w, middle.sin() / w, w));
+        points.push((pair[1].cos(), pair[1].sin(), 1.0));
+        knots.extend(std::iter::repeat_n(pair[1], if k + 2 == breaks.len() { 3 } else { 2 }));
+    }
+    (knots, points)
+}
+
+/// Spline parameter of an angle on the arc over `range`: `τ = tan(φ/2)/tan(h/2)` in each piece of half-angle `h`.
+pub fn parameter_of_angle(range: [f64; 2], angle: f64) -> f64 {
+    in_piece(range, angle, |phi, half| half * (0.5 * phi).tan() / (0.5 * half).tan())
+}
+
+/// Angle of a spline parameter: the inverse of [`parameter_of_angle`].
+pub fn angle_of_parameter(range: [f64; 2], parameter: f64) -> f64 {
+    in_piece(range, parameter, |tau, half| 2.0 * (tau / half * (0.5 * half).tan()).atan())
+}
+
+/// Applies a map of the offset from the middle of the piece that holds `x`.
+fn in_piece(range: [f64; 2], x: f64, map: impl Fn(f64, f64) -> f64) -> f64 {
+    let breaks = breakpoints(range);
+    let piece = breaks[1..breaks.len() - 1].partition_point(|&b| b <= x);
+    let (a, b) = (breaks[piece], breaks[piece + 1]);
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    middle + map(x - middle, half)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn angle_and_parameter_are_inverse_and_true() {
+        for range in [[0.0, 2.0 * PI], [-1.3, 1.9], [0.2, 0.3]] {
+            let c = arc(&Frame::IDENTITY, 1.0, range);
+            for i in 0..=40 {
+                let angle = range[0] + (range[1] - range[0]) * i as f64 / 40.0;
+                let t = parameter_of_angle(range, angle);
+                assert!((c.evaluate(t) - Point::new(angle.cos(), angle.sin(), 0.0)).length() < 1e-14);
+                assert!((angle_of_parameter(range, t) - angle).abs() < 1e-14);
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+use super::{Curve, Surface};
+use crate::math::{Aabb, Homogeneous, Uv};
+
+/// A rational Bézier patch: one polynomial piece of a surface, over local parameters `[0, 1]²`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BezierPatch {
+    /// Polynomial degrees in u and v.
+    pub degree: [usize; 2],
+    /// Homogeneous control points, `points[i * (degree[1] + 1) + j]`.
+    pub points: Vec<Homogeneous>,
+    /// The rectangle `[[u0, u1], [v0, v1]]` of the surface's domain that the patch covers.
+    pub domain: [[f64; 2]; 2],
+}
+
+impl BezierPatch {
+    pub(super) fn extract(surface: &Surface) -> Vec<Self> {
+        let [p, q] = surface.degree;
+        let [nu, nv] = surface.counts();
+        let column = |j: usize| {
+            let points = (0..nu).map(|i| surface.points[i * nv + j]).collect();
+            Curve { degree: p, knots: surface.knots[0].clone(), points }
+        };
+        // columns[j][span][i]: Bézier points in u of every column of control points.
+        let columns: Vec<Vec<Vec<Homogeneous>>> = (0..nv).map(|j| column(j).bezier_pieces()).collect();
+        let breaks = |d: usize| {
+            let mut b = surface.knots[d][surface.degree[d]..=[nu, nv][d]].to_vec();
+            b.dedup();
+            b
+        };
+        let (us, vs) = (breaks(0), breaks(1));
+        let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
+        for a in 0..us.len() - 1 {
+            let rows: Vec<Vec<Vec<Homogeneous>>> = (0..=p)
+                .map(|i| {
+                    let points = columns.iter().map(|c| c[a][i]).collect();
+                    Curve { degree: q, knots: surface.knots[1].clone(), points }.bezier_pieces()
+                })
+                .collect();
+            for b in 0..vs.len() - 1 {
+                patches.push(Self {
+                    degree: [p, q],
+                    points: rows.iter().flat_map(|r| r[b].iter().copied()).collect(),
+                    domain: [[us[a], us[a + 1]], [vs[b], vs[b + 1]]],
+                });
+            }
+        }
+        patches
+    }
+
+    /// Homogeneous point and first derivatives with respect to the local parameters in `[0, 1]²`.
+    pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
+        let [p, q] = self.degree;
+        let (bu, du) = bernstein(p, local.x);
+        let (bv, dv) = bernstein(q, local.y);
+        let mut sums = [Homogeneous::ZERO; 3];
+        for i in 0..=p {
+            let (mut row, mut row_v) = (Homogeneous::ZERO, Homogeneous::ZERO);
+            for j in 0..=q {
+                let c = self.points[i * (q + 1) + j];
+                row += c * bv[j];
+                row_v += c * dv[j];
+            }
+            sums[0] += row * bu[i];
+            sums[1] += row * du[i];
+            sums[2] += row_v * bu[i];
+        }
+        sums
+    }
+
+    /// Parameters of the surface at local parameters in `[0, 1]²`.
+    pub fn surface_uv(&self, local: Uv) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        Uv::new(u0 + local.x * (u1 - u0), v0 + local.y * (v1 - v0))
+    }
+
+    /// A box that contains the patch: that of its control points.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.points.iter().map(|p| p.project()))
+    }
+
+    /// The two halves in `direction` (0: u, 1: v), by de Casteljau.
+    pub fn halves(&self, direction: usize) -> [Self; 2] {
+        let [p, q] = self.degree;
+        let n = self.degree[direction];
+        let (mut low, mut high) = (self.clone(), self.clone());
+        for line in 0..=self.degree[1 - direction] {
+            let at = |k: usize| {
+                if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k }
+            };
+            let mut w: Vec<Homogeneous> = (0..=n).map(|k| self.points[at(k)]).collect();
+            for r in 0..=n {
+                low.points[at(r)] = w[0];
+                for k in 0..n - r {
+                    w[k] = 0.5 * (w[k] + w[k + 1]);
+                }
+            }
+            // w[k] now holds the right half's control points.
+            for k in 0..=n {
+                high.points[at(k)] = w[k];
+            }
+        }
+        let _ = p;
+        let [a, b] = self.domain[direction];
+        let middle = 0.5 * (a + b);
+        low.domain[direction] = [a, middle];
+        high.domain[direction] = [middle, b];
+        [low, high]
+    }
+}
+
+/// Bernstein polynomials of degree `n` and their derivatives at `t`.
+fn bernstein(n: usize, t: f64) -> ([f64; super::MAX_DEGREE + 1], [f64; super::MAX_DEGREE + 1]) {
+    let s = 1.0 - t;
+    let mut b = [0.0; super::MAX_DEGREE + 1];
+    let mut d = [0.0; super::MAX_DEGREE + 1];
+    b[0] = 1.0;
+    for k in 1..=n {
+        if k == n {
+            // Derivatives from degree n − 1: n (B_{i−1} − B_i).
+            for i in 0..=n {
+                let before = if i > 0 { b[i - 1] } else { 0.0 };
+                let here = if i < n { b[i] } else { 0.0 };
+                d[i] = n as f64 * (before - here);
+            }
+        }
+        let mut saved = 0.0;
+        for x in &mut b[..k] {
+            let value = *x;
+            *x = saved + s * value;
+            saved = t * value;
+        }
+        b[k] = saved;
+    }
+    (b, d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn patches_and_their_halves_agree_with_the_surface() {
+        let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        let patches = s.bezier_patches();
+        assert_eq!(patches.len(), 16);
+        let local = Uv::new(0.3, 0.8);
+        for patch in &patches {
+            let d = s.derivatives(patch.surface_uv(local));
+            let [a, au, _] = patch.homogeneous(local);
+            assert!((a.project() - d.point).length() < 1e-13);
+            let du = (au.truncate() - a.project() * au.w) / a.w / (patch.domain[0][1] - patch.domain[0][0]);
+            assert!((du - d.du).length() < 1e-12);
+            for half in patch.halves(0).iter().chain(&patch.halves(1)) {
+                let uv = half.surface_uv(local);
+                assert!((half.homogeneous(local)[0].project() - s.evaluate(uv)).length() < 1e-13);
+            }
+        }
+    }
+}

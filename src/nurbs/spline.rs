@@ -1,0 +1,338 @@
+use super::basis::{MAX_DEGREE, basis, find_span};
+use crate::math::{Aabb, Homogeneous, Point};
+use glam::{DVec2, DVec3};
+use smallvec::SmallVec;
+use std::ops::{Add, Mul, Sub};
+
+/// A homogeneous control point: `DVec4` of a space curve, `DVec3` of a curve in the parameter plane.
+pub trait ControlPoint:
+    Copy + PartialEq + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
+{
+    /// What it projects to.
+    type Position: Copy
+        + PartialEq
+        + Add<Output = Self::Position>
+        + Sub<Output = Self::Position>
+        + Mul<f64, Output = Self::Position>;
+    /// The neutral element of addition.
+    const ZERO: Self;
+    /// The control point at a position with a weight.
+    fn weighted(position: Self::Position, weight: f64) -> Self;
+    /// The numerator, weight times position.
+    fn numerator(self) -> Self::Position;
+    /// The weight.
+    fn weight(self) -> f64;
+    /// Numerator over weight.
+    fn position(self) -> Self::Position {
+        self.numerator() * (1.0 / self.weight())
+    }
+}
+
+impl ControlPoint for Homogeneous {
+    type Position = Point;
+    const ZERO: Self = Self::ZERO;
+    fn weighted(position: Point, weight: f64) -> Self {
+        (position * weight).extend(weight)
+    }
+    fn numerator(self) -> Point {
+        self.truncate()
+    }
+    fn weight(self) -> f64 {
+        self.w
+    }
+}
+
+impl ControlPoint for DVec3 {
+    type Position = DVec2;
+    const ZERO: Self = Self::ZERO;
+    fn weighted(position: DVec2, weight: f64) -> Self {
+        (position * weight).extend(weight)
+    }
+    fn numerator(self) -> DVec2 {
+        self.truncate()
+    }
+    fn weight(self) -> f64 {
+        self.z
+    }
+}
+
+/// A rational B-spline curve with clamped ends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spline<P> {
+    /// Polynomial degree, 1 to [`MAX_DEGREE`].
+    pub degree: usize,
+    /// Non-decreasing, `points.len() + degree + 1` of them.
+    pub knots: Vec<f64>,
+    /// Homogeneous control points, weights positive.
+    pub points: Vec<P>,
+}
+
+/// A curve in space, mm.
+pub type Curve = Spline<Homogeneous>;
+/// A curve in the parameter plane of a surface.
+pub type UvCurve = Spline<DVec3>;
+
+/// Position and first two derivatives with respect to the curve parameter.
+#[derive(Clone, Copy, Debug)]
+pub struct CurveDerivatives<V> {
+    /// Position.
+    pub point: V,
+    /// First derivative.
+    pub first: V,
+    /// Second derivative.
+    pub second: V,
+}
+
+impl<P: ControlPoint> Spline<P> {
+    /// The straight segment from `a` to `b` over the parameters `[t0, t1]`.
+    pub fn line(a: P::Position, b: P::Position, [t0, t1]: [f64; 2]) -> Self {
+        Self { degree: 1, knots: vec![t0, t0, t1, t1], points: vec![P::weighted(a, 1.0), P::weighted(b, 1.0)] }
+    }
+
+    /// The polyline through positions at strictly increasing parameters; at least two.
+    pub fn polyline(parameters: &[f64], positions: &[P::Position]) -> Self {
+        let mut knots = Vec::with_capacity(parameters.len() + 2);
+        knots.push(parameters[0]);
+        knots.extend_from_slice(parameters);
+        knots.push(parameters[parameters.len() - 1]);
+        Self { degree: 1, knots, points: positions.iter().map(|&p| P::weighted(p, 1.0)).collect() }
+    }
+
+    /// The cubic Hermite spline (C¹) through positions with derivatives at strictly increasing parameters.
+    pub fn hermite(parameters: &[f64], positions: &[P::Position], derivatives: &[P::Position]) -> Self {
+        let n = parameters.len();
+        let (mut knots, mut points) = (vec![parameters[0]; 4], vec![P::weighted(positions[0], 1.0)]);
+        for i in 0..n - 1 {
+            let third = (parameters[i + 1] - parameters[i]) / 3.0;
+            points.push(P::weighted(positions[i] + derivatives[i] * third, 1.0));
+            points.push(P::weighted(positions[i + 1] - derivatives[i + 1] * third, 1.0));
+            if i + 2 < n {
+                knots.extend([parameters[i + 1]; 2]);
+            }
+        }
+        points.push(P::weighted(positions[n - 1], 1.0));
+        knots.extend([parameters[n - 1]; 4]);
+        Self { degree: 3, knots, points }
+    }
+
+    /// First and last parameter.
+    pub fn domain(&self) -> [f64; 2] {
+        [self.knots[self.degree], self.knots[self.points.len()]]
+    }
+
+    /// Position at `t`, which is clamped to the domain.
+    pub fn evaluate(&self, t: f64) -> P::Position {
+        self.homogeneous(t, 0)[0].position()
+    }
+
+    /// Position and derivatives at `t`, which is clamped to the domain.
+    pub fn derivatives(&self, t: f64) -> CurveDerivatives<P::Position> {
+        let [a, a1, a2] = self.homogeneous(t, 2);
+        let inv = 1.0 / a.weight();
+        let point = a.numerator() * inv;
+        let first = (a1.numerator() - point * a1.weight()) * inv;
+        let second = (a2.numerator() - first * (2.0 * a1.weight()) - point * a2.weight()) * inv;
+        CurveDerivatives { point, first, second }
+    }
+
+    /// Homogeneous point at `t` inside the domain.
+    pub(super) fn homogeneous_at(&self, t: f64) -> P {
+        self.homogeneous(t, 0)[0]
+    }
+
+    fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {
+        let [t0, t1] = self.domain();
+        let t = t.clamp(t0, t1);
+        let span = find_span(&self.knots, self.degree, t);
+        let b = basis(&self.knots, self.degree, span, t, order);
+        let active = &self.points[span - self.degree..=span];
+        std::array::from_fn(|k| {
+            if k > order {
+                return P::ZERO;
+            }
+            active.iter().zip(&b.value[k]).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
+        })
+    }
+
+    /// The blossom (polar form) of the polynomial piece over knot span `span` at `degree` arguments.
+    fn blossom(&self, span: usize, arguments: &[f64]) -> P {
+        let p = self.degree;
+        let mut d: SmallVec<[P; 8]> = self.points[span - p..=span].into();
+        for (r, &u) in arguments.iter().enumerate() {
+            for j in 0..p - r {
+                let (lo, hi) = (self.knots[span - p + j + r + 1], self.knots[span + j + 1]);
+                let s = (u - lo) / (hi - lo);
+                d[j] = d[j] * (1.0 - s) + d[j + 1] * s;
+            }
+        }
+        d[0]
+    }
+
+    /// The same curve over another knot vector that refines this one on `[knots[degree], knots[n]]`.
+    ///
+    /// New knots may start and end inside the domain (the curve is then cut there) and must hold every old knot
+    /// between, at least as often. This is knot insertion, clamping and cutting in one (Oslo algorithm by blossoms).
+    pub fn refined(&self, knots: Vec<f64>) -> Self {
+        let (p, n) = (self.degree, knots.len() - self.degree - 1);
+        let points = (0..n)
+            .map(|i| {
+                let middle = 0.5 * (knots[i] + knots[i + p + 1]);
+                self.blossom(find_span(&self.knots, p, middle), &knots[i + 1..=i + p])
+            })
+            .collect();
+        Self { degree: p, knots, points }
+    }
+
+    /// The part over `[a, b]`, which must lie in the domain with `a < b`; its domain is `[a, b]`.
+    pub fn restricted(&self, a: f64, b: f64) -> Self {
+        if [a, b] == self.domain() && self.is_clamped() {
+            return self.clone();
+        }
+        let inner = self.knots.iter().copied().filter(|&k| k > a && k < b);
+        let p1 = self.degree + 1;
+        let knots = std::iter::repeat_n(a, p1).chain(inner).chain(std::iter::repeat_n(b, p1)).collect();
+        self.refined(knots)
+    }
+
+    /// Whether the first and last `degree + 1` knots coincide.
+    pub fn is_clamped(&self) -> bool {
+        let (p, n) = (self.degree, self.points.len());
+        self.knots[0] == self.knots[p] && self.knots[n] == self.knots[n + p]
+    }
+
+    /// The distinct knots of the domain, both ends included.
+    pub fn breakpoints(&self) -> Vec<f64> {
+        let mut b = self.knots[self.degree..=self.points.len()].to_vec();
+        b.dedup();
+        b
+    }
+
+    /// Control points of the Bézier piece over each non-empty knot span, in order of [`Spline::breakpoints`].
+    pub fn bezier_pieces(&self) -> Vec<Vec<P>> {
+        let p = self.degree;
+        (p..self.points.len())
+            .filter(|&k| self.knots[k] < self.knots[k + 1])
+            .map(|k| {
+                let mut arguments = [self.knots[k]; MAX_DEGREE];
+                let mut piece = vec![self.blossom(k, &arguments[..p])];
+                for i in 1..=p {
+                    arguments[p - i] = self.knots[k + 1];
+                    piece.push(self.blossom(k, &arguments[..p]));
+                }
+                piece
+            })
+            .collect()
+    }
+
+    /// The same curve run backwards, with `t` mapped to `t0 + t1 − t`.
+    pub fn reversed(&self) -> Self {
+        let [t0, t1] = self.domain();
+        let knots = self.knots.iter().rev().map(|k| t0 + (t1 - k)).collect();
+        Self { degree: self.degree, knots, points: self.points.iter().rev().copied().collect() }
+    }
+
+    /// The same curve with its parameter mapped affinely onto `[a, b]`, `a < b`.
+    pub fn reparametrised(&self, [a, b]: [f64; 2]) -> Self {
+        let [t0, t1] = self.domain();
+        let map = |k: f64| {
+            if k <= t0 {
+                a
+            } else if k >= t1 {
+                b
+            } else {
+                a + (k - t0) * ((b - a) / (t1 - t0))
+            }
+        };
+        Self {
+            degree: self.degree,
+            knots: self.knots.iter().map(|&k| map(k)).collect(),
+            points: self.points.clone(),
+        }
+    }
+}
+
+impl Curve {
+    /// A box that contains the curve: that of its control points.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.points.iter().map(|p| p.position()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::conic;
+
+    fn wavy() -> Curve {
+        let xs =
+            [(0.0, 0.0, 1.0), (1.0, 2.0, 0.5), (2.0, -1.0, 2.0), (3.0, 1.0, 1.0), (4.0, 0.0, 3.0), (5.0, 5.0, 1.0)];
+        let points = xs.iter().map(|&(x, y, w)| Homogeneous::weighted(Point::new(x, y, x * y), w)).collect();
+        Curve { degree: 3, knots: vec![0.0, 0.0, 0.0, 0.0, 1.0, 2.5, 3.0, 3.0, 3.0, 3.0], points }
+    }
+
+    #[test]
+    fn cutting_keeps_the_curve() {
+        let c = wavy();
+        let cut = c.restricted(0.4, 2.7);
+        assert_eq!(cut.domain(), [0.4, 2.7]);
+        for i in 0..=50 {
+            let t = 0.4 + 2.3 * i as f64 / 50.0;
+            assert!((cut.evaluate(t) - c.evaluate(t)).length() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn an_unclamped_curve_is_clamped_to_its_domain() {
+        let c = Curve { knots: vec![-1.0, -0.5, -0.2, 0.0, 1.0, 2.5, 3.0, 3.1, 3.2, 4.0], ..wavy() };
+        let [a, b] = c.domain();
+        let k = c.restricted(a, b);
+        assert!(k.is_clamped() && !c.is_clamped());
+        for i in 0..=30 {
+            let t = a + (b - a) * i as f64 / 30.0;
+            assert!((k.evaluate(t) - c.evaluate(t)).length() < 1e-13);
+        }
+        assert!((k.points[0].position() - c.evaluate(a)).length() < 1e-13);
+    }
+
+    #[test]
+    fn bezier_pieces_meet_at_the_breakpoints() {
+        let c = wavy();
+        let pieces = c.bezier_pieces();
+        assert_eq!(pieces.len(), 3);
+        for (piece, t) in pieces.iter().zip(c.breakpoints()) {
+            assert!((piece[0].position() - c.evaluate(t)).length() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn derivatives_match_differences() {
+        let c = wavy();
+        let (t, h) = (1.7, 1e-5);
+        let d = c.derivatives(t);
+        let (a, b) = (c.evaluate(t - h), c.evaluate(t + h));
+        assert!(((b - a) / (2.0 * h) - d.first).length() < 1e-7);
+        assert!(((a + b - 2.0 * d.point) / (h * h) - d.second).length() < 1e-3);
+    }
+
+    #[test]
+    fn hermite_of_a_circle_and_reversal() {
+        let c = conic::arc(&Frame::IDENTITY, 2.0, [0.0, 1.0]);
+        let ts: Vec<f64> = (0..=8).map(|i| i as f64 / 8.0).collect();
+        let (p, d): (Vec<_>, Vec<_>) = ts
+            .iter()
+            .map(|&t| {
+                let x = c.derivatives(t);
+                (x.point, x.first)
+            })
+            .unzip();
+        let h = Curve::hermite(&ts, &p, &d);
+        let r = h.reversed();
+        for i in 0..=40 {
+            let t = i as f64 / 40.0;
+            // Hermite remainder: h⁴/384 times the fourth derivative, 2·(1/8)⁴/384 = 1.3e-6.
+            assert!((h.evaluate(t) - c.evaluate(t)).length() < 1.5e-6);
+            assert!((r.evaluate(1.0 - t) - h.evaluate(t)).length() < 1e-14);
+        }
+    }
+}

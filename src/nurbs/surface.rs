@@ -1,0 +1,274 @@
+use super::basis::{Basis, basis, find_span};
+use super::{BezierPatch, ControlPoint, Curve};
+use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
+
+/// A rational B-spline surface with clamped ends in both directions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Polynomial degrees in u and v, 1 to [`super::MAX_DEGREE`].
+    pub degree: [usize; 2],
+    /// Knots in u and in v, non-decreasing.
+    pub knots: [Vec<f64>; 2],
+    /// Homogeneous control points, `points[i * count_v + j]`, weights positive.
+    pub points: Vec<Homogeneous>,
+}
+
+/// Position and first partial derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct Derivatives {
+    /// Position, mm.
+    pub point: Point,
+    /// ∂S/∂u.
+    pub du: Vector,
+    /// ∂S/∂v.
+    pub dv: Vector,
+}
+
+/// Position, first and second partial derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct SecondDerivatives {
+    /// Position, mm.
+    pub point: Point,
+    /// ∂S/∂u.
+    pub du: Vector,
+    /// ∂S/∂v.
+    pub dv: Vector,
+    /// ∂²S/∂u².
+    pub duu: Vector,
+    /// ∂²S/∂u∂v.
+    pub duv: Vector,
+    /// ∂²S/∂v².
+    pub dvv: Vector,
+}
+
+impl Surface {
+    /// Number of control points in u and v.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.knots[0].len() - self.degree[0] - 1, self.knots[1].len() - self.degree[1] - 1]
+    }
+
+    /// Parameter ranges `[[u0, u1], [v0, v1]]`.
+    pub fn domain(&self) -> [[f64; 2]; 2] {
+        let [nu, nv] = self.counts();
+        [[self.knots[0][self.degree[0]], self.knots[0][nu]], [self.knots[1][self.degree[1]], self.knots[1][nv]]]
+    }
+
+    /// The nearest parameters inside the domain.
+    pub fn clamp(&self, uv: Uv) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.domain();
+        Uv::new(uv.x.clamp(u0, u1), uv.y.clamp(v0, v1))
+    }
+
+    /// Position at `uv`, which is clamped to the domain.
+    pub fn evaluate(&self, uv: Uv) -> Point {
+        self.sums::<1>(uv, 0)[0].project()
+    }
+
+    /// Position and first derivatives at `uv`, which is clamped to the domain.
+    pub fn derivatives(&self, uv: Uv) -> Derivatives {
+        let [a, au, av] = self.sums::<3>(uv, 1);
+        let inv = 1.0 / a.w;
+        let point = a.truncate() * inv;
+        Derivatives { point, du: (au.truncate() - point * au.w) * inv, dv: (av.truncate() - point * av.w) * inv }
+    }
+
+    /// Position, first and second derivatives at `uv`, which is clamped to the domain.
+    pub fn second_derivatives(&self, uv: Uv) -> SecondDerivatives {
+        let [a, au, av, auu, auv, avv] = self.sums::<6>(uv, 2);
+        let inv = 1.0 / a.w;
+        let point = a.truncate() * inv;
+        let du = (au.truncate() - point * au.w) * inv;
+        let dv = (av.truncate() - point * av.w) * inv;
+        SecondDerivatives {
+            point,
+            du,
+            dv,
+            duu: (auu.truncate() - du * (2.0 * au.w) - point * auu.w) * inv,
+            duv: (auv.truncate() - du * av.w - dv * au.w - point * auv.w) * inv,
+            dvv: (avv.truncate() - dv * (2.0 * av.w) - point * avv.w) * inv,
+        }
+    }
+
+    /// Sums for (S), (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
+    fn sums<const N: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
+        const DERIVATIVE: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
+        let uv = self.clamp(uv);
+        let [p, q] = self.degree;
+        let count_v = self.counts()[1];
+        let (span_u, span_v) = (find_span(&self.knots[0], p, uv.x), find_span(&self.knots[1], q, uv.y));
+        let bu: Basis = basis(&self.knots[0], p, span_u, uv.x, order);
+        let bv: Basis = basis(&self.knots[1], q, span_v, uv.y, order);
+        let mut sums = [Homogeneous::ZERO; N];
+        for i in 0..=p {
+            let start = (span_u - p + i) * count_v + span_v - q;
+            let mut row = [Homogeneous::ZERO; 3];
+            for (j, &c) in self.points[start..=start + q].iter().enumerate() {
+                for k in 0..=order {
+                    row[k] += c * bv.value[k][j];
+                }
+            }
+            for (sum, (a, b)) in sums.iter_mut().zip(DERIVATIVE) {
+                *sum += row[b] * bu.value[a][i];
+            }
+        }
+        sums
+    }
+
+    /// Unit normal along `Su × Sv`; at a pole or collapsed edge the limit from inside; `None` where there is none.
+    pub fn normal(&self, uv: Uv) -> Option<Vector> {
+        let d = self.derivatives(uv);
+        let n = d.du.cross(d.dv);
+        if n.length() > 1e-10 * d.du.length() * d.dv.length() && n.length_squared() > 0.0 {
+            let scale =
+                d.du.length_squared().min(d.dv.length_squared()) / d.du.length_squared().max(d.dv.length_squared());
+            if scale > 1e-20 {
+                return n.try_normalize();
+            }
+        }
+        self.limit_normal(uv)
+    }
+
+    /// The normal just inside the domain, seen from a singular point: along the mixed derivative where one partial
+    /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre.
+    fn limit_normal(&self, uv: Uv) -> Option<Vector> {
+        let [[u0, u1], [v0, v1]] = self.domain();
+        let d = self.second_derivatives(uv);
+        let inward_u = if uv.x > 0.5 * (u0 + u1) { -1.0 } else { 1.0 };
+        let inward_v = if uv.y > 0.5 * (v0 + v1) { -1.0 } else { 1.0 };
+        // Comparable lengths: derivatives times the extent of the domain.
+        let (lu, lv) = (d.du.length() * (u1 - u0), d.dv.length() * (v1 - v0));
+        let n = if lu < 1e-8 * lv { d.duv.cross(d.dv) * inward_v } else { d.du.cross(d.duv) * inward_u };
+        let reference = d.duv.length() * d.du.length().max(d.dv.length());
+        if lu.min(lv) < 1e-8 * lu.max(lv) && n.length() > 1e-8 * reference {
+            return n.try_normalize();
+        }
+        let moved = uv + 1e-4 * Uv::new((u1 - u0) * inward_u, (v1 - v0) * inward_v);
+        let d = self.derivatives(moved);
+        let n = d.du.cross(d.dv);
+        (n.length() > 1e-12 * d.du.length() * d.dv.length()).then(|| n.try_normalize()).flatten()
+    }
+
+    /// A box that contains the surface: that of its control points.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.points.iter().map(|p| p.project()))
+    }
+
+    /// The line of constant `u` (a curve in v) or of constant `v` (a curve in u).
+    pub fn isoline(&self, direction: usize, at: f64) -> Curve {
+        // `direction` is the one held constant.
+        let lines = self.lines(direction);
+        let other = 1 - direction;
+        let points = lines
+            .into_iter()
+            .map(|points| {
+                let c = Curve { degree: self.degree[direction], knots: self.knots[direction].clone(), points };
+                let [a, b] = c.domain();
+                let at = at.clamp(a, b);
+                c.homogeneous_at(at)
+            })
+            .collect();
+        Curve { degree: self.degree[other], knots: self.knots[other].clone(), points }
+    }
+
+    /// Control polygons that run along `direction`.
+    fn lines(&self, direction: usize) -> Vec<Vec<Homogeneous>> {
+        let [nu, nv] = self.counts();
+        if direction == 0 {
+            (0..nv).map(|j| (0..nu).map(|i| self.points[i * nv + j]).collect()).collect()
+        } else {
+            self.points.chunks(nv).map(<[_]>::to_vec).collect()
+        }
+    }
+
+    /// Applies a change of one direction's curves (cutting, refining, reversing) to the whole surface.
+    pub fn map_direction(&self, direction: usize, change: impl Fn(Curve) -> Curve) -> Self {
+        let (degree, knots) = (self.degree[direction], &self.knots[direction]);
+        let lines: Vec<Curve> = self
+            .lines(direction)
+            .into_iter()
+            .map(|points| change(Curve { degree, knots: knots.clone(), points }))
+            .collect();
+        let first = &lines[0];
+        let mut s = self.clone();
+        s.degree[direction] = first.degree;
+        s.knots[direction] = first.knots.clone();
+        let n = first.points.len();
+        s.points = if direction == 0 {
+            (0..n).flat_map(|i| lines.iter().map(move |l| l.points[i])).collect()
+        } else {
+            lines.iter().flat_map(|l| l.points.iter().copied()).collect()
+        };
+        s
+    }
+
+    /// The part over a rectangle of the domain; an unclamped surface comes out clamped.
+    pub fn restricted(&self, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Self {
+        self.map_direction(0, |c| c.restricted(u0, u1)).map_direction(1, |c| c.restricted(v0, v1))
+    }
+
+    /// The same surface with u and v exchanged, which turns its normal around.
+    pub fn transposed(&self) -> Self {
+        Self {
+            degree: [self.degree[1], self.degree[0]],
+            knots: [self.knots[1].clone(), self.knots[0].clone()],
+            points: self.lines(0).into_iter().flatten().collect(),
+        }
+    }
+
+    /// The surface with every control point's position changed (by a placement, say).
+    pub fn transformed(&self, place: impl Fn(Point) -> Point) -> Self {
+        let points = self.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
+        Self { points, ..self.clone() }
+    }
+
+    /// The Bézier patches over the non-empty knot rectangles, row by row in u.
+    pub fn bezier_patches(&self) -> Vec<BezierPatch> {
+        BezierPatch::extract(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_sphere_is_a_sphere_with_normals_outward_also_at_its_poles() {
+        let s = sweep::sphere(&Frame::IDENTITY, 3.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        for i in 0..=24 {
+            for j in 0..=12 {
+                let uv = Uv::new(2.0 * PI * i as f64 / 24.0, PI * (j as f64 / 12.0 - 0.5));
+                let p = s.evaluate(uv);
+                assert!((p.length() - 3.0).abs() < 1e-14);
+                assert!((s.normal(uv).unwrap() - p / 3.0).length() < 1e-6, "{uv}");
+            }
+        }
+    }
+
+    #[test]
+    fn second_derivatives_match_differences() {
+        let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        let (uv, h) = (Uv::new(0.7, 2.2), 1e-5);
+        let d = s.second_derivatives(uv);
+        let (u, v) = (Uv::new(h, 0.0), Uv::new(0.0, h));
+        let (pu, pv) = (s.derivatives(uv + u), s.derivatives(uv + v));
+        let (mu, mv) = (s.derivatives(uv - u), s.derivatives(uv - v));
+        assert!(((pu.du - mu.du) / (2.0 * h) - d.duu).length() < 1e-6);
+        assert!(((pv.du - mv.du) / (2.0 * h) - d.duv).length() < 1e-6);
+        assert!(((pv.dv - mv.dv) / (2.0 * h) - d.dvv).length() < 1e-6);
+    }
+
+    #[test]
+    fn restriction_and_transposition_keep_the_points() {
+        let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        let r = s.restricted([[0.3, 4.0], [1.0, 5.5]]);
+        assert_eq!(r.domain(), [[0.3, 4.0], [1.0, 5.5]]);
+        let uv = Uv::new(2.9, 3.3);
+        assert!((r.evaluate(uv) - s.evaluate(uv)).length() < 1e-13);
+        assert!((s.transposed().evaluate(Uv::new(uv.y, uv.x)) - s.evaluate(uv)).length() < 1e-13);
+        assert!((s.isoline(0, 2.9).evaluate(3.3) - s.evaluate(uv)).length() < 1e-13);
+        assert!((s.isoline(1, 3.3).evaluate(2.9) - s.evaluate(uv)).length() < 1e-13);
+    }
+}

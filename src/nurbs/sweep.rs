@@ -1,0 +1,98 @@
+//! Revolution, extrusion and the analytic surfaces, exact as rational B-splines.
+//!
+//! Parametrisations follow ISO 10303-42: u is the angle of a revolution (with knots at angles, see
+//! [`super::conic`]), v the height, latitude or minor angle; the normal `Su × Sv` points away from the axis.
+
+use super::{ControlPoint, Curve, Surface, conic};
+use crate::math::{Frame, Homogeneous, Point, Vector};
+
+/// The plane rectangle `origin + u·x + v·y`.
+pub fn plane(frame: &Frame, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Surface {
+    let at = |u: f64, v: f64| Homogeneous::weighted(frame.point(Point::new(u, v, 0.0)), 1.0);
+    Surface {
+        degree: [1, 1],
+        knots: [vec![u0, u0, u1, u1], vec![v0, v0, v1, v1]],
+        points: vec![at(u0, v0), at(u0, v1), at(u1, v0), at(u1, v1)],
+    }
+}
+
+/// `curve(u) + v·direction`, v in `range`.
+pub fn extrusion(curve: &Curve, direction: Vector, [v0, v1]: [f64; 2]) -> Surface {
+    let at = |p: &Homogeneous, v: f64| Homogeneous::weighted(p.project() + v * direction, p.w);
+    Surface {
+        degree: [curve.degree, 1],
+        knots: [curve.knots.clone(), vec![v0, v0, v1, v1]],
+        points: curve.points.iter().flat_map(|p| [at(p, v0), at(p, v1)]).collect(),
+    }
+}
+
+/// `curve(v)` turned about the z axis of `axis` by the angle u in `angles`.
+pub fn revolution(curve: &Curve, axis: &Frame, angles: [f64; 2]) -> Surface {
+    let (knots, arc) = conic::unit_arc(angles);
+    let meridian: Vec<(Point, f64)> = curve.points.iter().map(|p| (axis.local_point(p.project()), p.w)).collect();
+    let points = arc
+        .iter()
+        .flat_map(|&(c, s, w)| {
+            meridian.iter().map(move |&(m, weight)| {
+                let turned = Point::new(c * m.x - s * m.y, s * m.x + c * m.y, m.z);
+                Homogeneous::weighted(axis.point(turned), w * weight)
+            })
+        })
+        .collect();
+    Surface { degree: [2, curve.degree], knots: [knots, curve.knots.clone()], points }
+}
+
+/// A cylinder about the z axis of `frame`: u the angle, v the height.
+pub fn cylinder(frame: &Frame, radius: f64, angles: [f64; 2], heights: [f64; 2]) -> Surface {
+    cone(frame, radius, 0.0, angles, heights)
+}
+
+/// A cone about the z axis: `radius` at height 0, growing by `tan(half_angle)` per unit of v along the axis.
+pub fn cone(frame: &Frame, radius: f64, half_angle: f64, angles: [f64; 2], heights: [f64; 2]) -> Surface {
+    let at = |v: f64| frame.point(Point::new(radius + v * half_angle.tan(), 0.0, v));
+    revolution(&Curve::line(at(heights[0]), at(heights[1]), heights), frame, angles)
+}
+
+/// A sphere: u the longitude about z, v the latitude in `[-π/2, π/2]`.
+pub fn sphere(frame: &Frame, radius: f64, longitudes: [f64; 2], latitudes: [f64; 2]) -> Surface {
+    torus(frame, 0.0, radius, longitudes, latitudes)
+}
+
+/// A torus: u the angle about z, v the angle about the tube, 0 on the outer equator.
+pub fn torus(frame: &Frame, major: f64, minor: f64, angles: [f64; 2], minor_angles: [f64; 2]) -> Surface {
+    // The meridian lies in the x–z plane.
+    let meridian =
+        Frame { origin: frame.point(major * Vector::X), x: frame.x, y: frame.z, z: -frame.y, scale: frame.scale };
+    revolution(&conic::arc(&meridian, minor, minor_angles), frame, angles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Uv;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn cone_and_torus_satisfy_their_equations() {
+        let f = Frame::from_axis(Point::new(1.0, 2.0, 3.0), Vector::new(0.2, 0.5, 1.0), None);
+        let c = cone(&f, 4.0, 0.3, [0.5, 5.0], [-2.0, 3.0]);
+        let t = torus(&f, 5.0, 1.5, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        for i in 0..=10 {
+            for j in 0..=10 {
+                let (a, b) = (i as f64 / 10.0, j as f64 / 10.0);
+                let p = f.local_point(c.evaluate(Uv::new(0.5 + 4.5 * a, -2.0 + 5.0 * b)));
+                assert!((p.x.hypot(p.y) - (4.0 + p.z * 0.3f64.tan())).abs() < 1e-13);
+                let q = f.local_point(t.evaluate(Uv::new(2.0 * PI * a, 2.0 * PI * b)));
+                assert!((((q.x.hypot(q.y) - 5.0).powi(2) + q.z * q.z).sqrt() - 1.5).abs() < 1e-13);
+            }
+        }
+        let n = t.normal(Uv::ZERO).unwrap();
+        assert!((n - f.x).length() < 1e-12, "outward on the outer equator");
+    }
+
+    #[test]
+    fn an_extruded_line_is_a_plane() {
+        let e = extrusion(&Curve::line(Point::ZERO, Point::X, [0.0, 1.0]), Vector::Y, [0.0, 2.0]);
+        assert_eq!(e.evaluate(Uv::new(0.25, 1.5)), Point::new(0.25, 1.5, 0.0));
+    }
+}

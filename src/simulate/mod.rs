@@ -1,0 +1,1 @@
+//! Scene, sources, receivers, the path kernel, random streams and tallies.

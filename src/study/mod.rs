@@ -1,0 +1,1 @@
+//! Cross-check of intersectors, and what accuracy costs.

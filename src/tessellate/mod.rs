@@ -1,0 +1,1 @@
+//! [`crate::model::Model`] to [`crate::mesh::FacetMesh`] inside a proved tolerance.
