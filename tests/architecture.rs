@@ -94,7 +94,8 @@ fn imported_rooms(code: &str) -> Vec<String> {
                     c if start && (c.is_alphanumeric() || c == '_') => word.push(c),
                     _ => {}
                 }
-                if !(c.is_alphanumeric() || c == '_' || c.is_whitespace() || c == ',') && !word.is_empty() {
+                let in_name = c.is_alphanumeric() || c == '_' || c.is_whitespace() || c == ',';
+                if !in_name && !word.is_empty() {
                     start = false;
                 }
                 if (c == ',' || c == ':' || c == '}') && !word.is_empty() {

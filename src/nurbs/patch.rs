@@ -80,7 +80,7 @@ impl BezierPatch {
 
     /// The two halves in `direction` (0: u, 1: v), by de Casteljau.
     pub fn halves(&self, direction: usize) -> [Self; 2] {
-        let [p, q] = self.degree;
+        let q = self.degree[1];
         let n = self.degree[direction];
         let (mut low, mut high) = (self.clone(), self.clone());
         for line in 0..=self.degree[1 - direction] {
@@ -95,11 +95,10 @@ impl BezierPatch {
                 }
             }
             // w[k] now holds the right half's control points.
-            for k in 0..=n {
-                high.points[at(k)] = w[k];
+            for (k, &point) in w.iter().enumerate() {
+                high.points[at(k)] = point;
             }
         }
-        let _ = p;
         let [a, b] = self.domain[direction];
         let middle = 0.5 * (a + b);
         low.domain[direction] = [a, middle];

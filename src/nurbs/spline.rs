@@ -316,23 +316,22 @@ mod tests {
     }
 
     #[test]
-    fn hermite_of_a_circle_and_reversal() {
+    fn hermite_converges_with_fourth_order_and_reverses() {
         let c = conic::arc(&Frame::IDENTITY, 2.0, [0.0, 1.0]);
-        let ts: Vec<f64> = (0..=8).map(|i| i as f64 / 8.0).collect();
-        let (p, d): (Vec<_>, Vec<_>) = ts
-            .iter()
-            .map(|&t| {
-                let x = c.derivatives(t);
-                (x.point, x.first)
+        let error = |n: usize| {
+            let ts: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+            let d: Vec<_> = ts.iter().map(|&t| c.derivatives(t)).collect();
+            let points: Vec<_> = d.iter().map(|d| d.point).collect();
+            let first: Vec<_> = d.iter().map(|d| d.first).collect();
+            let h = Curve::hermite(&ts, &points, &first);
+            let r = h.reversed();
+            let samples = (0..=200).map(|i| i as f64 / 200.0);
+            samples.fold(0f64, |e, t| {
+                assert!((r.evaluate(1.0 - t) - h.evaluate(t)).length() < 1e-14);
+                e.max((h.evaluate(t) - c.evaluate(t)).length())
             })
-            .unzip();
-        let h = Curve::hermite(&ts, &p, &d);
-        let r = h.reversed();
-        for i in 0..=40 {
-            let t = i as f64 / 40.0;
-            // Hermite remainder: h⁴/384 times the fourth derivative, 2·(1/8)⁴/384 = 1.3e-6.
-            assert!((h.evaluate(t) - c.evaluate(t)).length() < 1.5e-6);
-            assert!((r.evaluate(1.0 - t) - h.evaluate(t)).length() < 1e-14);
-        }
+        };
+        let ratio = error(8) / error(16);
+        assert!((14.0..18.0).contains(&ratio), "{ratio}");
     }
 }
