@@ -1,1 +1,19 @@
-//! The laws of light as pure functions: reflection, refraction, Fresnel, media, coatings, scatter, spectra.
+//! The laws of light at surfaces and inside media: pure functions and small enums, no scene and no ray tracing.
+//!
+//! Conventions, the same everywhere in the room: `d` is the unit direction light travels in, *towards* the surface;
+//! `n` is a unit normal that may point to either side; `cos_i = |d·n|`; `eta = n1/n2`, the refractive index of the
+//! side the light comes from over that of the other side. Wavelengths are vacuum wavelengths in nm.
+//!
+//! Sources: Born & Wolf, *Principles of Optics*, 1.5 (Snell, Fresnel, conductors); Chandrasekhar, *Radiative
+//! Transfer*, 1.15 (Stokes vectors); each file names its own.
+//! Guarantee: reflected and transmitted shares of a lossless interface add up to 1 to the last bit; every sampled
+//! lobe has a density that its samples follow, tested against closed forms.
+//! Known weakness: geometrical optics alone. No interference beyond what a coating table states, no fluorescence,
+//! no birefringence, no gradient index.
+
+mod bend;
+mod effects;
+pub mod fresnel;
+
+pub use bend::{reflect, refract};
+pub use effects::{Effect, Effects};
