@@ -142,7 +142,7 @@ mod tests {
         }
 
         #[test]
-        fn a_metal_never_gives_more_than_it_gets(i in 0.0..1.5707f64, n in 0.05..4.0f64, k in 0.0..8.0f64) {
+        fn a_metal_never_gives_more_than_it_gets(i in 0.0..1.57f64, n in 0.05..4.0f64, k in 0.0..8.0f64) {
             let r = conductor(i.cos(), 1.0, n, k);
             prop_assert!(r.rp <= r.rs + 1e-12 && (0.0..=1.0).contains(&r.rs) && (0.0..=1.0).contains(&r.rp));
         }
