@@ -35,8 +35,6 @@ const DOORS: &[(&str, &[&str])] = &[
     ("comfy_table", &["cli", "report"]),
     ("maud", &["report"]),
     ("plotly", &["report"]),
-    ("vtkio", &["formats"]),
-    ("gltf_json", &["formats"]),
     ("image", &["formats"]),
     ("npyz", &["formats"]),
     ("zip", &["formats"]),

@@ -8,7 +8,27 @@
 //! the same, or raw little-endian). Known weakness: STL and GLB are single precision by their own definition.
 
 mod atomic;
+mod base64;
+mod data2;
 mod error;
+mod facets;
+mod glb;
+mod grid;
+mod npz;
+mod obj;
+mod ply;
+mod png;
+mod polylines;
+mod stl;
+mod vtk;
 
 pub use atomic::write_atomic;
+pub use base64::base64;
+pub use data2::{Data2Facet, read_data2};
 pub use error::{Error, ErrorKind};
+pub use facets::{FACET_EXTENSIONS, Facets, Group, is_facet_file, write_facets};
+pub use grid::{Axis, Grid, write_grid_csv, write_grid_npz};
+pub use npz::{NpyArray, write_npz};
+pub use png::{ColourMap, Picture, write_grid_png, write_png};
+pub use polylines::Polylines;
+pub use vtk::{write_vti, write_vtp};

@@ -1,0 +1,164 @@
+//! glTF 2.0 in its binary form: a mesh for every part in its colour, ray paths as lines. The root node turns z up into y
+//! up and millimetres into metres, as the standard asks; positions are relative to the middle of the model, so that single precision
+//! costs at most 1e-7 of its size.
+
+use super::facets::Facets;
+use super::{Error, write_atomic};
+use crate::math::{Point, Vector};
+use serde_json::{Value, json};
+use std::path::Path;
+
+#[derive(Default)]
+struct Buffer {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Buffer {
+    fn view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
+        let start = self.bytes.len();
+        self.bytes.extend(bytes);
+        let length = self.bytes.len() - start;
+        while !self.bytes.len().is_multiple_of(4) {
+            self.bytes.push(0);
+        }
+        self.views.push(json!({"buffer": 0, "byteOffset": start, "byteLength": length, "target": target}));
+        self.views.len() - 1
+    }
+
+    fn vectors(&mut self, list: &[[f32; 3]]) -> usize {
+        let view = self.view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
+        let bound = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
+            (0..3).map(|k| list.iter().fold(start, |m, p| pick(m, p[k]))).collect()
+        };
+        self.accessors.push(json!({
+            "bufferView": view, "componentType": 5126, "count": list.len(), "type": "VEC3",
+            "min": bound(f32::min, f32::INFINITY), "max": bound(f32::max, f32::NEG_INFINITY),
+        }));
+        self.accessors.len() - 1
+    }
+
+    fn indices(&mut self, list: &[u32]) -> usize {
+        let view = self.view(list.iter().flat_map(|x| x.to_le_bytes()), 34963);
+        self.accessors
+            .push(json!({"bufferView": view, "componentType": 5125, "count": list.len(), "type": "SCALAR"}));
+        self.accessors.len() - 1
+    }
+}
+
+fn single(p: Vector) -> [f32; 3] {
+    [p.x as f32, p.y as f32, p.z as f32]
+}
+
+/// Display values (sRGB) to the linear ones that glTF wants.
+fn linear(c: f64) -> f64 {
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Point, material: usize) -> Value {
+    let mesh = facets.mesh;
+    let mut local = rustc_hash::FxHashMap::default();
+    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for &i in list {
+        let corners = mesh.facets[i].vertices.map(|v| {
+            *local.entry(v).or_insert_with(|| {
+                let vertex = &mesh.vertices[v as usize];
+                positions.push(single(mesh.positions[vertex.position as usize] - middle));
+                normals.push(single(vertex.normal));
+                positions.len() as u32 - 1
+            })
+        });
+        triangles.extend([corners[0], corners[1], corners[2]]);
+        if !mesh.facets[i].is_triangle() {
+            triangles.extend([corners[0], corners[2], corners[3]]);
+        }
+    }
+    let (position, normal) = (buffer.vectors(&positions), buffer.vectors(&normals));
+    let indices = buffer.indices(&triangles);
+    json!({"primitives": [{
+        "attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material, "mode": 4
+    }]})
+}
+
+pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
+    let bounds = facets.mesh.bounds();
+    let middle = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
+    let mut buffer = Buffer::default();
+    let (mut meshes, mut nodes, mut materials) = (Vec::new(), Vec::new(), Vec::new());
+    for (group, list) in facets.groups.iter().zip(facets.by_group()) {
+        if list.is_empty() {
+            continue;
+        }
+        let [r, g, b] = group.colour.map(linear);
+        materials.push(json!({"name": group.name, "doubleSided": true,
+            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.1, "roughnessFactor": 0.5}}));
+        meshes.push(group_mesh(&mut buffer, facets, &list, middle, materials.len() - 1));
+        nodes.push(json!({"name": group.name, "mesh": meshes.len() - 1}));
+    }
+    if let Some(paths) = facets.paths.filter(|p| !p.points.is_empty()) {
+        let points: Vec<[f32; 3]> = paths.points.iter().map(|&p| single(p - middle)).collect();
+        let mut segments = Vec::new();
+        let mut start = 0;
+        for &end in &paths.ends {
+            segments.extend((start + 1..end).flat_map(|k| [k as u32 - 1, k as u32]));
+            start = end;
+        }
+        materials.push(json!({"name": "ray paths", "extensions": {"KHR_materials_unlit": {}},
+            "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.6, 0.1, 1.0]}}));
+        let (position, indices) = (buffer.vectors(&points), buffer.indices(&segments));
+        meshes.push(json!({"primitives": [{
+            "attributes": {"POSITION": position}, "indices": indices, "material": materials.len() - 1, "mode": 1}]}));
+        nodes.push(json!({"name": "ray paths", "mesh": meshes.len() - 1}));
+    }
+    let children: Vec<usize> = (0..nodes.len()).collect();
+    // x → x, y → −z, z → y, and mm → m: a quarter turn about x.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let shift = Vector::new(middle.x, middle.z, -middle.y) * 1e-3;
+    nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [1e-3, 1e-3, 1e-3],
+        "rotation": [-half, 0.0, 0.0, half], "translation": shift.to_array()}));
+    let mut document = json!({
+        "asset": {"version": "2.0", "generator": concat!("lampyris ", env!("CARGO_PKG_VERSION"))},
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "scene": 0, "scenes": [{"nodes": [nodes.len() - 1]}], "nodes": nodes,
+    });
+    // The standard forbids empty arrays.
+    if !meshes.is_empty() {
+        document["meshes"] = meshes.into();
+        document["materials"] = materials.into();
+        document["buffers"] = json!([{"byteLength": buffer.bytes.len()}]);
+        document["bufferViews"] = buffer.views.into();
+        document["accessors"] = buffer.accessors.into();
+    } else {
+        nodes_without_children(&mut document);
+    }
+    container(path, &document, &buffer.bytes)
+}
+
+fn nodes_without_children(document: &mut Value) {
+    if let Some(node) = document["nodes"][0].as_object_mut() {
+        node.remove("children");
+    }
+}
+
+/// The two chunks of a GLB file, each padded to four bytes.
+fn container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
+    let mut text = document.to_string().into_bytes();
+    while !text.len().is_multiple_of(4) {
+        text.push(b' ');
+    }
+    let chunks: &[(&[u8], &[u8; 4])] =
+        if binary.is_empty() { &[(&text, b"JSON")] } else { &[(&text, b"JSON"), (binary, b"BIN\0")] };
+    let total = 12 + chunks.iter().map(|(c, _)| 8 + c.len()).sum::<usize>();
+    write_atomic(path, |w| {
+        w.write_all(b"glTF")?;
+        w.write_all(&2u32.to_le_bytes())?;
+        w.write_all(&(total as u32).to_le_bytes())?;
+        for (chunk, kind) in chunks {
+            w.write_all(&(chunk.len() as u32).to_le_bytes())?;
+            w.write_all(*kind)?;
+            w.write_all(chunk)?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,56 @@
+//! NumPy arrays in a ZIP file. The header is NPY 1.0: magic, little-endian length, a Python dictionary padded to 64 bytes.
+
+use super::{Error, ErrorKind, write_atomic};
+use std::io::{self, Cursor, Write};
+use std::path::Path;
+use zip::write::{SimpleFileOptions, ZipWriter};
+
+/// One `f64` array of an NPZ file, in C order.
+#[derive(Clone, Debug)]
+pub struct NpyArray<'a> {
+    /// Name of the array, without `.npy`.
+    pub name: &'a str,
+    /// Lengths of the dimensions; their product is the length of `data`.
+    pub shape: Vec<usize>,
+    /// The values, the last dimension fastest.
+    pub data: &'a [f64],
+}
+
+/// Writes named `f64` arrays as a compressed NPZ file that `numpy.load` opens.
+///
+/// # Errors
+/// When a shape does not hold its data, and when the file cannot be written.
+pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
+    if let Some(wrong) = arrays.iter().find(|a| a.shape.iter().product::<usize>() != a.data.len()) {
+        let message = format!("array '{}' of shape {:?} has {} values", wrong.name, wrong.shape, wrong.data.len());
+        return Err(Error::new(path, ErrorKind::Malformed(message)));
+    }
+    let pack = || -> Result<Vec<u8>, zip::result::ZipError> {
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
+        for array in arrays {
+            zip.start_file(format!("{}.npy", array.name), options)?;
+            zip.write_all(&header(&array.shape))?;
+            let mut bytes = Vec::with_capacity(8 * array.data.len());
+            array.data.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+            zip.write_all(&bytes)?;
+        }
+        Ok(zip.finish()?.into_inner())
+    };
+    let bytes = pack().map_err(|e| Error::new(path, ErrorKind::Write(io::Error::other(e))))?;
+    write_atomic(path, |w| w.write_all(&bytes))
+}
+
+fn header(shape: &[usize]) -> Vec<u8> {
+    // A tuple of one number needs its comma.
+    let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();
+    let mut text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
+    while (10 + text.len() + 1) % 64 != 0 {
+        text.push(' ');
+    }
+    text.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((text.len() as u16).to_le_bytes());
+    bytes.extend(text.bytes());
+    bytes
+}

@@ -1,0 +1,36 @@
+//! Wavefront OBJ: shared positions, one normal a corner, quads as quads, a group for every part.
+
+use super::facets::Facets;
+use super::{Error, write_atomic};
+use std::path::Path;
+
+/// Writes positions, normals and quads; numbers read back bit for bit.
+pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
+    let mesh = facets.mesh;
+    write_atomic(path, |w| {
+        writeln!(w, "# lampyris {}: {} facets, mm", env!("CARGO_PKG_VERSION"), mesh.facets.len())?;
+        for p in &mesh.positions {
+            writeln!(w, "v {} {} {}", p.x, p.y, p.z)?;
+        }
+        for v in &mesh.vertices {
+            writeln!(w, "vn {} {} {}", v.normal.x, v.normal.y, v.normal.z)?;
+        }
+        for (group, list) in facets.groups.iter().zip(facets.by_group()) {
+            if list.is_empty() {
+                continue;
+            }
+            // A name with blanks would read as several groups.
+            writeln!(w, "g {}", group.name.split_whitespace().collect::<Vec<_>>().join("_"))?;
+            for i in list {
+                let facet = &mesh.facets[i];
+                let corners = if facet.is_triangle() { 3 } else { 4 };
+                write!(w, "f")?;
+                for &v in &facet.vertices[..corners] {
+                    write!(w, " {}//{}", mesh.vertices[v as usize].position + 1, v + 1)?;
+                }
+                writeln!(w)?;
+            }
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,94 @@
+use super::{Error, ErrorKind, Grid, write_atomic};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use std::io;
+use std::path::Path;
+
+/// How values become colours: perceptually even, readable in print and with colour blindness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColourMap {
+    /// Black through red to pale yellow: light on a screen.
+    #[default]
+    Inferno,
+    /// Blue to yellow: errors and other signed-free quantities.
+    Viridis,
+}
+
+impl ColourMap {
+    /// The colour at `x` in `[0, 1]`; values outside are clamped, NaN is grey.
+    pub fn at(self, x: f64) -> [u8; 3] {
+        if x.is_nan() {
+            return [128; 3];
+        }
+        let map = match self {
+            Self::Inferno => colorous::INFERNO,
+            Self::Viridis => colorous::VIRIDIS,
+        };
+        map.eval_continuous(x.clamp(0.0, 1.0)).into_array()
+    }
+}
+
+/// A picture of 8-bit red, green, blue, the top row first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// `3 * width * height` bytes.
+    pub rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// A grid as a picture, one cell `zoom` pixels wide, the second axis upward, colours from 0 (or the smallest value when
+    /// negative) to the largest; `exponent` below 1 lifts the dark parts.
+    pub fn of_grid(grid: &Grid, map: ColourMap, zoom: u32, exponent: f64) -> Self {
+        let (nx, ny) = (grid.axes[0].cells, grid.axes[1].cells);
+        let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
+        let span = if high > low { high - low } else { 1.0 };
+        let zoom = zoom.max(1) as usize;
+        let mut rgb = Vec::with_capacity(3 * nx * ny * zoom * zoom);
+        for j in (0..ny).rev() {
+            let row: Vec<u8> = (0..nx)
+                .flat_map(|i| {
+                    let colour = map.at(((grid.values[j * nx + i] - low) / span).powf(exponent));
+                    std::iter::repeat_n(colour, zoom).flatten()
+                })
+                .collect();
+            (0..zoom).for_each(|_| rgb.extend(&row));
+        }
+        Self { width: (nx * zoom) as u32, height: (ny * zoom) as u32, rgb }
+    }
+
+    /// The picture as the bytes of a PNG file.
+    ///
+    /// # Errors
+    /// When the picture has no pixels or its bytes do not fit its size.
+    pub fn to_png(&self) -> io::Result<Vec<u8>> {
+        if self.rgb.len() != 3 * self.width as usize * self.height as usize || self.rgb.is_empty() {
+            return Err(io::Error::other("a picture without pixels"));
+        }
+        let mut bytes = Vec::new();
+        PngEncoder::new(&mut bytes)
+            .write_image(&self.rgb, self.width, self.height, ExtendedColorType::Rgb8)
+            .map_err(io::Error::other)?;
+        Ok(bytes)
+    }
+}
+
+/// Writes a picture as PNG.
+///
+/// # Errors
+/// When the picture has no pixels and when the file cannot be written.
+pub fn write_png(path: &Path, picture: &Picture) -> Result<(), Error> {
+    let bytes = picture.to_png().map_err(|e| Error::new(path, ErrorKind::Write(e)))?;
+    write_atomic(path, |w| w.write_all(&bytes))
+}
+
+/// Writes a grid as a coloured PNG of at least 800 pixels on its longer side.
+///
+/// # Errors
+/// When the grid is empty and when the file cannot be written.
+pub fn write_grid_png(path: &Path, grid: &Grid) -> Result<(), Error> {
+    let longer = grid.axes[0].cells.max(grid.axes[1].cells).max(1) as u32;
+    write_png(path, &Picture::of_grid(grid, ColourMap::Inferno, 800u32.div_ceil(longer), 1.0))
+}

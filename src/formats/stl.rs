@@ -1,0 +1,34 @@
+//! Binary STL: the triangles as traced (each quad is two that share its diagonal), single precision.
+
+use super::facets::Facets;
+use super::{Error, write_atomic};
+use crate::math::{Point, Vector};
+use std::path::Path;
+
+pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
+    let mesh = facets.mesh;
+    let mut triangles: Vec<[Point; 3]> = Vec::with_capacity(2 * mesh.facets.len());
+    for (i, facet) in mesh.facets.iter().enumerate() {
+        let [a, b, c, d] = mesh.corners(i);
+        triangles.push([a, b, c]);
+        if !facet.is_triangle() {
+            triangles.push([a, c, d]);
+        }
+    }
+    write_atomic(path, |w| {
+        // Readers take a header that starts with "solid" for the text form.
+        let mut header = [b' '; 80];
+        let title = format!("lampyris {} binary STL, mm", env!("CARGO_PKG_VERSION"));
+        header[..title.len()].copy_from_slice(title.as_bytes());
+        w.write_all(&header)?;
+        w.write_all(&(triangles.len() as u32).to_le_bytes())?;
+        for [a, b, c] in &triangles {
+            let normal: Vector = (*b - *a).cross(*c - *a).normalize_or_zero();
+            for x in [normal, *a, *b, *c].iter().flat_map(|p| p.to_array()) {
+                w.write_all(&(x as f32).to_le_bytes())?;
+            }
+            w.write_all(&[0, 0])?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,144 @@
+//! VTK's XML files: facets as VTU, polylines as VTP, grids as VTI. Arrays are inline base64 with a 64-bit length in front,
+//! little-endian, uncompressed, so that every reader of the format takes them.
+
+use super::base64::base64;
+use super::facets::Facets;
+use super::{Error, Grid, Polylines, write_atomic};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// A typed array of a VTK file.
+enum Array<'a> {
+    F64(&'a [f64]),
+    U32(&'a [u32]),
+    I64(&'a [i64]),
+    U8(&'a [u8]),
+}
+
+fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::Result<()> {
+    let (kind, body): (&str, Vec<u8>) = match data {
+        Array::F64(v) => ("Float64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
+        Array::U32(v) => ("UInt32", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
+        Array::I64(v) => ("Int64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
+        Array::U8(v) => ("UInt8", v.to_vec()),
+    };
+    let mut bytes = (body.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(body);
+    let name = escape(name);
+    write!(w, r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="binary">"#)?;
+    w.write_all(base64(&bytes).as_bytes())?;
+    writeln!(w, "</DataArray>")
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+fn open(w: &mut dyn Write, kind: &str) -> io::Result<()> {
+    writeln!(w, r#"<?xml version="1.0"?>"#)?;
+    writeln!(w, r#"<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)
+}
+
+/// Facets with normals, and cell data: sag (mm), normal error (degrees), curvature (1/mm), face id, part.
+pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
+    let mesh = facets.mesh;
+    let count = mesh.facets.len();
+    let points: Vec<f64> =
+        mesh.vertices.iter().flat_map(|v| mesh.positions[v.position as usize].to_array()).collect();
+    let normals: Vec<f64> = mesh.vertices.iter().flat_map(|v| v.normal.to_array()).collect();
+    let uv: Vec<f64> = mesh.vertices.iter().flat_map(|v| v.uv.to_array()).collect();
+    let (mut corners, mut offsets, mut types) = (Vec::new(), Vec::with_capacity(count), Vec::with_capacity(count));
+    for facet in &mesh.facets {
+        let n = if facet.is_triangle() { 3 } else { 4 };
+        corners.extend(facet.vertices[..n].iter().map(|&v| i64::from(v)));
+        offsets.push(corners.len() as i64);
+        // VTK_TRIANGLE and VTK_QUAD.
+        types.push(if n == 3 { 5u8 } else { 9 });
+    }
+    let faces: Vec<u32> = mesh.facets.iter().map(|f| f.face.0).collect();
+    let parts: Vec<u32> = mesh.facets.iter().map(|f| facets.group_of(f.face) as u32).collect();
+    write_atomic(path, |w| {
+        open(w, "UnstructuredGrid")?;
+        let vertices = mesh.vertices.len();
+        writeln!(w, r#"<UnstructuredGrid><Piece NumberOfPoints="{vertices}" NumberOfCells="{count}">"#)?;
+        writeln!(w, r#"<PointData Normals="normal">"#)?;
+        array(w, "normal", 3, Array::F64(&normals))?;
+        array(w, "uv", 2, Array::F64(&uv))?;
+        writeln!(w, r#"</PointData><CellData Scalars="sag_mm">"#)?;
+        for (name, data) in [
+            ("sag_mm", &mesh.sag),
+            ("normal_error_deg", &facets.normal_error_deg),
+            ("curvature_per_mm", &facets.curvature_per_mm),
+        ] {
+            if data.len() == count {
+                array(w, name, 1, Array::F64(data))?;
+            }
+        }
+        array(w, "face_id", 1, Array::U32(&faces))?;
+        array(w, "part", 1, Array::U32(&parts))?;
+        writeln!(w, "</CellData><Points>")?;
+        array(w, "Points", 3, Array::F64(&points))?;
+        writeln!(w, "</Points><Cells>")?;
+        array(w, "connectivity", 1, Array::I64(&corners))?;
+        array(w, "offsets", 1, Array::I64(&offsets))?;
+        array(w, "types", 1, Array::U8(&types))?;
+        writeln!(w, "</Cells></Piece></UnstructuredGrid></VTKFile>")
+    })
+}
+
+/// Writes polylines as VTP, their values as cell data.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
+    let points: Vec<f64> = lines.points.iter().flat_map(|p| p.to_array()).collect();
+    let connectivity: Vec<i64> = (0..lines.points.len() as i64).collect();
+    let offsets: Vec<i64> = lines.ends.iter().map(|&e| e as i64).collect();
+    write_atomic(path, |w| {
+        open(w, "PolyData")?;
+        writeln!(
+            w,
+            r#"<PolyData><Piece NumberOfPoints="{}" NumberOfVerts="0" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="0">"#,
+            lines.points.len(),
+            lines.ends.len()
+        )?;
+        writeln!(w, "<PointData></PointData><CellData>")?;
+        for (name, values) in &lines.values {
+            array(w, name, 1, Array::F64(values))?;
+        }
+        writeln!(w, "</CellData><Points>")?;
+        array(w, "Points", 3, Array::F64(&points))?;
+        writeln!(w, "</Points><Lines>")?;
+        array(w, "connectivity", 1, Array::I64(&connectivity))?;
+        array(w, "offsets", 1, Array::I64(&offsets))?;
+        writeln!(w, "</Lines></Piece></PolyData></VTKFile>")
+    })
+}
+
+/// Writes a grid as VTI: one layer of cells, values and errors as cell data (a layer of no thickness has no cells to some
+/// readers).
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
+    let [a, b] = &grid.axes;
+    write_atomic(path, |w| {
+        open(w, "ImageData")?;
+        let extent = format!("0 {} 0 {} 0 1", a.cells, b.cells);
+        writeln!(
+            w,
+            r#"<ImageData WholeExtent="{extent}" Origin="{} {} 0" Spacing="{} {} 1"><Piece Extent="{extent}">"#,
+            a.range[0],
+            b.range[0],
+            a.step(),
+            b.step()
+        )?;
+        let name = format!("{}_{}", grid.quantity.replace(' ', "_"), grid.unit.replace('/', "_per_"));
+        writeln!(w, r#"<PointData></PointData><CellData Scalars="{}">"#, escape(&name))?;
+        array(w, &name, 1, Array::F64(&grid.values))?;
+        if let Some(error) = &grid.error {
+            array(w, "standard_error", 1, Array::F64(error))?;
+        }
+        writeln!(w, "</CellData></Piece></ImageData></VTKFile>")
+    })
+}
