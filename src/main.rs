@@ -1,3 +1,5 @@
 //! The `lampyris` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    lampyris::cli::run(std::env::args_os())
+}

@@ -1,0 +1,206 @@
+use super::options::{Meshing, Tracing};
+use clap::{Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// CAD surfaces straight to optical simulation: a STEP file goes in, quad facets within a proved tolerance, a traced
+/// light distribution and an account of what its accuracy cost come out.
+#[derive(Debug, Parser)]
+#[command(name = "lampyris", version, max_term_width = 100, propagate_version = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Print one JSON document on stdout instead of text
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// No messages and no progress
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+    /// Say more; twice for everything
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub(crate) verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the main job on the built-in three-cavity lamp and write a report
+    Demo {
+        /// Folder for the report and all results
+        #[arg(short, long, default_value = "lampyris-demo", value_name = "DIR")]
+        output: PathBuf,
+        #[command(flatten)]
+        meshing: Meshing,
+        #[command(flatten)]
+        tracing: Tracing,
+    },
+    /// Say what a STEP file holds and what could not be read
+    Info {
+        /// STEP file
+        file: PathBuf,
+        #[command(flatten)]
+        limits: Refusals,
+    },
+    /// Tessellate a STEP file into quad facets
+    Facet {
+        /// STEP file
+        file: PathBuf,
+        /// File to write, by extension: .obj .ply .stl .vtu .glb .data2; may be given several times
+        #[arg(short, long, value_name = "OUT")]
+        output: Vec<PathBuf>,
+        #[command(flatten)]
+        meshing: Meshing,
+        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+        accuracy: Option<String>,
+        /// Number of threads; all cores by default
+        #[arg(long, value_name = "N")]
+        threads: Option<usize>,
+        #[command(flatten)]
+        limits: Refusals,
+    },
+    /// Simulate a scene and write a report, results.json and the receiver files
+    Trace {
+        /// Scene file
+        scene: PathBuf,
+        /// Folder for the report and all results (for a shard: the .tally file)
+        #[arg(short, long, default_value = "lampyris-results", value_name = "DIR")]
+        output: PathBuf,
+        #[command(flatten)]
+        meshing: Meshing,
+        #[command(flatten)]
+        tracing: Tracing,
+        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+        accuracy: Option<String>,
+        /// Trace only part I of N (I from 1)
+        #[arg(long, value_name = "I/N")]
+        shard: Option<String>,
+        /// Go on where an interrupted run stopped
+        #[arg(long)]
+        resume: bool,
+        /// Trace until the statistical error of a receiver is below P percent
+        #[arg(long, value_name = "P%@RECEIVER")]
+        until_error: Option<String>,
+        /// Run the full kernel too and compare every tally bit by bit
+        #[arg(long)]
+        verify_pruning: bool,
+        /// Read, check and tessellate, say what would be done, trace nothing
+        #[arg(long)]
+        dry_run: bool,
+        /// Largest share of energy that may be lost before the exit code becomes 4
+        #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
+        max_lost: f64,
+        #[command(flatten)]
+        limits: Refusals,
+    },
+    /// Compare octree, BVH and exact spline ray by ray
+    Check {
+        /// STEP file or scene
+        file: PathBuf,
+        #[command(flatten)]
+        meshing: Meshing,
+        #[command(flatten)]
+        tracing: Tracing,
+        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+        accuracy: Option<String>,
+        /// Write the rays used and the octree's answers
+        #[arg(long, value_name = "FILE")]
+        rays_out: Option<PathBuf>,
+        /// Use the rays of a file
+        #[arg(long, value_name = "FILE")]
+        rays_in: Option<PathBuf>,
+        #[command(flatten)]
+        limits: Refusals,
+    },
+    /// Measure what accuracy costs in time
+    Study {
+        /// Which question
+        kind: StudyKind,
+        /// STEP file or scene; the built-in lamp by default
+        file: Option<PathBuf>,
+        /// Folder for report, rows and pictures
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+        #[command(flatten)]
+        meshing: Meshing,
+        #[command(flatten)]
+        tracing: Tracing,
+    },
+    /// Merge the results of shards into one
+    Merge {
+        /// The .tally files of all shards
+        #[arg(required = true, value_name = "PART")]
+        parts: Vec<PathBuf>,
+        /// Folder for the merged results
+        #[arg(short, long, value_name = "DIR")]
+        output: PathBuf,
+    },
+    /// Print the JSON Schema of the scene file
+    Schema,
+    /// Print a completion script
+    Completions {
+        /// Shell to complete in
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write one page a command into a folder
+    Man {
+        /// Folder for the pages
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
+    },
+}
+
+/// What of a model may be missing.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(crate) struct Refusals {
+    /// Largest share of faces that may be refused before the exit code becomes 4
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pub(crate) max_refused: f64,
+}
+
+/// The studies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StudyKind {
+    /// Tolerance × normals × intersector: the cost–accuracy front
+    Accuracy,
+    /// Nearest, bilinear, cubic and exact normals (the seed paper's table 2)
+    Interpolation,
+    /// Three lamps before and after (the seed paper's table 1)
+    Complexity,
+    /// Rays through edges, vertices, tangents and other trouble
+    Stability,
+    /// Octree against bounding-volume hierarchies
+    Bvh,
+    /// What each optical effect costs
+    Effects,
+}
+
+impl StudyKind {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Accuracy => "accuracy",
+            Self::Interpolation => "interpolation",
+            Self::Complexity => "complexity",
+            Self::Stability => "stability",
+            Self::Bvh => "bvh",
+            Self::Effects => "effects",
+        }
+    }
+}
+
+impl Command {
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Demo { .. } => "demo",
+            Self::Info { .. } => "info",
+            Self::Facet { .. } => "facet",
+            Self::Trace { .. } => "trace",
+            Self::Check { .. } => "check",
+            Self::Study { .. } => "study",
+            Self::Merge { .. } => "merge",
+            Self::Schema => "schema",
+            Self::Completions { .. } => "completions",
+            Self::Man { .. } => "man",
+        }
+    }
+}

@@ -1,0 +1,25 @@
+use std::fs;
+
+/// Processor, number of cores and memory, as far as the system tells.
+pub(crate) fn hardware() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
+    let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
+    let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemTotal"));
+    let memory = memory.map(|kb| format!(", {:.0} GB", kb as f64 / 1e6)).unwrap_or_default();
+    format!("{cpu}, {cores} cores{memory}, {}", std::env::consts::OS)
+}
+
+/// Largest resident size of this process so far, bytes; `None` where the system does not tell.
+pub(crate) fn peak_bytes() -> Option<u64> {
+    kilobytes(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM").map(|kb| 1024 * kb)
+}
+
+fn field(text: &str, key: &str) -> Option<String> {
+    let line = text.lines().find(|l| l.starts_with(key))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+fn kilobytes(text: &str, key: &str) -> Option<u64> {
+    field(text, key)?.split_whitespace().next()?.parse().ok()
+}

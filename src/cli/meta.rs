@@ -1,0 +1,43 @@
+//! Commands about the command itself.
+
+use super::args::Arguments;
+use super::context::{Context, print};
+use super::{Failure, Outcome};
+use crate::formats::write_atomic;
+use clap::CommandFactory;
+use std::path::Path;
+
+pub(super) fn completions(shell: clap_complete::Shell) -> Result<Outcome, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "lampyris", &mut script);
+    print(&String::from_utf8_lossy(&script))?;
+    Ok(Outcome::Done)
+}
+
+pub(super) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, Failure> {
+    let mut command = Arguments::command();
+    command.build();
+    let render = |command: clap::Command| -> std::io::Result<Vec<u8>> {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(command).render(&mut page)?;
+        Ok(page)
+    };
+    let Some(folder) = folder else {
+        print(&String::from_utf8_lossy(&render(command)?))?;
+        return Ok(Outcome::Done);
+    };
+    std::fs::create_dir_all(folder)?;
+    let subcommands: Vec<clap::Command> =
+        command.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
+    let mut pages = vec![("lampyris".to_owned(), command)];
+    for subcommand in subcommands {
+        pages.push((format!("lampyris-{}", subcommand.get_name()), subcommand));
+    }
+    for (name, command) in pages {
+        let path = folder.join(format!("{name}.1"));
+        let page = render(command)?;
+        write_atomic(&path, |w| w.write_all(&page))?;
+        context.say(format_args!("wrote {}", path.display()));
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,178 @@
+//! Options shared by commands, and the small grammars of their values. Signs are let through the argument parser so that a
+//! negative number gets an answer about the number, not about an unknown option.
+
+use clap::ValueEnum;
+
+/// Options of everything that tessellates.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct Meshing {
+    /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform
+    #[arg(long, value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
+    pub(crate) tolerance: Option<[f64; 2]>,
+    /// Largest angle between facet and surface normal, degrees; off by default
+    #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
+    pub(crate) angle: Option<f64>,
+    /// Tolerance of one part, by name; may be given several times
+    #[arg(long, value_name = "NAME=MIN..MAX", value_parser = part)]
+    pub(crate) part: Vec<(String, [f64; 2])>,
+}
+
+/// Options of everything that traces.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct Tracing {
+    /// Number of rays, such as 1000000 or 1e6
+    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    pub(crate) rays: Option<u64>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "S")]
+    pub(crate) seed: Option<u64>,
+    /// Number of threads; all cores by default
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    /// What finds the hits
+    #[arg(long, value_name = "NAME")]
+    pub(crate) intersector: Option<IntersectorKind>,
+    /// How the normal at a hit is got; exact polishes the hit to the spline
+    #[arg(long, value_name = "NAME")]
+    pub(crate) normals: Option<NormalKind>,
+}
+
+/// What finds the hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum IntersectorKind {
+    #[default]
+    Octree,
+    Bvh2,
+    Cwbvh,
+    Exact,
+}
+
+/// How the normal at a hit is got.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum NormalKind {
+    Flat,
+    Nearest,
+    #[default]
+    Bilinear,
+    Cubic,
+    Exact,
+}
+
+impl std::fmt::Display for IntersectorKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Octree => "octree",
+            Self::Bvh2 => "bvh2",
+            Self::Cwbvh => "cwbvh",
+            Self::Exact => "exact",
+        })
+    }
+}
+
+impl std::fmt::Display for NormalKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Flat => "flat",
+            Self::Nearest => "nearest",
+            Self::Bilinear => "bilinear",
+            Self::Cubic => "cubic",
+            Self::Exact => "exact",
+        })
+    }
+}
+
+/// A positive length in mm.
+fn length(text: &str) -> Result<f64, String> {
+    let value: f64 =
+        text.trim().trim_end_matches("mm").trim().parse().map_err(|_| format!("'{text}' is no number of mm"))?;
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("a tolerance is a positive length in mm, not {text}; the default is 0.05..0.2"))
+    }
+}
+
+/// `MIN..MAX` or one number.
+pub(crate) fn tolerance(text: &str) -> Result<[f64; 2], String> {
+    let (low, high) = text.split_once("..").unwrap_or((text, text));
+    let (low, high) = (length(low)?, length(high)?);
+    if low <= high {
+        Ok([low, high])
+    } else {
+        Err(format!("{low} is larger than {high}; write the tighter tolerance first, as in {high}..{low}"))
+    }
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    let value = text.trim_end_matches("deg").trim().parse::<f64>().ok();
+    value
+        .filter(|v| *v > 0.0 && *v < 90.0)
+        .ok_or_else(|| format!("an angle is a number of degrees above 0 and below 90, not '{text}'"))
+}
+
+fn part(text: &str) -> Result<(String, [f64; 2]), String> {
+    // The last '=' parts the two, since names of parts may contain it.
+    let (name, range) = text.rsplit_once('=').ok_or("write NAME=MIN..MAX, as in cover=0.01..0.05")?;
+    if name.trim().is_empty() {
+        return Err("the name of the part is missing; write NAME=MIN..MAX, as in cover=0.01..0.05".into());
+    }
+    Ok((name.trim().to_owned(), tolerance(range)?))
+}
+
+/// A whole positive number; `1e6`, `1_000_000` and `10M` are understood.
+fn count(text: &str) -> Result<u64, String> {
+    let plain = text.replace('_', "");
+    let (digits, factor) = match plain.chars().last() {
+        Some('k') => (&plain[..plain.len() - 1], 1e3),
+        Some('M') => (&plain[..plain.len() - 1], 1e6),
+        Some('G') => (&plain[..plain.len() - 1], 1e9),
+        _ => (plain.as_str(), 1.0),
+    };
+    let value = digits.parse::<f64>().map_err(|_| format!("'{text}' is no number"))? * factor;
+    if (1.0..=9e15).contains(&value) && value.fract() == 0.0 {
+        Ok(value as u64)
+    } else {
+        Err(format!("a number of rays is whole and at least 1, not {text}"))
+    }
+}
+
+/// `0.05deg`: a direction error in degrees.
+pub(crate) fn accuracy(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix("deg").or_else(|| text.strip_suffix('°')).unwrap_or(text);
+    let value = number.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && *v < 90.0);
+    value.ok_or_else(|| format!("an accuracy is an angle above 0, as in 0.05deg, not '{text}'"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances() {
+        assert_eq!(tolerance("0.05..0.2"), Ok([0.05, 0.2]));
+        assert_eq!(tolerance("0.1mm"), Ok([0.1, 0.1]));
+        for (wrong, says) in [
+            ("-0.1", "positive"),
+            ("0..0.2", "positive"),
+            ("0.2..0.05", "0.05..0.2"),
+            ("a", "number"),
+            ("nan", "positive"),
+        ] {
+            assert!(tolerance(wrong).unwrap_err().contains(says), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn counts() {
+        assert_eq!((count("1e6"), count("10M"), count("1_000")), (Ok(1_000_000), Ok(10_000_000), Ok(1000)));
+        assert!(count("-5").is_err() && count("0").is_err() && count("1.5").is_err() && count("").is_err());
+    }
+
+    #[test]
+    fn parts_and_angles() {
+        assert_eq!(part("a=b=0.1"), Ok(("a=b".into(), [0.1, 0.1])));
+        assert!(part("=0.1").is_err() && part("cover").is_err());
+        assert_eq!((angle("5deg"), accuracy("0.05deg")), (Ok(5.0), Ok(0.05)));
+        assert!(angle("90").is_err() && accuracy("-1deg").is_err());
+    }
+}

@@ -1,0 +1,18 @@
+use serde::Serialize;
+
+/// Where numbers come from: everything needed to get them again.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Provenance {
+    /// The command as it can be typed again.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+    /// Commit it was built from; `unknown` outside release builds.
+    pub commit: String,
+    /// Processor, cores, memory, system.
+    pub hardware: String,
+    /// Threads used.
+    pub threads: usize,
+    /// Seed of the random numbers, where there were any.
+    pub seed: Option<u64>,
+}
