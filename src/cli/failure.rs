@@ -11,13 +11,20 @@ pub(crate) struct Failure {
     code: u8,
     message: String,
     help: Option<String>,
-    source_text: Option<NamedSource<String>>,
-    span: Option<(Range<usize>, String)>,
+    place: Option<Box<Place>>,
+}
+
+/// A stretch of a text file.
+#[derive(Debug)]
+struct Place {
+    source: NamedSource<String>,
+    span: Range<usize>,
+    label: String,
 }
 
 impl Failure {
     fn new(code: u8, message: impl Into<String>) -> Self {
-        Self { code, message: message.into(), help: None, source_text: None, span: None }
+        Self { code, message: message.into(), help: None, place: None }
     }
 
     /// Exit code 1.
@@ -43,8 +50,8 @@ impl Failure {
 
     /// Shows this stretch of a text file.
     pub(crate) fn shows(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
-        self.source_text = Some(NamedSource::new(file, text.to_owned()));
-        self.span = Some((span, label.to_owned()));
+        let source = NamedSource::new(file, text.to_owned());
+        self.place = Some(Box::new(Place { source, span, label: label.to_owned() }));
         self
     }
 
@@ -67,11 +74,11 @@ impl Diagnostic for Failure {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source_text.as_ref().map(|s| s as &dyn SourceCode)
+        self.place.as_ref().map(|p| &p.source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let (span, label) = self.span.as_ref()?;
+        let Place { span, label, .. } = self.place.as_deref()?;
         let label = LabeledSpan::new(Some(label.clone()), span.start, span.len());
         Some(Box::new(std::iter::once(label)))
     }
