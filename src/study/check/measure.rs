@@ -1,0 +1,54 @@
+use super::Entrants;
+use crate::intersect::{Cost, Intersector};
+use crate::math::Ray;
+use crate::study::{Rounds, Timing};
+use std::hint::black_box;
+
+/// One intersector in a race.
+#[derive(Clone, Copy)]
+pub struct Competitor<'a> {
+    /// As in [`Entrants`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
+    pub name: &'a str,
+    /// Who answers.
+    pub who: &'a dyn Intersector,
+    /// Whether it gets the rays as one batch or one by one.
+    pub batch: bool,
+}
+
+/// Times all competitors on the same rays, on this thread, in alternating rounds; seconds per pass over the rays.
+pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
+    let mut race = Rounds::default();
+    for c in competitors {
+        let Competitor { who, batch, .. } = *c;
+        let mut hits = vec![None; rays.len()];
+        race.add(c.name, move || {
+            let mut cost = Cost::default();
+            if batch {
+                who.intersect_batch(rays, &mut hits, &mut cost);
+            } else {
+                for (ray, hit) in rays.iter().zip(&mut hits) {
+                    *hit = who.intersect(ray, &mut cost);
+                }
+            }
+            black_box(&hits);
+        });
+    }
+    race.run(rounds)
+}
+
+impl Entrants {
+    /// Sets the figure of the intersector of that name; an unknown name is ignored.
+    pub fn set(&mut self, name: &str, figure: f64) {
+        let slot = match name {
+            "octree" => &mut self.octree,
+            "octree_single" => &mut self.octree_single,
+            "bvh2" => &mut self.bvh2,
+            "cwbvh" => &mut self.cwbvh,
+            "cwbvh_as_shipped" => &mut self.cwbvh_as_shipped,
+            "polish" => &mut self.polish,
+            "exact" => &mut self.exact,
+            _ => return,
+        };
+        *slot = Some(figure);
+    }
+}

@@ -1,0 +1,337 @@
+use crate::math::{Aabb, Point, Ray, Uv, Vector};
+use crate::model::{Face, PlacedFace};
+use crate::nurbs::{Surface, UvCurve};
+use rustc_hash::FxHashMap;
+
+/// A placed face as the court sees it: its surface, and its border in space.
+pub(super) struct Sheet {
+    surface: Surface,
+    sign: f64,
+    size: f64,
+    /// Largest distance between an edge in space and its uv curve, mm.
+    pub(super) gap: f64,
+    borders: Vec<Border>,
+    seeds: Vec<(Uv, Point)>,
+}
+
+struct Border {
+    curve: UvCurve,
+    samples: Vec<(f64, Point)>,
+    bounds: Aabb,
+}
+
+/// The point of a sheet nearest to a given one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Foot {
+    pub(super) uv: Uv,
+    pub(super) point: Point,
+    pub(super) normal: Vector,
+    /// Distance, negative inside.
+    pub(super) offset: f64,
+    /// Curvature of the sheet along the ray's tangential direction, 1/mm.
+    curvature: f64,
+    /// Whether the foot is held back by the end of the domain.
+    held: bool,
+}
+
+/// The stretch of a ray that stays within a band about a sheet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// Range of `t`.
+    pub(super) range: [f64; 2],
+    /// The side on which the ray leaves the band, before and after; 0 where the ray itself ends inside.
+    pub(super) sides: [i8; 2],
+    /// Whether it comes within the band of the face's border.
+    pub(super) border: bool,
+    /// Whether both ends were found within the budget of steps.
+    pub(super) complete: bool,
+}
+
+const SAMPLES: usize = 16;
+const STEPS: usize = 600;
+
+impl Sheet {
+    /// `None` for a face without a surface.
+    pub(super) fn of(placed: &PlacedFace<'_>) -> Option<Self> {
+        let face = placed.face?;
+        let surface = face.surface.transformed(|p| placed.placement.point(p));
+        let flips = [face.reversed, placed.placement.is_mirrored()].iter().filter(|&&f| f).count();
+        let size = surface.bounds().diagonal();
+        let borders = border_curves(face, &surface, size).into_iter().map(|c| Border::new(c, &surface)).collect();
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        let at = |i: usize, a: f64, b: f64| a + (b - a) * i as f64 / SAMPLES as f64;
+        let seeds = (0..=SAMPLES)
+            .flat_map(|i| (0..=SAMPLES).map(move |j| Uv::new(at(i, u0, u1), at(j, v0, v1))))
+            .map(|uv| (uv, surface.evaluate(uv)))
+            .collect();
+        let sign = if flips == 1 { -1.0 } else { 1.0 };
+        Some(Self { surface, sign, size, gap: face.gap * placed.placement.scale, borders, seeds })
+    }
+
+    /// Diagonal of the box about the control points, mm.
+    pub(super) fn size(&self) -> f64 {
+        self.size
+    }
+
+    /// The foot of `p`, from a guess; where the guess ends at the end of the domain, also from everywhere else.
+    pub(super) fn foot(&self, p: Point, guess: Uv, direction: Vector) -> Foot {
+        let near = self.project(p, guess);
+        let mut best = self.describe(p, near, direction);
+        if best.held {
+            let mut seeds: Vec<_> = self.seeds.iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
+            seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, uv) in seeds.into_iter().take(4) {
+                let other = self.describe(p, self.project(p, uv), direction);
+                if other.offset.abs() < best.offset.abs() * (1.0 - 1e-9) || (best.held && !other.held) {
+                    best = other;
+                }
+            }
+        }
+        best
+    }
+
+    fn describe(&self, p: Point, uv: Uv, direction: Vector) -> Foot {
+        let d = self.surface.second_derivatives(uv);
+        let normal = self.surface.normal(uv).map_or(Vector::ZERO, |n| n * self.sign);
+        let away = p - d.point;
+        let height = away.dot(normal);
+        let offset = if height < 0.0 { -away.length() } else { away.length() };
+        let held = (away - normal * height).length() > 1e-6 * away.length() + 1e-9 * self.size;
+        let tangential = direction - normal * direction.dot(normal);
+        let (e, f, g) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
+        let det = e * g - f * f;
+        let (bu, bv) = (tangential.dot(d.du), tangential.dot(d.dv));
+        let (a, b) = ((g * bu - f * bv) / det, (e * bv - f * bu) / det);
+        let second = d.duu * (a * a) + d.duv * (2.0 * a * b) + d.dvv * (b * b);
+        let curvature = second.dot(normal);
+        let curvature = if curvature.is_finite() { curvature } else { 1.0 / self.size };
+        Foot { uv, point: d.point, normal, offset, curvature, held }
+    }
+
+    /// A local minimum of the distance inside the domain: Newton with an active set of the domain's sides.
+    fn project(&self, p: Point, start: Uv) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let mut uv = self.surface.clamp(start);
+        for _ in 0..40 {
+            let d = self.surface.second_derivatives(uv);
+            let r = d.point - p;
+            let g = [r.dot(d.du), r.dot(d.dv)];
+            let fixed = [
+                (uv.x <= u0 && g[0] > 0.0) || (uv.x >= u1 && g[0] < 0.0),
+                (uv.y <= v0 && g[1] > 0.0) || (uv.y >= v1 && g[1] < 0.0),
+            ];
+            let (e, f, k) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
+            let (mut a, mut b, mut c) = (e + r.dot(d.duu), f + r.dot(d.duv), k + r.dot(d.dvv));
+            if !(a > 0.0 && c > 0.0 && a * c - b * b > 1e-6 * a * c) {
+                (a, b, c) = (e * (1.0 + 1e-6) + 1e-300, f, k * (1.0 + 1e-6) + 1e-300);
+            }
+            let det = a * c - b * b;
+            let step = match fixed {
+                [true, true] => break,
+                [true, false] => Uv::new(0.0, -g[1] / c),
+                [false, true] => Uv::new(-g[0] / a, 0.0),
+                _ => Uv::new(-(c * g[0] - b * g[1]) / det, -(a * g[1] - b * g[0]) / det),
+            };
+            if !step.is_finite() {
+                break;
+            }
+            let mut scale = 1.0;
+            let mut next = self.surface.clamp(uv + step);
+            while self.surface.evaluate(next).distance_squared(p) > r.length_squared() && scale > 1e-3 {
+                scale *= 0.5;
+                next = self.surface.clamp(uv + step * scale);
+            }
+            let moved = (next - uv).abs();
+            uv = next;
+            if moved.x * e.sqrt() + moved.y * k.sqrt() < 1e-13 * self.size {
+                break;
+            }
+        }
+        uv
+    }
+
+    /// Distance from a point of the sheet to its border; infinite for a closed face.
+    fn border_distance(&self, p: Point, enough: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        for border in self.borders.iter().filter(|b| b.bounds.grown(enough).contains(p)) {
+            best = best.min(border.distance(&self.surface, p, enough));
+        }
+        best
+    }
+
+    /// Walks from `t` in both directions for as long as the ray stays within `band` of the sheet.
+    pub(super) fn stretch(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> Option<Stretch> {
+        let start = self.foot(ray.at(t), guess, ray.direction);
+        if start.offset.abs() > band {
+            return None;
+        }
+        let mut found = Stretch { range: [t, t], sides: [0, 0], border: false, complete: true };
+        for (end, sign) in [(0, -1.0), (1, 1.0)] {
+            let mut foot = start;
+            let mut at = t;
+            let mut steps = 0;
+            loop {
+                if self.border_distance(foot.point, band + 2.0 * self.gap) <= band + 2.0 * self.gap {
+                    found.border = true;
+                }
+                if foot.offset.abs() > band || foot.held {
+                    found.sides[end] = if foot.offset < 0.0 { -1 } else { 1 };
+                    break;
+                }
+                let limit = if end == 0 { ray.t_min } else { ray.t_max };
+                if at == limit {
+                    break;
+                }
+                steps += 1;
+                if steps > STEPS {
+                    found.complete = false;
+                    break;
+                }
+                at = at + sign * self.step(&foot, ray, band);
+                at = if end == 0 { at.max(limit) } else { at.min(limit) };
+                foot = self.foot(ray.at(at), foot.uv, ray.direction);
+            }
+            found.range[end] = at;
+        }
+        Some(found)
+    }
+
+    /// A length over which the offset changes by at most about half the band.
+    fn step(&self, foot: &Foot, ray: &Ray, band: f64) -> f64 {
+        let (g, k) = (foot.normal.dot(ray.direction).abs(), foot.curvature.abs());
+        let by_offset = if k * band < 1e-6 * g * g { 0.5 * band / g } else { ((g * g + k * band).sqrt() - g) / k };
+        by_offset.clamp(0.05 * band, (0.02 * self.size).max(band))
+    }
+}
+
+impl Border {
+    fn new(curve: UvCurve, surface: &Surface) -> Self {
+        let breaks = curve.breakpoints();
+        let mut samples = Vec::new();
+        for pair in breaks.windows(2) {
+            for i in 0..SAMPLES {
+                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / SAMPLES as f64;
+                samples.push((t, surface.evaluate(curve.evaluate(t))));
+            }
+        }
+        let end = curve.domain()[1];
+        samples.push((end, surface.evaluate(curve.evaluate(end))));
+        let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
+        let bounds = Aabb::around(samples.iter().map(|s| s.1)).grown(0.25 * longest);
+        Self { curve, samples, bounds }
+    }
+
+    fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        for pair in self.samples.windows(2) {
+            let ((ta, a), (tb, b)) = (pair[0], pair[1]);
+            let chord = b - a;
+            let s = if chord == Vector::ZERO { 0.0 } else { (p - a).dot(chord) / chord.length_squared() };
+            let coarse = p.distance(a + chord * s.clamp(0.0, 1.0));
+            // The curve stays within half a chord's length of its chord unless it is sampled far too thinly.
+            if coarse > enough + 0.5 * chord.length() || coarse > best + 0.5 * chord.length() {
+                continue;
+            }
+            let at = |t: f64| p.distance_squared(surface.evaluate(self.curve.evaluate(t)));
+            let (mut lo, mut hi) = (ta, tb);
+            for _ in 0..24 {
+                let (x, y) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+                if at(x) < at(y) { hi = y } else { lo = x }
+            }
+            best = best.min(at(0.5 * (lo + hi)).sqrt());
+        }
+        best
+    }
+}
+
+/// The uv curves that bound a face in space: no seams, no poles.
+fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<UvCurve> {
+    if !face.loops.is_empty() {
+        let mut uses = FxHashMap::default();
+        for u in face.loops.iter().flat_map(|l| &l.uses) {
+            if let Some(edge) = u.edge {
+                *uses.entry(edge).or_insert(0) += 1;
+            }
+        }
+        let is_border = |edge| uses.get(&edge) == Some(&1);
+        let all = face.loops.iter().flat_map(|l| &l.uses);
+        return all.filter(|u| u.edge.is_some_and(is_border)).map(|u| u.uv.clone()).collect();
+    }
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    let side = |a: Uv, b: Uv| UvCurve::line(a, b, [0.0, 1.0]);
+    let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+    let sides = [
+        side(corners[0], corners[1]),
+        side(corners[3], corners[2]),
+        side(corners[0], corners[3]),
+        side(corners[1], corners[2]),
+    ];
+    let points = |c: &UvCurve| -> Vec<Point> {
+        (0..=SAMPLES).map(|i| surface.evaluate(c.evaluate(i as f64 / SAMPLES as f64))).collect()
+    };
+    let traced: Vec<Vec<Point>> = sides.iter().map(points).collect();
+    let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < 1e-9 * size);
+    let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < 1e-9 * size);
+    (0..4).filter(|&i| !close(&traced[i], &traced[i ^ 1]) && !pole(&traced[i])).map(|i| sides[i].clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::model::Analytic;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    fn sphere(radius: f64) -> Sheet {
+        let face = Face {
+            name: String::new(),
+            entity: None,
+            colour: None,
+            surface: sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]),
+            analytic: Analytic::Other,
+            reversed: false,
+            loops: Vec::new(),
+            gap: 0.0,
+        };
+        let placed = PlacedFace {
+            id: crate::math::FaceId(0),
+            instance: 0,
+            part: crate::model::PartId(0),
+            shell: None,
+            face: Some(&face),
+            tessellated: None,
+            placement: &Frame::IDENTITY,
+        };
+        Sheet::of(&placed).unwrap()
+    }
+
+    #[test]
+    fn feet_on_a_sphere_also_across_seam_and_pole() {
+        let s = sphere(10.0);
+        assert!(s.borders.is_empty(), "a whole sphere has no border");
+        let guess = Uv::new(0.01, 0.3);
+        for p in [Point::new(12.0, -0.5, 3.0), Point::new(0.1, 0.0, 9.0), Point::new(-3.0, -8.0, -7.0)] {
+            let foot = s.foot(p, guess, Vector::X);
+            assert!((foot.point - p.normalize() * 10.0).length() < 1e-9, "{p}: {foot:?}");
+            assert!((foot.offset - (p.length() - 10.0)).abs() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn stretches_of_a_ray_through_and_past_a_sphere() {
+        let s = sphere(10.0);
+        let band = 0.1;
+        // Past the sphere at a clearance of 0.05: the stretch is the chord of the sphere of radius 10.1.
+        let past = Ray::new(Point::new(-20.0, 0.0, 10.05), Vector::X);
+        let found = s.stretch(&past, 20.0, Uv::new(0.5, 1.5), band).unwrap();
+        let half = (10.1f64.powi(2) - 10.05f64.powi(2)).sqrt();
+        assert!(found.range[0] <= 20.0 - half && found.range[1] >= 20.0 + half);
+        assert!(found.range[0] > 20.0 - 3.0 * half && found.range[1] < 20.0 + 3.0 * half);
+        assert_eq!((found.sides, found.border, found.complete), ([1, 1], false, true));
+        let into = Ray::new(Point::new(-20.0, 0.0, 3.0), Vector::X);
+        let t = 20.0 - (100f64 - 9.0).sqrt();
+        assert_eq!(s.stretch(&into, t, Uv::new(PI, 0.3), band).unwrap().sides, [1, -1]);
+        assert!(s.stretch(&into, t - 1.0, Uv::new(PI, 0.3), band).is_none());
+    }
+}

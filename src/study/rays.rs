@@ -1,0 +1,207 @@
+//! Rays to ask of a model, each a pure function of its index: a camera's, random ones through the box, and bounces.
+
+use super::Random;
+use crate::intersect::{Cost, Intersector};
+use crate::math::{Aabb, Point, Ray, Vector, orthonormal_pair};
+use std::ops::Range;
+
+/// A numbered family of rays.
+pub trait RaySource: Sync {
+    /// How many rays there are.
+    fn len(&self) -> u64;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The rays of a range of indices; always the same for the same index.
+    fn rays(&self, range: Range<u64>) -> Vec<Ray>;
+}
+
+impl RaySource for [Ray] {
+    fn len(&self) -> u64 {
+        <[Ray]>::len(self) as u64
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        self[range.start as usize..range.end as usize].to_vec()
+    }
+}
+
+impl RaySource for Vec<Ray> {
+    fn len(&self) -> u64 {
+        self.as_slice().len() as u64
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        self.as_slice().rays(range)
+    }
+}
+
+/// Coherent rays: pixel by pixel from one eye that sees the whole bounding sphere.
+#[derive(Clone, Copy, Debug)]
+pub struct Camera {
+    eye: Point,
+    corner: Vector,
+    across: Vector,
+    up: Vector,
+    side: u64,
+    count: u64,
+}
+
+impl Camera {
+    /// A square picture of about `count` pixels from an odd direction, so that no axis of the model is favoured.
+    pub fn new(bounds: &Aabb, count: u64) -> Self {
+        let view = Vector::new(0.48, -0.62, 0.39).normalize();
+        let radius = (0.5 * bounds.diagonal()).max(f64::MIN_POSITIVE);
+        let (across, up) = orthonormal_pair(view);
+        let side = (count as f64).sqrt().ceil().max(1.0) as u64;
+        let eye = bounds.center() + view * (3.0 * radius);
+        // The tangent cone of the sphere seen from 3 radii has tangent 1/√8.
+        let half = radius * 3.0 / 8f64.sqrt();
+        let corner = bounds.center() - across * half - up * half - eye;
+        Self { eye, corner, across: across * (2.0 * half), up: up * (2.0 * half), side, count }
+    }
+}
+
+impl RaySource for Camera {
+    fn len(&self) -> u64 {
+        self.count
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        let pixel = |i: u64| {
+            let at = |k: u64| (k as f64 + 0.5) / self.side as f64;
+            let d = self.corner + self.across * at(i % self.side) + self.up * at(i / self.side);
+            Ray::new(self.eye, d.normalize())
+        };
+        range.map(pixel).collect()
+    }
+}
+
+/// Random rays: direction uniform, through a uniform point of the box grown by 5 %, from outside the bounding sphere.
+#[derive(Clone, Copy, Debug)]
+pub struct Uniform {
+    bounds: Aabb,
+    seed: u64,
+    count: u64,
+}
+
+impl Uniform {
+    /// `count` rays through a box.
+    pub fn new(bounds: &Aabb, seed: u64, count: u64) -> Self {
+        let margin = 0.025 * bounds.diagonal();
+        Self { bounds: bounds.grown(margin), seed, count }
+    }
+
+    fn ray(&self, index: u64) -> Ray {
+        let mut random = Random::new(self.seed, index);
+        let size = self.bounds.size();
+        let target = self.bounds.min + size * Vector::new(random.unit(), random.unit(), random.unit());
+        let d = random.direction();
+        Ray::new(target - d * (1.1 * self.bounds.diagonal()), d)
+    }
+}
+
+impl RaySource for Uniform {
+    fn len(&self) -> u64 {
+        self.count
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        range.map(|i| self.ray(i)).collect()
+    }
+}
+
+/// Rays of one path: the first comes from outside, the others from where the one before it hit.
+pub const BOUNCES: u64 = 8;
+
+/// Incoherent rays: paths of up to eight rays that leave each hit in a random direction on the side they came from.
+///
+/// A ray starts `lift` mm above the surface, in free space, so that all intersectors are asked the very same question
+/// whatever they take for the surface. A path that leaves the model begins anew.
+#[derive(Clone, Copy)]
+pub struct Bounces<'a> {
+    first: Uniform,
+    guide: &'a dyn Intersector,
+    lift: f64,
+}
+
+impl<'a> Bounces<'a> {
+    /// `guide` finds the points the rays leave; `lift` is best a few times the sag of the facets, mm.
+    pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, lift: f64, seed: u64, count: u64) -> Self {
+        Self { first: Uniform::new(bounds, seed, count), guide, lift }
+    }
+
+    fn path(&self, path: u64) -> Vec<Ray> {
+        let mut random = Random::new(self.first.seed ^ 0x5851_f42d_4c95_7f2d, path);
+        let mut cost = Cost::default();
+        let mut rays = Vec::with_capacity(BOUNCES as usize);
+        let mut ray = self.first.ray(path * BOUNCES);
+        for k in 1..=BOUNCES {
+            rays.push(ray);
+            ray = match self.guide.intersect(&ray, &mut cost) {
+                Some(hit) => {
+                    let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+                    let n = hit.geometric_normal * side;
+                    Ray::new(ray.at(hit.t) + n * self.lift, random.hemisphere(n))
+                }
+                None => self.first.ray(path * BOUNCES + k),
+            };
+        }
+        rays
+    }
+}
+
+impl RaySource for Bounces<'_> {
+    fn len(&self) -> u64 {
+        self.first.count
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        let mut rays = Vec::with_capacity((range.end - range.start) as usize);
+        let mut path = range.start / BOUNCES;
+        while path * BOUNCES < range.end {
+            let begin = path * BOUNCES;
+            let wanted = |k: usize| range.contains(&(begin + k as u64));
+            rays.extend(self.path(path).into_iter().enumerate().filter(|(k, _)| wanted(*k)).map(|(_, r)| r));
+            path += 1;
+        }
+        rays
+    }
+}
+
+/// Several families one after the other.
+pub struct Chain<'a>(pub Vec<&'a dyn RaySource>);
+
+impl RaySource for Chain<'_> {
+    fn len(&self) -> u64 {
+        self.0.iter().map(|s| s.len()).sum()
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        let (mut rays, mut begin) = (Vec::new(), 0);
+        for source in &self.0 {
+            let end = begin + source.len();
+            let (a, b) = (range.start.clamp(begin, end), range.end.clamp(begin, end));
+            if a < b {
+                rays.extend(source.rays(a - begin..b - begin));
+            }
+            begin = end;
+        }
+        rays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_do_not_depend_on_the_range_they_are_asked_in() {
+        let bounds = Aabb { min: Point::new(-1.0, -2.0, -3.0), max: Point::new(1.0, 2.0, 3.0) };
+        let (camera, uniform) = (Camera::new(&bounds, 100), Uniform::new(&bounds, 3, 50));
+        let chain = Chain(vec![&camera, &uniform]);
+        let all = chain.rays(0..chain.len());
+        assert_eq!(all.len(), 150);
+        let pieces: Vec<Ray> = [0..7, 7..120, 120..150].into_iter().flat_map(|r| chain.rays(r)).collect();
+        assert_eq!(all, pieces);
+        assert!(all.iter().all(|r| (r.direction.length() - 1.0).abs() < 1e-15));
+        assert!(all[100..].iter().all(|r| bounds.grown(0.2).clip(r).is_some()), "random rays pass through the box");
+    }
+}

@@ -1,0 +1,175 @@
+//! Models built here, whose every answer is known: single surfaces, and a plain mesher for them that shares nothing with
+//! the product's.
+
+use crate::math::{Aabb, Frame, Point, Uv, Vector};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::model::{Analytic, Face, Model, Part, PlacedFace, Shell};
+use crate::nurbs::Surface;
+use rustc_hash::FxHashMap;
+
+/// A face that is the whole domain of its surface.
+pub fn face(surface: Surface) -> Face {
+    Face {
+        name: String::new(),
+        entity: None,
+        colour: None,
+        surface,
+        analytic: Analytic::Other,
+        reversed: false,
+        loops: Vec::new(),
+        gap: 0.0,
+    }
+}
+
+/// A model of one shell with these untrimmed surfaces as its faces.
+pub fn model(name: &str, surfaces: impl IntoIterator<Item = Surface>) -> Model {
+    let faces = surfaces.into_iter().map(face).collect();
+    let shell = Shell { faces, ..Shell::default() };
+    Model::from_part(Part { name: name.into(), shells: vec![shell], ..Part::default() })
+}
+
+/// The same model under another placement of all its instances.
+pub fn placed(mut model: Model, frame: &Frame) -> Model {
+    for instance in &mut model.instances {
+        instance.placement = frame.compose(&instance.placement);
+    }
+    model
+}
+
+/// A uniform grid of facets over every knot rectangle of every untrimmed face, `divisions` a side.
+///
+/// Points that agree within 1e-9 of the model's size become one position, so closed surfaces come out closed. The sag is
+/// the largest distance at equal parameters over 7 × 7 samples of each facet, plus 15 %: measured, not proved.
+pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
+    let divisions = divisions.max(1);
+    let bounds = Aabb::around(model.placed_faces().filter_map(|p| p.face.map(|f| (p, f))).flat_map(|(p, f)| {
+        let b = f.surface.bounds().corners();
+        b.map(|c| p.placement.point(c))
+    }));
+    let cell = (1e-9 * bounds.diagonal()).max(f64::MIN_POSITIVE);
+    let mut weld = Weld { origin: bounds.min, cell, seen: FxHashMap::default() };
+    let mut mesh = FacetMesh::default();
+    for placed in model.placed_faces() {
+        if let Some(face) = placed.face {
+            grid_face(&mut mesh, &mut weld, &placed, face, divisions);
+        }
+    }
+    mesh
+}
+
+struct Weld {
+    origin: Point,
+    cell: f64,
+    seen: FxHashMap<[i64; 3], u32>,
+}
+
+impl Weld {
+    fn position(&mut self, p: Point, positions: &mut Vec<Point>) -> u32 {
+        let scaled = (p - self.origin) / (16.0 * self.cell);
+        // A point near a cell's side is looked for in both cells.
+        let near = |x: f64| [(x - 0.1).floor() as i64, (x + 0.1).floor() as i64];
+        let [xs, ys, zs] = [near(scaled.x), near(scaled.y), near(scaled.z)];
+        for x in xs {
+            for y in ys {
+                for z in zs {
+                    if let Some(&i) = self.seen.get(&[x, y, z]) {
+                        return i;
+                    }
+                }
+            }
+        }
+        let i = positions.len() as u32;
+        positions.push(p);
+        self.seen.insert([scaled.x, scaled.y, scaled.z].map(|x| x.floor() as i64), i);
+        i
+    }
+}
+
+fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
+    let [a, b] = surface.domain()[direction];
+    let mut knots: Vec<f64> = surface.knots[direction].iter().copied().filter(|k| (a..=b).contains(k)).collect();
+    knots.dedup();
+    let inner = knots
+        .windows(2)
+        .flat_map(|w| (0..divisions).map(move |i| w[0] + (w[1] - w[0]) * i as f64 / divisions as f64));
+    inner.chain([b]).collect()
+}
+
+fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, face: &Face, divisions: usize) {
+    let (us, vs) = (breaks(&face.surface, 0, divisions), breaks(&face.surface, 1, divisions));
+    let mirrored = placed.placement.is_mirrored();
+    let first = mesh.vertices.len() as u32;
+    for &u in &us {
+        for &v in &vs {
+            let uv = Uv::new(u, v);
+            let position = weld.position(placed.placement.point(face.surface.evaluate(uv)), &mut mesh.positions);
+            let n = placed.placement.normal(face.surface.normal(uv).unwrap_or(Vector::Z));
+            mesh.vertices.push(MeshVertex { position, normal: if face.reversed { -n } else { n }, uv });
+        }
+    }
+    let at = |i: usize, j: usize| first + (i * vs.len() + j) as u32;
+    for i in 0..us.len() - 1 {
+        for j in 0..vs.len() - 1 {
+            let mut corners = vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            if mirrored != face.reversed {
+                corners.reverse();
+            }
+            let position = |k: u32| mesh.vertices[k as usize].position;
+            // Facets at a pole lose the corner that falls on its neighbour.
+            let keep: Vec<u32> = (0..4)
+                .filter(|&k| position(corners[k]) != position(corners[(k + 1) % 4]))
+                .map(|k| corners[k])
+                .collect();
+            let vertices = match keep[..] {
+                [a, b, c, d] => [a, b, c, d],
+                [a, b, c] => [a, b, c, c],
+                _ => continue,
+            };
+            mesh.facets.push(Facet { vertices, face: placed.id });
+            let sag = sampled_sag(mesh, mesh.facets.len() - 1, placed, face);
+            mesh.sag.push(sag);
+        }
+    }
+}
+
+fn sampled_sag(mesh: &FacetMesh, facet: usize, placed: &PlacedFace<'_>, face: &Face) -> f64 {
+    let corners = mesh.corners(facet);
+    let uv = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);
+    let mut worst = 0.0f64;
+    for triangle in [[0, 1, 2], [0, 2, 3]] {
+        for i in 0..=6 {
+            for j in 0..=6 - i {
+                let b = [i, j, 6 - i - j].map(|k| k as f64 / 6.0);
+                let mix = |k: usize| triangle[k];
+                let p = corners[mix(0)] * b[0] + corners[mix(1)] * b[1] + corners[mix(2)] * b[2];
+                let q = uv[mix(0)] * b[0] + uv[mix(1)] * b[1] + uv[mix(2)] * b[2];
+                worst = worst.max(p.distance(placed.placement.point(face.surface.evaluate(q))));
+            }
+        }
+    }
+    1.15 * worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_gridded_sphere_is_closed_and_as_large_as_its_sag_allows() {
+        let s = sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        let mesh = grid_mesh(&model("ball", [s]), 8);
+        let n = mesh.positions.len() as i64;
+        let triangles: i64 = mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        assert_eq!(2 * n - 4, triangles, "Euler's formula of a closed genus-0 surface");
+        let worst = mesh.sag.iter().copied().fold(0.0, f64::max);
+        let full = 4.0 / 3.0 * PI * 1000.0;
+        assert!(mesh.volume() < full && mesh.volume() > 4.0 / 3.0 * PI * (10.0 - worst).powi(3));
+        let mirrored = placed(
+            model("ball", [sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0])]),
+            &Frame { z: -Vector::Z, ..Frame::IDENTITY },
+        );
+        assert!(grid_mesh(&mirrored, 8).volume() > 0.0, "a mirrored placement keeps normals outward");
+    }
+}

@@ -1,0 +1,122 @@
+use serde::Serialize;
+use std::time::Instant;
+
+/// How far a study has come; handed to its progress callback.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// What is being done, in a few words.
+    pub stage: String,
+    /// Share of the whole study that is done, 0 to 1.
+    pub done: f64,
+    /// Seconds left, from the pace so far; `None` before anything is known.
+    pub remaining_seconds: Option<f64>,
+}
+
+/// Seconds of repeated runs: never a single one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// The fastest run.
+    pub min: f64,
+    /// The middle run.
+    pub median: f64,
+    /// 90 % of the runs were faster.
+    pub p90: f64,
+    /// Number of runs.
+    pub runs: usize,
+}
+
+impl Timing {
+    /// From the seconds of each run; all zero without any.
+    pub fn of(mut seconds: Vec<f64>) -> Self {
+        if seconds.is_empty() {
+            return Self::default();
+        }
+        seconds.sort_by(f64::total_cmp);
+        let n = seconds.len();
+        Self {
+            min: seconds[0],
+            median: 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2]),
+            p90: seconds[((n as f64 * 0.9).ceil() as usize).clamp(1, n) - 1],
+            runs: n,
+        }
+    }
+}
+
+/// Competitors timed in alternating rounds: A B C, then C B A, and so on, so that a slow phase of the machine meets all
+/// of them alike.
+#[derive(Default)]
+pub struct Rounds<'a> {
+    competitors: Vec<(String, Box<dyn FnMut() + 'a>)>,
+}
+
+impl<'a> Rounds<'a> {
+    /// Adds a competitor; one call of `run` is one timed run.
+    pub fn add(&mut self, name: impl Into<String>, run: impl FnMut() + 'a) {
+        self.competitors.push((name.into(), Box::new(run)));
+    }
+
+    /// Runs every competitor once untimed and then `rounds` times; results in the order of adding.
+    pub fn run(mut self, rounds: usize) -> Vec<(String, Timing)> {
+        let mut seconds = vec![Vec::with_capacity(rounds); self.competitors.len()];
+        for (_, run) in &mut self.competitors {
+            run();
+        }
+        for round in 0..rounds {
+            let order: Vec<usize> = if round % 2 == 0 {
+                (0..self.competitors.len()).collect()
+            } else {
+                (0..self.competitors.len()).rev().collect()
+            };
+            for i in order {
+                let start = Instant::now();
+                (self.competitors[i].1)();
+                seconds[i].push(start.elapsed().as_secs_f64());
+            }
+        }
+        self.competitors.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::of(s))).collect()
+    }
+}
+
+/// Reports progress with the time left.
+pub(super) struct Clock<'a> {
+    start: Instant,
+    report: &'a (dyn Fn(Progress) + Sync),
+}
+
+impl<'a> Clock<'a> {
+    pub(super) fn new(report: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        Self { start: Instant::now(), report }
+    }
+
+    /// `done` is the share of the expected work, not of the number of steps.
+    pub(super) fn at(&self, stage: &str, done: f64) {
+        let elapsed = self.start.elapsed().as_secs_f64();
+        let remaining_seconds = (done > 0.01).then(|| elapsed * (1.0 - done).max(0.0) / done);
+        (self.report)(Progress { stage: stage.into(), done, remaining_seconds });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+
+    #[test]
+    fn figures_of_ten_runs() {
+        let t = Timing::of((1..=10).rev().map(f64::from).collect());
+        assert_eq!((t.min, t.median, t.p90, t.runs), (1.0, 5.5, 9.0, 10));
+        assert_eq!(Timing::of(Vec::new()).runs, 0);
+    }
+
+    #[test]
+    fn rounds_alternate() {
+        let log = RefCell::new(String::new());
+        let mut rounds = Rounds::default();
+        rounds.add("a", || log.borrow_mut().push('a'));
+        rounds.add("b", || log.borrow_mut().push('b'));
+        let timings = rounds.run(2);
+        assert_eq!(log.borrow().as_str(), "ababba");
+        assert_eq!(timings[1].0, "b");
+        assert_eq!(timings[1].1.runs, 2);
+    }
+}
