@@ -110,7 +110,7 @@ fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, fac
     let at = |i: usize, j: usize| first + (i * vs.len() + j) as u32;
     for i in 0..us.len() - 1 {
         for j in 0..vs.len() - 1 {
-            let mut corners = vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            let mut corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
             if mirrored != face.reversed {
                 corners.reverse();
             }

@@ -187,7 +187,7 @@ impl Sheet {
                     found.complete = false;
                     break;
                 }
-                at = at + sign * self.step(&foot, ray, band);
+                at += sign * self.step(&foot, ray, band);
                 at = if end == 0 { at.max(limit) } else { at.min(limit) };
                 foot = self.foot(ray.at(at), foot.uv, ray.direction);
             }
