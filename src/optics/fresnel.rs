@@ -4,7 +4,7 @@
 
 use super::bend::cos_transmitted;
 
-/// Reflected shares of power, for light polarised across (s) and in (p) the plane of incidence.
+/// Shares of power (reflected, unless said otherwise), for light polarised across (s) and in (p) the plane of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Power {
     /// Electric field perpendicular to the plane of incidence.
@@ -17,9 +17,18 @@ impl Power {
     /// All power reflected.
     pub const TOTAL: Self = Self { rs: 1.0, rp: 1.0 };
 
+    /// No power reflected.
+    pub const NONE: Self = Self { rs: 0.0, rp: 0.0 };
+
     /// The share of unpolarised light: the mean of both.
     pub fn unpolarised(&self) -> f64 {
         0.5 * (self.rs + self.rp)
+    }
+
+    /// Adds a weighted share.
+    pub(super) fn add(&mut self, other: Self, weight: f64) {
+        self.rs += other.rs * weight;
+        self.rp += other.rp * weight;
     }
 }
 

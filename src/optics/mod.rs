@@ -11,9 +11,27 @@
 //! Known weakness: geometrical optics alone. No interference beyond what a coating table states, no fluorescence,
 //! no birefringence, no gradient index.
 
+mod abg;
 mod bend;
+pub mod catalogue;
+mod coating;
 mod effects;
+mod error;
 pub mod fresnel;
+mod media;
+mod phase;
+pub mod sampling;
+mod scatter;
+mod table;
+#[cfg(test)]
+mod testing;
 
+pub use abg::Abg;
 pub use bend::{reflect, refract};
+pub use coating::{Coating, CoatingTable, Split};
 pub use effects::{Effect, Effects};
+pub use error::{Error, ErrorKind};
+pub use media::{Absorption, Index, Medium, line};
+pub use phase::BulkScatter;
+pub use scatter::{Lobe, Scatter};
+pub use table::Table;

@@ -1,0 +1,237 @@
+use super::bend::cos_transmitted;
+use super::error::{Error, ErrorKind, checked};
+use super::fresnel::{self, Power};
+use super::table::{bracket, check_increasing};
+
+/// What an interface does to the power that meets it.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum Coating {
+    /// A bare interface of two media: Fresnel's equations.
+    #[default]
+    Bare,
+    /// Constant shares; the rest is absorbed. `(0, 1)` is a perfect antireflection coating, `(1, 0)` a perfect mirror,
+    /// `(0, 0)` black.
+    Ideal {
+        /// Share reflected.
+        reflectance: f64,
+        /// Share transmitted.
+        transmittance: f64,
+    },
+    /// An opaque metal of index `n + i·k`; what is not reflected is absorbed.
+    Metal {
+        /// Real part of the index.
+        n: f64,
+        /// Extinction coefficient.
+        k: f64,
+    },
+    /// Measured or computed shares over angle and wavelength.
+    Table(CoatingTable),
+}
+
+/// Shares of the incident power, by polarisation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Split {
+    /// Reflected.
+    pub reflected: Power,
+    /// Transmitted.
+    pub transmitted: Power,
+}
+
+impl Split {
+    /// Absorbed share of unpolarised light.
+    pub fn absorbed(&self) -> f64 {
+        1.0 - self.reflected.unpolarised() - self.transmitted.unpolarised()
+    }
+}
+
+impl Coating {
+    /// Constant shares, each from 0 to 1 and no more than 1 together.
+    pub fn ideal(reflectance: f64, transmittance: f64) -> Result<Self, Error> {
+        let share = |x: f64| (0.0..=1.0).contains(&x);
+        checked("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
+        checked("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
+        let sum = reflectance + transmittance;
+        checked("reflectance plus transmittance", sum, sum <= 1.0 + 1e-12, "at most 1")?;
+        Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
+    }
+
+    /// Shares at `cos_i = |d·n|`, with the index `n1` on the side of arrival and `n2` on the other.
+    ///
+    /// Where Snell's law has no refracted ray, what would have been transmitted is reflected.
+    pub fn split(&self, cos_i: f64, n1: f64, n2: f64, wavelength_nm: f64) -> Split {
+        let eta = n1 / n2;
+        let split = match self {
+            Self::Bare => {
+                let reflected = fresnel::dielectric(cos_i, eta);
+                let transmitted = Power { rs: 1.0 - reflected.rs, rp: 1.0 - reflected.rp };
+                return Split { reflected, transmitted };
+            }
+            Self::Metal { n, k } => {
+                return Split { reflected: fresnel::conductor(cos_i, n1, *n, *k), transmitted: Power::NONE };
+            }
+            Self::Ideal { reflectance: r, transmittance: t } => {
+                Split { reflected: Power { rs: *r, rp: *r }, transmitted: Power { rs: *t, rp: *t } }
+            }
+            Self::Table(table) => table.at(table.angle_deg(cos_i, eta), wavelength_nm),
+        };
+        if cos_transmitted(cos_i, eta).is_some() {
+            return split;
+        }
+        let (r, t) = (split.reflected, split.transmitted);
+        Split { reflected: Power { rs: r.rs + t.rs, rp: r.rp + t.rp }, transmitted: Power::NONE }
+    }
+
+    /// Whether the shares depend on the wavelength beyond what the media's indices do.
+    pub fn is_dispersive(&self) -> bool {
+        matches!(self, Self::Table(t) if t.wavelengths_nm.len() > 1)
+    }
+
+    /// Whether nothing is ever transmitted.
+    pub fn is_opaque(&self) -> bool {
+        match self {
+            Self::Bare => false,
+            Self::Ideal { transmittance, .. } => *transmittance == 0.0,
+            Self::Metal { .. } => true,
+            Self::Table(t) => t.is_opaque(),
+        }
+    }
+
+    /// Whether nothing is ever reflected, apart from total internal reflection.
+    pub fn is_reflectionless(&self) -> bool {
+        match self {
+            Self::Bare | Self::Metal { .. } => false,
+            Self::Ideal { reflectance, .. } => *reflectance == 0.0,
+            Self::Table(t) => t.cells.iter().all(|c| c.reflected == Power::NONE),
+        }
+    }
+}
+
+/// Shares over angle and wavelength, bilinear between the points and constant beyond them.
+///
+/// The angle is measured in the rarer of the two media, so that one table serves light from both sides; an opaque coating is
+/// read at the angle of incidence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoatingTable {
+    angles_deg: Vec<f64>,
+    wavelengths_nm: Vec<f64>,
+    /// `cells[i * wavelengths + j]`.
+    cells: Vec<Split>,
+}
+
+impl CoatingTable {
+    /// From cells angle by angle, in each wavelength by wavelength. Angles from 0 to 90; both axes strictly increasing.
+    pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, cells: Vec<Split>) -> Result<Self, Error> {
+        let what = "coating";
+        if angles_deg.is_empty() || wavelengths_nm.is_empty() {
+            return Err(ErrorKind::EmptyTable { what }.into());
+        }
+        check_increasing("coating angle", &angles_deg)?;
+        check_increasing("coating wavelength", &wavelengths_nm)?;
+        for &angle in &angles_deg {
+            checked("a coating angle", angle, (0.0..=90.0).contains(&angle), "from 0 to 90 degrees")?;
+        }
+        let expected = angles_deg.len() * wavelengths_nm.len();
+        if cells.len() != expected {
+            return Err(ErrorKind::WrongCount { what, found: cells.len(), expected }.into());
+        }
+        for c in &cells {
+            for (r, t) in [(c.reflected.rs, c.transmitted.rs), (c.reflected.rp, c.transmitted.rp)] {
+                checked("a reflectance of the coating", r, (0.0..=1.0).contains(&r), "from 0 to 1")?;
+                checked("a transmittance of the coating", t, (0.0..=1.0).contains(&t), "from 0 to 1")?;
+                checked("reflectance plus transmittance of the coating", r + t, r + t <= 1.0 + 1e-9, "at most 1")?;
+            }
+        }
+        Ok(Self { angles_deg, wavelengths_nm, cells })
+    }
+
+    /// The shares at an angle of the table and a wavelength.
+    pub fn at(&self, angle_deg: f64, wavelength_nm: f64) -> Split {
+        let (i, s) = bracket(&self.angles_deg, angle_deg);
+        let (j, t) = bracket(&self.wavelengths_nm, wavelength_nm);
+        let columns = self.wavelengths_nm.len();
+        let mut sum = Split { reflected: Power::NONE, transmitted: Power::NONE };
+        for (row, a) in [(i, 1.0 - s), (i + 1, s)] {
+            for (column, b) in [(j, 1.0 - t), (j + 1, t)] {
+                let weight = a * b;
+                if weight > 0.0 {
+                    let cell = &self.cells[row * columns + column];
+                    sum.reflected.add(cell.reflected, weight);
+                    sum.transmitted.add(cell.transmitted, weight);
+                }
+            }
+        }
+        sum
+    }
+
+    fn is_opaque(&self) -> bool {
+        self.cells.iter().all(|c| c.transmitted == Power::NONE)
+    }
+
+    /// The angle that the table is read at.
+    fn angle_deg(&self, cos_i: f64, eta: f64) -> f64 {
+        let cos = if eta <= 1.0 || self.is_opaque() { cos_i } else { cos_transmitted(cos_i, eta).unwrap_or(0.0) };
+        cos.clamp(0.0, 1.0).acos().to_degrees()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn same(x: f64) -> Power {
+        Power { rs: x, rp: x }
+    }
+
+    fn table() -> Coating {
+        let cell = |r: f64, t: f64| Split { reflected: same(r), transmitted: same(t) };
+        let cells = vec![cell(0.01, 0.99), cell(0.03, 0.95), cell(0.05, 0.93), cell(0.09, 0.85)];
+        Coating::Table(CoatingTable::new(vec![0.0, 60.0], vec![450.0, 650.0], cells).unwrap())
+    }
+
+    #[test]
+    fn bare_and_ideal_close_to_the_last_bit() {
+        for i in 0..=90 {
+            let cos_i = f64::from(i).to_radians().cos();
+            let s = Coating::Bare.split(cos_i, 1.0, 1.5168, 550.0);
+            assert_eq!(s.reflected.rs + s.transmitted.rs, 1.0);
+            assert_eq!(s.reflected.rp + s.transmitted.rp, 1.0);
+        }
+        let half = Coating::ideal(0.3, 0.6).unwrap().split(0.7, 1.0, 1.5, 550.0);
+        assert!((half.absorbed() - 0.1).abs() < 1e-15);
+        assert!(Coating::ideal(0.6, 0.5).is_err() && Coating::ideal(-0.1, 0.5).is_err());
+    }
+
+    #[test]
+    fn a_table_is_bilinear_and_serves_both_sides() {
+        let c = table();
+        let middle = c.split(30f64.to_radians().cos(), 1.0, 1.5, 550.0);
+        assert!((middle.reflected.rs - 0.045).abs() < 1e-12);
+        assert!((middle.transmitted.rp - 0.93).abs() < 1e-12);
+        // From inside at the refracted angle the same cell answers.
+        let inside = (0.5f64 / 1.5).asin();
+        let back = c.split(inside.cos(), 1.5, 1.0, 550.0);
+        assert!((back.reflected.rs - middle.reflected.rs).abs() < 1e-12);
+        // Beyond the last angle the table is constant.
+        assert_eq!(c.split(0.0, 1.0, 1.5, 450.0).reflected.rs, 0.05);
+    }
+
+    #[test]
+    fn what_cannot_be_transmitted_is_reflected() {
+        let s = Coating::ideal(0.0, 1.0).unwrap().split(0.5, 1.5, 1.0, 550.0);
+        assert_eq!((s.reflected, s.transmitted), (same(1.0), Power::NONE));
+        let s = table().split(0.5, 1.5, 1.0, 450.0);
+        assert!((s.reflected.rs - 0.98).abs() < 1e-12 && s.transmitted == Power::NONE);
+        let mirror = Coating::ideal(0.95, 0.0).unwrap().split(0.5, 1.5, 1.0, 550.0);
+        assert_eq!(mirror.reflected, same(0.95));
+    }
+
+    #[test]
+    fn tables_without_sense_are_refused() {
+        let cell = Split { reflected: same(0.6), transmitted: same(0.6) };
+        assert!(CoatingTable::new(vec![0.0], vec![550.0], vec![cell]).is_err());
+        let e = CoatingTable::new(vec![0.0, 10.0], vec![550.0], vec![]).unwrap_err();
+        assert_eq!(e.to_string(), "the coating table has 0 values where 2 belong");
+        assert!(CoatingTable::new(vec![0.0, 95.0], vec![550.0], vec![]).is_err());
+    }
+}

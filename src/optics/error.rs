@@ -1,0 +1,74 @@
+use thiserror::Error;
+
+/// Why optical data was refused; the message says what is wrong and what to give instead.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{kind}")]
+pub struct Error {
+    kind: ErrorKind,
+}
+
+/// The kinds of refusal.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// A table without rows.
+    #[error("the {what} table is empty; give at least one row")]
+    EmptyTable {
+        /// What the table holds.
+        what: &'static str,
+    },
+    /// Rows out of order.
+    #[error(
+        "row {row} of the {what} table does not come after the one before it; sort by the first column and remove duplicates"
+    )]
+    NotIncreasing {
+        /// What the table holds.
+        what: &'static str,
+        /// Counted from 1.
+        row: usize,
+    },
+    /// Columns of different length.
+    #[error("the {what} table has {found} values where {expected} belong")]
+    WrongCount {
+        /// What the table holds.
+        what: &'static str,
+        /// Values given.
+        found: usize,
+        /// Values needed.
+        expected: usize,
+    },
+    /// A number that means nothing.
+    #[error("{what} is {value}, but must be {allowed}")]
+    OutOfRange {
+        /// What the number is.
+        what: &'static str,
+        /// As given.
+        value: f64,
+        /// What would be accepted.
+        allowed: &'static str,
+    },
+    /// A spectrum or lobe that carries no power.
+    #[error("{what} carries no power; give at least one positive value")]
+    NoPower {
+        /// What it is.
+        what: &'static str,
+    },
+}
+
+impl Error {
+    /// The kind of refusal.
+    pub fn kind(&self) -> &ErrorKind {
+        &self.kind
+    }
+}
+
+impl From<ErrorKind> for Error {
+    fn from(kind: ErrorKind) -> Self {
+        Self { kind }
+    }
+}
+
+/// `value` when `good`, else the refusal that names it.
+pub(super) fn checked(what: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
+    if good && value.is_finite() { Ok(value) } else { Err(ErrorKind::OutOfRange { what, value, allowed }.into()) }
+}

@@ -1,0 +1,235 @@
+use super::error::{Error, checked};
+use super::phase::BulkScatter;
+use super::table::Table;
+
+/// What light travels through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Medium {
+    /// As reports name it.
+    pub name: String,
+    /// Refractive index.
+    pub index: Index,
+    /// Loss along the way.
+    pub absorption: Absorption,
+    /// Scattering along the way.
+    pub scatter: Option<BulkScatter>,
+}
+
+impl Medium {
+    /// A medium of that index that neither absorbs nor scatters.
+    pub fn clear(name: impl Into<String>, index: Index) -> Self {
+        Self { name: name.into(), index, absorption: Absorption::None, scatter: None }
+    }
+
+    /// Vacuum, and air where its index of 1.00028 does not matter.
+    pub fn vacuum() -> Self {
+        Self::clear("vacuum", Index::Constant(1.0))
+    }
+}
+
+/// Refractive index over the vacuum wavelength.
+///
+/// The formulas take λ in µm inside, as their sources print the coefficients.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Index {
+    /// The same at every wavelength.
+    Constant(f64),
+    /// `n² = 1 + Σ B λ²/(λ² − C)` with pairs `[B, C]`, C in µm² (already squared). Also the one-term form that
+    /// Sultanova et al. (Acta Phys. Pol. A 116, 585, 2009) fit to plastics.
+    Sellmeier(Vec<[f64; 2]>),
+    /// `n = A + B/λ² + C/λ⁴ + …`.
+    Cauchy(Vec<f64>),
+    /// `n² = A₀ + A₁λ² + A₂λ⁻² + A₃λ⁻⁴ + A₄λ⁻⁶ + A₅λ⁻⁸`: the form of Schott's catalogues before 1992.
+    Schott([f64; 6]),
+    /// Points over the wavelength in nm, linear between them.
+    Table(Table),
+}
+
+impl Index {
+    /// The one-term Sellmeier form `n² = 1 + A λ²/(λ² − B)`.
+    pub fn sultanova(a: f64, b: f64) -> Self {
+        Self::Sellmeier(vec![[a, b]])
+    }
+
+    /// The index at a vacuum wavelength.
+    ///
+    /// NaN where a formula has no real value, far outside the range it was fitted to; see [`Index::checked`].
+    pub fn at(&self, wavelength_nm: f64) -> f64 {
+        let um = wavelength_nm * 1e-3;
+        let l2 = um * um;
+        match self {
+            Self::Constant(n) => *n,
+            Self::Sellmeier(terms) => terms.iter().fold(1.0, |n2, [b, c]| n2 + b * l2 / (l2 - c)).sqrt(),
+            Self::Cauchy(terms) => terms.iter().rev().fold(0.0, |n, a| n / l2 + a),
+            Self::Schott([a0, a1, rest @ ..]) => {
+                (a0 + a1 * l2 + rest.iter().rev().fold(0.0, |n, a| (n + a) / l2)).sqrt()
+            }
+            Self::Table(table) => table.at(wavelength_nm),
+        }
+    }
+
+    /// Whether the index depends on the wavelength.
+    pub fn is_dispersive(&self) -> bool {
+        match self {
+            Self::Constant(_) => false,
+            Self::Sellmeier(terms) => terms.iter().any(|t| t[0] != 0.0),
+            Self::Cauchy(terms) => terms.iter().skip(1).any(|&a| a != 0.0),
+            Self::Schott([_, rest @ ..]) => rest.iter().any(|&a| a != 0.0),
+            Self::Table(table) => !table.is_constant(),
+        }
+    }
+
+    /// The same index, refused when it is not a number of at least 0.1 at any of the wavelengths.
+    pub fn checked(self, wavelengths_nm: &[f64]) -> Result<Self, Error> {
+        for &nm in wavelengths_nm {
+            let n = self.at(nm);
+            checked(
+                "a refractive index",
+                n,
+                (0.1..=10.0).contains(&n),
+                "between 0.1 and 10 at every wavelength in use",
+            )?;
+        }
+        Ok(self)
+    }
+
+    /// The Abbe number `(n_d − 1)/(n_F − n_C)`; infinite without dispersion.
+    pub fn abbe_number(&self) -> f64 {
+        (self.at(line::D) - 1.0) / (self.at(line::F) - self.at(line::C))
+    }
+}
+
+/// Vacuum wavelengths of spectral lines, nm.
+pub mod line {
+    /// Hydrogen, blue.
+    pub const F: f64 = 486.1327;
+    /// Mercury, green.
+    pub const E: f64 = 546.074;
+    /// Helium, yellow.
+    pub const D: f64 = 587.5618;
+    /// Helium–neon laser.
+    pub const HE_NE: f64 = 632.8;
+    /// Hydrogen, red.
+    pub const C: f64 = 656.2725;
+}
+
+/// Loss of power along the way, by Beer and Lambert's law.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum Absorption {
+    /// None.
+    #[default]
+    None,
+    /// Napierian coefficient, per mm.
+    Constant(f64),
+    /// Napierian coefficient per mm over the wavelength in nm.
+    Table(Table),
+}
+
+impl Absorption {
+    /// A constant coefficient, per mm.
+    pub fn per_mm(coefficient: f64) -> Result<Self, Error> {
+        Ok(Self::Constant(checked("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
+    }
+
+    /// Coefficients per mm at wavelengths in nm.
+    pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
+        let table = Table::new("absorption", points)?;
+        let [low, _] = table.extremes();
+        checked("an absorption coefficient", low, low >= 0.0, "zero or more")?;
+        Ok(Self::Table(table))
+    }
+
+    /// From internal transmittances over a sample of `thickness_mm`, as glass sheets give them.
+    pub fn from_transmittance(
+        thickness_mm: f64,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Result<Self, Error> {
+        checked("a thickness", thickness_mm, thickness_mm > 0.0, "positive")?;
+        let rows = points.into_iter().map(|(nm, t)| {
+            checked("an internal transmittance", t, t > 0.0 && t <= 1.0, "above 0 and at most 1")?;
+            Ok((nm, -t.ln() / thickness_mm))
+        });
+        Self::table(rows.collect::<Result<Vec<_>, Error>>()?)
+    }
+
+    /// The coefficient at a wavelength, per mm.
+    pub fn coefficient(&self, wavelength_nm: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Constant(a) => *a,
+            Self::Table(table) => table.at(wavelength_nm),
+        }
+    }
+
+    /// Share of power left after a way of `length` mm.
+    pub fn transmittance(&self, length: f64, wavelength_nm: f64) -> f64 {
+        match self {
+            Self::None => 1.0,
+            _ => (-self.coefficient(wavelength_nm) * length).exp(),
+        }
+    }
+
+    /// Whether nothing is absorbed at any wavelength.
+    pub fn is_none(&self) -> bool {
+        match self {
+            Self::None => true,
+            Self::Constant(a) => *a == 0.0,
+            Self::Table(table) => table.extremes()[1] == 0.0,
+        }
+    }
+
+    /// Whether the loss depends on the wavelength.
+    pub fn is_dispersive(&self) -> bool {
+        matches!(self, Self::Table(table) if !table.is_constant())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_agree_with_hand_evaluation() {
+        // λ = 0.5 µm, λ² = 0.25.
+        assert!((Index::Cauchy(vec![1.5, 0.004, 0.0001]).at(500.0) - (1.5 + 0.016 + 0.0016)).abs() < 1e-15);
+        let schott = Index::Schott([2.25, -0.01, 0.01, 0.001, 0.0001, 0.00001]);
+        let n2 = 2.25 - 0.0025 + 0.04 + 0.016 + 0.0064 + 0.00256;
+        assert!((schott.at(500.0) - f64::sqrt(n2)).abs() < 1e-15);
+        assert!((Index::sultanova(1.25, 0.05).at(500.0) - f64::sqrt(1.0 + 1.25 * 0.25 / 0.2)).abs() < 1e-15);
+        assert!(schott.is_dispersive() && !Index::Cauchy(vec![1.5, 0.0]).is_dispersive());
+        assert_eq!(Index::Constant(1.5).abbe_number(), f64::INFINITY);
+    }
+
+    #[test]
+    fn schott_n_bk7_of_the_old_catalogue_agrees_with_sellmeier() {
+        // Constants of BK7 in Schott's power series, catalogue of 1980; n_d = 1.51680, n_F = 1.52238, n_C = 1.51432.
+        let old =
+            Index::Schott([2.2718929, -1.0108077e-2, 1.0592509e-2, 2.0816965e-4, -7.6472538e-6, 4.9240991e-7]);
+        for (nm, n) in [(line::D, 1.51680), (line::F, 1.52238), (line::C, 1.51432)] {
+            assert!((old.at(nm) - n).abs() < 1e-5, "{nm}: {}", old.at(nm));
+        }
+    }
+
+    #[test]
+    fn beer_and_lambert() {
+        // 0.1 per cm over 3 cm.
+        let a = Absorption::per_mm(0.01).unwrap();
+        assert!((a.transmittance(30.0, 550.0) - 0.740818).abs() < 1e-6);
+        assert!((a.transmittance(10.0, 550.0) * a.transmittance(20.0, 550.0) - (-0.3f64).exp()).abs() < 1e-15);
+        assert_eq!(Absorption::None.transmittance(1e9, 550.0), 1.0);
+        let glass = Absorption::from_transmittance(25.0, [(400.0, 0.992), (500.0, 0.994)]).unwrap();
+        assert!((glass.transmittance(25.0, 400.0) - 0.992).abs() < 1e-15);
+        assert!((glass.transmittance(50.0, 500.0) - 0.994 * 0.994).abs() < 1e-15);
+        assert!(glass.is_dispersive() && !a.is_dispersive());
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_a_reason() {
+        assert!(Absorption::per_mm(-1.0).is_err());
+        let e = Absorption::from_transmittance(10.0, [(400.0, 1.2)]).unwrap_err();
+        assert!(e.to_string().contains("internal transmittance is 1.2"), "{e}");
+        assert!(Index::sultanova(1.2, 0.3).checked(&[450.0]).is_err());
+    }
+}

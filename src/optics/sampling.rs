@@ -1,0 +1,116 @@
+//! Directions and points from pairs of numbers in `[0, 1)²`, without rejection, so that every sample costs the same numbers.
+//!
+//! Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., A.5 (concentric disk of Shirley and Chiu 1997).
+
+use crate::math::{Uv, Vector, orthonormal_pair};
+use std::f64::consts::{FRAC_PI_4, PI};
+
+/// A uniform point of the unit disk; neighbouring pairs stay neighbours.
+pub fn disk([u, v]: [f64; 2]) -> Uv {
+    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    if x == 0.0 && y == 0.0 {
+        return Uv::ZERO;
+    }
+    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_4 * (2.0 - x / y)) };
+    Uv::new(r * angle.cos(), r * angle.sin())
+}
+
+/// A uniform direction of the whole sphere.
+pub fn sphere([u, v]: [f64; 2]) -> Vector {
+    let z = 1.0 - 2.0 * u;
+    let r = ((1.0 - z) * (1.0 + z)).sqrt();
+    let (s, c) = (2.0 * PI * v).sin_cos();
+    Vector::new(r * c, r * s, z)
+}
+
+/// A uniform direction of the cone of half-angle `acos(cos_max)` about the unit vector `axis`.
+pub fn cone(axis: Vector, cos_max: f64, [u, v]: [f64; 2]) -> Vector {
+    // 1 - cos is kept, so that narrow cones lose no digits.
+    let one_minus = u * (1.0 - cos_max);
+    around(axis, 1.0 - one_minus, (one_minus * (2.0 - one_minus)).sqrt(), v)
+}
+
+/// A direction with density `cos θ/π` per steradian about `n`: Lambert's law.
+pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
+    let p = disk(u);
+    let (a, b) = orthonormal_pair(n);
+    let z = (1.0 - p.length_squared()).max(0.0).sqrt();
+    (a * p.x + b * p.y + n * z).normalize()
+}
+
+/// A direction with density `(m + 1)/2π · cosᵐ θ` per steradian about `axis`.
+pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
+    let cos = (1.0 - u).powf(1.0 / (exponent + 1.0));
+    around(axis, cos, ((1.0 - cos) * (1.0 + cos)).sqrt(), v)
+}
+
+/// The direction at an angle from `axis`, at azimuth `2π·turn`.
+pub(super) fn around(axis: Vector, cos: f64, sin: f64, turn: f64) -> Vector {
+    let (a, b) = orthonormal_pair(axis);
+    let (s, c) = (2.0 * PI * turn).sin_cos();
+    (axis * cos + (a * c + b * s) * sin).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optics::fresnel;
+    use crate::optics::testing::pairs;
+
+    const N: usize = 200_000;
+
+    fn mean(values: impl Iterator<Item = f64>) -> f64 {
+        values.sum::<f64>() / N as f64
+    }
+
+    #[test]
+    fn moments_of_directions() {
+        let axis = Vector::new(0.36, 0.48, -0.8);
+        let five_sigma = 5.0 * 0.6 / (N as f64).sqrt();
+        assert!(mean(pairs(N).map(|u| sphere(u).dot(axis))).abs() < five_sigma);
+        assert!((mean(pairs(N).map(|u| sphere(u).dot(axis).powi(2))) - 1.0 / 3.0).abs() < five_sigma);
+        assert!((mean(pairs(N).map(|u| lambertian(axis, u).dot(axis))) - 2.0 / 3.0).abs() < five_sigma);
+        assert!((mean(pairs(N).map(|u| cone(axis, 0.9, u).dot(axis))) - 0.95).abs() < five_sigma);
+        // Mean of cos under cosᵐ: (m + 1)/(m + 2).
+        assert!((mean(pairs(N).map(|u| cosine_power(axis, 6.0, u).dot(axis))) - 7.0 / 8.0).abs() < five_sigma);
+        assert!((mean(pairs(N).map(|u| disk(u).length_squared())) - 0.5).abs() < five_sigma);
+        assert!(pairs(1000).all(|u| cone(axis, 1.0 - 1e-14, u).cross(axis).length() < 1.5e-7));
+    }
+
+    #[test]
+    fn walshs_diffuse_reflection_by_monte_carlo() {
+        // Walsh's closed form (Prahl 1988, B41): outside, and inside by 1 - (1 - R)/n².
+        for (n, outside, inside) in
+            [(1.5, 0.091778, 0.596346), (4.0 / 3.0, 0.066458, 0.474883), (1.5168, 0.094240, 0.606308)]
+        {
+            for (eta, expected) in [(1.0 / n, outside), (n, inside)] {
+                let values: Vec<f64> = pairs(N)
+                    .map(|u| fresnel::dielectric(lambertian(Vector::Z, u).z.min(1.0), eta).unpolarised())
+                    .collect();
+                let m = mean(values.iter().copied());
+                let sigma = (mean(values.iter().map(|v| (v - m) * (v - m))) / N as f64).sqrt();
+                assert!((m - expected).abs() < 4.0 * sigma, "n = {n}: {m} ± {sigma}, not {expected}");
+                assert!(sigma < 0.0012);
+            }
+        }
+    }
+
+    #[test]
+    fn isotropic_light_escapes_through_the_cone() {
+        // (1 - √(1 - 1/n²))/2 of a sphere for one face of n = 1.5.
+        let critical = (1.0 - 1.0 / 2.25f64).sqrt();
+        let share = mean(pairs(N).map(|u| f64::from(u8::from(sphere(u).z > critical))));
+        assert!((share - 0.127322).abs() < 4.0 * (0.1273f64 * 0.8727 / N as f64).sqrt());
+    }
+
+    #[test]
+    fn a_diffuse_disk_lights_a_disk() {
+        // Coaxial equal disks at a distance of one radius: form factor 0.381966.
+        let hits = mean(pairs(N).zip(pairs(2 * N).skip(N)).map(|(u, v)| {
+            let d = lambertian(Vector::Z, v);
+            let p = disk(u) + d.truncate() / d.z;
+            f64::from(u8::from(p.length_squared() <= 1.0))
+        }));
+        assert!((hits - 0.381966).abs() < 4.0 * (0.382f64 * 0.618 / N as f64).sqrt(), "{hits}");
+    }
+}
