@@ -14,6 +14,7 @@
 mod abg;
 mod bend;
 pub mod catalogue;
+mod cie;
 mod coating;
 mod effects;
 mod error;
@@ -22,6 +23,7 @@ mod media;
 mod phase;
 pub mod sampling;
 mod scatter;
+mod spectrum;
 mod table;
 #[cfg(test)]
 mod testing;
@@ -34,4 +36,5 @@ pub use error::{Error, ErrorKind};
 pub use media::{Absorption, Index, Medium, line};
 pub use phase::BulkScatter;
 pub use scatter::{Lobe, Scatter};
+pub use spectrum::{MAX_EFFICACY, Spectrum, Wavelengths, WhiteLed, chromaticity, xyz_of_watt};
 pub use table::Table;

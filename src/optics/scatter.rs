@@ -87,7 +87,9 @@ impl Lobe {
         match self {
             Self::Lambertian => cos / PI,
             Self::Gaussian { sigma } => both(&|c| gaussian(c, *sigma)),
-            Self::Cosine { exponent } => both(&|c| (exponent + 1.0) / (2.0 * PI) * c.max(0.0).powf(*exponent)),
+            Self::Cosine { exponent } => {
+                both(&|c| if c > 0.0 { (exponent + 1.0) / (2.0 * PI) * c.powf(*exponent) } else { 0.0 })
+            }
             Self::Abg(abg) => abg.density(specular, n, out),
         }
     }
