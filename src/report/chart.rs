@@ -1,0 +1,125 @@
+use crate::formats::{ColourMap, Grid};
+
+/// A picture in two dimensions: interactive in the page, static beside it.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// Stem of its files.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// How to read it, one or two sentences.
+    pub caption: String,
+    /// The horizontal axis.
+    pub x: AxisStyle,
+    /// The vertical axis.
+    pub y: AxisStyle,
+    /// What is drawn.
+    pub content: Content,
+}
+
+/// One axis of a chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AxisStyle {
+    /// What runs along it.
+    pub label: String,
+    /// Its unit, empty for pure numbers.
+    pub unit: String,
+    /// Whether it is logarithmic.
+    pub log: bool,
+}
+
+/// What a chart draws.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Content {
+    /// Points and lines.
+    Series(Vec<Series>),
+    /// Bars stacked on one another: for each category, a height of every named layer.
+    Bars {
+        /// Names under the bars.
+        categories: Vec<String>,
+        /// Name and heights of each layer, from the bottom up.
+        layers: Vec<(String, Vec<f64>)>,
+    },
+    /// A coloured map.
+    Map {
+        /// Values and axes.
+        grid: Box<Grid>,
+        /// Colours.
+        map: ColourMap,
+    },
+}
+
+/// A line or a cloud of points.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Where the points are.
+    pub points: Vec<[f64; 2]>,
+    /// What the pointer shows at each point; may be empty.
+    pub labels: Vec<String>,
+    /// Half-lengths of vertical error bars; empty for none.
+    pub errors: Vec<f64>,
+    /// How it is drawn.
+    pub style: SeriesStyle,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SeriesStyle {
+    /// Points joined by a line.
+    #[default]
+    LineAndPoints,
+    /// A line alone.
+    Line,
+    /// A dashed line: theory and references.
+    Dashed,
+    /// Points alone.
+    Points,
+    /// Points in the background: dominated combinations.
+    Faint,
+}
+
+/// Colours of series, apart in print and with colour blindness, readable on white and on black.
+pub(super) const PALETTE: [&str; 8] =
+    ["#d97706", "#3b82f6", "#10a37f", "#e0529c", "#8b5cf6", "#0ea5b7", "#b45309", "#84a30d"];
+
+impl AxisStyle {
+    /// A linear axis.
+    pub fn linear(label: &str, unit: &str) -> Self {
+        Self { label: label.into(), unit: unit.into(), log: false }
+    }
+
+    /// A logarithmic axis.
+    pub fn log(label: &str, unit: &str) -> Self {
+        Self { label: label.into(), unit: unit.into(), log: true }
+    }
+
+    /// Label and unit as written at the axis.
+    pub fn title(&self) -> String {
+        if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
+    }
+}
+
+impl Chart {
+    /// A map of a grid; the axes are the grid's.
+    pub fn map(name: &str, title: &str, caption: &str, grid: Grid) -> Self {
+        let axis = |k: usize| AxisStyle::linear(&grid.axes[k].label, &grid.axes[k].unit);
+        Self {
+            name: name.into(),
+            title: title.into(),
+            caption: caption.into(),
+            x: axis(0),
+            y: axis(1),
+            content: Content::Map { grid: Box::new(grid), map: ColourMap::Inferno },
+        }
+    }
+
+    /// Points and lines.
+    pub fn series(name: &str, title: &str, caption: &str, axes: [AxisStyle; 2], series: Vec<Series>) -> Self {
+        let [x, y] = axes;
+        let content = Content::Series(series);
+        Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, content }
+    }
+}

@@ -1,0 +1,164 @@
+//! The page itself.
+
+use super::document::{Block, Report, Section};
+use super::provenance::Provenance;
+use super::table::Table;
+use super::{plotly, raster, svg};
+use crate::formats::base64;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// What the browser is told: nothing may be loaded from anywhere.
+const ALONE: &str = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; \
+    img-src data: blob:; worker-src blob:; font-src data:; connect-src data: blob:";
+
+/// The page, complete: styles, scripts, data, static twins.
+pub(super) fn page(report: &Report) -> String {
+    let interactive =
+        report.sections.iter().flat_map(|s| &s.blocks).any(|b| !matches!(b, Block::Text(_) | Block::Table(_)));
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta http-equiv="Content-Security-Policy" content=(ALONE);
+                title { (report.title) }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
+            body {
+                a.skip href="#answer" { "Skip to the answer" }
+                header {
+                    span.mark { "lampyris" }
+                    nav aria-label="Sections" {
+                        @for section in &report.sections { a href={ "#" (anchor(&section.title)) } { (section.title) } }
+                    }
+                    button #theme type="button" title="Light or dark" aria-label="Switch between light and dark" { "◐" }
+                }
+                main {
+                    h1 { (report.title) }
+                    p #answer.answer tabindex="-1" { (emphasised(&report.answer)) }
+                    @for section in &report.sections { (part(section)) }
+                    (origin(&report.provenance))
+                }
+                @if interactive { script { (PreEscaped(plotly::script())) } }
+                script { (PreEscaped(include_str!("page.js"))) }
+            }
+        }
+    };
+    markup.into_string()
+}
+
+fn part(section: &Section) -> Markup {
+    let mut rows: Vec<Vec<&Block>> = Vec::new();
+    // Neighbouring pictures share a row, at most two.
+    for block in &section.blocks {
+        let picture = |b: &Block| matches!(b, Block::Chart(_) | Block::View(_));
+        match rows.last_mut() {
+            Some(row) if row.len() == 1 && picture(row[0]) && picture(block) => row.push(block),
+            _ => rows.push(vec![block]),
+        }
+    }
+    html! {
+        section id=(anchor(&section.title)) {
+            h2 { (section.title) }
+            @for row in rows {
+                @if row.len() == 2 { div.pair { @for block in row { (content(block)) } } }
+                @else { @for block in row { (content(block)) } }
+            }
+        }
+    }
+}
+
+fn content(block: &Block) -> Markup {
+    match block {
+        Block::Text(text) => html! { p { (emphasised(text)) } },
+        Block::Table(table) => table_markup(table),
+        Block::Chart(chart) => {
+            let drawing = PreEscaped(svg::render(chart));
+            figure(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
+        }
+        Block::View(view) => {
+            let png = raster::render(view).to_png().map(|bytes| base64(&bytes)).unwrap_or_default();
+            let drawing = html! { img src={ "data:image/png;base64," (png) } alt=(view.title); };
+            figure(&view.name, &view.title, &view.caption, drawing, &plotly::view(view), true)
+        }
+    }
+}
+
+fn figure(
+    name: &str,
+    title: &str,
+    caption: &str,
+    drawing: Markup,
+    data: &serde_json::Value,
+    solid: bool,
+) -> Markup {
+    // '<' would let a name end the script element.
+    let json = data.to_string().replace('<', "\\u003c");
+    let (kind, file) =
+        if solid { ("view", format!("figures/{name}.png")) } else { ("chart", format!("figures/{name}.svg")) };
+    let keys = if solid { " Drag or arrow keys turn, wheel or + and − zoom, 0 resets." } else { "" };
+    html! {
+        figure {
+            h3 { (title) }
+            div class={ "plot " (kind) } id={ "fig-" (name) } tabindex="0" role="group" aria-label=(title) { (drawing) }
+            script type="application/json" data-for={ "fig-" (name) } { (PreEscaped(json)) }
+            figcaption { (caption) (keys) " " a href=(file) { "Static picture" } }
+        }
+    }
+}
+
+fn table_markup(table: &Table) -> Markup {
+    html! {
+        div.table id={ "table-" (table.name) } {
+            div.head {
+                h3 { (table.title) }
+                div {
+                    button type="button" data-copy={ "table-" (table.name) } { "Copy" }
+                    a.button href={ "tables/" (table.name) ".csv" } { "CSV" }
+                }
+            }
+            div.scroll tabindex="0" role="region" aria-label=(table.title) {
+                table {
+                    thead { tr { @for column in &table.columns {
+                        th scope="col" { button type="button" title="Sort" {
+                            (column.title) @if !column.unit.is_empty() { " " span.unit { (column.unit) } }
+                        } }
+                    } } }
+                    tbody { @for row in &table.rows { tr { @for cell in row {
+                        td.num[cell.is_numeric()] data-v=(cell.plain()) { (cell.shown()) }
+                    } } } }
+                }
+            }
+            @if !table.caption.is_empty() { p.caption { (emphasised(&table.caption)) } }
+        }
+    }
+}
+
+fn origin(p: &Provenance) -> Markup {
+    let seed = p.seed.map_or("none used".to_owned(), |s| s.to_string());
+    html! {
+        section #origin {
+            h2 { "Where these numbers come from" }
+            dl {
+                dt { "Command" } dd { code { (p.command) } }
+                dt { "Program" } dd { "lampyris " (p.version) ", commit " code { (p.commit) } }
+                dt { "Hardware" } dd { (p.hardware) }
+                dt { "Threads" } dd { (p.threads) }
+                dt { "Seed" } dd { (seed) }
+                dt { "Units" } dd { "mm, degrees, seconds, W or lm as written at each number" }
+            }
+        }
+    }
+}
+
+/// `**words**` become strong, everything else is text.
+fn emphasised(text: &str) -> Markup {
+    html! { @for (k, piece) in text.split("**").enumerate() { @if k % 2 == 1 { strong { (piece) } } @else { (piece) } } }
+}
+
+fn anchor(title: &str) -> String {
+    let lower = title.to_lowercase();
+    lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect::<Vec<_>>().join("-")
+}

@@ -1,0 +1,103 @@
+//! Numbers for people: as many digits as mean something, thousands set apart, units that fit the size.
+
+/// A number with so many significant digits, without exponent where that stays short, thousands apart: `0.0123`, `1 234`, `3.2e-9`.
+pub fn figures(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return if value.is_nan() {
+            "–".into()
+        } else if value > 0.0 {
+            "∞".into()
+        } else {
+            "−∞".into()
+        };
+    }
+    if value == 0.0 {
+        return "0".into();
+    }
+    let digits = digits.clamp(1, 17);
+    let scientific = format!("{:.*e}", digits - 1, value);
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if !(-4..9).contains(&exponent) {
+        return format!("{}e{exponent}", trimmed(mantissa)).replace('-', "−");
+    }
+    let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
+    let fraction = fraction.trim_end_matches('0');
+    let dot = if fraction.is_empty() { "" } else { "." };
+    format!("{}{dot}{fraction}", apart(whole)).replace('-', "−")
+}
+
+/// A whole number with its thousands set apart by narrow spaces.
+pub fn grouped(value: u64) -> String {
+    apart(&value.to_string())
+}
+
+/// A duration: `1.23 s`, `45 ms`, `2 min 5 s`.
+pub fn seconds(value: f64) -> String {
+    match value {
+        v if !v.is_finite() => "–".into(),
+        v if v < 1e-3 => format!("{} µs", figures(v * 1e6, 3)),
+        v if v < 1.0 => format!("{} ms", figures(v * 1e3, 3)),
+        v if v < 120.0 => format!("{} s", figures(v, 3)),
+        v => format!("{} min {} s", (v / 60.0).floor(), (v % 60.0).round()),
+    }
+}
+
+/// A size in memory: `12.3 MB`.
+pub fn bytes(value: u64) -> String {
+    let value = value as f64;
+    match value {
+        v if v < 1e3 => format!("{v} B"),
+        v if v < 1e6 => format!("{} kB", figures(v / 1e3, 3)),
+        v if v < 1e9 => format!("{} MB", figures(v / 1e6, 3)),
+        v => format!("{} GB", figures(v / 1e9, 3)),
+    }
+}
+
+fn trimmed(mantissa: &str) -> &str {
+    if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa }
+}
+
+fn apart(whole: &str) -> String {
+    let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |d| ("-", d));
+    if digits.len() < 5 {
+        return whole.to_owned();
+    }
+    let mut text = String::from(sign);
+    for (k, c) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(c);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_digits() {
+        for (value, digits, text) in [
+            (0.0123456, 3, "0.0123"),
+            (1234.5, 3, "1234"),
+            (1234567.0, 7, "1\u{202f}234\u{202f}567"),
+            (-0.5, 3, "−0.5"),
+            (3.2e-9, 2, "3.2e−9"),
+            (0.0, 3, "0"),
+            (99.96, 3, "100"),
+            (f64::NAN, 3, "–"),
+        ] {
+            assert_eq!(figures(value, digits), text);
+        }
+        assert_eq!(grouped(1_000_000), "1\u{202f}000\u{202f}000");
+        assert_eq!(
+            (seconds(0.0451), seconds(75.0), seconds(125.0)),
+            ("45.1 ms".into(), "75 s".into(), "2 min 5 s".into())
+        );
+        assert_eq!(bytes(12_345_678), "12.3 MB");
+    }
+}

@@ -1,0 +1,84 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const remember = (value) => { try { value === undefined || localStorage.setItem("lampyris-theme", value); return localStorage.getItem("lampyris-theme"); } catch { return null; } };
+  const asked = new URLSearchParams(location.search).get("theme") || remember();
+  if (asked === "light" || asked === "dark") root.dataset.theme = asked;
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const dark = () => (root.dataset.theme || (system.matches ? "dark" : "light")) === "dark";
+  const colours = () => { const s = getComputedStyle(root); return { fg: s.getPropertyValue("--fg").trim(), line: s.getPropertyValue("--line").trim(), card: s.getPropertyValue("--card").trim() }; };
+
+  const themed = (layout) => {
+    const c = colours();
+    layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
+    layout.font = { color: c.fg, family: "system-ui, sans-serif", size: 13 };
+    layout.hoverlabel = Object.assign(layout.hoverlabel || {}, { bgcolor: c.card, bordercolor: c.line, font: { color: c.fg } });
+    for (const key of ["xaxis", "yaxis"]) if (layout[key]) Object.assign(layout[key], { gridcolor: c.line, zerolinecolor: c.line, linecolor: c.line });
+    if (layout.scene) for (const key of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[key], { gridcolor: c.line, color: c.fg });
+    return layout;
+  };
+
+  const drawn = [];
+  const draw = (data) => {
+    const box = document.getElementById(data.dataset.for);
+    const twin = [...box.childNodes];
+    const figure = JSON.parse(data.textContent);
+    box.replaceChildren();
+    return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, scrollZoom: !!figure.layout.scene })
+      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); })
+      .catch(() => { box.replaceChildren(...twin); });
+  };
+
+  const keys = (box) => {
+    const start = structuredClone(box.layout.scene.camera);
+    box.addEventListener("keydown", (event) => {
+      const camera = structuredClone(box._fullLayout.scene._scene.getCamera());
+      const e = camera.eye;
+      const far = Math.hypot(e.x, e.y, e.z), flat = Math.atan2(e.y, e.x), high = Math.asin(e.z / far);
+      const put = (r, a, b) => { b = Math.max(-1.5, Math.min(1.5, b)); camera.eye = { x: r * Math.cos(b) * Math.cos(a), y: r * Math.cos(b) * Math.sin(a), z: r * Math.sin(b) }; Plotly.relayout(box, { "scene.camera": camera }); event.preventDefault(); };
+      const zoom = (f) => { const s = box.layout.scene.aspectratio || box._fullLayout.scene.aspectratio; Plotly.relayout(box, { "scene.aspectmode": "manual", "scene.aspectratio": { x: s.x * f, y: s.y * f, z: s.z * f } }); event.preventDefault(); };
+      if (event.key === "ArrowLeft") put(far, flat - 0.15, high);
+      else if (event.key === "ArrowRight") put(far, flat + 0.15, high);
+      else if (event.key === "ArrowUp") put(far, flat, high + 0.12);
+      else if (event.key === "ArrowDown") put(far, flat, high - 0.12);
+      else if (event.key === "+" || event.key === "=") zoom(1.15);
+      else if (event.key === "-") zoom(1 / 1.15);
+      else if (event.key === "0") Plotly.relayout(box, { "scene.camera": start, "scene.aspectmode": "data" });
+    });
+  };
+
+  const retheme = () => { for (const box of drawn) Plotly.relayout(box, themed(structuredClone(box.layout))); };
+  document.getElementById("theme").addEventListener("click", () => { root.dataset.theme = remember(dark() ? "light" : "dark") || (dark() ? "light" : "dark"); retheme(); });
+  system.addEventListener("change", () => root.dataset.theme || retheme());
+
+  for (const table of document.querySelectorAll(".table table")) {
+    const heads = [...table.tHead.rows[0].cells], body = table.tBodies[0], original = [...body.rows];
+    heads.forEach((head, column) => head.firstElementChild.addEventListener("click", () => {
+      const now = head.getAttribute("aria-sort");
+      const next = now === null ? "ascending" : now === "ascending" ? "descending" : null;
+      heads.forEach((h) => h.removeAttribute("aria-sort"));
+      if (next === null) return body.append(...original);
+      head.setAttribute("aria-sort", next);
+      const value = (row) => row.cells[column].dataset.v;
+      const sign = next === "ascending" ? 1 : -1;
+      body.append(...[...original].sort((a, b) => {
+        const x = value(a), y = value(b);
+        if (x === "" || y === "") return (x === "") - (y === "");
+        const d = Number(x) - Number(y);
+        return sign * (Number.isNaN(d) ? x.localeCompare(y, "en", { numeric: true }) : d);
+      }));
+    }));
+  }
+  for (const button of document.querySelectorAll("[data-copy]")) button.addEventListener("click", async () => {
+    const table = document.getElementById(button.dataset.copy).querySelector("table");
+    const text = [...table.rows].map((row) => [...row.cells].map((cell) => cell.dataset.v ?? cell.textContent.trim()).join("\t")).join("\n");
+    try { await navigator.clipboard.writeText(text); } catch {
+      const area = Object.assign(document.createElement("textarea"), { value: text });
+      document.body.append(area); area.select(); document.execCommand("copy"); area.remove();
+    }
+    const label = button.textContent; button.textContent = "Copied"; setTimeout(() => { button.textContent = label; }, 1500);
+  });
+
+  const figures = [...document.querySelectorAll("script[data-for]")];
+  figures.reduce((before, data) => before.then(() => draw(data)), Promise.resolve()).then(() => { root.dataset.ready = String(drawn.length); });
+})();

@@ -1,0 +1,173 @@
+//! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
+
+use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle};
+use super::raster::EYE;
+use super::view::{Shape, View};
+use crate::formats::{ColourMap, base64};
+use serde_json::{Value, json};
+
+/// The script of plotly.js as it stands in the crate, without the formula renderer that comes with it (2 MB, not needed).
+pub(super) fn script() -> String {
+    let sources = plotly::Plot::offline_js_sources();
+    let start = sources.find('>').map_or(0, |at| at + 1);
+    let end = sources.find("</script>").unwrap_or(sources.len());
+    sources[start..end].to_owned()
+}
+
+fn singles(values: impl Iterator<Item = f32>) -> Value {
+    let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+    json!({"dtype": "f4", "bdata": base64(&bytes)})
+}
+
+fn doubles(values: impl Iterator<Item = f64>) -> Value {
+    let bytes: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
+    json!({"dtype": "f8", "bdata": base64(&bytes)})
+}
+
+fn indices(values: impl Iterator<Item = u32>) -> Value {
+    let bytes: Vec<u8> = values.flat_map(u32::to_le_bytes).collect();
+    json!({"dtype": "u4", "bdata": base64(&bytes)})
+}
+
+fn colour_scale(map: ColourMap) -> Value {
+    let stop = |k: u32| {
+        let [r, g, b] = map.at(f64::from(k) / 16.0);
+        json!([f64::from(k) / 16.0, format!("rgb({r},{g},{b})")])
+    };
+    (0..=16).map(stop).collect()
+}
+
+fn css([r, g, b]: [f64; 3]) -> String {
+    let byte = |c: f64| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+    format!("rgb({},{},{})", byte(r), byte(g), byte(b))
+}
+
+fn axis(style: &AxisStyle) -> Value {
+    json!({"title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
+        "automargin": true, "exponentformat": "power"})
+}
+
+/// Data and layout of a chart.
+pub(super) fn chart(chart: &Chart) -> Value {
+    let (data, extra): (Vec<Value>, Value) = match &chart.content {
+        Content::Series(series) => {
+            let traces: Vec<Value> = series.iter().enumerate().map(|(k, s)| trace(k, s)).collect();
+            (traces, json!({}))
+        }
+        Content::Bars { categories, layers } => {
+            let bars = layers.iter().enumerate().map(|(k, (name, values))| {
+                json!({"type": "bar", "name": name, "x": categories, "y": values,
+                    "marker": {"color": PALETTE[k % PALETTE.len()]}})
+            });
+            (bars.collect(), json!({"barmode": "stack", "xaxis": {"type": "category", "automargin": true}}))
+        }
+        Content::Map { grid, map } => {
+            let [a, b] = &grid.axes;
+            let bytes: Vec<u8> = grid.values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+            let z = json!({"dtype": "f4", "bdata": base64(&bytes), "shape": format!("{}, {}", b.cells, a.cells)});
+            let hover = format!(
+                "{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<br><b>%{{z:.4g}} {}</b><extra></extra>",
+                a.label, a.unit, b.label, b.unit, grid.unit
+            );
+            let heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
+                "dy": b.step(), "colorscale": colour_scale(*map), "hovertemplate": hover,
+                "colorbar": {"title": {"text": grid.unit, "side": "right"}, "thickness": 14, "outlinewidth": 0}});
+            let spans = [a.range[1] - a.range[0], b.range[1] - b.range[0]];
+            let ratio = spans[0] / spans[1];
+            // Degrees against degrees and mm against mm look as they are, unless that makes a thin stripe.
+            let same = a.unit == b.unit && (0.3..3.4).contains(&ratio);
+            let anchor = if same { json!({"scaleanchor": "x", "constrain": "domain"}) } else { json!({}) };
+            (vec![heat], json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}}))
+        }
+    };
+    let mut layout = json!({"xaxis": axis(&chart.x), "yaxis": axis(&chart.y),
+        "margin": {"l": 60, "r": 14, "t": 10, "b": 48}, "legend": {"orientation": "h", "y": 1.12},
+        "hoverlabel": {"align": "left"}});
+    merge(&mut layout, extra);
+    json!({"data": data, "layout": layout})
+}
+
+fn trace(k: usize, s: &Series) -> Value {
+    let mode = match s.style {
+        SeriesStyle::LineAndPoints => "lines+markers",
+        SeriesStyle::Line | SeriesStyle::Dashed => "lines",
+        SeriesStyle::Points | SeriesStyle::Faint => "markers",
+    };
+    let faint = s.style == SeriesStyle::Faint;
+    let mut trace = json!({"type": "scatter", "mode": mode, "name": s.name,
+        "x": doubles(s.points.iter().map(|p| p[0])), "y": doubles(s.points.iter().map(|p| p[1])),
+        "opacity": if faint { 0.35 } else { 1.0 }, "marker": {"size": if faint { 6 } else { 8 }},
+        "line": {"width": 2, "dash": if s.style == SeriesStyle::Dashed { "dash" } else { "solid" }}});
+    let colour = PALETTE[k % PALETTE.len()];
+    trace["marker"]["color"] = colour.into();
+    trace["line"]["color"] = colour.into();
+    if !s.labels.is_empty() {
+        trace["text"] = json!(s.labels);
+        trace["hovertemplate"] = json!("%{text}<br>%{x:.4g}, %{y:.4g}<extra>%{fullData.name}</extra>");
+    }
+    if !s.errors.is_empty() {
+        trace["error_y"] = json!({"type": "data", "array": doubles(s.errors.iter().copied()), "width": 2});
+    }
+    trace
+}
+
+/// Data and layout of a 3-D view.
+pub(super) fn view(view: &View) -> Value {
+    let data: Vec<Value> = view.shapes.iter().map(shape).collect();
+    let quiet = json!({"showbackground": false, "showspikes": false, "zeroline": false, "title": {"text": ""},
+        "ticksuffix": " mm", "nticks": 5});
+    let [x, y, z] = EYE;
+    json!({"data": data, "layout": {
+        "scene": {"aspectmode": "data", "xaxis": quiet, "yaxis": quiet, "zaxis": quiet,
+            "camera": {"eye": {"x": x, "y": y, "z": z}, "projection": {"type": "orthographic"}}},
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "showlegend": view.shapes.len() > 1,
+        "legend": {"orientation": "h", "y": 0.0, "yanchor": "bottom"}}})
+}
+
+fn shape(shape: &Shape) -> Value {
+    match shape {
+        Shape::Surface { name, points, triangles, colour, opacity, values } => {
+            let mut mesh = json!({"type": "mesh3d", "name": name, "showlegend": values.is_none(),
+                "x": singles(points.iter().map(|p| p[0])), "y": singles(points.iter().map(|p| p[1])),
+                "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
+                "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
+                "opacity": opacity, "flatshading": true, "hoverinfo": "name",
+                "lighting": {"ambient": 0.55, "diffuse": 0.7, "specular": 0.15, "roughness": 0.6},
+                "lightposition": {"x": 2000, "y": -4000, "z": 6000}});
+            match values {
+                Some(v) => {
+                    mesh["intensity"] = singles(v.values.iter().copied());
+                    mesh["intensitymode"] = json!("cell");
+                    mesh["colorscale"] = colour_scale(v.map);
+                    mesh["colorbar"] =
+                        json!({"title": {"text": v.label, "side": "right"}, "thickness": 14, "outlinewidth": 0});
+                    mesh["hovertemplate"] = json!(format!("{} %{{intensity:.4g}}<extra></extra>", v.label));
+                }
+                None => mesh["color"] = json!(css(*colour)),
+            }
+            mesh
+        }
+        Shape::Lines { name, lines, colour, width } => {
+            // A NaN lifts the pen between two lines.
+            let along =
+                |k: usize| singles(lines.iter().flat_map(move |l| l.iter().map(move |p| p[k]).chain([f32::NAN])));
+            json!({"type": "scatter3d", "mode": "lines", "name": name, "hoverinfo": "name", "connectgaps": false,
+                "x": along(0), "y": along(1), "z": along(2), "opacity": 0.8,
+                "line": {"color": css(*colour), "width": width}})
+        }
+        Shape::Points { name, points, colour } => {
+            let along = |k: usize| singles(points.iter().map(move |p| p[k]));
+            json!({"type": "scatter3d", "mode": "markers", "name": name, "hoverinfo": "name",
+                "x": along(0), "y": along(1), "z": along(2), "marker": {"size": 4, "color": css(*colour)}})
+        }
+    }
+}
+
+fn merge(into: &mut Value, from: Value) {
+    match (into, from) {
+        (Value::Object(into), Value::Object(from)) => {
+            from.into_iter().for_each(|(k, v)| merge(into.entry(k).or_insert(Value::Null), v));
+        }
+        (into, from) => *into = from,
+    }
+}

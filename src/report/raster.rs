@@ -1,0 +1,166 @@
+//! The static picture of a 3-D view: parallel projection, depth buffer, light from over the left shoulder, four samples a pixel.
+
+use super::view::{Shape, View};
+use crate::formats::Picture;
+use glam::{Vec2, Vec3};
+
+const WIDTH: usize = 1200;
+const HEIGHT: usize = 800;
+/// Samples a pixel in each direction.
+const FINE: usize = 2;
+
+struct Canvas {
+    width: usize,
+    height: usize,
+    rgb: Vec<[f32; 3]>,
+    depth: Vec<f32>,
+}
+
+impl Canvas {
+    fn new() -> Self {
+        let (width, height) = (WIDTH * FINE, HEIGHT * FINE);
+        // A background that reads on a white and on a dark page.
+        let rgb = (0..width * height)
+            .map(|k| {
+                let shade = (k / width) as f32 / height as f32;
+                [0.10 + 0.05 * shade, 0.11 + 0.05 * shade, 0.14 + 0.06 * shade]
+            })
+            .collect();
+        Self { width, height, rgb, depth: vec![f32::INFINITY; width * height] }
+    }
+
+    fn put(&mut self, x: usize, y: usize, depth: f32, colour: [f32; 3], opacity: f32) {
+        let at = y * self.width + x;
+        if depth <= self.depth[at] {
+            for (old, new) in self.rgb[at].iter_mut().zip(colour) {
+                *old += (new - *old) * opacity;
+            }
+            if opacity > 0.5 {
+                self.depth[at] = depth;
+            }
+        }
+    }
+
+    fn triangle(&mut self, [a, b, c]: [Vec3; 3], colour: [f32; 3], opacity: f32) {
+        let [p, q, r] = [a.truncate(), b.truncate(), c.truncate()];
+        let area = (q - p).perp_dot(r - p);
+        if area == 0.0 || !area.is_finite() {
+            return;
+        }
+        let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+        let range = |lo: f32, hi: f32, n: usize| (lo.max(0.0) as usize)..((hi.max(-1.0) + 1.0) as usize).min(n);
+        for y in range(low.y, high.y, self.height) {
+            for x in range(low.x, high.x, self.width) {
+                let s = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let (u, v) = ((s - p).perp_dot(r - p) / area, (q - p).perp_dot(s - p) / area);
+                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                    let depth = a.z + u * (b.z - a.z) + v * (c.z - a.z);
+                    self.put(x, y, depth, colour, opacity);
+                }
+            }
+        }
+    }
+
+    fn line(&mut self, a: Vec3, b: Vec3, width: f32, colour: [f32; 3], opacity: f32) {
+        let steps = (b - a).truncate().abs().max_element().ceil().clamp(1.0, 8000.0) as usize;
+        let half = (width * FINE as f32 / 2.0).max(0.5);
+        for k in 0..=steps {
+            let p = a.lerp(b, k as f32 / steps as f32);
+            let span = |c: f32, n: usize| {
+                ((c - half).max(0.0).round() as usize)..((c + half).max(0.0).round() as usize).min(n)
+            };
+            for y in span(p.y, self.height) {
+                for x in span(p.x, self.width) {
+                    self.put(x, y, p.z, colour, opacity);
+                }
+            }
+        }
+    }
+
+    fn picture(&self) -> Picture {
+        let mut rgb = Vec::with_capacity(3 * WIDTH * HEIGHT);
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let mut sum = [0f32; 3];
+                for k in 0..FINE * FINE {
+                    let sample = self.rgb[(y * FINE + k / FINE) * self.width + x * FINE + k % FINE];
+                    sum.iter_mut().zip(sample).for_each(|(s, c)| *s += c);
+                }
+                rgb.extend(sum.map(|s| (s / (FINE * FINE) as f32 * 255.0).clamp(0.0, 255.0).round() as u8));
+            }
+        }
+        Picture { width: WIDTH as u32, height: HEIGHT as u32, rgb }
+    }
+}
+
+/// Where the camera stands, as a direction towards it: the same as that of the interactive view.
+pub(super) const EYE: [f64; 3] = [0.75, -1.25, 0.85];
+
+/// The view as a picture of 1200 × 800 pixels.
+pub(super) fn render(view: &View) -> Picture {
+    let mut canvas = Canvas::new();
+    let Some([low, high]) = view.bounds().map(|b| b.map(Vec3::from)) else { return canvas.picture() };
+    let back = Vec3::from(EYE.map(|x| x as f32)).normalize();
+    let right = Vec3::Z.cross(back).normalize();
+    let up = back.cross(right);
+    // The eight corners of the box decide the scale, so that nothing is cut off.
+    let middle = (low + high) * 0.5;
+    let mut reach = Vec2::splat(1e-6);
+    for k in 0..8 {
+        let corner =
+            Vec3::new([low.x, high.x][k & 1], [low.y, high.y][k >> 1 & 1], [low.z, high.z][k >> 2]) - middle;
+        reach = reach.max(Vec2::new(corner.dot(right), corner.dot(up)).abs());
+    }
+    let scale = (0.46 * canvas.width as f32 / reach.x).min(0.46 * canvas.height as f32 / reach.y);
+    let (cx, cy) = (canvas.width as f32 / 2.0, canvas.height as f32 / 2.0);
+    let project = |p: &[f32; 3]| {
+        let d = Vec3::from(*p) - middle;
+        Vec3::new(cx + scale * d.dot(right), cy - scale * d.dot(up), -scale * d.dot(back))
+    };
+    let light = (back + 0.6 * up - 0.4 * right).normalize();
+    for shape in &view.shapes {
+        match shape {
+            Shape::Surface { points, triangles, colour, opacity, values, .. } => {
+                let range = values.as_ref().map(|v| finite_range(&v.values));
+                for (t, corners) in triangles.iter().enumerate() {
+                    let [a, b, c] = corners.map(|k| Vec3::from(points[k as usize]));
+                    let normal = (b - a).cross(c - a).normalize_or_zero();
+                    let shade = 0.3 + 0.7 * normal.dot(light).abs();
+                    let base = match (values, range) {
+                        (Some(v), Some([lo, hi])) => v
+                            .map
+                            .at(f64::from((v.values[t] - lo) / (hi - lo).max(1e-30)))
+                            .map(|x| f32::from(x) / 255.0),
+                        _ => colour.map(|c| c as f32),
+                    };
+                    canvas.triangle(
+                        corners.map(|k| project(&points[k as usize])),
+                        base.map(|c| c * shade),
+                        *opacity as f32,
+                    );
+                }
+            }
+            Shape::Lines { lines, colour, width, .. } => {
+                for line in lines {
+                    for pair in line.windows(2) {
+                        let colour = colour.map(|c| c as f32);
+                        canvas.line(project(&pair[0]), project(&pair[1]), *width as f32 * 0.7, colour, 0.75);
+                    }
+                }
+            }
+            Shape::Points { points, colour, .. } => {
+                for p in points.iter().map(project) {
+                    canvas.line(p, p, 5.0, colour.map(|c| c as f32), 1.0);
+                }
+            }
+        }
+    }
+    canvas.picture()
+}
+
+pub(super) fn finite_range(values: &[f32]) -> [f32; 2] {
+    let finite = values.iter().copied().filter(|v| v.is_finite());
+    finite
+        .fold(None, |r, v| Some(r.map_or([v, v], |[lo, hi]: [f32; 2]| [lo.min(v), hi.max(v)])))
+        .unwrap_or([0.0, 1.0])
+}

@@ -1,0 +1,167 @@
+use super::number::{figures, grouped};
+
+/// A table that can be sorted and copied; also written as CSV.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    /// Stem of its CSV file.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// How to read it; may be empty.
+    pub caption: String,
+    /// Its columns.
+    pub columns: Vec<Column>,
+    /// Its rows, as long as there are columns.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+/// A column of a table.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Column {
+    /// What it holds.
+    pub title: String,
+    /// Its unit, empty for pure numbers and text.
+    pub unit: String,
+}
+
+/// One cell of a table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Cell {
+    /// Nothing was measured, or it does not apply.
+    #[default]
+    Empty,
+    /// Words.
+    Text(String),
+    /// A whole number.
+    Count(u64),
+    /// A measured number, shown with so many significant digits, copied and written in full.
+    Number(f64, usize),
+}
+
+impl Table {
+    /// A table without rows; columns are given as title and unit.
+    pub fn new(name: &str, title: &str, columns: &[(&str, &str)]) -> Self {
+        let column = |&(title, unit): &(&str, &str)| Column { title: title.into(), unit: unit.into() };
+        Self {
+            name: name.into(),
+            title: title.into(),
+            columns: columns.iter().map(column).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a row, cut or filled to the number of columns.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        let mut row: Vec<Cell> = cells.into_iter().take(self.columns.len()).collect();
+        row.resize(self.columns.len(), Cell::Empty);
+        self.rows.push(row);
+    }
+
+    /// The table with a caption.
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = caption.into();
+        self
+    }
+
+    /// The table as CSV (RFC 4180), units in the header, numbers in full.
+    pub fn to_csv(&self) -> String {
+        let quoted = |text: &str| {
+            if text.contains([',', '"', '\n', '\r']) {
+                format!("\"{}\"", text.replace('"', "\"\""))
+            } else {
+                text.to_owned()
+            }
+        };
+        let header: Vec<String> = self.columns.iter().map(|c| quoted(&c.heading())).collect();
+        let mut text = header.join(",") + "\n";
+        for row in &self.rows {
+            let cells: Vec<String> = row.iter().map(|c| quoted(&c.plain())).collect();
+            text += &(cells.join(",") + "\n");
+        }
+        text
+    }
+}
+
+impl Column {
+    /// Title and unit on one line.
+    pub(super) fn heading(&self) -> String {
+        if self.unit.is_empty() { self.title.clone() } else { format!("{} ({})", self.title, self.unit) }
+    }
+}
+
+impl Cell {
+    /// For people.
+    pub fn shown(&self) -> String {
+        match self {
+            Self::Empty => "–".into(),
+            Self::Text(t) => t.clone(),
+            Self::Count(n) => grouped(*n),
+            Self::Number(x, digits) => figures(*x, *digits),
+        }
+    }
+
+    /// For programs: every digit, nothing between them.
+    pub fn plain(&self) -> String {
+        match self {
+            Self::Empty => String::new(),
+            Self::Text(t) => t.clone(),
+            Self::Count(n) => n.to_string(),
+            Self::Number(x, _) => x.to_string(),
+        }
+    }
+
+    pub(super) fn is_numeric(&self) -> bool {
+        matches!(self, Self::Count(_) | Self::Number(..))
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.into())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<u64> for Cell {
+    fn from(n: u64) -> Self {
+        Self::Count(n)
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(n: usize) -> Self {
+        Self::Count(n as u64)
+    }
+}
+
+/// A measured number, four digits shown.
+impl From<f64> for Cell {
+    fn from(x: f64) -> Self {
+        Self::Number(x, 4)
+    }
+}
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Empty, Into::into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_quotes_and_keeps_every_digit() {
+        let mut table = Table::new("t", "T", &[("name", ""), ("sag", "mm")]);
+        table.row(["a, \"b\"".into(), Cell::from(1.0 / 3.0)]);
+        table.row([Cell::Empty]);
+        assert_eq!(table.to_csv(), "name,sag (mm)\n\"a, \"\"b\"\"\",0.3333333333333333\n,\n");
+        assert_eq!(table.rows[0][1].shown(), "0.3333");
+    }
+}

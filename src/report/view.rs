@@ -1,0 +1,265 @@
+use crate::formats::{ColourMap, Facets, Polylines};
+use rustc_hash::FxHashMap;
+
+/// A 3-D view: turns in the page, a static picture beside it.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Stem of its files.
+    pub name: String,
+    /// What it shows.
+    pub title: String,
+    /// How to read it.
+    pub caption: String,
+    /// What is drawn, mm.
+    pub shapes: Vec<Shape>,
+}
+
+/// One thing in a 3-D view.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum Shape {
+    /// Triangles.
+    Surface {
+        /// Name in the legend.
+        name: String,
+        /// Corners, mm.
+        points: Vec<[f32; 3]>,
+        /// Indices into `points`.
+        triangles: Vec<[u32; 3]>,
+        /// Red, green, blue in `[0, 1]`.
+        colour: [f64; 3],
+        /// From 0, invisible, to 1.
+        opacity: f64,
+        /// A value for each triangle in place of the colour.
+        values: Option<Values>,
+    },
+    /// Polylines.
+    Lines {
+        /// Name in the legend.
+        name: String,
+        /// The lines, mm.
+        lines: Vec<Vec<[f32; 3]>>,
+        /// Red, green, blue in `[0, 1]`.
+        colour: [f64; 3],
+        /// Width on the screen, pixels.
+        width: f64,
+    },
+    /// Points.
+    Points {
+        /// Name in the legend.
+        name: String,
+        /// Where they are, mm.
+        points: Vec<[f32; 3]>,
+        /// Red, green, blue in `[0, 1]`.
+        colour: [f64; 3],
+    },
+}
+
+/// Values that colour triangles.
+#[derive(Clone, Debug)]
+pub struct Values {
+    /// What they mean, with the unit.
+    pub label: String,
+    /// One a triangle.
+    pub values: Vec<f32>,
+    /// Colours from the smallest to the largest.
+    pub map: ColourMap,
+}
+
+/// More triangles than this are simplified for showing: base64 of 60,000 is 3 MB of page.
+const SHOWN: usize = 60_000;
+
+impl View {
+    /// Facets in the colours of their parts, with the facet edges drawn while there are few enough to be seen.
+    pub fn of_facets(name: &str, title: &str, facets: &Facets) -> Self {
+        let mut view = Self { name: name.into(), title: title.into(), caption: String::new(), shapes: Vec::new() };
+        let mut merged = 0.0f64;
+        let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        for (g, group) in facets.groups.iter().enumerate() {
+            let (points, triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
+            if triangles.is_empty() {
+                continue;
+            }
+            let limit = (SHOWN * triangles.len()).div_ceil(total.max(1)).max(200);
+            let (points, triangles, cell) = simplified(points, triangles, limit);
+            merged = merged.max(cell);
+            view.shapes.push(Shape::Surface {
+                name: group.name.clone(),
+                points,
+                triangles,
+                colour: group.colour,
+                opacity: 1.0,
+                values: None,
+            });
+        }
+        if merged > 0.0 {
+            view.caption = format!(
+                "Shown simplified: corners closer than about {} mm are merged; the traced mesh is untouched.",
+                super::figures(merged, 2)
+            );
+        }
+        view
+    }
+
+    /// Facets coloured by a value each.
+    pub fn of_values(
+        name: &str,
+        title: &str,
+        facets: &Facets,
+        label: &str,
+        values: &[f64],
+        map: ColourMap,
+    ) -> Self {
+        let (points, triangles) = triangles_of(facets, |_| true);
+        let mut per_triangle = Vec::with_capacity(triangles.len());
+        for (facet, value) in facets.mesh.facets.iter().zip(values) {
+            per_triangle.extend(std::iter::repeat_n(*value as f32, if facet.is_triangle() { 1 } else { 2 }));
+        }
+        per_triangle.resize(triangles.len(), f32::NAN);
+        let mut caption = String::new();
+        let (mut kept, step) = (triangles, per_triangle.len().div_ceil(2 * SHOWN).max(1));
+        if step > 1 {
+            caption = format!("Shown: every {step}th triangle of {}.", super::grouped(kept.len() as u64));
+            kept = kept.into_iter().step_by(step).collect();
+            per_triangle = per_triangle.into_iter().step_by(step).collect();
+        }
+        let values = Some(Values { label: label.into(), values: per_triangle, map });
+        let colour = [0.6; 3];
+        let shape = Shape::Surface { name: label.into(), points, triangles: kept, colour, opacity: 1.0, values };
+        Self { name: name.into(), title: title.into(), caption, shapes: vec![shape] }
+    }
+
+    /// The view with a sentence in front of its caption.
+    pub fn caption(mut self, text: &str) -> Self {
+        self.caption = format!("{text} {}", self.caption).trim().to_owned();
+        self
+    }
+
+    /// The view with ray paths, each cut where it leaves `reach` mm around what is shown already.
+    pub fn paths(mut self, name: &str, paths: &Polylines, reach: f64, colour: [f64; 3]) -> Self {
+        let Some(bounds) = self.bounds() else { return self };
+        let inside = |p: &[f32; 3]| {
+            (0..3).all(|k| {
+                f64::from(p[k]) >= f64::from(bounds[0][k]) - reach
+                    && f64::from(p[k]) <= f64::from(bounds[1][k]) + reach
+            })
+        };
+        let mut lines = Vec::new();
+        for path in paths.lines() {
+            let points: Vec<[f32; 3]> = path.iter().map(|p| p.as_vec3().to_array()).collect();
+            let mut line: Vec<[f32; 3]> = Vec::new();
+            for p in points {
+                if inside(&p) {
+                    line.push(p);
+                    continue;
+                }
+                // The first point outside is pulled back along its segment to the reach.
+                if let Some(&last) = line.last() {
+                    let [a, b] = [glam::Vec3::from(last), glam::Vec3::from(p)];
+                    line.push((a + (b - a).clamp_length_max(reach as f32)).to_array());
+                }
+                break;
+            }
+            if line.len() > 1 {
+                lines.push(line);
+            }
+        }
+        self.shapes.push(Shape::Lines { name: name.into(), lines, colour, width: 1.5 });
+        self
+    }
+
+    /// Lowest and highest coordinates of everything shown.
+    pub fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        let all = self.shapes.iter().flat_map(|s| -> Box<dyn Iterator<Item = &[f32; 3]>> {
+            match s {
+                Shape::Surface { points, .. } | Shape::Points { points, .. } => Box::new(points.iter()),
+                Shape::Lines { lines, .. } => Box::new(lines.iter().flatten()),
+            }
+        });
+        all.fold(None, |b: Option<[[f32; 3]; 2]>, p| {
+            let [mut lo, mut hi] = b.unwrap_or([*p, *p]);
+            for k in 0..3 {
+                lo[k] = lo[k].min(p[k]);
+                hi[k] = hi[k].max(p[k]);
+            }
+            Some([lo, hi])
+        })
+    }
+}
+
+type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
+/// The traced triangles of some faces, positions shared.
+fn triangles_of(facets: &Facets, wanted: impl Fn(crate::math::FaceId) -> bool) -> Triangles {
+    let mesh = facets.mesh;
+    let mut index = FxHashMap::default();
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (i, facet) in mesh.facets.iter().enumerate().filter(|(_, f)| wanted(f.face)) {
+        let [a, b, c, d] = mesh.corner_positions(i).map(|p| {
+            *index.entry(p).or_insert_with(|| {
+                points.push(mesh.positions[p as usize].as_vec3().to_array());
+                points.len() as u32 - 1
+            })
+        });
+        triangles.push([a, b, c]);
+        if !facet.is_triangle() {
+            triangles.push([a, c, d]);
+        }
+    }
+    (points, triangles)
+}
+
+/// Merges corners within cells of a grid until no more than `limit` triangles remain: no holes, unlike leaving triangles out.
+/// Also gives the cell size in mm, 0 when nothing had to be merged.
+fn simplified(
+    points: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    limit: usize,
+) -> (Vec<[f32; 3]>, Vec<[u32; 3]>, f64) {
+    if triangles.len() <= limit {
+        return (points, triangles, 0.0);
+    }
+    let span = (0..3).fold(0f32, |s, k| {
+        let (lo, hi) = points.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        s.max(hi - lo)
+    });
+    let mut cell = span / 400.0;
+    for _ in 0..40 {
+        let mut index = FxHashMap::default();
+        let mut merged: Vec<[f32; 3]> = Vec::new();
+        let of: Vec<u32> = (points.iter())
+            .map(|p| {
+                *index.entry(p.map(|x| (x / cell).floor() as i64)).or_insert_with(|| {
+                    merged.push(*p);
+                    merged.len() as u32 - 1
+                })
+            })
+            .collect();
+        let kept: Vec<[u32; 3]> = (triangles.iter())
+            .map(|t| t.map(|v| of[v as usize]))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
+        if kept.len() <= limit {
+            return (merged, kept, f64::from(cell));
+        }
+        cell *= 1.3;
+    }
+    (points, triangles, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn simplifying_keeps_the_extent_within_a_cell() {
+        let n = 200u32;
+        let points: Vec<[f32; 3]> = (0..n * n).map(|k| [(k % n) as f32 * 0.1, (k / n) as f32 * 0.1, 0.0]).collect();
+        let quads = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
+        let triangles: Vec<[u32; 3]> = quads.flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]]).collect();
+        let (merged, kept, cell) = simplified(points, triangles, 5000);
+        assert!(kept.len() <= 5000 && kept.len() > 1000 && cell > 0.0);
+        let far = merged.iter().map(|p| p[0]).fold(0f32, f32::max);
+        assert!(f64::from(far) > 19.9 - cell);
+    }
+}

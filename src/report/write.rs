@@ -1,0 +1,49 @@
+use super::document::{Block, Report};
+use super::{html, raster, svg};
+use crate::formats::{Error, ErrorKind, write_atomic, write_png};
+use std::path::{Path, PathBuf};
+
+impl Report {
+    /// The page as one self-contained HTML text.
+    pub fn to_html(&self) -> String {
+        html::page(self)
+    }
+
+    /// Writes `report.html`, `figures/*.svg|png` and `tables/*.csv` into a folder, which is made when missing; gives the files written,
+    /// the page first.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, Error> {
+        let make = |path: &Path| std::fs::create_dir_all(path).map_err(|e| Error::new(path, ErrorKind::Write(e)));
+        make(folder)?;
+        let page = folder.join("report.html");
+        write_atomic(&page, |w| w.write_all(self.to_html().as_bytes()))?;
+        let mut written = vec![page];
+        for block in self.sections.iter().flat_map(|s| &s.blocks) {
+            let inside = |kind: &str, file: String| -> Result<PathBuf, Error> {
+                make(&folder.join(kind))?;
+                Ok(folder.join(kind).join(file))
+            };
+            match block {
+                Block::Text(_) => continue,
+                Block::Chart(chart) => {
+                    let path = inside("figures", format!("{}.svg", chart.name))?;
+                    write_atomic(&path, |w| w.write_all(svg::render(chart).as_bytes()))?;
+                    written.push(path);
+                }
+                Block::View(view) => {
+                    let path = inside("figures", format!("{}.png", view.name))?;
+                    write_png(&path, &raster::render(view))?;
+                    written.push(path);
+                }
+                Block::Table(table) => {
+                    let path = inside("tables", format!("{}.csv", table.name))?;
+                    write_atomic(&path, |w| w.write_all(table.to_csv().as_bytes()))?;
+                    written.push(path);
+                }
+            }
+        }
+        Ok(written)
+    }
+}

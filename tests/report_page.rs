@@ -1,0 +1,177 @@
+//! The report form: one self-contained page that a real browser draws, static twins and CSV beside it.
+
+use lampyris::formats::{Axis, ColourMap, Facets, Grid, Group, Polylines};
+use lampyris::math::{FaceId, Point, Uv, Vector};
+use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
+use lampyris::report::{AxisStyle, Chart, Content, Provenance, Report, Section, Series, SeriesStyle, Table, View};
+use std::path::Path;
+use std::process::Command;
+
+/// A saddle of quads over ±50 mm.
+fn saddle(n: u32) -> FacetMesh {
+    let at = |k: u32| 100.0 * f64::from(k) / f64::from(n) - 50.0;
+    let grid = || (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
+    let positions: Vec<Point> = grid().map(|(i, j)| Point::new(at(i), at(j), at(i) * at(j) / 60.0)).collect();
+    let normal = |(i, j)| Vector::new(-at(j) / 60.0, -at(i) / 60.0, 1.0).normalize();
+    let vertices =
+        grid().enumerate().map(|(k, ij)| MeshVertex { position: k as u32, normal: normal(ij), uv: Uv::ZERO });
+    let corner = |i: u32, j: u32| j * (n + 1) + i;
+    let facets = (0..n * n).map(|k| {
+        let (i, j) = (k % n, k / n);
+        let vertices = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        Facet { vertices, face: FaceId(i * 2 / n) }
+    });
+    FacetMesh {
+        positions,
+        vertices: vertices.collect(),
+        facets: facets.collect(),
+        sag: vec![0.1; (n * n) as usize],
+    }
+}
+
+fn sample(n: u32) -> Report {
+    let mesh = saddle(n);
+    let group = |name: &str, colour| Group { name: name.into(), colour, index_ratio: 1.0 };
+    let facets = Facets {
+        groups: vec![group("left </script><b>", [0.2, 0.5, 0.9]), group("right", [0.9, 0.6, 0.2])],
+        group_of_face: vec![0, 1],
+        ..Facets::plain(&mesh, "")
+    };
+    let mut paths = Polylines::default();
+    paths.push([Point::new(0.0, 0.0, 80.0), Point::ZERO, Point::new(1e6, 0.0, 1e6)]);
+    let error: Vec<f64> = (0..mesh.facets.len()).map(|k| k as f64).collect();
+    let axis = |label: &str| Axis { label: label.into(), unit: "deg".into(), range: [-3.0, 3.0], cells: 30 };
+    let bump =
+        |k: usize| (-((k % 30) as f64 - 15.0).powi(2) / 40.0 - ((k / 30) as f64 - 12.0).powi(2) / 20.0).exp();
+    let grid = Grid {
+        name: "far".into(),
+        quantity: "luminous intensity".into(),
+        unit: "cd".into(),
+        axes: [axis("H"), axis("V")],
+        values: (0..900).map(|k| 1200.0 * bump(k)).collect(),
+        error: None,
+    };
+    let line = |name: &str, style, power: i32| Series {
+        name: name.into(),
+        points: (1..8).map(|k| [f64::from(k), f64::from(k).powi(power)]).collect(),
+        style,
+        ..Series::default()
+    };
+    let axes = [AxisStyle::log("tolerance", "mm"), AxisStyle::log("error", "deg")];
+    let series = vec![line("measured", SeriesStyle::LineAndPoints, 2), line("theory", SeriesStyle::Dashed, 1)];
+    let mut table = Table::new("times", "Times", &[("step", ""), ("time", "s"), ("rays", "")]);
+    table.row(["read".into(), 0.25.into(), 1_000_000usize.into()]);
+    table.row(["trace".into(), 1.5.into(), 7usize.into()]);
+    let bars = Chart {
+        content: Content::Bars {
+            categories: vec!["octree".into(), "bvh".into()],
+            layers: vec![("build".into(), vec![1.0, 2.0]), ("trace".into(), vec![3.0, 1.0])],
+        },
+        ..Chart::series(
+            "bars",
+            "Where time goes",
+            "Stacked.",
+            [AxisStyle::default(), AxisStyle::linear("time", "s")],
+            vec![],
+        )
+    };
+    Report {
+        title: "A sample".into(),
+        answer: "The answer is **42 cd** & no <more>.".into(),
+        sections: vec![
+            Section::new("Light")
+                .with(Chart::map("far", "Far field", "Straight ahead is 0, 0.", grid))
+                .with(View::of_facets("facets", "Facets", &facets).paths("rays", &paths, 20.0, [1.0, 0.7, 0.1])),
+            Section::new("Cost")
+                .with(Chart::series("front", "Front", "Lower left is better.", axes, series))
+                .with(bars)
+                .with(View::of_values("error", "Error", &facets, "error (deg)", &error, ColourMap::Viridis))
+                .with(table)
+                .with("Some **words**."),
+        ],
+        provenance: Provenance { command: "lampyris demo".into(), seed: Some(1), ..Provenance::default() },
+    }
+}
+
+#[test]
+fn the_page_stands_alone_and_its_parts_lie_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = sample(40).write(folder.path()).unwrap();
+    let names: Vec<String> = (written.iter())
+        .map(|p| p.strip_prefix(folder.path()).unwrap().to_string_lossy().replace('\\', "/"))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "report.html",
+            "figures/far.svg",
+            "figures/facets.png",
+            "figures/front.svg",
+            "figures/bars.svg",
+            "figures/error.png",
+            "tables/times.csv"
+        ]
+    );
+    let page = std::fs::read_to_string(&written[0]).unwrap();
+    assert!(page.len() < 15_000_000, "{} bytes", page.len());
+    assert!(page.contains("default-src 'none'"), "the browser itself is told to load nothing");
+    // plotly.js names addresses in texts that it never shows here.
+    let ours: Vec<&str> = page.split("<script").filter(|piece| piece.len() < 2_000_000).collect();
+    assert!(!ours.concat().contains("http://") && !ours.concat().contains("https://"), "an address in the page");
+    assert!(page.contains("<strong>42 cd</strong> &amp; no &lt;more&gt;"));
+    assert!(!page.contains("left </script>"), "a name may not end a script");
+    assert_eq!(
+        std::fs::read_to_string(&written[6]).unwrap(),
+        "step,time (s),rays\nread,0.25,1000000\ntrace,1.5,7\n"
+    );
+    let picture = image::open(&written[2]).unwrap().to_rgb8();
+    let lit = picture.pixels().filter(|p| p.0[2] > 120 && p.0[0] < 100).count();
+    assert!(lit > 20_000, "the blue half of the saddle covers {lit} pixels");
+}
+
+#[test]
+fn a_large_mesh_is_simplified_for_showing_and_says_so() {
+    let page = sample(400).to_html();
+    assert!(page.len() < 15_000_000, "{} bytes", page.len());
+    assert!(page.contains("Shown simplified"));
+}
+
+/// Where a Chromium is installed, if it is.
+fn chromium() -> Option<&'static str> {
+    ["chromium", "chromium-browser", "google-chrome", "/usr/bin/chromium"]
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success()))
+}
+
+/// The page after its scripts have run.
+fn browsed(browser: &str, page: &Path) -> String {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000", "--dump-dom"])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .unwrap();
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn a_browser_draws_every_picture() {
+    let Some(browser) = chromium() else {
+        eprintln!("SKIPPED: no Chromium is installed, the page was not opened in a browser");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let written = sample(20).write(folder.path()).unwrap();
+    let dom = browsed(browser, &written[0]);
+    let ready = dom.split("data-ready=\"").nth(1).and_then(|rest| rest.split('"').next());
+    // The 3-D views may fall back to their static picture where there is no WebGL; the three charts may not.
+    let drawn: usize = ready
+        .and_then(|n| n.parse().ok())
+        .unwrap_or_else(|| panic!("the script did not end: {}", &dom[..400.min(dom.len())]));
+    assert!(drawn >= 3, "{drawn} of 5 pictures drawn");
+    for chart in ["fig-far", "fig-front", "fig-bars"] {
+        let tag = dom.split(&format!("id=\"{chart}\"")).nth(1).unwrap().split('>').next().unwrap();
+        assert!(tag.contains("data-drawn=\"yes\""), "{chart}: {tag}");
+    }
+}
