@@ -15,6 +15,7 @@ mod random;
 pub mod rays;
 pub mod records;
 pub mod specimen;
+pub mod stability;
 mod timing;
 
 pub use quantiles::{Quantiles, Summary};

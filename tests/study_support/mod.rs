@@ -17,9 +17,14 @@ impl Intersector for Brute<'_> {
         for (i, facet) in self.0.facets.iter().enumerate() {
             let corners = self.0.corners(i);
             let vertex = facet.vertices.map(|v| self.0.vertices[v as usize]);
-            for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
+            let triangles: &[[usize; 3]] = if facet.is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
+            for &[a, b, c] in triangles {
                 let Some((t, v, w)) = triangle(ray, [corners[a], corners[b], corners[c]]) else { continue };
                 if t < ray.t_min || t > best.map_or(ray.t_max, |h| h.t) {
+                    continue;
+                }
+                // The point that the ray leaves, on whichever facets share it.
+                if ray.from.is_some() && t < 1e-12 * (1.0 + ray.origin.length()) {
                     continue;
                 }
                 let u = 1.0 - v - w;

@@ -1,0 +1,241 @@
+use super::{Ground, Question, Scene, Truth};
+use crate::intersect::{Certainty, Cost, Hit, Intersector};
+use crate::math::{Departure, Point, Ray, Vector};
+
+/// What an answer is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grade {
+    /// Agrees with the truth.
+    Right,
+    /// Not proved, and says so.
+    Flagged,
+    /// Disagrees with the truth in silence.
+    Wrong,
+}
+
+/// Steps of the search for a missed crossing of the band.
+const STEPS: usize = 256;
+
+impl Scene<'_> {
+    /// One grade per question, in order.
+    pub fn grades(&self, who: &dyn Intersector, ground: Ground) -> Vec<Grade> {
+        let asker = Asker { scene: self, who, ground, band: self.band() };
+        self.case.questions.iter().map(|q| asker.grade(q)).collect()
+    }
+
+    /// The ray of a question where the scene stands; for paths the first ray.
+    pub fn rays(&self) -> Vec<Ray> {
+        let first = |q: &Question| match q {
+            Question::First { ray, .. } | Question::All { ray, .. } | Question::Guide { ray, .. } => *ray,
+            Question::Chord { toward, .. } => *toward,
+        };
+        self.case.questions.iter().map(|q| self.ray(&first(q))).collect()
+    }
+
+    fn ray(&self, local: &Ray) -> Ray {
+        let range = |t: f64| t * self.frame.scale;
+        Ray::new(self.frame.point(local.origin), self.frame.direction(local.direction).normalize())
+            .within(range(local.t_min), range(local.t_max))
+    }
+
+    /// Largest sag of the facets, in the case's own millimetres.
+    fn band(&self) -> f64 {
+        self.mesh.sag.iter().copied().fold(0.0, f64::max) / self.frame.scale
+    }
+
+    /// Rounding of coordinates of the size that the ray's numbers have here, in the case's own millimetres.
+    pub fn resolution(&self, ray: &Ray, t: f64) -> f64 {
+        let reach = self.frame.point(ray.origin).length() + self.frame.scale * t.abs() + self.frame.origin.length();
+        f64::EPSILON * (reach / self.frame.scale + 1.0)
+    }
+}
+
+struct Asker<'a> {
+    scene: &'a Scene<'a>,
+    who: &'a dyn Intersector,
+    ground: Ground,
+    band: f64,
+}
+
+fn flagged(hit: &Hit) -> bool {
+    matches!(hit.certainty, Certainty::Tangent | Certainty::Uncertified)
+}
+
+impl Asker<'_> {
+    fn ask(&self, ray: &Ray) -> Option<Hit> {
+        self.who.intersect(ray, &mut Cost::default())
+    }
+
+    fn grade(&self, question: &Question) -> Grade {
+        match question {
+            Question::First { ray, truth } => {
+                let hit = self.ask(&self.scene.ray(ray));
+                self.first(ray, truth, hit.as_ref())
+            }
+            Question::All { ray, truths } => self.all(ray, truths),
+            Question::Chord { toward, direction, radius } => self.chord(toward, *direction, *radius),
+            Question::Guide { ray, size, reflections } => self.guide(ray, *size, *reflections),
+        }
+    }
+
+    fn local_t(&self, hit: &Hit) -> f64 {
+        hit.t / self.scene.frame.scale
+    }
+
+    fn first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
+        match self.ground {
+            Ground::Spline => self.first_on_spline(ray, truth, hit),
+            Ground::Facets if self.right_within_sag(ray, truth, hit) => Grade::Right,
+            Ground::Facets => Grade::Wrong,
+        }
+    }
+
+    fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
+        let resolution = self.scene.resolution(ray, truth.t.unwrap_or(0.0));
+        let open = truth.margin <= 8.0 * resolution;
+        let right = match (truth.t, hit) {
+            (None, None) => true,
+            (Some(_), None) => open,
+            (None, Some(h)) => open && self.on_surface(ray, h, resolution),
+            (Some(t), Some(h)) => {
+                let close = (self.local_t(h) - t).abs() <= 16.0 * resolution * (1.0 + 1.0 / truth.cos);
+                let normal = truth.normal.map(|n| self.scene.frame.normal(n));
+                // A normal turns by displacement times curvature; 1e-6 is far below what any facet reaches.
+                let along = normal.is_none_or(|n| h.normal.cross(n).length() < 1e-6);
+                (close && along) || (open && self.on_surface(ray, h, resolution))
+            }
+        };
+        match (right, hit) {
+            (_, Some(h)) if flagged(h) && !open => Grade::Flagged,
+            (true, _) => Grade::Right,
+            (false, Some(h)) if flagged(h) => Grade::Flagged,
+            _ => Grade::Wrong,
+        }
+    }
+
+    fn on_surface(&self, ray: &Ray, hit: &Hit, resolution: f64) -> bool {
+        (self.scene.case.distance)(ray.at(self.local_t(hit))).abs() <= 64.0 * resolution + 1e-9
+    }
+
+    fn in_band(&self, ray: &Ray, t: f64) -> bool {
+        let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, t);
+        (self.scene.case.distance)(ray.at(t)).abs() <= self.band + slack
+    }
+
+    fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
+        let slack = 64.0 * self.scene.resolution(ray, truth.t.unwrap_or(0.0));
+        let Some(h) = hit else { return truth.t.is_none() || truth.margin <= self.band + slack };
+        let t = self.local_t(h);
+        if !self.in_band(ray, t) {
+            return false;
+        }
+        let Some(true_t) = truth.t else { return true };
+        // Between the true hit and a later one the ray must not have been through the whole band.
+        let start = (self.scene.case.distance)(ray.at(true_t - 2.0 * self.band - slack)).signum();
+        let through = |i: usize| {
+            let at = true_t + (t - true_t) * i as f64 / STEPS as f64;
+            start * (self.scene.case.distance)(ray.at(at)) < -self.band - slack
+        };
+        t <= true_t || !(1..STEPS).any(through)
+    }
+
+    fn all(&self, ray: &Ray, truths: &[Truth]) -> Grade {
+        let mut next = self.scene.ray(ray);
+        let origin = next.origin;
+        let mut hits: Vec<Hit> = Vec::new();
+        while hits.len() <= truths.len() + 2 {
+            let Some(h) = self.ask(&next) else { break };
+            let p = next.at(h.t);
+            hits.push(Hit { t: (p - origin).dot(next.direction), ..h });
+            next =
+                Ray::new(p, next.direction).leaving(Departure { face: h.face, primitive: h.primitive, uv: h.uv });
+        }
+        let resolution = self.scene.resolution(ray, truths.last().and_then(|t| t.t).unwrap_or(0.0));
+        let right = match self.ground {
+            Ground::Facets => {
+                let sure = truths.iter().filter(|t| t.margin > self.band).count();
+                let sequence =
+                    hits.len() >= sure && hits.len() <= truths.len() && (truths.len() - hits.len()) % 2 == 0;
+                sequence && hits.iter().all(|h| self.in_band(ray, self.local_t(h)))
+            }
+            Ground::Spline => {
+                let close = |(t, h): (&Truth, &Hit)| {
+                    t.t.is_some_and(|t_true| {
+                        (self.local_t(h) - t_true).abs() <= 64.0 * resolution * (1.0 + 1.0 / t.cos)
+                    })
+                };
+                hits.len() == truths.len() && truths.iter().zip(&hits).all(close)
+            }
+        };
+        match right {
+            _ if self.ground == Ground::Spline && hits.iter().any(flagged) => Grade::Flagged,
+            true => Grade::Right,
+            false => Grade::Wrong,
+        }
+    }
+
+    fn chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
+        let frame = &self.scene.frame;
+        let first = self.scene.ray(toward);
+        let Some(h) = self.ask(&first) else { return Grade::Wrong };
+        let origin = frame.local_point(first.at(h.t));
+        let local = Ray::new(origin, direction);
+        let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+        let second = Ray::new(first.at(h.t), frame.direction(direction).normalize()).leaving(from);
+        let true_t = -2.0 * origin.dot(direction);
+        let cos = (origin.dot(direction) / radius).abs();
+        let truth = Truth::hit(true_t, cos, radius * cos * cos * 0.5);
+        let answer = self.ask(&second);
+        let Some(a) = answer else {
+            return if self.ground == Ground::Facets && truth.margin <= self.band {
+                Grade::Right
+            } else {
+                Grade::Wrong
+            };
+        };
+        match self.ground {
+            Ground::Spline => self.first_on_spline(&local, &truth, Some(&a)),
+            Ground::Facets => {
+                let t = self.local_t(&a);
+                // From inside, a chord is missed only if the ray got out of the band on the far side.
+                let right = self.in_band(&local, t) && t > 1e-9 * true_t && t <= true_t + self.reach(&truth);
+                if right { Grade::Right } else { Grade::Wrong }
+            }
+        }
+    }
+
+    /// How far along the ray the sag band stretches behind a hit.
+    fn reach(&self, truth: &Truth) -> f64 {
+        4.0 * self.band / truth.cos.max(1e-3)
+    }
+
+    fn guide(&self, ray: &Ray, size: Vector, reflections: usize) -> Grade {
+        let frame = &self.scene.frame;
+        let mut ray_here = self.scene.ray(ray);
+        let mut path = 0.0;
+        let mut any_flag = false;
+        for _ in 0..reflections {
+            let Some(h) = self.ask(&ray_here) else { return Grade::Wrong };
+            any_flag |= flagged(&h);
+            path += h.t / frame.scale;
+            let d = ray_here.direction;
+            let turned = (d - h.geometric_normal * (2.0 * d.dot(h.geometric_normal))).normalize();
+            let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+            ray_here = Ray::new(ray_here.at(h.t), turned).leaving(from);
+        }
+        // Unfolded, the path is straight; folding each coordinate back gives the true end.
+        let fold = |x: f64, l: f64| {
+            let y = x.rem_euclid(2.0 * l);
+            if y > l { 2.0 * l - y } else { y }
+        };
+        let straight = ray.at(path);
+        let end = Point::new(fold(straight.x, size.x), fold(straight.y, size.y), fold(straight.z, size.z));
+        let off = frame.local_point(ray_here.origin).distance(end);
+        let rounding = reflections as f64 * 16.0 * self.scene.resolution(ray, size.length());
+        match off <= rounding + path * reflections as f64 * 4.0 * f64::EPSILON {
+            true => Grade::Right,
+            false if any_flag => Grade::Flagged,
+            false => Grade::Wrong,
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Cases on spheres and tori: grazing, silhouettes, poles, knot lines, thin tubes, weights, starts on the surface.
+
+use super::{Case, Question, Truth};
+use crate::math::{Frame, Homogeneous, Point, Ray, Vector, orthonormal_pair};
+use crate::nurbs::{BezierPatch, Surface, sweep};
+use crate::study::Random;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+const R: f64 = 50.0;
+const FULL: [f64; 2] = [0.0, 2.0 * PI];
+
+pub(super) fn cases() -> Vec<Case> {
+    vec![
+        graze(),
+        silhouette(),
+        pole(),
+        knots(),
+        thin_torus(),
+        weights(),
+        on_surface(),
+        far_origin(),
+        from_inside(),
+        facet_features(),
+    ]
+}
+
+pub(super) fn sphere(radius: f64) -> Surface {
+    sweep::sphere(&Frame::IDENTITY, radius, FULL, [-FRAC_PI_2, FRAC_PI_2])
+}
+
+fn ball(name: &'static str, questions: Vec<Question>) -> Case {
+    Case {
+        name,
+        surfaces: vec![sphere(R)],
+        divisions: 12,
+        slack: 0.0,
+        distance: Box::new(|p| p.length() - R),
+        questions,
+    }
+}
+
+/// A ray at impact parameter `b` about the origin, from 150 mm before its nearest point.
+fn past(random: &mut Random, b: f64) -> Ray {
+    let d = random.direction();
+    let (a, c) = orthonormal_pair(d);
+    let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
+    Ray::new((a * cos + c * sin) * b - d * 150.0, d)
+}
+
+/// Both crossings of the sphere for an impact parameter whose difference from the radius is known exactly.
+fn crossings(depth: f64) -> [Truth; 2] {
+    let half = (depth * (2.0 * R - depth)).sqrt();
+    [150.0 - half, 150.0 + half].map(|t| Truth::hit(t, half / R, depth))
+}
+
+fn graze() -> Case {
+    let mut questions = Vec::new();
+    for k in 1..=12 {
+        for sign in [-1.0, 1.0] {
+            for i in 0..40 {
+                let mut random = Random::new(1, k * 1000 + i + if sign > 0.0 { 500 } else { 0 });
+                let delta = sign * 10f64.powi(-(k as i32));
+                let truth = if sign < 0.0 { crossings(-delta)[0] } else { Truth::miss(delta) };
+                questions.push(Question::First { ray: past(&mut random, R + delta), truth });
+            }
+        }
+    }
+    let touch = |i| Question::First { ray: past(&mut Random::new(2, i), R), truth: Truth::hit(150.0, 1e-9, 0.0) };
+    questions.extend((0..40).map(touch));
+    ball("grazing sphere", questions)
+}
+
+fn silhouette() -> Case {
+    let question = |i| {
+        let mut random = Random::new(3, i);
+        let half = random.between(2.0, 4.0);
+        let depth = R - (R * R - half * half).sqrt();
+        Question::All { ray: past(&mut random, R - depth), truths: crossings(depth).to_vec() }
+    };
+    ball("near-silhouette entry", (0..400).map(question).collect())
+}
+
+fn pole() -> Case {
+    let mut questions = Vec::new();
+    for (k, offset) in [0.0, 1e-12, 1e-9, 1e-6, 1e-3].into_iter().enumerate() {
+        for i in 0..80 {
+            let mut random = Random::new(4, 1000 * k as u64 + i);
+            let side = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
+            let z = (R * R - offset * offset).sqrt();
+            let target = Point::new(offset * cos, offset * sin, side * z);
+            let d = if i < 20 { Vector::Z * -side } else { random.hemisphere(Vector::Z * -side) };
+            // Rays flatter than 6° would make the second crossing ill-conditioned.
+            let d = if d.z.abs() < 0.1 { Vector::Z * -side } else { d };
+            let n = target / R;
+            let cos_i = -d.dot(n);
+            let first = Truth::hit(150.0, cos_i, R).with_normal(n);
+            let second = Truth::hit(150.0 + 2.0 * R * cos_i, cos_i, R);
+            let ray = Ray::new(target - d * 150.0, d);
+            questions.push(Question::First { ray, truth: first });
+            questions.push(Question::All { ray, truths: vec![first, second] });
+        }
+    }
+    ball("pole", questions)
+}
+
+/// A point of the torus about z at the two angles, and the outward normal there.
+fn torus_point(major: f64, minor: f64, u: f64, v: f64) -> (Point, Vector) {
+    let n = Vector::new(v.cos() * u.cos(), v.cos() * u.sin(), v.sin());
+    (Point::new(major * u.cos(), major * u.sin(), 0.0) + n * minor, n)
+}
+
+fn torus_distance(major: f64, minor: f64) -> Box<dyn Fn(Point) -> f64 + Send + Sync> {
+    Box::new(move |p| (p.x.hypot(p.y) - major).hypot(p.z) - minor)
+}
+
+fn knots() -> Case {
+    let (major, minor) = (R, 15.0);
+    let mut questions = Vec::new();
+    for i in 0..400 {
+        let mut random = Random::new(5, i);
+        // Knots and the seam lie at multiples of 90°; the outer half of the tube is met first from outside.
+        let quarter = |r: &mut Random| (r.unit() * 5.0).floor() * FRAC_PI_2;
+        let u = if i % 3 == 0 { random.between(0.0, 2.0 * PI) } else { quarter(&mut random) };
+        let v = if i % 3 == 1 {
+            random.between(-1.5, 1.5)
+        } else {
+            (random.unit() * 3.0).floor() * FRAC_PI_2 - FRAC_PI_2
+        };
+        let (p, n) = torus_point(major, minor, u, v);
+        let truth = Truth::hit(100.0, 1.0, minor).with_normal(n);
+        questions.push(Question::First { ray: Ray::new(p + n * 100.0, -n), truth });
+    }
+    Case {
+        name: "knot line, corner, seam",
+        surfaces: vec![sweep::torus(&Frame::IDENTITY, major, minor, FULL, FULL)],
+        divisions: 12,
+        slack: 0.0,
+        distance: torus_distance(major, minor),
+        questions,
+    }
+}
+
+fn thin_torus() -> Case {
+    let (major, minor) = (R, 0.01);
+    let question = |i: u64| {
+        let mut random = Random::new(6, i);
+        let u = random.between(0.0, 2.0 * PI);
+        let v = random.between(-1.2, 1.2);
+        let (_, n) = torus_point(major, minor, u, v);
+        // In the meridian plane the tube is a circle: a ray at distance b from its centre has the chord 2√(r² − b²).
+        let half = 0.5 * 10f64.powf(random.between(-5.0, -1.71));
+        let b = (minor * minor - half * half).sqrt();
+        let side = Vector::new(-v.sin() * u.cos(), -v.sin() * u.sin(), v.cos());
+        let centre = Point::new(major * u.cos(), major * u.sin(), 0.0);
+        let depth = half * half / (minor + b);
+        let truth = Truth::hit(100.0 - half, half / minor, depth);
+        Question::First { ray: Ray::new(centre + side * b + n * 100.0, -n), truth }
+    };
+    Case {
+        name: "torus of radius 0.01",
+        surfaces: vec![sweep::torus(&Frame::IDENTITY, major, minor, FULL, FULL)],
+        divisions: 24,
+        slack: 0.0,
+        distance: torus_distance(major, minor),
+        questions: (0..400).map(question).collect(),
+    }
+}
+
+/// The patch with another parametrisation: weights times `lambda^i · mu^j` leave the set of points as it is.
+fn reweighted(patch: &BezierPatch, lambda: f64, mu: f64) -> Surface {
+    let [p, q] = patch.degree;
+    let points = (0..=p).flat_map(|i| (0..=q).map(move |j| (i, j))).map(|(i, j)| {
+        let c: Homogeneous = patch.points[i * (q + 1) + j];
+        c * (lambda.powi(i as i32) * mu.powi(j as i32))
+    });
+    let knots = |d: usize| [vec![0.0; d + 1], vec![1.0; d + 1]].concat();
+    Surface { degree: [p, q], knots: [knots(p), knots(q)], points: points.collect() }
+}
+
+fn weights() -> Case {
+    // λ²μ² = 1e4 between opposite corners of a biquadratic patch.
+    let surfaces = sphere(R).bezier_patches().iter().map(|p| reweighted(p, 10.0, 10.0)).collect();
+    let question = |i| {
+        let mut random = Random::new(7, i);
+        let depth = random.between(0.1, R);
+        Question::First { ray: past(&mut random, R - depth), truth: crossings(depth)[0] }
+    };
+    Case { surfaces, divisions: 24, ..ball("weights up to 1e4", (0..400).map(question).collect()) }
+}
+
+fn on_surface() -> Case {
+    let question = |i| {
+        let mut random = Random::new(8, i);
+        let toward = Ray::new(random.direction() * random.between(0.0, 20.0), random.direction());
+        let half = {
+            let b = toward.origin.dot(toward.direction);
+            -b + (b * b + R * R - toward.origin.length_squared()).sqrt()
+        };
+        let n = toward.at(half) / R;
+        // A third of the chords is shorter than 6 mm.
+        let flat = if i % 3 == 0 { random.between(0.005, 0.06) } else { random.between(0.06, 1.0) };
+        let (a, c) = orthonormal_pair(n);
+        let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
+        let direction = ((a * cos + c * sin) * (1.0 - flat * flat).sqrt() - n * flat).normalize();
+        Question::Chord { toward, direction, radius: R }
+    };
+    ball("start on the surface", (0..400).map(question).collect())
+}
+
+fn far_origin() -> Case {
+    let question = |i| {
+        let mut random = Random::new(9, i);
+        let depth = random.between(1.0, R);
+        let near = past(&mut random, R - depth);
+        let truth = crossings(depth)[0];
+        let ray = Ray::new(near.origin - near.direction * 1e6, near.direction);
+        Question::First { ray, truth: Truth { t: truth.t.map(|t| t + 1e6), ..truth } }
+    };
+    ball("origin 1e6 mm away", (0..400).map(question).collect())
+}
+
+fn from_inside() -> Case {
+    let question = |i| {
+        let mut random = Random::new(10, i);
+        let o = random.direction() * (R * 0.98 * random.unit().cbrt());
+        let d = if i % 4 == 0 {
+            [Vector::X, Vector::Y, Vector::Z, -Vector::X][i as usize / 4 % 4]
+        } else {
+            random.direction()
+        };
+        let b = o.dot(d);
+        let root = (b * b + R * R - o.length_squared()).sqrt();
+        let truth = Truth::hit(root - b, root / R, R - o.length());
+        Question::All { ray: Ray::new(o, d), truths: vec![truth] }
+    };
+    ball("from inside", (0..400).map(question).collect())
+}
+
+/// Rays at corners and edge middles of the facets, on the axes of the tree too.
+fn facet_features() -> Case {
+    let divisions = 12;
+    let case = ball("facet edge and vertex", Vec::new());
+    let mesh = super::specimen::grid_mesh(&super::specimen::model("ball", [sphere(R)]), divisions);
+    let mut questions = Vec::new();
+    for i in 0..600 {
+        let mut random = Random::new(11, i);
+        let corners = mesh.corners((random.unit() * mesh.facets.len() as f64) as usize);
+        let target = match i % 3 {
+            0 => corners[0],
+            1 => 0.5 * (corners[0] + corners[1]),
+            _ => 0.5 * (corners[0] + corners[2]),
+        };
+        let n = target.normalize();
+        let d = if i % 5 == 0 { -n } else { -random.hemisphere(n) };
+        let d = if d.dot(n) > -0.2 { -n } else { d };
+        let o = target - d * 150.0;
+        let (b, c) = (o.dot(d), o.length_squared() - R * R);
+        let root = (b * b - c).sqrt();
+        let truth = Truth::hit(c / (-b + root), root / R, R);
+        questions.push(Question::First { ray: Ray::new(o, d), truth });
+    }
+    Case { divisions, questions, ..case }
+}

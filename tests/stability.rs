@@ -1,0 +1,35 @@
+//! Every hard case in every variant, as a contract that each intersector signs.
+
+mod study_support;
+
+use lampyris::study::stability::{Ground, Row, Variant, cases};
+use study_support::Brute;
+
+fn table(rows: &[Row]) -> String {
+    let line = |r: &Row| {
+        format!(
+            "{:28} {:8} {:8} {:5} {:5} {:5} {:5}\n",
+            r.case, r.variant, r.intersector, r.rays, r.right, r.flagged, r.wrong
+        )
+    };
+    rows.iter().map(line).collect()
+}
+
+#[test]
+fn brute_force_over_the_facets_signs() {
+    let mut rows = Vec::new();
+    for case in cases() {
+        for variant in Variant::ALL {
+            // Ten thousand reflections are for the trees; needles a million times longer than wide, turned, are beyond
+            // this test's plain arithmetic.
+            let guide = case.name.starts_with("guide") && variant != Variant::Home;
+            if guide || (case.name == "slivers" && variant == Variant::Rotated) {
+                continue;
+            }
+            let scene = case.scene(variant);
+            rows.push(scene.ask("brute", &Brute(&scene.mesh), Ground::Facets));
+        }
+    }
+    let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
+    assert!(bad.is_empty(), "{}", table(&bad));
+}
