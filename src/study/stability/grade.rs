@@ -154,8 +154,9 @@ impl Asker<'_> {
         let right = match self.ground {
             Ground::Facets => {
                 let sure = truths.iter().filter(|t| t.margin > self.band).count();
-                let sequence =
-                    hits.len() >= sure && hits.len() <= truths.len() && (truths.len() - hits.len()) % 2 == 0;
+                let sequence = hits.len() >= sure
+                    && hits.len() <= truths.len()
+                    && (truths.len() - hits.len()).is_multiple_of(2);
                 sequence && hits.iter().all(|h| self.in_band(ray, self.local_t(h)))
             }
             Ground::Spline => {
