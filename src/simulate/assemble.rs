@@ -1,0 +1,66 @@
+//! Several models in one.
+
+use super::scene::{Key, Placement, Scene};
+use super::{Error, ErrorKind};
+use crate::math::{Frame, Point, Vector};
+use crate::model::{Model, PartId};
+
+impl Placement {
+    /// The placement as a frame.
+    pub fn frame(&self) -> Frame {
+        let z = Vector::from_array(self.z);
+        let x = self.x.map(Vector::from_array).unwrap_or(Vector::X);
+        Frame { scale: self.scale, ..Frame::from_axis(Point::from_array(self.at), z, Some(x)) }
+    }
+}
+
+impl Scene {
+    /// Puts the models of the scene, read in its order, where they stand, and makes one model of them.
+    pub fn assemble(&self, models: Vec<Model>) -> Result<Model, Error> {
+        if models.len() != self.models.len() {
+            let message = format!("{} models for {} [[model]] entries", models.len(), self.models.len());
+            return Err(self.error(ErrorKind::Model, &[Key::Name("model")], message));
+        }
+        let mut whole = Model { name: self.title.clone(), ..Model::default() };
+        for (i, (mut model, entry)) in models.into_iter().zip(&self.models).enumerate() {
+            let placement = entry.placement.frame();
+            if !(entry.placement.scale > 0.0 && entry.placement.scale.is_finite()) {
+                let at = [Key::Name("model"), Key::Index(i), Key::Name("placement")];
+                return Err(self.error(ErrorKind::Value, &at, "`scale` must be positive"));
+            }
+            let first = whole.parts.len() as u32;
+            whole.parts.append(&mut model.parts);
+            for mut instance in model.instances {
+                instance.part = PartId(first + instance.part.0);
+                if !placement.is_identity() {
+                    instance.placement = placement.compose(&instance.placement);
+                }
+                if !entry.name.is_empty() {
+                    instance.name = format!("{}/{}", entry.name, instance.name);
+                }
+                whole.instances.push(instance);
+            }
+        }
+        Ok(whole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Part;
+    use std::path::Path;
+
+    #[test]
+    fn models_are_named_and_placed() {
+        let text = "[[model]]\nfile = 'a.stp'\n[[model]]\nfile = 'a.stp'\nname = 'b'\nplacement = { at = [1, 2, 3], scale = 2 }";
+        let scene = Scene::parse(text, "s.toml", Path::new(".")).unwrap();
+        let model = || Model::from_part(Part { name: "p".into(), ..Part::default() });
+        let whole = scene.assemble(vec![model(), model()]).unwrap();
+        assert_eq!(whole.instances[1].name, "b/p");
+        assert_eq!(whole.instances[1].part, PartId(1));
+        assert_eq!(whole.instances[1].placement.point(Point::ONE), Point::new(3.0, 4.0, 5.0));
+        assert!(whole.instances[0].placement.is_identity());
+        assert!(scene.assemble(vec![model()]).is_err());
+    }
+}

@@ -1,0 +1,182 @@
+use crate::math::{Aabb, Point, Uv};
+use crate::model::{Face, Model, PlacedFace};
+
+/// Finds the face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton.
+///
+/// Exact for points on a face; between faces, good to the spacing of the samples (1/24 of a face) where the foot of the
+/// perpendicular lies outside a trimming loop.
+pub(super) struct Nearest<'a> {
+    faces: Vec<PlacedFace<'a>>,
+    bounds: Vec<Aabb>,
+    loops: Vec<Option<Vec<Vec<Uv>>>>,
+}
+
+/// Samples across a face in each direction, and along each edge of a loop.
+const SAMPLES: usize = 24;
+
+impl<'a> Nearest<'a> {
+    pub(super) fn new(model: &'a Model) -> Self {
+        let faces: Vec<_> = model.placed_faces().collect();
+        let bounds = faces.iter().map(bounds).collect();
+        let loops = vec![None; faces.len()];
+        Self { faces, bounds, loops }
+    }
+
+    /// Index of the nearest of the candidate faces; the first of equals.
+    pub(super) fn face(&mut self, p: Point, candidates: &[usize]) -> Option<usize> {
+        let away = |b: &Aabb| (b.min - p).max(p - b.max).max(Point::ZERO).length();
+        let mut order: Vec<(f64, usize)> = candidates.iter().map(|&c| (away(&self.bounds[c]), c)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut best: Option<(f64, usize)> = None;
+        for (low, c) in order {
+            // 1e-9 of the distance: a rounded box may lie that much too far.
+            if best.is_some_and(|(d, _)| low * (1.0 - 1e-9) > d) {
+                break;
+            }
+            let d = self.distance(c, p);
+            if best.is_none_or(|(b, f)| d < b || d == b && c < f) {
+                best = Some((d, c));
+            }
+        }
+        best.filter(|(d, _)| d.is_finite()).map(|(_, c)| c)
+    }
+
+    /// Distance from a point to a placed face, mm; infinite for a face without extent.
+    fn distance(&mut self, index: usize, p: Point) -> f64 {
+        let placed = self.faces[index];
+        let local = placed.placement.local_point(p);
+        let in_part = match (placed.face, placed.tessellated) {
+            (Some(face), _) => {
+                let loops = self.loops[index].get_or_insert_with(|| polygons(face));
+                to_face(face, loops, local)
+            }
+            (None, Some(t)) => (0..t.mesh.facets.len())
+                .flat_map(|f| {
+                    let [a, b, c, d] = t.mesh.corners(f);
+                    [to_triangle(local, [a, b, c]), to_triangle(local, [a, c, d])]
+                })
+                .fold(f64::INFINITY, f64::min),
+            (None, None) => f64::INFINITY,
+        };
+        in_part * placed.placement.scale
+    }
+}
+
+/// A box around a placed face.
+pub(super) fn bounds(f: &PlacedFace<'_>) -> Aabb {
+    let local = match (f.face, f.tessellated) {
+        (Some(face), _) => face.surface.bounds(),
+        (None, Some(t)) => t.mesh.bounds(),
+        (None, None) => Aabb::EMPTY,
+    };
+    if local.is_empty() { local } else { Aabb::around(local.corners().map(|c| f.placement.point(c))) }
+}
+
+fn polygons(face: &Face) -> Vec<Vec<Uv>> {
+    let points = |u: &crate::model::EdgeUse| {
+        let [a, b] = u.uv.domain();
+        let reversed = u.reversed;
+        (0..SAMPLES)
+            .map(move |i| {
+                let s = i as f64 / SAMPLES as f64;
+                a + (b - a) * if reversed { 1.0 - s } else { s }
+            })
+            .map(|t| u.uv.evaluate(t))
+            .collect::<Vec<_>>()
+    };
+    face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
+}
+
+/// Whether a parameter point lies inside the loops: an odd number of crossings.
+fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
+    let crossings = loops
+        .iter()
+        .flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])))
+        .filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
+        .count();
+    loops.is_empty() || crossings % 2 == 1
+}
+
+fn to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
+    let s = &face.surface;
+    let [[u0, u1], [v0, v1]] = s.domain();
+    let away = |uv: Uv| s.evaluate(uv).distance(p);
+    let border = loops.iter().flatten().map(|&uv| away(uv)).fold(f64::INFINITY, f64::min);
+    let grid = (0..SAMPLES * SAMPLES).map(|i| {
+        let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
+        Uv::new(at(i / SAMPLES, u0, u1), at(i % SAMPLES, v0, v1))
+    });
+    let start =
+        grid.filter(|&uv| inside(loops, uv)).map(|uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)).or_else(
+            || loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)),
+        );
+    let Some((coarse, mut uv)) = start else { return border };
+    for _ in 0..20 {
+        let d = s.derivatives(uv);
+        let r = p - d.point;
+        let (a, b, c) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
+        let det = a * c - b * b;
+        if det.is_nan() || det <= 1e-14 * a * c {
+            break;
+        }
+        let (g, h) = (d.du.dot(r), d.dv.dot(r));
+        let next = s.clamp(uv + Uv::new(c * g - b * h, a * h - b * g) / det);
+        if next == uv {
+            break;
+        }
+        uv = next;
+    }
+    let fine = if inside(loops, uv) { away(uv) } else { f64::INFINITY };
+    fine.min(coarse).min(border)
+}
+
+/// Distance from a point to a triangle: to the plane when the foot lies inside, else to the nearest edge.
+fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
+    let n = (b - a).cross(c - a);
+    let within = |a: Point, b: Point| (b - a).cross(p - a).dot(n) >= 0.0;
+    if n.length_squared() > 0.0 && within(a, b) && within(b, c) && within(c, a) {
+        return ((p - a).dot(n) / n.length()).abs();
+    }
+    [(a, b), (b, c), (c, a)]
+        .into_iter()
+        .map(|(a, b)| {
+            let e = b - a;
+            let s = if e == Point::ZERO { 0.0 } else { ((p - a).dot(e) / e.length_squared()).clamp(0.0, 1.0) };
+            p.distance(a + e * s)
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Frame, Vector};
+    use crate::model::{Analytic, Part, Shell};
+    use crate::nurbs::sweep;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    #[test]
+    fn distances_to_a_sphere_and_a_plane() {
+        let face = |surface| Face {
+            name: String::new(),
+            entity: None,
+            colour: None,
+            surface,
+            analytic: Analytic::Other,
+            reversed: false,
+            loops: Vec::new(),
+            gap: 0.0,
+        };
+        let sphere = sweep::sphere(&Frame::IDENTITY, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]);
+        let plane = sweep::plane(&Frame::translation(Vector::Z * 20.0), [[-1.0, 1.0], [-1.0, 1.0]]);
+        let shell = Shell { faces: vec![face(sphere), face(plane)], ..Shell::default() };
+        let mut model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+        model.instances[0].placement = Frame { scale: 2.0, ..Frame::translation(Vector::X * 100.0) };
+        let mut nearest = Nearest::new(&model);
+        let p = Point::new(100.0, 0.0, 0.0) + Vector::new(3.0, -4.0, 12.0).normalize() * 17.0;
+        assert!((nearest.distance(0, p) - 7.0).abs() < 1e-9);
+        assert!((nearest.distance(1, Point::new(100.5, 0.5, 41.0)) - 1.0).abs() < 1e-12);
+        assert_eq!(nearest.face(Point::new(100.0, 0.0, 35.0), &[0, 1]), Some(1));
+        assert_eq!(nearest.face(Point::new(100.0, 0.0, 24.0), &[0, 1]), Some(0));
+    }
+}

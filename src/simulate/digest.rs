@@ -1,0 +1,66 @@
+//! A hash of all tallies, as a fingerprint of a result.
+
+use super::kernel::Tallies;
+use super::tally::Sum;
+
+/// FNV-1a with 128 bits (Fowler, Noll, Vo): not meant against forgery, only to show that two results are the same.
+struct Fnv(u128);
+
+impl Fnv {
+    fn eat(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.0 = (self.0 ^ u128::from(b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013B);
+        }
+    }
+
+    fn sums(&mut self, sums: &[Sum]) {
+        self.eat(&(sums.len() as u64).to_le_bytes());
+        for (i, s) in sums.iter().enumerate().filter(|(_, s)| **s != Sum::default()) {
+            self.eat(&(i as u64).to_le_bytes());
+            self.eat(&s.total.to_le_bytes());
+            self.eat(&s.squares.to_le_bytes());
+        }
+    }
+}
+
+/// The hash of all sums and counts, as 32 hexadecimal digits.
+pub(crate) fn of(t: &Tallies) -> String {
+    let mut h = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+    t.cells.iter().for_each(|c| h.sums(c));
+    h.sums(&t.receivers);
+    h.sums(&t.faces);
+    h.sums(&t.bulk);
+    h.sums(&t.ends);
+    for m in &t.moments {
+        m.first.iter().for_each(|x| h.eat(&x.to_le_bytes()));
+        m.second.iter().for_each(|x| h.eat(&x.to_le_bytes()));
+        h.eat(&m.farthest.to_le_bytes());
+    }
+    let c = &t.counts;
+    [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off].iter().for_each(|x| h.eat(&x.to_le_bytes()));
+    format!("{:032x}", h.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_is_fnv_1a() {
+        // Published test vector of the 128-bit variant.
+        let mut h = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+        h.eat(b"a");
+        assert_eq!(h.0, 0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
+    }
+
+    #[test]
+    fn every_tally_counts() {
+        let base = Tallies { faces: vec![Sum::default(); 3], ..Tallies::default() };
+        let mut other = base.clone();
+        other.faces[1].add_replicate(1);
+        assert_ne!(of(&base), of(&other));
+        other = base.clone();
+        other.counts.segments = 1;
+        assert_ne!(of(&base), of(&other));
+    }
+}

@@ -1,0 +1,97 @@
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What went wrong with a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The scene file, or a file it names, cannot be read.
+    Unreadable,
+    /// Not TOML, or a key or type that the scene does not have.
+    Syntax,
+    /// A value out of range, or keys that do not go together.
+    Value,
+    /// A rule, name or point that nothing in the model answers to.
+    NoMatch,
+    /// A physical effect that is not simulated.
+    Unsupported,
+    /// The model has no geometry to trace, or more than a table can hold.
+    Model,
+}
+
+/// Why a scene cannot be simulated: names the file, the key, and what to do.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{}{message}{}", self.place(), self.help.as_ref().map(|h| format!("; {h}")).unwrap_or_default())]
+pub struct Error {
+    kind: ErrorKind,
+    message: String,
+    help: Option<String>,
+    file: String,
+    text: Option<Arc<str>>,
+    span: Option<Range<usize>>,
+}
+
+impl Error {
+    pub(crate) fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into(), help: None, file: String::new(), text: None, span: None }
+    }
+
+    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    pub(crate) fn at(mut self, file: &str, text: &Arc<str>, span: Option<Range<usize>>) -> Self {
+        self.file = file.into();
+        self.text = Some(text.clone());
+        self.span = span;
+        self
+    }
+
+    /// What kind of mistake it is.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// The message alone, without file, line and advice.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What to do about it.
+    pub fn advice(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// The scene file, empty for a scene that came from no file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The whole text of the scene file.
+    pub fn text(&self) -> Option<&str> {
+        self.text.as_deref()
+    }
+
+    /// The bytes of [`Error::text`] that are meant.
+    pub fn span(&self) -> Option<Range<usize>> {
+        self.span.clone()
+    }
+
+    /// Line and column of the place that is meant, both from 1.
+    pub fn line(&self) -> Option<(usize, usize)> {
+        let (text, span) = (self.text.as_deref()?, self.span.as_ref()?);
+        let before = text.get(..span.start)?;
+        let line = before.matches('\n').count() + 1;
+        Some((line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1))
+    }
+
+    fn place(&self) -> String {
+        match (self.file.is_empty(), self.line()) {
+            (true, None) => String::new(),
+            (true, Some((l, c))) => format!("line {l}, column {c}: "),
+            (false, None) => format!("{}: ", self.file),
+            (false, Some((l, c))) => format!("{}:{l}:{c}: ", self.file),
+        }
+    }
+}

@@ -1,0 +1,129 @@
+use crate::simulate::bind::AMBIENT;
+
+/// What a ray carries besides place, direction and power: the part of a path that decides which kernel is needed.
+pub(crate) trait Carry: Copy + Send {
+    /// Whether there are media at all; without, a face is opaque and nothing is absorbed on the way.
+    const MEDIA: bool;
+    /// A ray that starts inside these bodies, outermost first; `None` when it cannot carry so many.
+    fn inside(bodies: &[u16]) -> Option<Self>;
+    /// The innermost body.
+    fn body(&self) -> u16;
+    /// The same ray on the other side of the boundary of a body; `None` for a crossing that cannot be.
+    fn across(&self, body: u16, entering: bool) -> Option<Self>;
+}
+
+/// No media: mirrors and absorbers in empty space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nothing;
+
+impl Carry for Nothing {
+    const MEDIA: bool = false;
+    fn inside(_: &[u16]) -> Option<Self> {
+        Some(Self)
+    }
+    fn body(&self) -> u16 {
+        AMBIENT
+    }
+    fn across(&self, _: u16, _: bool) -> Option<Self> {
+        None
+    }
+}
+
+/// One body at a time: bodies that neither touch nor nest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OneBody(u16);
+
+impl Carry for OneBody {
+    const MEDIA: bool = true;
+    fn inside(bodies: &[u16]) -> Option<Self> {
+        match bodies {
+            [] => Some(Self(AMBIENT)),
+            [body] => Some(Self(*body)),
+            _ => None,
+        }
+    }
+    #[inline]
+    fn body(&self) -> u16 {
+        self.0
+    }
+    #[inline]
+    fn across(&self, body: u16, entering: bool) -> Option<Self> {
+        match entering {
+            true => (self.0 == AMBIENT).then_some(Self(body)),
+            false => (self.0 == body).then_some(Self(AMBIENT)),
+        }
+    }
+}
+
+/// Deepest nesting of bodies.
+pub(crate) const DEPTH: usize = 7;
+
+/// A stack of bodies, innermost last. A body may be left from below the top: so overlapping and touching solids hand light over
+/// in either order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stack {
+    bodies: [u16; DEPTH],
+    depth: u16,
+}
+
+impl Carry for Stack {
+    const MEDIA: bool = true;
+    fn inside(bodies: &[u16]) -> Option<Self> {
+        let mut stack = Self { bodies: [AMBIENT; DEPTH], depth: bodies.len() as u16 };
+        stack.bodies.get_mut(..bodies.len())?.copy_from_slice(bodies);
+        Some(stack)
+    }
+    #[inline]
+    fn body(&self) -> u16 {
+        match self.depth {
+            0 => AMBIENT,
+            n => self.bodies[n as usize - 1],
+        }
+    }
+    #[inline]
+    fn across(&self, body: u16, entering: bool) -> Option<Self> {
+        let mut next = *self;
+        let n = self.depth as usize;
+        if entering {
+            *next.bodies.get_mut(n)? = body;
+            next.depth += 1;
+        } else {
+            let at = self.bodies[..n].iter().rposition(|b| *b == body)?;
+            next.bodies.copy_within(at + 1..n, at);
+            next.bodies[n - 1] = AMBIENT;
+            next.depth -= 1;
+        }
+        Some(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_are_left_in_any_order() {
+        let s = Stack::inside(&[]).unwrap().across(1, true).unwrap().across(2, true).unwrap();
+        assert_eq!(s.body(), 2);
+        assert_eq!(s.across(2, false).unwrap().body(), 1);
+        let left = s.across(1, false).unwrap();
+        assert_eq!(left.body(), 2);
+        assert_eq!(left.across(2, false).unwrap().body(), AMBIENT);
+        assert!(left.across(1, false).is_none());
+        let mut deep = Stack::inside(&[]).unwrap();
+        for _ in 0..DEPTH {
+            deep = deep.across(1, true).unwrap();
+        }
+        assert!(deep.across(1, true).is_none());
+    }
+
+    #[test]
+    fn one_body_agrees_with_a_stack_where_bodies_stand_apart() {
+        let (a, s) = (OneBody::inside(&[]).unwrap(), Stack::inside(&[]).unwrap());
+        for (body, entering) in [(1, true), (2, true), (1, false), (3, false)] {
+            let (x, y) = (a.across(body, entering), s.across(body, entering));
+            assert_eq!(x.map(|c| c.body()), y.map(|c| c.body()));
+        }
+        assert!(a.across(1, true).unwrap().across(2, true).is_none());
+    }
+}

@@ -1,0 +1,89 @@
+use std::sync::LazyLock;
+
+/// Dimensions of the sequence: two for the place, two for the direction, one for the wavelength, one spare.
+pub const DIMENSIONS: usize = 6;
+
+/// Primitive polynomials and initial direction numbers of dimensions 2… of Joe and Kuo, *Constructing Sobol sequences with
+/// better two-dimensional projections*, SIAM J. Sci. Comput. 30 (2008), table `new-joe-kuo-6`.
+const JOE_KUO: [(u32, u32, &[u32]); DIMENSIONS - 1] =
+    [(1, 0, &[1]), (2, 1, &[1, 3]), (3, 1, &[1, 3, 1]), (3, 2, &[1, 1, 1]), (4, 1, &[1, 1, 3, 3])];
+
+/// Contributions of each byte of the index, so that a number is four look-ups (measured 4 × faster than bit by bit).
+type Table = [[u32; 256]; 4];
+
+static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(table).collect());
+
+fn directions(dimension: usize) -> [u32; 32] {
+    let mut v = [0u32; 32];
+    if dimension == 0 {
+        return std::array::from_fn(|i| 1 << (31 - i));
+    }
+    let (s, a, m) = JOE_KUO[dimension - 1];
+    let s = s as usize;
+    for i in 0..32 {
+        v[i] = if i < s {
+            m[i] << (31 - i)
+        } else {
+            (1..s).fold(v[i - s] ^ (v[i - s] >> s), |x, k| x ^ ((a >> (s - 1 - k)) & 1) * v[i - k])
+        };
+    }
+    v
+}
+
+fn table(dimension: usize) -> Table {
+    let v = directions(dimension);
+    std::array::from_fn(|byte| {
+        std::array::from_fn(|value| (0..8).filter(|b| value >> b & 1 == 1).fold(0, |x, b| x ^ v[8 * byte + b]))
+    })
+}
+
+/// The Sobol number of an index, 32 bits after the point, Owen-scrambled by `seed`.
+///
+/// The scrambling is the hash of Laine and Karras as improved by N. Vegdahl, applied to reversed bits: Burley, *Practical
+/// hash-based Owen scrambling*, JCGT 9 (4), 2020. Each seed gives an independent randomisation of the same net, so the mean
+/// over seeds is unbiased and the spread over seeds is an honest error.
+#[inline]
+pub fn scrambled(index: u32, dimension: usize, seed: u32) -> u32 {
+    let t = &TABLES[dimension];
+    let b = index.to_le_bytes();
+    let x = t[0][b[0] as usize] ^ t[1][b[1] as usize] ^ t[2][b[2] as usize] ^ t[3][b[3] as usize];
+    let mut n = x.reverse_bits();
+    n ^= n.wrapping_mul(0x3d20_adea);
+    n = n.wrapping_add(seed);
+    n = n.wrapping_mul((seed >> 16) | 1);
+    n ^= n.wrapping_mul(0x0552_6c56);
+    n ^= n.wrapping_mul(0x53a2_2864);
+    n.reverse_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A (0, m, 2)-net in base 2 has one point in every elementary interval of area 2⁻ᵐ; scrambling keeps that.
+    #[test]
+    fn the_first_two_dimensions_stay_a_net() {
+        for seed in [0u32, 1, 0xdead_beef, 0x1234_5678] {
+            for m in [4u32, 8] {
+                for split in 0..=m {
+                    let mut seen = vec![0; 1 << m];
+                    for i in 0..1u32 << m {
+                        let x = u64::from(scrambled(i, 0, seed)) >> (32 - split);
+                        let y = u64::from(scrambled(i, 1, seed ^ 0x9e37_79b9)) >> (32 - (m - split));
+                        seen[(x << (m - split) | y) as usize] += 1;
+                    }
+                    assert!(seen.iter().all(|&n| n == 1), "seed {seed:x}, 2^{m}, split {split}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_dimension_is_stratified() {
+        for dimension in 0..DIMENSIONS {
+            let mut seen = [0; 256];
+            (0..256).for_each(|i| seen[(scrambled(i, dimension, 77) >> 24) as usize] += 1);
+            assert!(seen.iter().all(|&n| n == 1), "dimension {dimension}");
+        }
+    }
+}

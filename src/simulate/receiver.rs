@@ -1,0 +1,243 @@
+//! Receivers in the form the kernel asks: where a ray meets them, and which cell counts it.
+
+use super::scene::{self, FarFieldType, ReceiverKind};
+use crate::math::{Frame, Point, Ray, Vector};
+use std::f64::consts::TAU;
+
+/// A receiver.
+#[derive(Clone, Debug)]
+pub(crate) struct Receiver {
+    pub(crate) name: String,
+    pub(crate) cells: [u32; 2],
+    pub(crate) absorbs: bool,
+    pub(crate) interactions: Option<u32>,
+    pub(crate) shape: Shape,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum Shape {
+    Plane { frame: Frame, half: [f64; 2], one_sided: bool },
+    Sphere { frame: Frame, radius: f64 },
+    /// Axes right, up, forward; both ranges of angles in radians.
+    FarField { frame: Frame, angles: FarFieldType, low: [f64; 2], high: [f64; 2] },
+    /// Faces whose absorbed power counts.
+    Absorbed { faces: Vec<u32> },
+}
+
+/// Where light meets a receiver: the cell, and the coordinates in units of the half sides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spot {
+    pub(crate) cell: usize,
+    pub(crate) at: [f64; 2],
+    /// Squared distance from the centre, in units of the square of the larger half side.
+    pub(crate) radius2: f64,
+}
+
+impl Receiver {
+    pub(crate) fn new(r: &scene::Receiver, faces: Vec<u32>) -> Self {
+        let (at, n) = (Point::from_array(r.at), Vector::from_array(r.normal));
+        let shape = match r.kind {
+            ReceiverKind::Plane => {
+                let [a, b] = r.size.unwrap_or([1.0, 1.0]);
+                let frame = Frame::from_axis(at, n, r.x.map(Vector::from_array));
+                Shape::Plane { frame, half: [0.5 * a, 0.5 * b], one_sided: r.one_sided }
+            }
+            ReceiverKind::Sphere => {
+                Shape::Sphere { frame: far_axes(at, n, Vector::from_array(r.up)), radius: r.radius.unwrap_or(1.0) }
+            }
+            ReceiverKind::FarField => {
+                let (h, v) = r.angles_deg();
+                let frame = far_axes(Point::ZERO, n, Vector::from_array(r.up));
+                let rad = |x: [f64; 2], y: [f64; 2], i: usize| [x[i].to_radians(), y[i].to_radians()];
+                Shape::FarField { frame, angles: r.angles, low: rad(h, v, 0), high: rad(h, v, 1) }
+            }
+            ReceiverKind::Absorbed => Shape::Absorbed { faces },
+        };
+        let cells = if r.kind == ReceiverKind::Absorbed { [1, 1] } else { r.cells };
+        Self { name: r.name.clone(), cells, absorbs: r.absorbs, interactions: r.interactions, shape }
+    }
+
+    pub(crate) fn cell_count(&self) -> usize {
+        self.cells[0] as usize * self.cells[1] as usize
+    }
+
+    /// Distances at which a ray crosses the receiver, in `(after, before)`; the nearest.
+    #[inline]
+    pub(crate) fn crossing(&self, ray: &Ray, after: f64, before: f64) -> Option<f64> {
+        match &self.shape {
+            Shape::Plane { frame, half, one_sided } => {
+                let along = ray.direction.dot(frame.z);
+                if along == 0.0 || *one_sided && along > 0.0 {
+                    return None;
+                }
+                let t = (frame.origin - ray.origin).dot(frame.z) / along;
+                if !(t > after && t < before) {
+                    return None;
+                }
+                let p = ray.at(t) - frame.origin;
+                (p.dot(frame.x).abs() <= half[0] && p.dot(frame.y).abs() <= half[1]).then_some(t)
+            }
+            Shape::Sphere { frame, radius } => {
+                let o = ray.origin - frame.origin;
+                let b = o.dot(ray.direction);
+                // Distance of the ray from the centre by the foot of the perpendicular: no cancellation for far origins.
+                let foot = o - ray.direction * b;
+                let d2 = radius * radius - foot.length_squared();
+                if d2 < 0.0 {
+                    return None;
+                }
+                let root = d2.sqrt();
+                [-b - root, -b + root].into_iter().find(|&t| t > after && t < before)
+            }
+            Shape::FarField { .. } | Shape::Absorbed { .. } => None,
+        }
+    }
+
+    /// The cell and coordinates of a point on a plane or sphere.
+    #[inline]
+    pub(crate) fn spot(&self, p: Point) -> Option<Spot> {
+        match &self.shape {
+            Shape::Plane { frame, half, .. } => {
+                let local = p - frame.origin;
+                let (x, y) = (local.dot(frame.x), local.dot(frame.y));
+                let at = [(x / half[0]).clamp(-1.0, 1.0), (y / half[1]).clamp(-1.0, 1.0)];
+                let largest = half[0].max(half[1]);
+                Some(self.counted(at, (x * x + y * y) / (largest * largest)))
+            }
+            Shape::Sphere { frame, .. } => {
+                let d = frame.local_direction(p - frame.origin).normalize();
+                self.angular(d, FarFieldType::A, [-0.5 * TAU, -0.25 * TAU], [0.5 * TAU, 0.25 * TAU])
+            }
+            Shape::FarField { .. } | Shape::Absorbed { .. } => None,
+        }
+    }
+
+    /// The cell and coordinates of a direction in a far field; `None` outside its ranges.
+    #[inline]
+    pub(crate) fn direction(&self, d: Vector) -> Option<Spot> {
+        match &self.shape {
+            Shape::FarField { frame, angles, low, high } => {
+                self.angular(frame.local_direction(d), *angles, *low, *high)
+            }
+            _ => None,
+        }
+    }
+
+    fn angular(&self, d: Vector, angles: FarFieldType, low: [f64; 2], high: [f64; 2]) -> Option<Spot> {
+        let [h, v] = to_angles(d, angles);
+        if !(low[0] <= h && h <= high[0] && low[1] <= v && v <= high[1]) {
+            return None;
+        }
+        let part = |a: f64, i: usize| (2.0 * (a - low[i]) / (high[i] - low[i]) - 1.0).clamp(-1.0, 1.0);
+        let at = [part(h, 0), part(v, 1)];
+        Some(self.counted(at, at[0] * at[0] + at[1] * at[1]))
+    }
+
+    fn counted(&self, at: [f64; 2], radius2: f64) -> Spot {
+        let index = |x: f64, n: u32| ((0.5 * (x + 1.0) * f64::from(n)) as u32).min(n - 1) as usize;
+        let cell = index(at[1], self.cells[1]) * self.cells[0] as usize + index(at[0], self.cells[0]);
+        Spot { cell, at, radius2 }
+    }
+
+    /// Area (mm²) or solid angle (sr) of the cells of a row; all cells of a row are alike.
+    pub(crate) fn cell_measure(&self, row: usize) -> f64 {
+        let n = self.cells.map(f64::from);
+        match &self.shape {
+            Shape::Plane { half, .. } => 4.0 * half[0] * half[1] / (n[0] * n[1]),
+            Shape::Sphere { radius, .. } => {
+                let [h, v] = [[-0.5 * TAU, 0.5 * TAU], [-0.25 * TAU, 0.25 * TAU]];
+                radius * radius * solid_angle(FarFieldType::A, [h[0], v[0]], [h[1], v[1]], self.cells, [0, row])
+            }
+            Shape::FarField { angles, low, high, .. } => solid_angle(*angles, *low, *high, self.cells, [0, row]),
+            Shape::Absorbed { .. } => 1.0,
+        }
+    }
+
+    /// The same for one cell; only type B has columns that differ.
+    pub(crate) fn measure(&self, column: usize, row: usize) -> f64 {
+        match &self.shape {
+            Shape::FarField { angles, low, high, .. } => solid_angle(*angles, *low, *high, self.cells, [column, row]),
+            _ => self.cell_measure(row),
+        }
+    }
+}
+
+fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
+    let side = Frame::from_axis(origin, forward, Some(up));
+    // from_axis makes x the upward one; right, up, forward as seen by one who looks along the light is left-handed.
+    Frame { x: side.y, y: side.x, ..side }
+}
+
+/// Angles of a direction given as (right, up, forward), radians.
+pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
+    match angles {
+        FarFieldType::A => [d.x.atan2(d.z), d.y.clamp(-1.0, 1.0).asin()],
+        FarFieldType::B => [d.x.clamp(-1.0, 1.0).asin(), d.y.atan2(d.z)],
+        FarFieldType::C => [d.y.atan2(d.x).rem_euclid(TAU), d.z.clamp(-1.0, 1.0).acos()],
+    }
+}
+
+fn solid_angle(angles: FarFieldType, low: [f64; 2], high: [f64; 2], cells: [u32; 2], [i, j]: [usize; 2]) -> f64 {
+    let edge = |axis: usize, k: usize| low[axis] + (high[axis] - low[axis]) * k as f64 / f64::from(cells[axis]);
+    let (h, v) = ([edge(0, i), edge(0, i + 1)], [edge(1, j), edge(1, j + 1)]);
+    match angles {
+        FarFieldType::A => (h[1] - h[0]) * (v[1].sin() - v[0].sin()),
+        FarFieldType::B => (h[1].sin() - h[0].sin()) * (v[1] - v[0]),
+        FarFieldType::C => (h[1] - h[0]) * (v[0].cos() - v[1].cos()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn far(angles: FarFieldType, h: [f64; 2], v: [f64; 2], cells: [u32; 2]) -> Receiver {
+        let kind = ReceiverKind::FarField;
+        Receiver::new(&scene::Receiver { kind, angles, h_deg: h, v_deg: v, cells, ..Default::default() }, Vec::new())
+    }
+
+    #[test]
+    fn the_cells_of_a_whole_sphere_make_four_pi() {
+        for (angles, h, v) in [
+            (FarFieldType::A, [-180.0, 180.0], [-90.0, 90.0]),
+            (FarFieldType::B, [-90.0, 90.0], [-180.0, 180.0]),
+            (FarFieldType::C, [0.0, 360.0], [0.0, 180.0]),
+        ] {
+            let r = far(angles, h, v, [12, 7]);
+            let sum: f64 = (0..12).flat_map(|i| (0..7).map(move |j| (i, j))).map(|(i, j)| r.measure(i, j)).sum();
+            assert!((sum - 2.0 * TAU).abs() < 1e-12, "{angles:?} {sum}");
+        }
+    }
+
+    #[test]
+    fn right_is_positive_h_and_up_is_positive_v() {
+        // Looking along +z with y up, right is −x.
+        for angles in [FarFieldType::A, FarFieldType::B] {
+            let r = far(angles, [-90.0, 90.0], [-90.0, 90.0], [2, 2]);
+            assert_eq!(r.direction(Vector::new(-0.1, 0.1, 1.0).normalize()).unwrap().cell, 3);
+            assert_eq!(r.direction(Vector::new(0.1, -0.1, 1.0).normalize()).unwrap().cell, 0);
+        }
+    }
+
+    #[test]
+    fn types_a_and_b_differ_off_axis() {
+        let d = Vector::new(0.5, 0.5, 0.5f64.sqrt());
+        let [h, v] = to_angles(d, FarFieldType::A);
+        assert!((v - (0.5f64).asin()).abs() < 1e-15 && (h - 0.5f64.sqrt().atan()).abs() < 1e-12 || h > v);
+        let [hb, vb] = to_angles(d, FarFieldType::B);
+        assert!((hb - v).abs() < 1e-15 && (vb - h).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_plane_is_crossed_inside_its_sides() {
+        let r = scene::Receiver { at: [0.0, 0.0, 5.0], size: Some([2.0, 4.0]), cells: [2, 2], ..Default::default() };
+        let r = Receiver::new(&r, Vec::new());
+        let ray = |x: f64, y: f64| Ray::new(Point::new(x, y, 0.0), Vector::Z);
+        assert_eq!(r.crossing(&ray(0.9, 1.9), 0.0, 1e9), Some(5.0));
+        assert_eq!(r.crossing(&ray(1.1, 0.0), 0.0, 1e9), None);
+        assert_eq!(r.crossing(&ray(0.9, 1.9), 0.0, 4.0), None);
+        assert_eq!(r.crossing(&ray(0.9, 1.9), 5.0, 9.0), None);
+        let spot = r.spot(Point::new(0.5, -1.0, 5.0)).unwrap();
+        assert_eq!((spot.at, spot.radius2), ([0.5, -0.5], 1.25 / 4.0));
+    }
+}

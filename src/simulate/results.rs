@@ -1,0 +1,284 @@
+//! What a simulation found out, in the units of the scene; it serialises to the `trace --json` object.
+
+use super::bind::BoundScene;
+use super::effects::{Because, KernelKind, Required};
+use super::kernel::{Counts, LostRay, PathVertex, Tallies};
+use super::receiver::{Receiver, Shape};
+use super::run::Plan;
+use super::scene::FarFieldType;
+use super::tally::Sum;
+use crate::intersect::Cost;
+use serde::{Serialize, Serializer};
+
+/// Results of a simulation.
+///
+/// Powers are in the unit of the sources (watts or lumens).
+#[derive(Clone, Debug, Serialize)]
+pub struct Results {
+    /// Rays that left the sources.
+    pub rays: u64,
+    /// Seconds of each stage; whoever read and built the scene fills in those but `trace`.
+    pub seconds: Seconds,
+    /// Nearest-hit queries.
+    pub segments: u64,
+    /// Million rays from the sources per second of `trace`.
+    pub mrays_per_s: f64,
+    /// Million segments per second of `trace`.
+    pub msegments_per_s: f64,
+    /// Threads used.
+    pub threads: usize,
+    /// What was simulated and what not.
+    pub effects: EffectsUsed,
+    /// Where the power went.
+    pub power: Power,
+    /// Paths that were lost.
+    pub lost_rays: u64,
+    /// Paths that a limit cut off.
+    pub cut_off_rays: u64,
+    /// Hits that used the facet's normal because the interpolated one would have sent the ray through the wrong side.
+    pub corrected_normals: u64,
+    /// Power absorbed by each instance on its faces, and in each medium.
+    pub absorbed: Vec<Absorbed>,
+    /// The receivers in the order of the scene.
+    pub receivers: Vec<ReceiverResult>,
+    /// Lost rays of the lowest index, at most 1000.
+    #[serde(skip)]
+    pub ledger: Vec<LostRay>,
+    /// Recorded paths, vertex by vertex.
+    #[serde(skip)]
+    pub paths: Vec<PathVertex>,
+    /// Work of the intersector.
+    #[serde(skip)]
+    pub cost: Cost,
+    /// The raw sums, to be merged with those of other shards.
+    #[serde(skip)]
+    pub tallies: Tallies,
+    /// Hash of all tallies: equal if and only if all of them are, bit by bit.
+    pub digest: String,
+}
+
+/// Seconds of each stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Reading the models.
+    pub read: f64,
+    /// Making facets.
+    pub tessellate: f64,
+    /// Building the intersector.
+    pub build: f64,
+    /// Tracing.
+    pub trace: f64,
+}
+
+/// What was simulated and what not, each with the reason.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectsUsed {
+    /// Simulated.
+    pub simulated: Vec<Because>,
+    /// Not simulated.
+    pub not_simulated: Vec<Because>,
+    /// The kernel that was picked.
+    pub kernel: &'static str,
+}
+
+/// Where the power went. `emitted` is the sum of the others to the last quantum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Power {
+    /// By all sources.
+    pub emitted: f64,
+    /// On receivers that end light.
+    pub received: f64,
+    /// In faces and media.
+    pub absorbed: f64,
+    /// Out of the scene, past every receiver.
+    pub escaped: f64,
+    /// On paths that a limit cut off.
+    pub cut_off: f64,
+    /// On paths that were lost.
+    pub lost: f64,
+}
+
+impl Power {
+    /// What does not add up, as a share of what was emitted.
+    pub fn imbalance(&self) -> f64 {
+        let sum = self.received + self.absorbed + self.escaped + self.cut_off + self.lost;
+        (self.emitted - sum).abs() / self.emitted
+    }
+}
+
+/// Power absorbed by one instance or medium.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Absorbed {
+    /// Instance, or the instance that holds the medium.
+    pub name: String,
+    /// `faces` or the name of the medium.
+    pub r#in: String,
+    /// Power.
+    pub power: f64,
+    /// Its standard error.
+    pub error: f64,
+}
+
+/// What one receiver counted.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReceiverResult {
+    /// Its name.
+    pub name: String,
+    /// `plane`, `far_field`, `sphere` or `absorbed`.
+    pub kind: &'static str,
+    /// Power that it counted.
+    pub power: f64,
+    /// Standard error of `power`.
+    pub power_error: f64,
+    /// Cells along both sides.
+    pub grid: [usize; 2],
+    /// Largest cell, in `unit`.
+    pub max: f64,
+    /// Smallest cell, in `unit`.
+    pub min: f64,
+    /// Unit of the cells, for sources in watts: `W/m2` or `W/sr`; lx and cd for sources in lumens.
+    pub unit: &'static str,
+    /// Mean position of the light: mm on a plane, degrees in angles.
+    pub centroid: [f64; 2],
+    /// Root mean square about the receiver's centre, in the same units.
+    pub rms: [f64; 2],
+    /// Largest distance from the centre, in the same units.
+    pub farthest: f64,
+    /// Files written for it; whoever writes them fills this in.
+    pub files: Vec<String>,
+    /// Half sides: mm of a plane, degrees of angles.
+    pub half: [f64; 2],
+    /// Middle of the ranges of angles, degrees; 0 for planes.
+    pub middle: [f64; 2],
+    /// Type of the angles of a far field.
+    #[serde(serialize_with = "angle_type")]
+    pub angles: Option<FarFieldType>,
+    /// Cells row by row, the first coordinate running fastest, in `unit`.
+    #[serde(skip)]
+    pub cells: Vec<f64>,
+    /// Standard error of each cell, in `unit`.
+    #[serde(skip)]
+    pub errors: Vec<f64>,
+}
+
+fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S::Error> {
+    a.serialize(s)
+}
+
+impl Results {
+    #[expect(clippy::too_many_arguments, reason = "called once, with everything a run leaves behind")]
+    pub(super) fn new(
+        bound: &BoundScene,
+        plan: &Plan,
+        required: &Required,
+        kernel: KernelKind,
+        mut tallies: Tallies,
+        cost: Cost,
+        trace: f64,
+        threads: usize,
+    ) -> Self {
+        // A run that was stopped early, or is one shard of many, answers for the rays it traced.
+        let traced = tallies.ends[0].total as f64 * plan.quantum;
+        let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
+        let Counts { rays, segments, corrected_normals, lost, cut_off } = tallies.counts;
+        let power = tallies.ends.map(|s| s.total as f64 * quantum);
+        let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;
+        let digest = super::digest::of(&tallies);
+        Self {
+            rays,
+            seconds: Seconds { trace, ..Seconds::default() },
+            segments,
+            mrays_per_s: rays as f64 / trace / 1e6,
+            msegments_per_s: segments as f64 / trace / 1e6,
+            threads,
+            effects: EffectsUsed {
+                simulated: required.simulated.clone(),
+                not_simulated: required.not_simulated.clone(),
+                kernel: kernel.name(),
+            },
+            power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },
+            lost_rays: lost,
+            cut_off_rays: cut_off,
+            corrected_normals,
+            absorbed: absorbed_by(bound, &tallies, quantum),
+            receivers: bound
+                .receivers
+                .iter()
+                .enumerate()
+                .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum))
+                .collect(),
+            ledger: std::mem::take(&mut tallies.ledger),
+            paths: std::mem::take(&mut tallies.paths),
+            cost,
+            tallies,
+            digest,
+        }
+    }
+}
+
+fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
+    let mut by_instance = vec![Sum::default(); bound.instances.len()];
+    for (sum, &instance) in tallies.faces.iter().zip(&bound.instance_of_face) {
+        // Squares add up as if faces were independent, which overstates the error of an instance hit by split light.
+        by_instance[instance as usize].merge(sum);
+    }
+    let result = |name: &str, r#in: &str, s: &Sum| Absorbed {
+        name: name.into(),
+        r#in: r#in.into(),
+        power: s.total as f64 * quantum,
+        error: s.error(tallies.replicates) * quantum,
+    };
+    let faces = bound.instances.iter().zip(&by_instance).map(|(name, s)| result(name, "faces", s));
+    let bulk = bound.bodies.iter().zip(&tallies.bulk).map(|(b, s)| result(&b.name, &b.medium, s));
+    faces.chain(bulk).filter(|a| a.power > 0.0).collect()
+}
+
+impl ReceiverResult {
+    fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64) -> Self {
+        let grid = r.cells.map(|n| n as usize);
+        let degrees = |low: [f64; 2], high: [f64; 2]| {
+            let half = [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees());
+            (half, [0, 1].map(|a| 0.5 * (high[a] + low[a]).to_degrees()))
+        };
+        let (kind, unit, scale, (half, middle), angles) = match &r.shape {
+            Shape::Plane { half, .. } => ("plane", "W/m2", 1e6, (*half, [0.0; 2]), None),
+            Shape::Sphere { .. } => ("sphere", "W/m2", 1e6, ([180.0, 90.0], [0.0; 2]), None),
+            Shape::FarField { angles, low, high, .. } => {
+                ("far_field", "W/sr", 1.0, degrees(*low, *high), Some(*angles))
+            }
+            Shape::Absorbed { .. } => ("absorbed", "W", 1.0, ([1.0; 2], [0.0; 2]), None),
+        };
+        let per = |k: usize| quantum * scale / r.measure(k % grid[0], k / grid[0]);
+        let sums = &tallies.cells[i];
+        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k)).collect();
+        let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
+        let total = &tallies.receivers[i];
+        let means = tallies.moments[i].means(total.total);
+        let largest = half[0].max(half[1]);
+        Self {
+            name: r.name.clone(),
+            kind,
+            power: total.total as f64 * quantum,
+            power_error: total.error(tallies.replicates) * quantum,
+            grid,
+            max: cells.iter().copied().fold(0.0, f64::max),
+            min: cells.iter().copied().fold(f64::INFINITY, f64::min),
+            unit,
+            centroid: [0, 1].map(|a| middle[a] + half[a] * means[a][0]),
+            rms: [0, 1].map(|a| half[a] * means[a][1].sqrt()),
+            farthest: largest * tallies.moments[i].farthest(),
+            files: Vec::new(),
+            half,
+            middle,
+            angles,
+            cells,
+            errors,
+        }
+    }
+
+    /// Cell `(i, j)`: the `i`-th along the first side, the `j`-th along the second.
+    pub fn cell(&self, i: usize, j: usize) -> f64 {
+        self.cells[j * self.grid[0] + i]
+    }
+}
+

@@ -1,0 +1,160 @@
+//! The scene file: models, media, materials, sources, receivers and the settings of the run, as TOML.
+//!
+//! A scene is plain data. [`Scene::parse`] refuses unknown keys with the place and the nearest known key;
+//! [`Scene::bind`](crate::simulate::BoundScene) then finds the faces of a model that each rule means. Lengths are mm, angles degrees
+//! where the key says `_deg`, wavelengths nm, powers watts (or lumens: the receivers answer in the unit of the sources).
+
+mod locate;
+mod material;
+mod receiver;
+mod run;
+mod source;
+pub(crate) mod suggest;
+
+use super::{Error, ErrorKind};
+pub use material::{Material, Medium, ModelUse, OneOrMany, Placement, Reflectance, SurfaceKind};
+pub use receiver::{FarFieldType, Receiver, ReceiverKind};
+pub use run::{Accuracy, Interfaces, Run, Sampling};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+pub use source::{Source, SourceKind};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A whole scene file.
+///
+/// ```
+/// let text = r#"
+///     [[source]]
+///     kind = "point"
+///     at = [0, 0, 10]
+///
+///     [[receiver]]
+///     name = "wall"
+///     kind = "plane"
+///     at = [0, 0, 1000]
+///     normal = [0, 0, -1]
+///     size = [2000, 2000]
+///     cells = [200, 200]
+/// "#;
+/// let scene = lampyris::simulate::Scene::parse(text, "scene.toml", std::path::Path::new("."))?;
+/// assert_eq!(scene.receivers[0].name, "wall");
+/// let slip = lampyris::simulate::Scene::parse("[run]\nray = 5", "scene.toml", std::path::Path::new(".")).unwrap_err();
+/// assert!(slip.to_string().contains("scene.toml:2:1") && slip.to_string().contains("`rays`"), "{slip}");
+/// # Ok::<(), lampyris::simulate::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scene {
+    /// What the scene is, for the report.
+    pub title: String,
+    /// Settings of the run.
+    pub run: Run,
+    /// How the models are faceted and traced; the command's options override it.
+    pub accuracy: Accuracy,
+    /// The CAD models and where they stand.
+    #[serde(rename = "model")]
+    pub models: Vec<ModelUse>,
+    /// Transparent media by name.
+    #[serde(rename = "medium")]
+    pub media: Vec<Medium>,
+    /// What parts and faces are made of; of several rules that meet on a face, the last one counts.
+    #[serde(rename = "material")]
+    pub materials: Vec<Material>,
+    /// What every other face is: `absorber` unless said otherwise.
+    pub default_surface: SurfaceKind,
+    /// Name of the medium around everything; vacuum unless said otherwise.
+    pub ambient: Option<String>,
+    /// Where light comes from.
+    #[serde(rename = "source")]
+    pub sources: Vec<Source>,
+    /// Where light is counted.
+    #[serde(rename = "receiver")]
+    pub receivers: Vec<Receiver>,
+    /// The file it came from, for messages.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// Where a scene came from.
+#[derive(Clone, Debug, Default)]
+pub struct Origin {
+    /// Name of the scene file, as the user gave it.
+    pub file: String,
+    /// Folder that relative paths start from.
+    pub folder: PathBuf,
+    /// The text, for messages that show the line.
+    pub text: Option<Arc<str>>,
+}
+
+impl Scene {
+    /// Reads a scene file; paths in it are relative to its folder.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            let kind = ErrorKind::Unreadable;
+            Error::new(kind, format!("{name}: cannot read the scene file: {e}")).help("check the path")
+        })?;
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Self::parse(&text, &name, folder)
+    }
+
+    /// Parses the text of a scene file and checks every value that can be checked without a model.
+    pub fn parse(text: &str, file_name: &str, base_dir: &Path) -> Result<Self, Error> {
+        let shared: Arc<str> = text.into();
+        let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax(&e, file_name, &shared))?;
+        scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared) };
+        scene.check()?;
+        Ok(scene)
+    }
+
+    /// The JSON Schema of a scene file.
+    pub fn schema() -> serde_json::Value {
+        schemars::schema_for!(Self).to_value()
+    }
+
+    /// A path named in the scene, seen from where the program runs.
+    pub fn resolve(&self, file: &str) -> PathBuf {
+        self.origin.folder.join(file)
+    }
+
+    /// An error about the value at `path`, a key or index at a time, with its place in the file.
+    pub(crate) fn error(&self, kind: ErrorKind, path: &[Key<'_>], message: impl Into<String>) -> Error {
+        let error = Error::new(kind, message);
+        match &self.origin.text {
+            Some(text) => error.at(&self.origin.file, text, self.span(path)),
+            None => error,
+        }
+    }
+
+    fn span(&self, path: &[Key<'_>]) -> Option<Range<usize>> {
+        locate::span(self.origin.text.as_deref()?, path)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.run.check(self)?;
+        material::check(self)?;
+        self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;
+        self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
+        let mut names: Vec<&str> = Vec::new();
+        for (i, receiver) in self.receivers.iter().enumerate() {
+            if names.contains(&receiver.name.as_str()) {
+                let message = format!("two receivers are called '{}'", receiver.name);
+                let at = [Key::Name("receiver"), Key::Index(i), Key::Name("name")];
+                return Err(self.error(ErrorKind::Value, &at, message).help("give each a name of its own"));
+            }
+            names.push(&receiver.name);
+        }
+        Ok(())
+    }
+}
+
+/// One step of a path into a scene file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Key<'a> {
+    /// A key of a table.
+    Name(&'a str),
+    /// A place in an array.
+    Index(usize),
+}

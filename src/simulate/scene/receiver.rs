@@ -1,0 +1,158 @@
+use super::{Key, OneOrMany, Scene};
+use crate::simulate::{Error, ErrorKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where light is counted. Planes and spheres stand in space and are no part of a model.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Receiver {
+    /// Name, used in reports and file names.
+    pub name: String,
+    /// What it is.
+    pub kind: ReceiverKind,
+    /// Centre of a plane or sphere, mm.
+    pub at: [f64; 3],
+    /// Normal of a plane; the main direction (0, 0) of a far field.
+    pub normal: [f64; 3],
+    /// Direction of the first side of a plane, as far as `normal` lets it.
+    pub x: Option<[f64; 3]>,
+    /// Upward direction of a far field, as far as `normal` lets it.
+    pub up: [f64; 3],
+    /// Sides of a plane, mm.
+    pub size: Option<[f64; 2]>,
+    /// Radius of a sphere, mm.
+    pub radius: Option<f64>,
+    /// Number of cells along both sides.
+    pub cells: [u32; 2],
+    /// Whether light ends at a plane or sphere; otherwise it is counted and goes on.
+    pub absorbs: bool,
+    /// Counts light that comes against `normal` only, and lets the other pass unseen.
+    pub one_sided: bool,
+    /// Counts only light that was hit exactly so many times before.
+    pub interactions: Option<u32>,
+    /// Angles of a far field.
+    pub angles: FarFieldType,
+    /// First angle of a far field (H, or C), from and to, degrees.
+    pub h_deg: [f64; 2],
+    /// Second angle of a far field (V, or γ), from and to, degrees.
+    pub v_deg: [f64; 2],
+    /// Part whose absorbed flux is counted.
+    pub part: Option<OneOrMany<String>>,
+    /// Instance whose absorbed flux is counted.
+    pub instance: Option<OneOrMany<String>>,
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            kind: ReceiverKind::Plane,
+            at: [0.0; 3],
+            normal: [0.0, 0.0, 1.0],
+            x: None,
+            up: [0.0, 1.0, 0.0],
+            size: None,
+            radius: None,
+            cells: [100, 100],
+            absorbs: true,
+            one_sided: false,
+            interactions: None,
+            angles: FarFieldType::A,
+            h_deg: [-90.0, 90.0],
+            v_deg: [-90.0, 90.0],
+            part: None,
+            instance: None,
+        }
+    }
+}
+
+/// The kinds of receivers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ReceiverKind {
+    /// A rectangle in space: power per area.
+    Plane,
+    /// All light that leaves the scene, by direction: power per solid angle.
+    FarField,
+    /// A sphere in space, by direction from its centre: power per area.
+    Sphere,
+    /// What the faces of a part absorb.
+    Absorbed,
+}
+
+/// How directions become two angles (CIE 121, IES LM-75).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[schemars(rename_all = "snake_case")]
+pub enum FarFieldType {
+    /// Vertical polar axis, as for headlamps: V is the elevation above the horizontal plane, H turns about the vertical.
+    #[default]
+    #[serde(rename = "A")]
+    A,
+    /// Horizontal polar axis, as for floodlights: H is the elevation out of the vertical plane, V turns about the horizontal.
+    #[serde(rename = "B")]
+    B,
+    /// C-planes about `normal` and γ from it, as for luminaires.
+    #[serde(rename = "C")]
+    C,
+}
+
+impl Receiver {
+    /// The ranges of both angles as given, or all directions for C-planes without a range.
+    pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
+        let unset = Self::default();
+        match self.angles {
+            FarFieldType::C if self.h_deg == unset.h_deg && self.v_deg == unset.v_deg => ([0.0, 360.0], [0.0, 180.0]),
+            FarFieldType::C if self.h_deg == unset.h_deg => ([0.0, 360.0], self.v_deg),
+            FarFieldType::C if self.v_deg == unset.v_deg => (self.h_deg, [0.0, 180.0]),
+            _ => (self.h_deg, self.v_deg),
+        }
+    }
+
+    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+        let fail = |key: &str, message: &str| {
+            let at = [Key::Name("receiver"), Key::Index(index), Key::Name(key)];
+            Err(scene.error(ErrorKind::Value, &at, message))
+        };
+        if self.name.is_empty() {
+            return fail("name", "this receiver has no `name`");
+        }
+        if self.cells.contains(&0) || u64::from(self.cells[0]) * u64::from(self.cells[1]) > 1 << 24 {
+            return fail("cells", "`cells` must be at least 1 and at most 16 million in all");
+        }
+        if !self.at.iter().chain(&self.normal).all(|x| x.is_finite()) || self.normal.iter().all(|x| *x == 0.0) {
+            return fail("normal", "`at` must be a point and `normal` a direction");
+        }
+        match self.kind {
+            ReceiverKind::Plane => match self.size {
+                Some(s) if s.iter().all(|x| *x > 0.0 && x.is_finite()) => Ok(()),
+                _ => fail("size", "a plane needs `size`, two positive lengths"),
+            },
+            ReceiverKind::Sphere => match self.radius {
+                Some(r) if r > 0.0 && r.is_finite() => Ok(()),
+                _ => fail("radius", "a sphere needs a positive `radius`"),
+            },
+            ReceiverKind::FarField => {
+                let ([h0, h1], [v0, v1]) = self.angles_deg();
+                let (h, v) = match self.angles {
+                    FarFieldType::A => (180.0, 90.0),
+                    FarFieldType::B => (90.0, 180.0),
+                    FarFieldType::C => (360.0, 180.0),
+                };
+                let low = if self.angles == FarFieldType::C { [0.0, 0.0] } else { [-h, -v] };
+                if !(low[0] <= h0 && h0 < h1 && h1 <= h) {
+                    return fail("h_deg", "`h_deg` must rise and stay within the angles of its type");
+                }
+                if !(low[1] <= v0 && v0 < v1 && v1 <= v) {
+                    return fail("v_deg", "`v_deg` must rise and stay within the angles of its type");
+                }
+                Ok(())
+            }
+            ReceiverKind::Absorbed if self.part.is_none() && self.instance.is_none() => {
+                fail("part", "say whose absorbed flux is meant: `part` or `instance`")
+            }
+            ReceiverKind::Absorbed => Ok(()),
+        }
+    }
+}

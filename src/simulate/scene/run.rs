@@ -1,0 +1,103 @@
+use super::{Key, Scene};
+use crate::simulate::{Error, ErrorKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the run.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Run {
+    /// Number of rays that leave the sources.
+    pub rays: u64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// How places, directions and wavelengths are chosen at the sources.
+    pub sampling: Sampling,
+    /// What happens to a ray at a partly reflecting interface.
+    pub interfaces: Interfaces,
+    /// Below this share of a ray's first power an interface no longer splits the ray but chooses a side.
+    pub split_floor: f64,
+    /// Whether the polarisation of each ray is followed; otherwise light is unpolarised at every hit.
+    pub polarisation: bool,
+    /// Hits after which a path ends and counts as cut off.
+    pub max_bounces: u32,
+    /// Length after which a path ends and counts as cut off, mm.
+    pub max_length_mm: f64,
+    /// Share of a ray's first power below which its path ends and counts as cut off.
+    pub power_floor: f64,
+    /// Faces of two solids at most this far apart are one interface, mm.
+    pub glue_mm: f64,
+    /// Independent parts the run is divided into; errors are computed from how much they differ.
+    pub replicates: u32,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self {
+            rays: 1_000_000,
+            seed: 1,
+            sampling: Sampling::Sobol,
+            interfaces: Interfaces::Roulette,
+            split_floor: 1e-3,
+            polarisation: false,
+            max_bounces: 100_000,
+            max_length_mm: 1e9,
+            power_floor: 1e-6,
+            glue_mm: 1e-3,
+            replicates: 128,
+        }
+    }
+}
+
+/// How a source is sampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// An Owen-scrambled Sobol net in each replicate: smaller errors, honestly estimated.
+    #[default]
+    Sobol,
+    /// Independent random numbers.
+    Random,
+}
+
+/// What happens at a partly reflecting interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Interfaces {
+    /// The ray is reflected or transmitted by chance, with its whole power.
+    #[default]
+    Roulette,
+    /// The ray becomes two, each with its share of the power.
+    Split,
+}
+
+/// How the models are faceted and traced.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Accuracy {
+    /// Smallest and largest sag of a facet, mm.
+    pub tolerance_mm: Option<[f64; 2]>,
+    /// Largest angle between the normals of a facet's corners, degrees.
+    pub angle_deg: Option<f64>,
+    /// `octree`, `bvh2`, `cwbvh` or `exact`.
+    pub intersector: Option<String>,
+    /// `flat`, `nearest`, `bilinear`, `cubic` or `exact`.
+    pub normals: Option<String>,
+}
+
+impl Run {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
+        let fail = |key: &str, message: &str| {
+            Err(scene.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))
+        };
+        match self {
+            r if r.rays == 0 || r.rays >= 1 << 47 => fail("rays", "must be from 1 to 1e14"),
+            r if r.replicates < 2 || r.replicates > 1 << 16 => fail("replicates", "must be from 2 to 65536"),
+            r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
+            r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
+            r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
+            r if !(0.0..=1.0).contains(&r.glue_mm) => fail("glue_mm", "must be from 0 to 1"),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,115 @@
+use super::{Key, OneOrMany, Scene};
+use crate::simulate::{Error, ErrorKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A source of light.
+///
+/// It shines from a point, or evenly from a disc (`radius`) or rectangle (`size`) around `at`, square to `direction`.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Source {
+    /// Name for the report.
+    pub name: String,
+    /// How the light leaves.
+    pub kind: SourceKind,
+    /// Power, watts; all sources of a scene in the same unit.
+    pub power: f64,
+    /// Position or centre, mm.
+    pub at: [f64; 3],
+    /// Main direction; need not be of unit length.
+    pub direction: [f64; 3],
+    /// Direction of the first side of `size`, as far as `direction` lets it.
+    pub x: Option<[f64; 3]>,
+    /// Radius of a disc, mm.
+    pub radius: Option<f64>,
+    /// Sides of a rectangle, mm.
+    pub size: Option<[f64; 2]>,
+    /// Half the opening angle of a cone, degrees.
+    pub half_angle_deg: Option<f64>,
+    /// Exponent n of a cosⁿ lobe.
+    pub exponent: Option<f64>,
+    /// Names of the instances that the source lies inside of, outermost first, when it lies in a medium.
+    pub inside: Option<OneOrMany<String>>,
+    /// Number of its rays; by its share of the power otherwise.
+    pub rays: Option<u64>,
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            kind: SourceKind::Point,
+            power: 1.0,
+            at: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+            x: None,
+            radius: None,
+            size: None,
+            half_angle_deg: None,
+            exponent: None,
+            inside: None,
+            rays: None,
+        }
+    }
+}
+
+/// How light leaves a source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum SourceKind {
+    /// The same in every direction.
+    Point,
+    /// The same in every direction within `half_angle_deg` of `direction`.
+    Cone,
+    /// All along `direction`.
+    Collimated,
+    /// Radiant intensity proportional to the cosine to `direction`, on one side.
+    Lambertian,
+    /// Radiant intensity proportional to cosⁿ, n being `exponent`.
+    Cosine,
+}
+
+impl Source {
+    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+        let fail = |key: &str, message: String| {
+            let at = [Key::Name("source"), Key::Index(index), Key::Name(key)];
+            Err(scene.error(ErrorKind::Value, &at, message))
+        };
+        let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
+        if !(self.power > 0.0 && self.power.is_finite()) {
+            return fail("power", format!("a power of {} is not positive", self.power));
+        }
+        if !finite(&self.at) {
+            return fail("at", "not a point".into());
+        }
+        if !finite(&self.direction) || self.direction.iter().all(|x| *x == 0.0) {
+            return fail("direction", "not a direction".into());
+        }
+        if self.radius.is_some() && self.size.is_some() {
+            return fail("size", "a source has a `radius` or a `size`, not both".into());
+        }
+        if self.radius.is_some_and(|r| !(r > 0.0 && r.is_finite())) {
+            return fail("radius", "`radius` must be positive".into());
+        }
+        if self.size.is_some_and(|s| !s.iter().all(|x| *x > 0.0 && x.is_finite())) {
+            return fail("size", "both sides of `size` must be positive".into());
+        }
+        if self.rays == Some(0) {
+            return fail("rays", "`rays` must be positive".into());
+        }
+        match (self.kind, self.half_angle_deg, self.exponent) {
+            (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}
+            (SourceKind::Cone, ..) => return fail("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into()),
+            (_, Some(_), _) => return fail("half_angle_deg", "`half_angle_deg` belongs to a cone".into()),
+            _ => {}
+        }
+        match (self.kind, self.exponent) {
+            (SourceKind::Cosine, Some(n)) if (0.0..=1e6).contains(&n) => Ok(()),
+            (SourceKind::Cosine, _) => fail("exponent", "a cosine source needs `exponent` in 0 to 1e6".into()),
+            (_, Some(_)) => fail("exponent", "`exponent` belongs to a cosine source".into()),
+            _ => Ok(()),
+        }
+    }
+}
