@@ -61,8 +61,12 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
     let interfaces = if bound.has_media() { used(|s| matches!(s, Surface::Interface)) } else { 0 };
     let absorbing: Vec<&str> =
         bound.bodies.iter().filter(|b| b.absorption > 0.0).map(|b| b.medium.as_str()).collect();
-    let mut required =
-        Required { effects: Effects::NONE, simulated: Vec::new(), not_simulated: Vec::new(), kernel: KernelKind::Opaque };
+    let mut required = Required {
+        effects: Effects::NONE,
+        simulated: Vec::new(),
+        not_simulated: Vec::new(),
+        kernel: KernelKind::Opaque,
+    };
     for effect in Effect::ALL {
         let (wanted, because) = match effect {
             Effect::Reflection => (mirrors > 0, plural(mirrors, "mirror face", "no face is a mirror")),

@@ -12,7 +12,6 @@ use std::f64::consts::TAU;
 /// A source ready to emit.
 #[derive(Clone, Debug)]
 pub(crate) struct Emitter {
-    pub(crate) name: String,
     pub(crate) power: f64,
     pub(crate) rays: Option<u64>,
     /// Bodies around it, outermost first.
@@ -50,8 +49,7 @@ pub(crate) struct Stream {
 impl Stream {
     pub(crate) fn new(seed: u64, sampling: Sampling, replicate: u32, source: u32) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
-        let (a, b) =
-            (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
+        let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
         let all = [a[0], a[1], a[2], a[3], b[0], b[1]];
         Self { seed, sampling, scrambles: all }
     }
@@ -73,7 +71,13 @@ impl Stream {
 }
 
 impl Emitter {
-    pub(crate) fn new(scene: &Scene, i: usize, s: &scene::Source, model: &Model, bodies: &[Body]) -> Result<Self, Error> {
+    pub(crate) fn new(
+        scene: &Scene,
+        i: usize,
+        s: &scene::Source,
+        model: &Model,
+        bodies: &[Body],
+    ) -> Result<Self, Error> {
         let (direction, at) = (Vector::from_array(s.direction), Point::from_array(s.at));
         let shape = match (s.radius, s.size) {
             (Some(r), _) => Shape::Disc(r),
@@ -87,7 +91,7 @@ impl Emitter {
             SourceKind::Lambertian => Lobe::Cosine(0.5),
             SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
         };
-        let name = if s.name.is_empty() { format!("source {}", i + 1) } else { s.name.clone() };
+
         let mut inside = SmallVec::new();
         for instance in s.inside.iter().flat_map(|n| n.as_slice()) {
             let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
@@ -99,7 +103,7 @@ impl Emitter {
             inside.push(body as u16 + 1);
         }
         let x = s.x.map(Vector::from_array);
-        Ok(Self { name, power: s.power, rays: s.rays, inside, frame: Frame::from_axis(at, direction, x), shape, lobe })
+        Ok(Self { power: s.power, rays: s.rays, inside, frame: Frame::from_axis(at, direction, x), shape, lobe })
     }
 
     /// Ray `ray` of the run, the `index`-th of this source and replicate.

@@ -16,12 +16,26 @@ pub(crate) struct Receiver {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
-    Plane { frame: Frame, half: [f64; 2], one_sided: bool },
-    Sphere { frame: Frame, radius: f64 },
+    Plane {
+        frame: Frame,
+        half: [f64; 2],
+        one_sided: bool,
+    },
+    Sphere {
+        frame: Frame,
+        radius: f64,
+    },
     /// Axes right, up, forward; both ranges of angles in radians.
-    FarField { frame: Frame, angles: FarFieldType, low: [f64; 2], high: [f64; 2] },
+    FarField {
+        frame: Frame,
+        angles: FarFieldType,
+        low: [f64; 2],
+        high: [f64; 2],
+    },
     /// Faces whose absorbed power counts.
-    Absorbed { faces: Vec<u32> },
+    Absorbed {
+        faces: Vec<u32>,
+    },
 }
 
 /// Where light meets a receiver: the cell, and the coordinates in units of the half sides.
@@ -156,7 +170,9 @@ impl Receiver {
     /// The same for one cell; only type B has columns that differ.
     pub(crate) fn measure(&self, column: usize, row: usize) -> f64 {
         match &self.shape {
-            Shape::FarField { angles, low, high, .. } => solid_angle(*angles, *low, *high, self.cells, [column, row]),
+            Shape::FarField { angles, low, high, .. } => {
+                solid_angle(*angles, *low, *high, self.cells, [column, row])
+            }
             _ => self.cell_measure(row),
         }
     }
@@ -193,7 +209,10 @@ mod tests {
 
     fn far(angles: FarFieldType, h: [f64; 2], v: [f64; 2], cells: [u32; 2]) -> Receiver {
         let kind = ReceiverKind::FarField;
-        Receiver::new(&scene::Receiver { kind, angles, h_deg: h, v_deg: v, cells, ..Default::default() }, Vec::new())
+        Receiver::new(
+            &scene::Receiver { kind, angles, h_deg: h, v_deg: v, cells, ..Default::default() },
+            Vec::new(),
+        )
     }
 
     #[test]
@@ -230,7 +249,8 @@ mod tests {
 
     #[test]
     fn a_plane_is_crossed_inside_its_sides() {
-        let r = scene::Receiver { at: [0.0, 0.0, 5.0], size: Some([2.0, 4.0]), cells: [2, 2], ..Default::default() };
+        let r =
+            scene::Receiver { at: [0.0, 0.0, 5.0], size: Some([2.0, 4.0]), cells: [2, 2], ..Default::default() };
         let r = Receiver::new(&r, Vec::new());
         let ray = |x: f64, y: f64| Ray::new(Point::new(x, y, 0.0), Vector::Z);
         assert_eq!(r.crossing(&ray(0.9, 1.9), 0.0, 1e9), Some(5.0));

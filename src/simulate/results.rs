@@ -281,4 +281,3 @@ impl ReceiverResult {
         self.cells[j * self.grid[0] + i]
     }
 }
-

@@ -146,8 +146,8 @@ impl Plan {
             .collect();
         // At least 16 rays of the run in each replicate, so that a small run still has an error to state.
         let replicates = settings.replicates.clamp(2, (rays / 16).clamp(2, 1 << 16) as u32);
-        let record_mask = (settings.path_samples > 0)
-            .then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
+        let record_mask =
+            (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
         let quantum = emitted / (rays as f64 * QUANTA);
         Self { shares, replicates, rays, quantum, emitted, record_mask, reach: 100.0 }
     }

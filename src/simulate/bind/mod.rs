@@ -116,7 +116,9 @@ impl Scene {
             .zip(&body_of_face)
             .map(|((f, (surface_rule, _)), &body)| {
                 let surface = match surface_rule.map(|r| &self.materials[r]) {
-                    Some(rule) => surface(rule.surface.unwrap_or(SurfaceKind::Interface), rule.reflectance.as_ref()),
+                    Some(rule) => {
+                        surface(rule.surface.unwrap_or(SurfaceKind::Interface), rule.reflectance.as_ref())
+                    }
                     None if body != AMBIENT => Surface::Interface,
                     None => surfaces[default as usize].clone(),
                 };

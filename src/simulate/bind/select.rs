@@ -103,9 +103,14 @@ mod tests {
 
     #[test]
     fn stars_stand_for_anything() {
-        for (pattern, name) in
-            [("led", "led"), ("led*", "led_2"), ("*PMMA", "cover_PMMA"), ("a*b*c", "axxbyyc"), ("*", ""), ("a*", "a")]
-        {
+        for (pattern, name) in [
+            ("led", "led"),
+            ("led*", "led_2"),
+            ("*PMMA", "cover_PMMA"),
+            ("a*b*c", "axxbyyc"),
+            ("*", ""),
+            ("a*", "a"),
+        ] {
             assert!(fits(pattern, name), "{pattern} {name}");
         }
         for (pattern, name) in [("led", "led_2"), ("led*", "xled"), ("a*b*c", "acb"), ("ab*b", "ab"), ("", "x")] {

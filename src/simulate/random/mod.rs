@@ -68,10 +68,7 @@ impl Key {
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
         let high = (self.ray >> 32) as u32 & 0xffff | (purpose as u32) << 16;
-        philox4x32(
-            [self.ray as u32, high, self.bounce, self.branch],
-            [self.seed as u32, (self.seed >> 32) as u32],
-        )
+        philox4x32([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])
     }
 }
 

@@ -11,7 +11,8 @@ pub fn philox4x32(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
             key = [key[0].wrapping_add(W[0]), key[1].wrapping_add(W[1])];
         }
         let (p, q) = (M[0] * u64::from(counter[0]), M[1] * u64::from(counter[2]));
-        counter = [(q >> 32) as u32 ^ counter[1] ^ key[0], q as u32, (p >> 32) as u32 ^ counter[3] ^ key[1], p as u32];
+        counter =
+            [(q >> 32) as u32 ^ counter[1] ^ key[0], q as u32, (p >> 32) as u32 ^ counter[3] ^ key[1], p as u32];
     }
     counter
 }

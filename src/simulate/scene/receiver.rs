@@ -103,7 +103,9 @@ impl Receiver {
     pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
         let unset = Self::default();
         match self.angles {
-            FarFieldType::C if self.h_deg == unset.h_deg && self.v_deg == unset.v_deg => ([0.0, 360.0], [0.0, 180.0]),
+            FarFieldType::C if self.h_deg == unset.h_deg && self.v_deg == unset.v_deg => {
+                ([0.0, 360.0], [0.0, 180.0])
+            }
             FarFieldType::C if self.h_deg == unset.h_deg => ([0.0, 360.0], self.v_deg),
             FarFieldType::C if self.v_deg == unset.v_deg => (self.h_deg, [0.0, 180.0]),
             _ => (self.h_deg, self.v_deg),

@@ -101,7 +101,9 @@ impl Source {
         }
         match (self.kind, self.half_angle_deg, self.exponent) {
             (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}
-            (SourceKind::Cone, ..) => return fail("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into()),
+            (SourceKind::Cone, ..) => {
+                return fail("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into());
+            }
             (_, Some(_), _) => return fail("half_angle_deg", "`half_angle_deg` belongs to a cone".into()),
             _ => {}
         }
