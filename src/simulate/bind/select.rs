@@ -64,10 +64,11 @@ pub(super) fn faces(
 fn each_name_means_something(scene: &Scene, index: usize, rule: &Material, model: &Model) -> Result<(), Error> {
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
     let instances = model.instances.iter().map(|i| i.name.as_str());
-    let lists: [(&str, &Option<OneOrMany<String>>, Vec<&str>); 3] = [
-        ("part", &rule.part, parts.collect()),
+    let faces = model.placed_faces().map(|f| f.face.map_or("", |f| f.name.as_str()));
+    let lists = [
+        ("part", &rule.part, parts.collect::<Vec<_>>()),
         ("instance", &rule.instance, instances.collect()),
-        ("face", &rule.face, model.placed_faces().map(|f| f.face.map_or("", |f| f.name.as_str())).collect()),
+        ("face", &rule.face, faces.collect()),
     ];
     for (key, patterns, names) in lists {
         for pattern in patterns.iter().flat_map(|p| p.as_slice()) {

@@ -24,7 +24,7 @@ fn directions(dimension: usize) -> [u32; 32] {
         v[i] = if i < s {
             m[i] << (31 - i)
         } else {
-            (1..s).fold(v[i - s] ^ (v[i - s] >> s), |x, k| x ^ ((a >> (s - 1 - k)) & 1) * v[i - k])
+            (1..s).fold(v[i - s] ^ (v[i - s] >> s), |x, k| x ^ (((a >> (s - 1 - k)) & 1) * v[i - k]))
         };
     }
     v
