@@ -21,6 +21,7 @@ mod error;
 pub mod fresnel;
 mod media;
 mod phase;
+pub mod polarised;
 pub mod sampling;
 mod scatter;
 mod spectrum;
