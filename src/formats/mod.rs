@@ -1,7 +1,7 @@
 //! Other people's file formats as plain structs, read and written; knows points and facets, nothing of simulation.
 //!
 //! Facets go out as Wavefront OBJ, Stanford PLY, STL, VTK's VTU, glTF 2.0 (GLB) and the seed's Data_2; grids as
-//! CSV, NPZ, PNG and VTI; polylines as VTP.
+//! CSV, NPZ, PNG and VTI; polylines as VTP. Intensities are read and written as IES LM-63 and EULUMDAT.
 //!
 //! Guarantee: every file is written beside its final name and renamed when complete ([`write_atomic`]), so a reader
 //! never sees half of one; `f64` values survive CSV, NPZ, VTU, VTP, VTI, PLY and OBJ bit for bit (shortest text that reads back
@@ -11,11 +11,14 @@ mod atomic;
 mod base64;
 mod data2;
 mod error;
+mod eulumdat;
 mod facets;
 mod glb;
 mod grid;
+mod ies;
 mod npz;
 mod obj;
+mod photometry;
 mod ply;
 mod png;
 mod polylines;
@@ -26,9 +29,12 @@ pub use atomic::write_atomic;
 pub use base64::base64;
 pub use data2::{Data2Facet, read_data2};
 pub use error::{Error, ErrorKind};
+pub use eulumdat::{parse_eulumdat, read_eulumdat, write_eulumdat};
 pub use facets::{FACET_EXTENSIONS, Facets, Group, is_facet_file, write_facets};
 pub use grid::{Axis, Grid, write_grid_csv, write_grid_npz};
+pub use ies::{parse_ies, read_ies, write_ies};
 pub use npz::{NpyArray, write_npz};
+pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
 pub use vtk::{write_vti, write_vtp};

@@ -1,0 +1,210 @@
+//! Luminous intensity in the EULUMDAT format (`.ldt`), by the `eulumdat` crate.
+
+use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
+use eulumdat::{Eulumdat, LampSet, Symmetry, TypeIndicator};
+use std::path::Path;
+
+/// Reads an EULUMDAT file. Intensities become candela by the flux of the first set of lamps and the file's conversion factor.
+///
+/// # Errors
+/// When the file cannot be read or is not EULUMDAT.
+pub fn read_eulumdat(path: &Path) -> Result<Photometry, Error> {
+    let bytes = std::fs::read(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    parse_eulumdat(path, &String::from_utf8_lossy(&bytes))
+}
+
+/// Reads EULUMDAT text; `path` is for messages alone.
+///
+/// # Errors
+/// As [`read_eulumdat`].
+pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
+    let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
+    let ldt = Eulumdat::parse(text).map_err(|e| malformed(format!("not EULUMDAT: {e}")))?;
+    let (n, rows) = (ldt.num_c_planes, ldt.g_angles.len());
+    if n == 0 || rows < 2 || ldt.intensities.is_empty() {
+        return Err(malformed("the file holds no intensities; check the numbers of C-planes and γ angles".into()));
+    }
+    // The C-planes that the file holds, in its order; for the plane C90–C270 it starts at C270.
+    let stored: Vec<f64> = match ldt.symmetry {
+        Symmetry::VerticalAxis => vec![0.0],
+        Symmetry::PlaneC90C270 => {
+            (0..ldt.intensities.len()).map(|i| 90.0 - 180.0 * (1.0 - i as f64 / (n / 2) as f64)).collect()
+        }
+        _ => ldt.c_angles.iter().copied().take(ldt.intensities.len()).collect(),
+    };
+    if stored.len() != ldt.intensities.len() || stored.iter().chain(&ldt.g_angles).any(|a| !a.is_finite()) {
+        return Err(malformed("the C-planes do not fit the symmetry the file states".into()));
+    }
+    let first = ldt.lamp_sets.first();
+    let lumens = first.map(|s| s.total_luminous_flux).filter(|f| *f > 0.0);
+    let absolute = first.is_some_and(|s| s.num_lamps < 0);
+    let to_candela =
+        lumens.unwrap_or(1000.0) / 1000.0 * if ldt.conversion_factor > 0.0 { ldt.conversion_factor } else { 1.0 };
+    let mut planes: Vec<(f64, &[f64])> =
+        stored.iter().copied().zip(ldt.intensities.iter().map(Vec::as_slice)).collect();
+    if ldt.symmetry == Symmetry::PlaneC90C270 {
+        // As LM-63 has it: from C90 through C180 to C270, mirrored in the plane.
+        planes.iter_mut().for_each(|p| p.0 = 180.0 - p.0);
+        planes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    let ascending = |a: &[f64]| a.windows(2).all(|p| p[0] < p[1]);
+    let horizontal_deg: Vec<f64> = planes.iter().map(|p| p.0).collect();
+    if !ascending(&horizontal_deg) || !ascending(&ldt.g_angles) {
+        return Err(malformed("C-planes and γ angles must ascend".into()));
+    }
+    let candela: Vec<f64> = planes.iter().flat_map(|p| p.1).map(|c| c * to_candela).collect();
+    if let Some(bad) = candela.iter().find(|c| !(**c >= 0.0 && c.is_finite())) {
+        return Err(malformed(format!("an intensity of {bad} cd; intensities must be zero or more")));
+    }
+    let keyword =
+        |name: &str, value: &str| (!value.trim().is_empty()).then(|| (name.to_owned(), value.trim().to_owned()));
+    let keywords = [
+        keyword("MANUFAC", &ldt.identification),
+        keyword("TEST", &ldt.measurement_report_number),
+        keyword("LUMINAIRE", &ldt.luminaire_name),
+        keyword("LUMCAT", &ldt.luminaire_number),
+        keyword("ISSUEDATE", &ldt.date_user),
+    ];
+    Ok(Photometry {
+        kind: PhotometricType::C,
+        horizontal_deg,
+        vertical_deg: ldt.g_angles,
+        candela,
+        lamp_lumens: if absolute { None } else { lumens },
+        watts: first.map_or(0.0, |s| s.wattage_with_ballast),
+        opening_mm: [ldt.luminous_area_width, ldt.luminous_area_length, ldt.height_c0],
+        keywords: keywords.into_iter().flatten().collect(),
+    })
+}
+
+/// Writes an EULUMDAT file: all C-planes, without symmetry, or the one plane of a rotational distribution.
+///
+/// Numbers have six decimals. Absolute photometry is written with the flux of the distribution itself and −1 lamps.
+///
+/// # Errors
+/// When the photometry is not of type C, does not cover whole turns, or the file cannot be written.
+pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
+    let malformed = |m: &str| Error::new(path, ErrorKind::Malformed(m.into()));
+    if p.kind != PhotometricType::C {
+        return Err(malformed("EULUMDAT holds type C photometry alone; write types A and B as .ies"));
+    }
+    let all = if p.horizontal_deg.len() == 1 { p.clone() } else { p.expanded() };
+    let rows = all.vertical_deg.len();
+    let rotational = all.horizontal_deg.len() == 1;
+    if !rotational && (all.horizontal_deg[0] != 0.0 || all.horizontal_deg[all.horizontal_deg.len() - 1] != 360.0) {
+        return Err(malformed("EULUMDAT needs C-planes over the whole turn, from 0 to 360 degrees"));
+    }
+    if all.candela.len() != rows * all.horizontal_deg.len() || rows < 2 {
+        return Err(malformed("the intensities do not fill the planes"));
+    }
+    let planes = if rotational { 1 } else { all.horizontal_deg.len() - 1 };
+    let lumens = p.lamp_lumens.unwrap_or_else(|| p.flux());
+    let per_klm = if lumens > 0.0 { 1000.0 / lumens } else { 1.0 };
+    let even = |a: &[f64]| {
+        let step = a[1] - a[0];
+        if a.windows(2).all(|p| (p[1] - p[0] - step).abs() < 1e-9) { step } else { 0.0 }
+    };
+    let find = |name: &str| {
+        all.keywords.iter().find(|k| k.0 == name).map_or(String::new(), |k| k.1.replace(['\n', '\r'], " "))
+    };
+    let mut ldt = Eulumdat::new();
+    ldt.identification = find("MANUFAC");
+    ldt.type_indicator =
+        if rotational { TypeIndicator::PointSourceSymmetric } else { TypeIndicator::PointSourceOther };
+    ldt.symmetry = if rotational { Symmetry::VerticalAxis } else { Symmetry::None };
+    ldt.num_c_planes = planes;
+    ldt.c_plane_distance = if rotational { 0.0 } else { even(&all.horizontal_deg) };
+    ldt.num_g_planes = rows;
+    ldt.g_plane_distance = even(&all.vertical_deg);
+    ldt.measurement_report_number = find("TEST");
+    ldt.luminaire_name = find("LUMINAIRE");
+    ldt.luminaire_number = find("LUMCAT");
+    ldt.date_user = find("ISSUEDATE");
+    let [width, length, height] = all.opening_mm.map(f64::abs);
+    (ldt.luminous_area_width, ldt.luminous_area_length, ldt.height_c0) = (width, length, height);
+    (ldt.width, ldt.length, ldt.height) = (width, length, height);
+    ldt.light_output_ratio = 100.0;
+    ldt.downward_flux_fraction = 100.0;
+    ldt.conversion_factor = 1.0;
+    ldt.lamp_sets = vec![LampSet {
+        num_lamps: if p.lamp_lumens.is_some() { 1 } else { -1 },
+        lamp_type: "lamp".into(),
+        total_luminous_flux: lumens,
+        wattage_with_ballast: p.watts,
+        ..LampSet::default()
+    }];
+    ldt.c_angles = all.horizontal_deg[..planes].to_vec();
+    ldt.g_angles = all.vertical_deg.clone();
+    ldt.intensities =
+        all.candela.chunks(rows).take(planes).map(|r| r.iter().map(|c| c * per_klm).collect()).collect();
+    let text = ldt.to_ldt();
+    write_atomic(path, |w| w.write_all(text.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::photometry::tests::{of, steps};
+    use super::*;
+
+    fn round_trip(p: &Photometry) -> Photometry {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ldt");
+        write_eulumdat(&path, p).unwrap();
+        read_eulumdat(&path).unwrap()
+    }
+
+    #[test]
+    fn intensities_survive_to_the_formats_precision() {
+        let cases = [
+            Photometry {
+                lamp_lumens: Some(2500.0),
+                ..of(PhotometricType::C, &steps(0.0, 360.0, 24), &steps(0.0, 90.0, 18), |h, v| {
+                    500.0 + (h - 180.0).abs() - v
+                })
+            },
+            of(PhotometricType::C, &steps(0.0, 90.0, 6), &steps(0.0, 180.0, 36), |h, v| 500.0 + h - v),
+            of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 18), |_, v| 800.0 - v),
+        ];
+        for p in &cases {
+            let back = round_trip(p);
+            let (a, b) = (p.expanded(), back.expanded());
+            assert_eq!((&a.horizontal_deg, &a.vertical_deg), (&b.horizontal_deg, &b.vertical_deg));
+            let worst = a.candela.iter().zip(&b.candela).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+            // Half a unit of the sixth decimal of cd/klm, and the same of the flux.
+            assert!(worst < 1e-6 * p.flux().max(2500.0) / 1000.0, "{worst}");
+            assert_eq!(back.lamp_lumens.is_some(), p.lamp_lumens.is_some());
+            assert!((back.flux() / p.flux() - 1.0).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn the_plane_c90_c270_is_mirrored_as_the_format_means_it() {
+        // Eight planes; C270 to C90 through C0 are stored: intensities 100 + index.
+        let mut lines: Vec<String> =
+            ["x", "3", "3", "8", "45", "2", "90", "", "", "", "", ""].map(String::from).into();
+        lines.extend((0..9).map(|_| "0".into()));
+        lines.extend(["100", "100", "1", "0", "1", "1", "lamp", "1000", "", "", "10"].map(String::from));
+        lines.extend((0..10).map(|_| "1".into()));
+        lines.extend((0..8).map(|i| (45 * i).to_string()));
+        lines.extend(["0", "90"].map(String::from));
+        for i in 0..5 {
+            lines.extend([(100 + i).to_string(), "0".into()]);
+        }
+        let p = parse_eulumdat(Path::new("a.ldt"), &lines.join("\n")).unwrap().expanded();
+        let at = |c: f64| p.candela[2 * p.horizontal_deg.iter().position(|&h| h == c).unwrap()];
+        assert_eq!([270.0, 315.0, 0.0, 45.0, 90.0].map(at), [100.0, 101.0, 102.0, 103.0, 104.0]);
+        assert_eq!([225.0, 180.0, 135.0].map(at), [101.0, 102.0, 103.0]);
+    }
+
+    #[test]
+    fn what_cannot_be_said_is_refused() {
+        let path = Path::new("/tmp/x.ldt");
+        let beam = of(PhotometricType::A, &[-1.0, 1.0], &[-1.0, 1.0], |_, _| 1.0);
+        assert!(write_eulumdat(path, &beam).unwrap_err().to_string().contains("type C"));
+        let part = of(PhotometricType::C, &[10.0, 20.0], &[0.0, 90.0], |_, _| 1.0);
+        assert!(write_eulumdat(path, &part).unwrap_err().to_string().contains("whole turn"));
+        for text in ["", "x\n1\n1\n-5\n0\n-7\n", "a\n1\n1\n1e30\n0\n1e30\n0\n"] {
+            assert!(parse_eulumdat(path, text).is_err());
+        }
+    }
+}

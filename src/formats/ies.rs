@@ -1,0 +1,293 @@
+//! Luminous intensity in the format of IES LM-63: editions of 1986 to 2019 are read, that of 2002 is written.
+
+use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
+use std::path::Path;
+
+/// Millimetres in a foot.
+const FOOT: f64 = 304.8;
+/// Longest line the format allows, its end not counted.
+const LONGEST_LINE: usize = 130;
+
+/// Reads an IES LM-63 file.
+///
+/// All multipliers (candela multiplier, ballast factor, ballast-lamp factor) are applied. A tilt table is read and left
+/// out: it holds for tilted lamps alone.
+///
+/// # Errors
+/// When the file cannot be read or is not LM-63; the message names the line.
+pub fn read_ies(path: &Path) -> Result<Photometry, Error> {
+    let bytes = std::fs::read(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    parse_ies(path, &String::from_utf8_lossy(&bytes))
+}
+
+/// Reads LM-63 text; `path` is for messages alone.
+///
+/// # Errors
+/// As [`read_ies`].
+pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
+    let mut keywords: Vec<(String, String)> = Vec::new();
+    let mut lines = text.lines().enumerate();
+    let (tilt_line, tilt) = loop {
+        let Some((n, line)) = lines.next() else {
+            return Err(Error::at_line(path, 1, "no line starts with TILT=; this is not an IES LM-63 file"));
+        };
+        let line = line.trim();
+        if let Some(tilt) = line.strip_prefix("TILT=") {
+            break (n + 1, tilt.trim());
+        }
+        if let Some((name, value)) = line.strip_prefix('[').and_then(|l| l.split_once(']')) {
+            match keywords.last_mut() {
+                Some((_, before)) if name.eq_ignore_ascii_case("MORE") => {
+                    before.push('\n');
+                    before.push_str(value.trim());
+                }
+                _ => keywords.push((name.trim().to_uppercase(), value.trim().to_owned())),
+            }
+        }
+    };
+    let rest: Vec<(usize, &str)> = lines
+        .flat_map(|(n, l)| l.split([' ', '\t', ',', '\r']).filter(|w| !w.is_empty()).map(move |w| (n + 1, w)))
+        .collect();
+    let mut numbers = Numbers { path, words: &rest, at: 0, last_line: tilt_line };
+    match tilt.to_uppercase().as_str() {
+        "NONE" => {}
+        "INCLUDE" => {
+            numbers.next("lamp-to-luminaire geometry")?;
+            let count = numbers.count("number of tilt angles")?;
+            numbers.list(2 * count, "tilt table")?;
+        }
+        _ => {
+            let message =
+                format!("TILT={tilt} refers to another file; write TILT=NONE, or TILT=INCLUDE with its table");
+            return Err(Error::at_line(path, tilt_line, message));
+        }
+    }
+    let lamps = numbers.next("number of lamps")?;
+    let lumens_per_lamp = numbers.next("lumens per lamp")?;
+    let multiplier = numbers.next("candela multiplier")?;
+    let rows = numbers.count("number of vertical angles")?;
+    let planes = numbers.count("number of horizontal angles")?;
+    let kind = match numbers.next("photometric type")? {
+        1.0 => PhotometricType::C,
+        2.0 => PhotometricType::B,
+        3.0 => PhotometricType::A,
+        other => return Err(numbers.error(format!("photometric type {other}: must be 1 (C), 2 (B) or 3 (A)"))),
+    };
+    let unit = match numbers.next("unit type")? {
+        1.0 => FOOT,
+        2.0 => 1000.0,
+        other => return Err(numbers.error(format!("unit type {other}: must be 1 (feet) or 2 (metres)"))),
+    };
+    let opening = numbers.list(3, "width, length and height")?;
+    let ballast = numbers.next("ballast factor")?;
+    let lamp_factor = numbers.next("ballast-lamp photometric factor")?;
+    // LM-63-2019 keeps a code for how the file was made in the field that held the ballast-lamp factor.
+    let factor = if text.trim_start().starts_with("IES:LM-63-2019") { ballast } else { ballast * lamp_factor };
+    let watts = numbers.next("input watts")?;
+    let vertical_deg = numbers.ascending(rows, "vertical angles")?;
+    let horizontal_deg = numbers.ascending(planes, "horizontal angles")?;
+    let mut candela = numbers.list(rows.saturating_mul(planes), "candela values")?;
+    candela.iter_mut().for_each(|c| *c *= multiplier * factor);
+    if let Some(bad) = candela.iter().find(|c| !(**c >= 0.0 && c.is_finite())) {
+        return Err(numbers.error(format!("an intensity of {bad} cd; intensities must be zero or more")));
+    }
+    Ok(Photometry {
+        kind,
+        horizontal_deg,
+        vertical_deg,
+        candela,
+        lamp_lumens: (lumens_per_lamp > 0.0).then_some(lamps * lumens_per_lamp),
+        watts,
+        opening_mm: [opening[0] * unit, opening[1] * unit, opening[2] * unit],
+        keywords,
+    })
+}
+
+/// The free-format numbers after the TILT line, each with its line.
+struct Numbers<'a> {
+    path: &'a Path,
+    words: &'a [(usize, &'a str)],
+    at: usize,
+    last_line: usize,
+}
+
+impl Numbers<'_> {
+    fn error(&self, message: String) -> Error {
+        Error::at_line(self.path, self.last_line, message)
+    }
+
+    fn next(&mut self, what: &str) -> Result<f64, Error> {
+        let Some(&(line, word)) = self.words.get(self.at) else {
+            return Err(self.error(format!("the file ends where the {what} should follow")));
+        };
+        self.at += 1;
+        self.last_line = line;
+        match word.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => Err(self.error(format!("'{word}' is not a number ({what})"))),
+        }
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, Error> {
+        let x = self.next(what)?;
+        if x >= 1.0 && x.fract() == 0.0 && x <= self.words.len() as f64 {
+            Ok(x as usize)
+        } else {
+            Err(self.error(format!("{what} is {x}, but the file holds {} numbers", self.words.len())))
+        }
+    }
+
+    fn list(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+        let left = self.words.len() - self.at;
+        if count > left {
+            return Err(self.error(format!("{count} numbers should follow ({what}), but only {left} do")));
+        }
+        (0..count).map(|_| self.next(what)).collect()
+    }
+
+    fn ascending(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+        let list = self.list(count, what)?;
+        match list.windows(2).find(|p| p[1] <= p[0]) {
+            Some(p) => Err(self.error(format!("{what} must ascend, but {} follows {}", p[1], p[0]))),
+            None => Ok(list),
+        }
+    }
+}
+
+/// Writes an IES LM-63-2002 file. Angles and candela are written so that they read back bit for bit.
+///
+/// # Errors
+/// When the shape of the data is inconsistent or the file cannot be written.
+pub fn write_ies(path: &Path, p: &Photometry) -> Result<(), Error> {
+    let text = ies_text(p).map_err(|m| Error::new(path, ErrorKind::Malformed(m)))?;
+    write_atomic(path, |w| w.write_all(text.as_bytes()))
+}
+
+fn ies_text(p: &Photometry) -> Result<String, String> {
+    let (planes, rows) = (p.horizontal_deg.len(), p.vertical_deg.len());
+    if planes == 0 || rows == 0 || p.candela.len() != planes * rows {
+        return Err(format!("{} intensities do not fill {planes} planes of {rows} angles", p.candela.len()));
+    }
+    let mut out = Lines::default();
+    out.line("IESNA:LM-63-2002");
+    for (name, value) in &p.keywords {
+        for (i, part) in value.lines().enumerate() {
+            let clean: String = part.chars().filter(|c| !c.is_control()).collect();
+            out.line(&format!("[{}] {clean}", if i == 0 { name } else { "MORE" }));
+        }
+    }
+    out.line("TILT=NONE");
+    let kind = match p.kind {
+        PhotometricType::C => 1,
+        PhotometricType::B => 2,
+        PhotometricType::A => 3,
+    };
+    let lumens = p.lamp_lumens.map_or("-1".to_owned(), |l| l.to_string());
+    let [width, length, height] = p.opening_mm.map(|x| x / 1000.0);
+    out.line(&format!("1 {lumens} 1 {rows} {planes} {kind} 2 {width} {length} {height}"));
+    out.line(&format!("1 1 {}", p.watts));
+    out.numbers(&p.vertical_deg);
+    out.numbers(&p.horizontal_deg);
+    p.candela.chunks(rows).for_each(|plane| out.numbers(plane));
+    Ok(out.0)
+}
+
+/// Text with CR LF ends, as the format asks, and lines that are not too long.
+#[derive(Default)]
+struct Lines(String);
+
+impl Lines {
+    fn line(&mut self, text: &str) {
+        self.0.extend(text.chars().take(LONGEST_LINE));
+        self.0.push_str("\r\n");
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        let mut line = String::new();
+        for number in numbers {
+            let word = number.to_string();
+            if !line.is_empty() && line.len() + 1 + word.len() > LONGEST_LINE {
+                self.line(&line);
+                line.clear();
+            }
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(&word);
+        }
+        self.line(&line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::photometry::tests::{of, steps};
+    use super::*;
+
+    const TEXT: &str = "IESNA:LM-63-1995\n[TEST] 42\n[MANUFAC] A,\n[MORE] and B\nTILT=INCLUDE\n1\n3\n0 45 90\n1.0 .95 .9\n\
+        2 1000 2.5 3 2 1 1 0.5 -0.5 0\n0.9 1.0 60\n0 45,90\n0 90\n100 50\n0 200 100 1e0\n";
+
+    fn parse(text: &str) -> Result<Photometry, Error> {
+        parse_ies(Path::new("lamp.ies"), text)
+    }
+
+    #[test]
+    fn a_file_by_hand() {
+        let p = parse(TEXT).unwrap();
+        assert_eq!((p.kind, p.lamp_lumens, p.watts), (PhotometricType::C, Some(2000.0), 60.0));
+        assert_eq!(
+            (p.vertical_deg.as_slice(), p.horizontal_deg.as_slice()),
+            ([0.0, 45.0, 90.0].as_slice(), [0.0, 90.0].as_slice())
+        );
+        let expected = [100.0, 50.0, 0.0, 200.0, 100.0, 1.0].map(|c| c * 2.5 * 0.9);
+        assert!(p.candela.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert_eq!(p.opening_mm, [152.4, -152.4, 0.0]);
+        assert_eq!(p.keywords[1], ("MANUFAC".into(), "A,\nand B".into()));
+    }
+
+    #[test]
+    fn what_is_written_reads_back_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        for kind in [PhotometricType::A, PhotometricType::B, PhotometricType::C] {
+            let p =
+                of(kind, &steps(0.0, 90.0, 37), &steps(0.0, 90.0, 41), |h, v| (1.0 + h).sqrt() * 1e3 / (1.0 + v));
+            let path = folder.path().join("a.ies");
+            write_ies(&path, &p).unwrap();
+            assert_eq!(read_ies(&path).unwrap(), p);
+            let text = std::fs::read_to_string(&path).unwrap();
+            assert!(text.lines().all(|l| l.len() < 132) && text.ends_with("\r\n"));
+        }
+    }
+
+    #[test]
+    fn an_independent_reader_finds_the_same_intensities() {
+        let p = of(PhotometricType::C, &steps(0.0, 180.0, 4), &steps(0.0, 90.0, 6), |h, v| 10.0 + h + 2.0 * v);
+        let text = ies_text(&Photometry { lamp_lumens: Some(1000.0), ..p.clone() }).unwrap();
+        let other = eulumdat::IesParser::parse(&text).unwrap();
+        for (i, plane) in other.intensities.iter().enumerate().take(5) {
+            for (j, c) in plane.iter().enumerate() {
+                assert!((c - p.candela[i * 7 + j]).abs() < 1e-9, "{i} {j}: {c}");
+            }
+        }
+        assert_eq!(other.g_angles, p.vertical_deg);
+    }
+
+    #[test]
+    fn refusals_name_the_line() {
+        for (wrong, right, message) in [
+            ("TILT=NONE", "TILT=INCLUDE", "'.95' "),
+            ("3 2 1 1", "3 2 7 1", "photometric type 7"),
+            ("3 2 1 1", "300000000 2 1 1", "number of vertical angles is 300000000"),
+            ("1e0", "", "candela values"),
+            ("45,90", "45,45", "must ascend"),
+            ("TILT=INCLUDE", "TILT=lamp.tlt", "refers to another file"),
+            ("TILT=INCLUDE", "", "not an IES LM-63 file"),
+            ("200 100", "200 x", "'x' is not a number"),
+            ("2.5 3", "-2.5 3", "zero or more"),
+        ] {
+            let text = if wrong == "TILT=NONE" { continue } else { TEXT.replace(wrong, right) };
+            let e = parse(&text).unwrap_err().to_string();
+            assert!(e.contains(message) && e.starts_with("lamp.ies:"), "{e}");
+        }
+    }
+}
