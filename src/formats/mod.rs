@@ -1,7 +1,8 @@
 //! Other people's file formats as plain structs, read and written; knows points and facets, nothing of simulation.
 //!
 //! Facets go out as Wavefront OBJ, Stanford PLY, STL, VTK's VTU, glTF 2.0 (GLB) and the seed's Data_2; grids as
-//! CSV, NPZ, PNG and VTI; polylines as VTP. Intensities are read and written as IES LM-63 and EULUMDAT.
+//! CSV, NPZ, PNG and VTI; polylines as VTP. Intensities are read and written as IES LM-63 and
+//! EULUMDAT, lists of rays as CSV and NPZ and the seed's Data_1, results as its Data_3.
 //!
 //! Guarantee: every file is written beside its final name and renamed when complete ([`write_atomic`]), so a reader
 //! never sees half of one; `f64` values survive CSV, NPZ, VTU, VTP, VTI, PLY and OBJ bit for bit (shortest text that reads back
@@ -9,7 +10,9 @@
 
 mod atomic;
 mod base64;
+mod data1;
 mod data2;
+mod data3;
 mod error;
 mod eulumdat;
 mod facets;
@@ -22,12 +25,15 @@ mod photometry;
 mod ply;
 mod png;
 mod polylines;
+mod rays;
 mod stl;
 mod vtk;
 
 pub use atomic::write_atomic;
 pub use base64::base64;
+pub use data1::{read_data1, write_data1};
 pub use data2::{Data2Facet, read_data2};
+pub use data3::{Data3, read_data3, write_data3};
 pub use error::{Error, ErrorKind};
 pub use eulumdat::{parse_eulumdat, read_eulumdat, write_eulumdat};
 pub use facets::{FACET_EXTENSIONS, Facets, Group, is_facet_file, write_facets};
@@ -37,4 +43,5 @@ pub use npz::{NpyArray, write_npz};
 pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
+pub use rays::{LightRay, read_rays, write_rays};
 pub use vtk::{write_vti, write_vtp};

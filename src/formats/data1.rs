@@ -1,0 +1,136 @@
+//! The light part of the seed's file format (Data_1): the number of rays, then for each ray its origin in mm, its direction
+//! and its power, one ray a line, seven numbers separated by blanks.
+
+use super::rays::LightRay;
+use super::{Error, ErrorKind, write_atomic};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Writes rays as a Data_1 file; wavelengths have no place in it.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_data1(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
+    write_atomic(path, |w| ray_block(w, rays))
+}
+
+/// Reads the rays of a Data_1 file; directions are brought to unit length.
+///
+/// # Errors
+/// When the file cannot be read, a line does not hold a ray, or the count is not that of the lines.
+pub fn read_data1(path: &Path) -> Result<Vec<LightRay>, Error> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let mut lines = Lines::of(path, &text);
+    let rays = lines.rays()?;
+    lines.end()?;
+    Ok(rays)
+}
+
+/// The count and the lines of a list of rays.
+pub(super) fn ray_block(w: &mut dyn Write, rays: &[LightRay]) -> io::Result<()> {
+    writeln!(w, "{}", rays.len())?;
+    for ray in rays {
+        let [x, y, z, dx, dy, dz, power] = ray.numbers();
+        writeln!(w, "{x} {y} {z} {dx} {dy} {dz} {power}")?;
+    }
+    Ok(())
+}
+
+/// The lines of a seed file that are not blank, with their numbers.
+pub(super) struct Lines<'a> {
+    path: &'a Path,
+    lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
+    at: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub(super) fn of(path: &'a Path, text: &'a str) -> Self {
+        let lines = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim())).filter(|(_, l)| !l.is_empty());
+        Self { path, lines: Box::new(lines), at: 0 }
+    }
+
+    pub(super) fn error(&self, message: impl Into<String>) -> Error {
+        Error::at_line(self.path, self.at.max(1), message)
+    }
+
+    /// The next line's `count` finite numbers, which are `what`.
+    pub(super) fn numbers(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+        let Some((n, line)) = self.lines.next() else {
+            return Err(self.error(format!("the file ends where {what} should follow")));
+        };
+        self.at = n;
+        let numbers: Vec<f64> =
+            line.split_whitespace().map_while(|w| w.parse::<f64>().ok()).filter(|x| x.is_finite()).collect();
+        if numbers.len() != count || line.split_whitespace().count() != count {
+            return Err(self.error(format!("{count} finite numbers must stand here: {what}")));
+        }
+        Ok(numbers)
+    }
+
+    /// The next line's whole numbers, zero or more.
+    pub(super) fn counts<const N: usize>(&mut self, what: &str) -> Result<[usize; N], Error> {
+        let numbers = self.numbers(N, what)?;
+        if numbers.iter().any(|x| *x < 0.0 || x.fract() != 0.0 || *x > 1e15) {
+            return Err(self.error(format!("whole numbers must stand here: {what}")));
+        }
+        Ok(std::array::from_fn(|i| numbers[i] as usize))
+    }
+
+    pub(super) fn rays(&mut self) -> Result<Vec<LightRay>, Error> {
+        let [count] = self.counts("the number of rays")?;
+        // No capacity from the count: a file may lie about it.
+        let mut rays = Vec::new();
+        for _ in 0..count {
+            let numbers = self.numbers(7, "origin, direction and power of a ray")?;
+            rays.push(LightRay::from_numbers(&numbers).map_err(|m| self.error(m))?);
+        }
+        Ok(rays)
+    }
+
+    pub(super) fn end(&mut self) -> Result<(), Error> {
+        match self.lines.next() {
+            None => Ok(()),
+            Some((n, _)) => Err(Error::at_line(self.path, n, "more lines than the number of rays says")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rays::tests::some;
+    use super::*;
+
+    #[test]
+    fn rays_survive() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.data1");
+        let rays = some(50, false);
+        write_data1(&path, &rays).unwrap();
+        let back = read_data1(&path).unwrap();
+        assert!(rays.iter().zip(&back).all(|(a, b)| a.origin == b.origin
+            && a.power == b.power
+            && (a.direction - b.direction).length() < 2e-16));
+        assert_eq!(back.len(), 50);
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().next(), Some("50"));
+    }
+
+    #[test]
+    fn refusals_name_the_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.data1");
+        for (text, line, message) in [
+            ("", 1, "the file ends"),
+            ("two\n", 1, "1 finite numbers"),
+            ("2\n0 0 0 0 0 1 1\n", 2, "the file ends"),
+            ("1\n\n0 0 0 0 0 1\n", 3, "7 finite numbers"),
+            ("1\n0 0 0 0 0 1 1\n0 0 0 0 0 1 1\n", 3, "more lines"),
+            ("1\n0 0 0 0 0 0 1\n", 2, "no length"),
+            ("1e14\n", 1, "the file ends"),
+            ("-1\n", 1, "whole numbers"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let e = read_data1(&path).unwrap_err().to_string();
+            assert!(e.contains(&format!("data1:{line}: ")) && e.contains(message), "{text:?}: {e}");
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Lists of light rays: origin, direction, power and wavelength, as CSV or NPZ.
+
+use super::{Error, ErrorKind, NpyArray, write_atomic, write_npz};
+use crate::math::{Point, Vector};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// One ray of light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightRay {
+    /// Where it starts, mm.
+    pub origin: Point,
+    /// Unit length.
+    pub direction: Vector,
+    /// Watts or lumens, as the whole list.
+    pub power: f64,
+    /// Vacuum wavelength, nm, if the list says.
+    pub wavelength_nm: Option<f64>,
+}
+
+/// Names of the columns of a CSV file, in the order they are written.
+const COLUMNS: [&str; 8] = ["x", "y", "z", "dx", "dy", "dz", "power", "wavelength_nm"];
+
+impl LightRay {
+    /// From origin, direction, power and wavelength; the direction is brought to unit length.
+    pub(super) fn from_numbers(numbers: &[f64]) -> Result<Self, String> {
+        let triple = |k: usize| Vector::new(numbers[k], numbers[k + 1], numbers[k + 2]);
+        if let Some(bad) = numbers.iter().find(|x| !x.is_finite()) {
+            return Err(format!("{bad} is no finite number"));
+        }
+        let given = triple(3);
+        let length = given.length();
+        if length == 0.0 || !length.is_finite() {
+            return Err("the direction has no length".into());
+        }
+        // A direction that is already of unit length keeps its bits.
+        let direction = if (length - 1.0).abs() < 1e-15 { given } else { given / length };
+        let power = numbers[6];
+        if power < 0.0 {
+            return Err(format!("a power of {power}; powers must be zero or more"));
+        }
+        let wavelength_nm = numbers.get(7).copied();
+        if wavelength_nm.is_some_and(|w| w <= 0.0) {
+            return Err("a wavelength must be positive, in nm".into());
+        }
+        Ok(Self { origin: triple(0), direction, power, wavelength_nm })
+    }
+
+    pub(super) fn numbers(&self) -> [f64; 7] {
+        let ([x, y, z], [dx, dy, dz]) = (self.origin.to_array(), self.direction.to_array());
+        [x, y, z, dx, dy, dz, self.power]
+    }
+}
+
+/// Reads a list of rays; `.npz` by arrays `origin` (n × 3), `direction` (n × 3), `power` (n) and, if wanted,
+/// `wavelength_nm` (n), of f64 or f32; anything else as CSV with columns `x, y, z, dx, dy, dz, power` and, if wanted,
+/// `wavelength_nm`. A CSV header may name the columns in any order; lines that start with `#` are comments.
+///
+/// # Errors
+/// When the file cannot be read or its content makes no rays; the message names the line.
+pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+        return read_npz(path);
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    parse_csv(path, &text)
+}
+
+/// Writes a list of rays as NPZ or CSV, by the extension; wavelengths when the first ray has one.
+///
+/// # Errors
+/// When the extension is another, or the file cannot be written.
+pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
+    let spectral = rays.first().is_some_and(|r| r.wavelength_nm.is_some());
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        "npz" => {
+            let origin: Vec<f64> = rays.iter().flat_map(|r| r.origin.to_array()).collect();
+            let direction: Vec<f64> = rays.iter().flat_map(|r| r.direction.to_array()).collect();
+            let power: Vec<f64> = rays.iter().map(|r| r.power).collect();
+            let wavelength: Vec<f64> = rays.iter().map(|r| r.wavelength_nm.unwrap_or(f64::NAN)).collect();
+            let n = rays.len();
+            let mut arrays = vec![
+                NpyArray { name: "origin", shape: vec![n, 3], data: &origin },
+                NpyArray { name: "direction", shape: vec![n, 3], data: &direction },
+                NpyArray { name: "power", shape: vec![n], data: &power },
+            ];
+            if spectral {
+                arrays.push(NpyArray { name: "wavelength_nm", shape: vec![n], data: &wavelength });
+            }
+            write_npz(path, &arrays)
+        }
+        "csv" | "txt" => write_atomic(path, |w| {
+            writeln!(w, "{}", COLUMNS[..if spectral { 8 } else { 7 }].join(","))?;
+            let mut line = String::new();
+            for ray in rays {
+                line.clear();
+                for (i, x) in ray.numbers().iter().enumerate() {
+                    let _ = write!(line, "{}{x}", if i > 0 { "," } else { "" });
+                }
+                if spectral {
+                    let _ = write!(line, ",{}", ray.wavelength_nm.unwrap_or(f64::NAN));
+                }
+                writeln!(w, "{line}")?;
+            }
+            Ok(())
+        }),
+        _ => Err(Error::new(path, ErrorKind::Extension { given: extension, known: ".csv, .npz" })),
+    }
+}
+
+fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
+    let mut rays = Vec::new();
+    // Position of each of `COLUMNS` in a line.
+    let mut order: Option<Vec<usize>> = None;
+    for (n, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let fail = |message: String| Error::at_line(path, n + 1, message);
+        let cells: Vec<&str> = if line.contains([',', ';']) {
+            line.split([',', ';']).map(str::trim).collect()
+        } else {
+            line.split_whitespace().collect()
+        };
+        if order.is_none() {
+            let header = cells.iter().any(|c| COLUMNS.contains(&c.to_lowercase().as_str()));
+            order = Some(columns(&cells, header).map_err(&fail)?);
+            if header {
+                continue;
+            }
+        }
+        let order = order.as_deref().unwrap_or_default();
+        let numbers: Vec<f64> = order
+            .iter()
+            .map(|&k| {
+                let cell = cells.get(k).copied().unwrap_or_default();
+                cell.parse::<f64>().map_err(|_| fail(format!("'{cell}' is not a number (column {})", k + 1)))
+            })
+            .collect::<Result<_, Error>>()?;
+        rays.push(LightRay::from_numbers(&numbers).map_err(fail)?);
+    }
+    Ok(rays)
+}
+
+/// Where the seven or eight columns stand in a line.
+fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
+    if !header {
+        return match cells.len() {
+            7 | 8 => Ok((0..cells.len()).collect()),
+            n => Err(format!("{n} columns; a ray has {} and, if wanted, wavelength_nm", COLUMNS[..7].join(", "))),
+        };
+    }
+    let find = |name: &str| cells.iter().position(|c| c.eq_ignore_ascii_case(name));
+    let mut order = Vec::new();
+    for name in &COLUMNS[..7] {
+        order
+            .push(find(name).ok_or_else(|| format!("no column '{name}'; needed are {}", COLUMNS[..7].join(", ")))?);
+    }
+    order.extend(find(COLUMNS[7]));
+    Ok(order)
+}
+
+fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
+    let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
+    let file = File::open(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let mut zip = zip::ZipArchive::new(file).map_err(|e| malformed(format!("not an NPZ file: {e}")))?;
+    let mut array = |name: &str, width: usize| -> Result<Option<Vec<f64>>, Error> {
+        let entry = match zip.by_name(&format!("{name}.npy")) {
+            Ok(entry) => entry,
+            Err(zip::result::ZipError::FileNotFound) => return Ok(None),
+            Err(e) => return Err(malformed(format!("array '{name}': {e}"))),
+        };
+        read_array(entry, width).map(Some).map_err(|m| malformed(format!("array '{name}': {m}")))
+    };
+    let mut needed = |name: &str, width: usize| {
+        array(name, width)?
+            .ok_or_else(|| malformed(format!("no array '{name}'; a ray list has origin, direction, power")))
+    };
+    let (origin, direction, power) = (needed("origin", 3)?, needed("direction", 3)?, needed("power", 1)?);
+    let wavelength = array("wavelength_nm", 1)?;
+    let n = power.len();
+    if origin.len() != 3 * n || direction.len() != 3 * n || wavelength.as_ref().is_some_and(|w| w.len() != n) {
+        return Err(malformed("the arrays origin, direction, power and wavelength_nm differ in length".into()));
+    }
+    (0..n)
+        .map(|i| {
+            let (o, d) = (&origin[3 * i..3 * i + 3], &direction[3 * i..3 * i + 3]);
+            let mut numbers = vec![o[0], o[1], o[2], d[0], d[1], d[2], power[i]];
+            numbers.extend(wavelength.as_ref().map(|w| w[i]));
+            LightRay::from_numbers(&numbers).map_err(|m| malformed(format!("ray {i}: {m}")))
+        })
+        .collect()
+}
+
+/// The values of an NPY array of shape `(n, width)`, or `(n,)` for a width of 1.
+fn read_array(mut entry: impl Read, width: usize) -> Result<Vec<f64>, String> {
+    let cut = |e: std::io::Error| e.to_string();
+    let mut start = [0u8; 10];
+    entry.read_exact(&mut start).map_err(cut)?;
+    if &start[..6] != b"\x93NUMPY" {
+        return Err("not an NPY array".into());
+    }
+    // Versions 2 and 3 have a header length of four bytes; a header of this kind never needs them.
+    if start[6] > 1 {
+        entry.read_exact(&mut [0u8; 2]).map_err(cut)?;
+    }
+    let mut header = vec![0u8; usize::from(u16::from_le_bytes([start[8], start[9]]))];
+    entry.read_exact(&mut header).map_err(cut)?;
+    let header = String::from_utf8_lossy(&header).replace([' ', '"'], "");
+    let bytes = if header.contains("'descr':'<f8'") {
+        8
+    } else if header.contains("'descr':'<f4'") {
+        4
+    } else {
+        return Err("its numbers are not little-endian f64 or f32".into());
+    };
+    let shape =
+        header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')).map(|(s, _)| s).unwrap_or_default();
+    let dims: Vec<u64> = shape.split(',').filter(|d| !d.is_empty()).map_while(|d| d.parse().ok()).collect();
+    let fits = match width {
+        1 => dims.len() == 1,
+        _ => dims.len() == 2 && dims[1] == width as u64,
+    };
+    if !fits || !header.contains("'fortran_order':False") {
+        return Err(format!("shape ({shape}), where (n, {width}) in C order is needed"));
+    }
+    let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);
+    // What is read grows with what is there, whatever the header says.
+    let mut raw = Vec::new();
+    entry.take(wanted).read_to_end(&mut raw).map_err(cut)?;
+    if raw.len() as u64 != wanted {
+        return Err(format!("{} bytes where shape ({shape}) needs {wanted}", raw.len()));
+    }
+    Ok(match bytes {
+        8 => raw.chunks_exact(8).map(|b| f64::from_le_bytes(std::array::from_fn(|i| b[i]))).collect(),
+        _ => raw.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(std::array::from_fn(|i| b[i])))).collect(),
+    })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(in crate::formats) fn some(n: usize, spectral: bool) -> Vec<LightRay> {
+        (0..n)
+            .map(|i| {
+                let t = i as f64;
+                LightRay {
+                    origin: Point::new(t, 0.1 * t, 1.0 / 3.0),
+                    direction: Vector::new(t.sin(), t.cos(), 0.1).normalize(),
+                    power: 1.0 / (1.0 + t),
+                    wavelength_nm: spectral.then_some(450.0 + t),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn both_formats_keep_every_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.csv", "a.npz"] {
+            for spectral in [false, true] {
+                let (path, rays) = (folder.path().join(name), some(100, spectral));
+                write_rays(&path, &rays).unwrap();
+                let back = read_rays(&path).unwrap();
+                assert_eq!(back.len(), rays.len());
+                for (a, b) in rays.iter().zip(&back) {
+                    assert_eq!((a.origin, a.power, a.wavelength_nm), (b.origin, b.power, b.wavelength_nm));
+                    assert!((a.direction - b.direction).length() < 2e-16);
+                }
+            }
+        }
+        assert!(write_rays(&folder.path().join("a.ray"), &[]).unwrap_err().to_string().contains(".csv, .npz"));
+    }
+
+    #[test]
+    fn columns_may_come_in_any_order() {
+        let text = "# from elsewhere\nPower;dx;dy;dz;x;y;z;note\n2;0;0;4;1;2;3;hello\n";
+        let rays = parse_csv(Path::new("r.csv"), text).unwrap();
+        let expected =
+            LightRay { origin: Point::new(1.0, 2.0, 3.0), direction: Vector::Z, power: 2.0, wavelength_nm: None };
+        assert_eq!(rays, [expected]);
+        let plain = parse_csv(Path::new("r.csv"), "1 2 3 0 0 2 2\n1 2 3 0 0 1 2\n").unwrap();
+        assert_eq!(plain, [expected; 2]);
+    }
+
+    #[test]
+    fn refusals_name_the_line() {
+        for (text, message) in [
+            ("x,y,z,dx,dy,dz\n", "r.csv:1: no column 'power'"),
+            ("0,0,0,0,0,1,1\n0,0,0,0,0,0,1\n", "r.csv:2: the direction has no length"),
+            ("0,0,0,0,0,1,1\n\n0,0,0,0,0,1,-1\n", "r.csv:3: a power of -1"),
+            ("0,0,0,0,0,1,one\n", "r.csv:1: 'one' is not a number"),
+            ("0,0,0\n", "r.csv:1: 3 columns"),
+            ("0,0,0,0,0,1,inf\n", "r.csv:1: inf is no finite number"),
+        ] {
+            let e = parse_csv(Path::new("r.csv"), text).unwrap_err().to_string();
+            assert!(e.starts_with(message), "{e}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        std::fs::write(&path, b"PK no zip").unwrap();
+        assert!(read_rays(&path).unwrap_err().to_string().contains("not an NPZ file"));
+        write_npz(&path, &[NpyArray { name: "origin", shape: vec![6], data: &[0.0; 6] }]).unwrap();
+        assert!(read_rays(&path).unwrap_err().to_string().contains("shape (6,)"));
+    }
+}
