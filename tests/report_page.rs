@@ -66,6 +66,7 @@ fn sample(n: u32) -> Report {
         content: Content::Bars {
             categories: vec!["octree".into(), "bvh".into()],
             layers: vec![("build".into(), vec![1.0, 2.0]), ("trace".into(), vec![3.0, 1.0])],
+            stacked: true,
         },
         ..Chart::series(
             "bars",

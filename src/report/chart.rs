@@ -34,12 +34,14 @@ pub struct AxisStyle {
 pub enum Content {
     /// Points and lines.
     Series(Vec<Series>),
-    /// Bars stacked on one another: for each category, a height of every named layer.
+    /// Bars: for each category, a height of every named layer.
     Bars {
         /// Names under the bars.
         categories: Vec<String>,
-        /// Name and heights of each layer, from the bottom up.
+        /// Name and heights of each layer, from the bottom up or the left.
         layers: Vec<(String, Vec<f64>)>,
+        /// Whether layers stand on one another (parts of a whole) or side by side (rivals).
+        stacked: bool,
     },
     /// A coloured map.
     Map {

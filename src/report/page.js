@@ -24,7 +24,7 @@
     const twin = [...box.childNodes];
     const figure = JSON.parse(data.textContent);
     box.replaceChildren();
-    return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, scrollZoom: !!figure.layout.scene })
+    return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
       .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); })
       .catch(() => { box.replaceChildren(...twin); });
   };

@@ -54,12 +54,13 @@ pub(super) fn chart(chart: &Chart) -> Value {
             let traces: Vec<Value> = series.iter().enumerate().map(|(k, s)| trace(k, s)).collect();
             (traces, json!({}))
         }
-        Content::Bars { categories, layers } => {
+        Content::Bars { categories, layers, stacked } => {
             let bars = layers.iter().enumerate().map(|(k, (name, values))| {
                 json!({"type": "bar", "name": name, "x": categories, "y": values,
                     "marker": {"color": PALETTE[k % PALETTE.len()]}})
             });
-            (bars.collect(), json!({"barmode": "stack", "xaxis": {"type": "category", "automargin": true}}))
+            let mode = if *stacked { "stack" } else { "group" };
+            (bars.collect(), json!({"barmode": mode, "xaxis": {"type": "category", "automargin": true}}))
         }
         Content::Map { grid, map } => {
             let [a, b] = &grid.axes;
@@ -115,7 +116,7 @@ fn trace(k: usize, s: &Series) -> Value {
 pub(super) fn view(view: &View) -> Value {
     let data: Vec<Value> = view.shapes.iter().map(shape).collect();
     let quiet = json!({"showbackground": false, "showspikes": false, "zeroline": false, "title": {"text": ""},
-        "ticksuffix": " mm", "nticks": 5});
+        "ticksuffix": " mm", "nticks": 4, "tickfont": {"size": 11}});
     let [x, y, z] = EYE;
     json!({"data": data, "layout": {
         "scene": {"aspectmode": "data", "xaxis": quiet, "yaxis": quiet, "zaxis": quiet,
@@ -132,7 +133,7 @@ fn shape(shape: &Shape) -> Value {
                 "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
                 "opacity": opacity, "flatshading": true, "hoverinfo": "name",
-                "lighting": {"ambient": 0.55, "diffuse": 0.7, "specular": 0.15, "roughness": 0.6},
+                "lighting": {"ambient": 0.72, "diffuse": 0.6, "specular": 0.15, "roughness": 0.6},
                 "lightposition": {"x": 2000, "y": -4000, "z": 6000}});
             match values {
                 Some(v) => {

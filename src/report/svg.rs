@@ -78,7 +78,7 @@ pub(super) fn render(chart: &Chart) -> String {
     );
     match &chart.content {
         Content::Series(series) => series_chart(&mut svg, chart, series),
-        Content::Bars { categories, layers } => bar_chart(&mut svg, chart, categories, layers),
+        Content::Bars { categories, layers, stacked } => bar_chart(&mut svg, chart, categories, layers, *stacked),
         Content::Map { grid, map } => map_chart(&mut svg, chart, grid, *map),
     }
     svg.push_str("</svg>\n");
@@ -177,27 +177,29 @@ fn series_chart(svg: &mut String, chart: &Chart, series: &[Series]) {
     legend(svg, &names);
 }
 
-fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(String, Vec<f64>)]) {
+fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(String, Vec<f64>)], stacked: bool) {
     let [left, top, right, bottom] = AREA;
-    let height = |c: usize| layers.iter().map(|(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0)).sum::<f64>();
+    let heights = |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0));
+    let tallest = |c: usize| if stacked { heights(c).sum::<f64>() } else { heights(c).fold(0.0, f64::max) };
     let linear = AxisStyle { log: false, ..chart.y.clone() };
-    let y = Scale::new((0..categories.len()).map(height), &linear, [bottom, top], true);
+    let y = Scale::new((0..categories.len()).map(tallest), &linear, [bottom, top], true);
     axes(svg, chart, None, &y, right);
     let slot = (right - left) / categories.len().max(1) as f64;
+    let width = slot * 0.7 / if stacked { 1.0 } else { layers.len().max(1) as f64 };
     for (c, category) in categories.iter().enumerate() {
         let mut base = 0.0;
-        for (k, (_, values)) in layers.iter().enumerate() {
-            let value = values.get(c).copied().unwrap_or(0.0).max(0.0);
+        for (k, value) in heights(c).enumerate() {
             let (low, high) = (y.at(base), y.at(base + value));
+            let shift = if stacked { 0.0 } else { k as f64 * width };
             let _ = write!(
                 svg,
                 r#"<rect x="{:.1}" y="{high:.1}" width="{:.1}" height="{:.1}" fill="{}"/>"#,
-                left + slot * (c as f64 + 0.18),
-                slot * 0.64,
+                left + slot * (c as f64 + 0.15) + shift,
+                width * 0.96,
                 (low - high).max(0.0),
                 PALETTE[k % PALETTE.len()]
             );
-            base += value;
+            base += if stacked { value } else { 0.0 };
         }
         let _ = write!(
             svg,

@@ -1,0 +1,172 @@
+//! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
+
+use super::{distinct, number, text};
+use crate::report::{AxisStyle, Chart, Content, Section, Series, SeriesStyle, figures, seconds};
+use serde_json::Value;
+
+/// The direction error that the answer speaks about, degrees.
+const ASKED: f64 = 0.05;
+
+struct Point<'a> {
+    row: &'a Value,
+    seconds: f64,
+    error: f64,
+}
+
+impl<'a> Point<'a> {
+    fn of(row: &'a Value) -> Option<Self> {
+        let part = |key: &str| number(row, key).unwrap_or(0.0);
+        let seconds = part("seconds_tessellate") + part("seconds_build") + number(row, "seconds_trace_median")?;
+        Some(Self { row, seconds, error: number(row, "direction_error_deg_p99")? })
+    }
+
+    fn label(&self) -> String {
+        let intersector = text(self.row, "intersector");
+        if intersector == "exact" {
+            return "the exact spline".into();
+        }
+        let tolerance = if self.row["adaptive"].as_bool() == Some(true) {
+            "the adaptive tolerance".into()
+        } else {
+            format!("{} mm", number(self.row, "tolerance_mm").map_or("?".into(), |t| figures(t, 3)))
+        };
+        format!("{tolerance} with {} normals on {intersector}", text(self.row, "normals"))
+    }
+}
+
+pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
+    let model = distinct(rows, "model").join(", ");
+    // Facts at the largest number of threads: that is what a user waits for.
+    let threads = rows.iter().filter_map(|r| r["threads"].as_u64()).max().unwrap_or(1);
+    let chosen: Vec<&Value> =
+        rows.iter().copied().filter(|r| r["threads"].as_u64().unwrap_or(threads) == threads).collect();
+    let points: Vec<Point> = chosen.iter().filter_map(|r| Point::of(r)).collect();
+    let title = format!("What accuracy costs in time: {model}");
+    let section = Section::new("Cost against accuracy").with(front(&points)).with(slopes(&chosen));
+    let time = Section::new("Where the time goes").with(stacked(&chosen));
+    (title, answer(&points), vec![section, time])
+}
+
+fn answer(points: &[Point]) -> String {
+    let best = (points.iter())
+        .filter(|p| p.error <= ASKED && text(p.row, "intersector") != "exact")
+        .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let exact = (points.iter())
+        .filter(|p| text(p.row, "intersector") == "exact")
+        .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let beside = exact.map_or(String::new(), |e| format!(" The exact spline costs **{}**.", seconds(e.seconds)));
+    match best {
+        Some(p) => format!(
+            "For a direction error of {ASKED}° (99th percentile) take **{}**: **{}** in all, {}° reached.{beside}",
+            p.label(),
+            seconds(p.seconds),
+            figures(p.error, 2)
+        ),
+        None => {
+            format!("No combination measured here reaches a direction error of {ASKED}° (99th percentile).{beside}")
+        }
+    }
+}
+
+/// Every combination as a point; those that another one beats in both time and error are faint.
+fn front(points: &[Point]) -> Chart {
+    let beaten = |p: &Point| {
+        points
+            .iter()
+            .any(|q| q.seconds <= p.seconds && q.error <= p.error && (q.seconds < p.seconds || q.error < p.error))
+    };
+    // An error of exactly 0 has no place on a logarithmic axis; it is shown at a tenth of the smallest other.
+    let smallest = points.iter().map(|p| p.error).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    let shown = |p: &&Point| [p.seconds, if p.error > 0.0 { p.error } else { smallest / 10.0 }];
+    let of = |name: String, style, wanted: &dyn Fn(&Point) -> bool| {
+        let mut list: Vec<&Point> = points.iter().filter(|p| wanted(p)).collect();
+        list.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        Series {
+            name,
+            points: list.iter().map(shown).collect(),
+            labels: list.iter().map(|p| p.label()).collect(),
+            style,
+            ..Series::default()
+        }
+    };
+    let mut series = vec![of("the front".into(), SeriesStyle::Line, &|p| !beaten(p))];
+    let rows: Vec<&Value> = points.iter().map(|p| p.row).collect();
+    for normals in distinct(&rows, "normals") {
+        series.push(of(normals.into(), SeriesStyle::Points, &|p| text(p.row, "normals") == normals && !beaten(p)));
+    }
+    series.push(of("dominated".into(), SeriesStyle::Faint, &|p| beaten(p)));
+    series.retain(|s| !s.points.is_empty());
+    let caption = "Each point is one combination of tolerance, normals and intersector; lower left is better. Faint: another \
+        combination is both faster and more accurate. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \
+        tenth of the smallest other.";
+    let axes = [AxisStyle::log("time", "s"), AxisStyle::log("direction error, p99", "°")];
+    Chart::series("front", "Cost–accuracy front", caption, axes, series)
+}
+
+fn slopes(rows: &[&Value]) -> Chart {
+    let mut series = Vec::new();
+    for normals in distinct(rows, "normals").into_iter().filter(|n| *n != "exact") {
+        let mut points: Vec<[f64; 2]> = (rows.iter())
+            .filter(|r| text(r, "normals") == normals && text(r, "intersector") == "octree")
+            .filter(|r| r["adaptive"].as_bool() != Some(true))
+            .filter_map(|r| {
+                let sag = number(r, "sag_mean_mm").or(number(r, "tolerance_mm"))?;
+                Some([sag, number(r, "direction_error_deg_rms")?])
+            })
+            .filter(|p| p[0] > 0.0 && p[1] > 0.0)
+            .collect();
+        points.sort_by(|a, b| b[0].total_cmp(&a[0]));
+        let Some(&start) = points.first() else { continue };
+        let theory = if matches!(normals, "flat" | "nearest") { 0.5 } else { 1.0 };
+        let line = points.iter().map(|p| [p[0], start[1] * (p[0] / start[0]).powf(theory)]).collect();
+        let name = match slope(&points) {
+            Some(s) => format!("{normals}, slope {}", figures(s, 3)),
+            None => normals.to_owned(),
+        };
+        series.push(Series { name, points, ..Series::default() });
+        let style = SeriesStyle::Dashed;
+        series.push(Series { name: format!("theory {theory}"), points: line, style, ..Series::default() });
+    }
+    let caption = "Error of reflected and refracted directions against the mean sag reached, octree. Dashed: the slope theory expects \
+        (½ for flat and nearest normals, 1 for interpolated ones), through the coarsest measurement.";
+    let axes = [AxisStyle::log("mean sag", "mm"), AxisStyle::log("direction error, rms", "°")];
+    Chart::series("slopes", "Convergence", caption, axes, series)
+}
+
+/// Least-squares slope in log-log; `None` with fewer than three points.
+fn slope(points: &[[f64; 2]]) -> Option<f64> {
+    let logs: Vec<[f64; 2]> = points.iter().map(|p| p.map(f64::ln)).collect();
+    let n = logs.len() as f64;
+    let mean = |k: usize| logs.iter().map(|p| p[k]).sum::<f64>() / n;
+    let (mx, my) = (mean(0), mean(1));
+    let sxx: f64 = logs.iter().map(|p| (p[0] - mx).powi(2)).sum();
+    let sxy: f64 = logs.iter().map(|p| (p[0] - mx) * (p[1] - my)).sum();
+    (logs.len() > 2 && sxx > 0.0).then(|| sxy / sxx)
+}
+
+fn stacked(rows: &[&Value]) -> Chart {
+    let shown: Vec<&&Value> = (rows.iter())
+        .filter(|r| {
+            text(r, "intersector") == "exact"
+                || text(r, "intersector") == "octree" && text(r, "normals") == "bilinear"
+        })
+        .take(14)
+        .collect();
+    let name = |r: &&&Value| match (text(r, "intersector"), r["adaptive"].as_bool()) {
+        ("exact", _) => "exact".to_owned(),
+        (_, Some(true)) => "adaptive".to_owned(),
+        _ => number(r, "tolerance_mm").map_or("?".into(), |t| format!("{} mm", figures(t, 3))),
+    };
+    let layer = |title: &str, key: &str| {
+        (title.to_owned(), shown.iter().map(|r| number(r, key).unwrap_or(0.0)).collect::<Vec<f64>>())
+    };
+    let layers = vec![
+        layer("tessellate", "seconds_tessellate"),
+        layer("build", "seconds_build"),
+        layer("trace", "seconds_trace_median"),
+    ];
+    let content = Content::Bars { categories: shown.iter().map(name).collect(), layers, stacked: true };
+    let axes = [AxisStyle::linear("tolerance", ""), AxisStyle::linear("time", "s")];
+    let caption = "Octree with bilinear normals by tolerance, and the exact spline. Median of alternating rounds.";
+    Chart { content, ..Chart::series("time", "Tessellate, build, trace", caption, axes, Vec::new()) }
+}

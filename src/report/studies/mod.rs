@@ -1,0 +1,147 @@
+//! Studies as reports: from the rows of `study … --json` alone, so that a kept `study.json` can be drawn again years later.
+
+mod accuracy;
+mod others;
+
+use super::{Cell, Provenance, Report, Section, Table};
+use serde_json::Value;
+
+/// The report of a study document as `lampyris study … --json` prints it.
+pub fn study_report(document: &Value, provenance: Provenance) -> Report {
+    let rows: Vec<&Value> = document["rows"].as_array().map(|r| r.iter().collect()).unwrap_or_default();
+    let kind = document["study"].as_str().unwrap_or_default();
+    let (title, answer, mut sections) = match kind {
+        "accuracy" => accuracy::report(&rows),
+        "interpolation" => others::interpolation(&rows),
+        "complexity" => others::complexity(&rows),
+        "stability" => others::stability(&rows),
+        "bvh" => others::bvh(&rows),
+        "effects" => others::effects(&rows),
+        _ => (format!("Study {kind}"), String::new(), Vec::new()),
+    };
+    sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
+    Report { title, answer, sections, provenance }
+}
+
+/// A number of a row; `None` when absent or null.
+fn number(row: &Value, key: &str) -> Option<f64> {
+    row[key].as_f64().filter(|x| x.is_finite())
+}
+
+/// A text of a row, empty when absent.
+fn text<'a>(row: &'a Value, key: &str) -> &'a str {
+    row[key].as_str().unwrap_or_default()
+}
+
+/// The different texts of a key, in order of appearance.
+fn distinct<'a>(rows: &[&'a Value], key: &str) -> Vec<&'a str> {
+    let mut seen = Vec::new();
+    for value in rows.iter().map(|r| text(r, key)) {
+        if !value.is_empty() && !seen.contains(&value) {
+            seen.push(value);
+        }
+    }
+    seen
+}
+
+/// Title and unit of a key, by the suffixes that keys carry.
+fn heading(key: &str) -> (String, &'static str) {
+    let units = [
+        ("_mm_p50", "mm", " median"),
+        ("_mm_p99", "mm", " p99"),
+        ("_deg_rms", "°", " rms"),
+        ("_deg_p99", "°", " p99"),
+        ("_deg_max", "°", " max"),
+        ("_mm", "mm", ""),
+        ("_deg", "°", ""),
+    ];
+    for (suffix, unit, kept) in units {
+        if let Some(stem) = key.strip_suffix(suffix) {
+            return (format!("{}{kept}", stem.replace('_', " ")), unit);
+        }
+    }
+    let unit = match key {
+        k if k.starts_with("seconds") || k.ends_with("seconds") => "s",
+        k if k.starts_with("mrays_per_s") => "Mrays/s",
+        "bytes" | "bytes_per_facet" => "B",
+        _ => "",
+    };
+    let title = key.replace("mrays_per_s", "rate").replace('_', " ");
+    (title, unit)
+}
+
+/// Every row with every key.
+fn rows_table(kind: &str, rows: &[&Value]) -> Table {
+    let mut keys: Vec<&str> = Vec::new();
+    for key in rows.iter().filter_map(|r| r.as_object()).flat_map(|o| o.keys()) {
+        if !keys.contains(&key.as_str()) {
+            keys.push(key);
+        }
+    }
+    let headings: Vec<(String, &str)> = keys.iter().map(|k| heading(k)).collect();
+    let columns: Vec<(&str, &str)> = headings.iter().map(|(t, u)| (t.as_str(), *u)).collect();
+    let mut table = Table::new(&format!("{kind}-rows"), "Every measurement", &columns);
+    for row in rows {
+        table.row(keys.iter().map(|k| match &row[*k] {
+            Value::Null => Cell::Empty,
+            Value::Bool(b) => Cell::from(if *b { "yes" } else { "no" }),
+            Value::String(s) => Cell::from(s.as_str()),
+            Value::Number(n) => n.as_u64().map_or_else(|| n.as_f64().into(), Cell::from),
+            Value::Array(list) => {
+                let words: Vec<String> =
+                    list.iter().map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned)).collect();
+                Cell::from(words.join(" "))
+            }
+            other => Cell::from(other.to_string()),
+        }));
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn table(document: &Value) -> Report {
+        study_report(document, Provenance::default())
+    }
+
+    #[test]
+    fn rows_of_any_study_become_a_table_with_units() {
+        let rows = json!([{"case": "edge", "seconds_min": 0.5, "sag_max_mm": null, "flips": 3}, {"case": "b", "extra": true}]);
+        let report = table(&json!({"study": "unheard of", "rows": rows}));
+        let csv = match &report.sections[0].blocks[0] {
+            crate::report::Block::Table(t) => t.to_csv(),
+            _ => panic!("no table"),
+        };
+        assert_eq!(csv, "case,seconds min (s),sag max (mm),flips,extra\nedge,0.5,,3,\nb,,,,yes\n");
+    }
+
+    #[test]
+    fn documents_that_are_damaged_still_give_a_page() {
+        for kind in ["accuracy", "interpolation", "complexity", "stability", "bvh", "effects"] {
+            for rows in [json!(null), json!([]), json!([null, 3, {"model": 7, "normals": "flat"}])] {
+                assert!(!table(&json!({"study": kind, "rows": rows})).title.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn the_cheapest_combination_that_reaches_an_accuracy_is_named() {
+        let row = |tol: f64, normals: &str, intersector: &str, seconds: f64, error: f64| {
+            json!({"model": "m", "tolerance_mm": tol, "normals": normals, "intersector": intersector, "threads": 4,
+                "seconds_tessellate": 0.1, "seconds_build": 0.1, "seconds_trace_median": seconds,
+                "sag_mean_mm": tol / 2.0, "direction_error_deg_p99": error, "direction_error_deg_rms": error / 3.0})
+        };
+        let rows = json!([
+            row(0.1, "bilinear", "octree", 1.0, 0.04),
+            row(0.1, "flat", "octree", 0.9, 1.0),
+            row(0.05, "bilinear", "octree", 2.0, 0.02),
+            row(0.1, "exact", "exact", 10.0, 0.0),
+        ]);
+        let report = table(&json!({"study": "accuracy", "rows": rows}));
+        assert!(report.answer.contains("0.1 mm") && report.answer.contains("bilinear"), "{}", report.answer);
+        assert!(report.answer.contains("1.2 s") && report.answer.contains("10.2 s"), "{}", report.answer);
+    }
+}

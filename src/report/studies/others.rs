@@ -1,0 +1,240 @@
+//! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
+
+use super::{distinct, number, text};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, figures, grouped, seconds};
+use serde_json::Value;
+
+type Parts = (String, String, Vec<Section>);
+
+/// Bars of one value: a category for every text of `by`, a layer for every text of `split`; the last row of a pair counts.
+fn bars(
+    name: &str,
+    title: &str,
+    caption: &str,
+    rows: &[&Value],
+    [by, split, value]: [&str; 3],
+    unit: &str,
+) -> Chart {
+    let categories = distinct(rows, by);
+    let layers = (distinct(rows, split).into_iter())
+        .map(|layer| {
+            let height = |category: &&str| {
+                let fits = |r: &&&Value| text(r, by) == *category && text(r, split) == layer;
+                rows.iter().filter(fits).filter_map(|r| number(r, value)).next_back().unwrap_or(0.0)
+            };
+            (layer.to_owned(), categories.iter().map(height).collect())
+        })
+        .collect();
+    let content =
+        Content::Bars { categories: categories.iter().map(|c| (*c).to_owned()).collect(), layers, stacked: false };
+    let axes = [AxisStyle::linear(by, ""), AxisStyle::linear(title, unit)];
+    Chart { content, ..Chart::series(name, title, caption, axes, Vec::new()) }
+}
+
+/// The seed paper's table 2: mean normal error and seconds.
+const PAPER_INTERPOLATION: [(&str, f64, f64); 3] =
+    [("nearest", 0.015, 5.2), ("bilinear", 0.008, 6.8), ("cubic", 0.005, 12.4)];
+
+pub(super) fn interpolation(rows: &[&Value]) -> Parts {
+    let columns = [
+        ("model", ""),
+        ("algorithm", ""),
+        ("normal error, mean", ""),
+        ("normal error, max", ""),
+        ("time, median", "s"),
+        ("paper: error", ""),
+        ("paper: time", "s"),
+    ];
+    let mut table = Table::new("interpolation", "Normals between corners", &columns).caption(
+        "Error is the Euclidean distance between unit normals. The paper's figures are of its own model and machine: \
+         compare the order and the ratios, not the values.",
+    );
+    for row in rows {
+        let paper = PAPER_INTERPOLATION.iter().find(|(name, ..)| *name == text(row, "algorithm"));
+        table.row([
+            text(row, "model").into(),
+            text(row, "algorithm").into(),
+            number(row, "normal_error_mean").into(),
+            number(row, "normal_error_max").into(),
+            number(row, "seconds_median").into(),
+            paper.map(|p| p.1).into(),
+            paper.map(|p| p.2).into(),
+        ]);
+    }
+    let models = distinct(rows, "model");
+    let mean = |model: &str, algorithm: &str| {
+        let fits = |r: &&&Value| text(r, "model") == model && text(r, "algorithm") == algorithm;
+        rows.iter().find(fits).and_then(|r| number(r, "normal_error_mean"))
+    };
+    let ordered = models.iter().filter(|m| {
+        matches!((mean(m, "cubic"), mean(m, "bilinear"), mean(m, "nearest")), (Some(c), Some(b), Some(n)) if c < b && b < n)
+    });
+    let answer = format!(
+        "The error of the normal falls from nearest over bilinear to cubic on **{} of {} models**; the paper reports \
+         0.015, 0.008 and 0.005.",
+        ordered.count(),
+        models.len()
+    );
+    let keys = ["model", "algorithm", "normal_error_mean"];
+    let chart = bars("error", "mean normal error", "Shorter is better.", rows, keys, "");
+    let title = "Normals between corners: nearest, bilinear, cubic, exact".into();
+    (title, answer, vec![Section::new("Errors").with(chart).with(table)])
+}
+
+/// The seed paper's table 1: share of time saved, percent.
+const PAPER_COMPLEXITY: [f64; 3] = [18.75, 25.45, 46.65];
+
+pub(super) fn complexity(rows: &[&Value]) -> Parts {
+    let mut table = Table::new(
+        "complexity",
+        "Before and after",
+        &[
+            ("model", ""),
+            ("method", ""),
+            ("patches", ""),
+            ("facets", ""),
+            ("prepare", "s"),
+            ("trace", "s"),
+            ("ratio to traditional", "×"),
+            ("paper: time saved", "%"),
+        ],
+    )
+    .caption(
+        "Traditional: every spline surface is intersected for every ray. Prepare includes tessellation and build. The \
+         paper's percentages are of its own three lamps.",
+    );
+    let models = distinct(rows, "model");
+    let count = |row: &Value, key: &str| -> Cell { row[key].as_u64().into() };
+    for row in rows {
+        let lamp = models.iter().position(|m| *m == text(row, "model"));
+        let paper = lamp.filter(|_| text(row, "method") == "octree").and_then(|k| PAPER_COMPLEXITY.get(k));
+        table.row([
+            text(row, "model").into(),
+            text(row, "method").into(),
+            count(row, "patches"),
+            count(row, "facets"),
+            number(row, "seconds_prepare").into(),
+            number(row, "seconds_trace_median").into(),
+            number(row, "ratio_to_traditional").into(),
+            paper.copied().into(),
+        ]);
+    }
+    let best = (rows.iter())
+        .filter(|r| text(r, "method") == "octree")
+        .filter_map(|r| Some((number(r, "ratio_to_traditional")?, *r)))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let answer = best.map_or(String::new(), |(ratio, row)| {
+        format!(
+            "On **{}** the facets in the octree are **{} ×** as fast as intersecting every spline surface, tessellation and \
+             build included; the paper reports 1.87 × on its most intricate lamp.",
+            text(row, "model"),
+            figures(ratio, 3)
+        )
+    });
+    let keys = ["model", "method", "ratio_to_traditional"];
+    let chart = bars("ratio", "ratio to traditional", "Longer is better.", rows, keys, "×");
+    ("Three lamps, before and after".into(), answer, vec![Section::new("Time").with(table).with(chart)])
+}
+
+pub(super) fn stability(rows: &[&Value]) -> Parts {
+    let sum = |name: &str, key: &str| -> u64 {
+        rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
+    };
+    let names = distinct(rows, "intersector");
+    let columns = [("intersector", ""), ("rays", ""), ("right", ""), ("flagged", ""), ("wrong", "")];
+    let mut table = Table::new("stability", "Hard rays", &columns)
+        .caption("Flagged: the answer itself says that it is not proved. Truths are by construction.");
+    for name in &names {
+        let counts = ["rays", "right", "flagged", "wrong"].map(|key| Cell::from(sum(name, key)));
+        table.row(std::iter::once(Cell::from(*name)).chain(counts));
+    }
+    let verdicts: Vec<String> =
+        names.iter().map(|n| format!("{n} **{}** wrong of {}", sum(n, "wrong"), grouped(sum(n, "rays")))).collect();
+    let answer = format!("Rays through edges, vertices, tangents and other trouble: {}.", verdicts.join(", "));
+    let layers = ["flagged", "wrong"]
+        .map(|key| (key.to_owned(), names.iter().map(|n| sum(n, key) as f64).collect::<Vec<f64>>()));
+    let content = Content::Bars {
+        categories: names.iter().map(|n| (*n).to_owned()).collect(),
+        layers: layers.into(),
+        stacked: true,
+    };
+    let axes = [AxisStyle::linear("intersector", ""), AxisStyle::linear("rays", "")];
+    let caption = "Rays flagged as unproved, and rays answered wrongly.";
+    let chart = Chart { content, ..Chart::series("verdicts", "Flagged and wrong", caption, axes, Vec::new()) };
+    ("Numerical stability".into(), answer, vec![Section::new("Verdicts").with(chart).with(table)])
+}
+
+pub(super) fn bvh(rows: &[&Value]) -> Parts {
+    let rate = |name: &str, kind: &str| {
+        let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;
+        rows.iter().filter(fits).filter_map(|r| number(r, "mrays_per_s_median")).fold(0.0, f64::max)
+    };
+    let (octree, cwbvh) = (rate("octree", "incoherent"), rate("cwbvh", "incoherent"));
+    let answer = if octree > 0.0 && cwbvh > 0.0 {
+        format!(
+            "On incoherent rays the octree answers **{} million rays/s**, obvhs' CwBvh {}: **{} ×** (best call and number \
+             of threads of each, medians of alternating rounds).",
+            figures(octree, 3),
+            figures(cwbvh, 3),
+            figures(octree / cwbvh, 3)
+        )
+    } else {
+        "Octree against bounding-volume hierarchies on the same facets and rays.".into()
+    };
+    let mut section = Section::new("Rates");
+    for kind in distinct(rows, "rays_kind") {
+        let of: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "rays_kind") == kind).collect();
+        let facets = |r: &Value| r["facets"].as_u64().map_or("?".into(), grouped);
+        // Categories are texts; sizes are made ones.
+        let sized: Vec<Value> = (of.iter())
+            .map(|r| {
+                let mut row = (*r).clone();
+                if row.is_object() {
+                    row["size"] = Value::from(format!("{} facets, {}", facets(r), text(r, "call")));
+                }
+                row
+            })
+            .collect();
+        let sized: Vec<&Value> = sized.iter().collect();
+        let mut chart = bars(
+            &format!("rates-{kind}"),
+            &format!("{kind} rays"),
+            "Median of alternating rounds; longer is better.",
+            &sized,
+            ["size", "intersector", "mrays_per_s_median"],
+            "Mrays/s",
+        );
+        chart.x = AxisStyle::linear("facets and call", "");
+        section = section.with(chart);
+    }
+    ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
+}
+
+pub(super) fn effects(rows: &[&Value]) -> Parts {
+    let list = |r: &Value| -> String {
+        let words = r["effects"].as_array().map(|a| a.iter().filter_map(Value::as_str).collect::<Vec<_>>());
+        words.filter(|w| !w.is_empty()).map_or("none".into(), |w| w.join(" + "))
+    };
+    let categories: Vec<String> = rows.iter().map(|r| list(r)).collect();
+    let times: Vec<f64> = rows.iter().map(|r| number(r, "seconds_trace_median").unwrap_or(0.0)).collect();
+    let answer = match (times.first(), times.last()) {
+        (Some(&pruned), Some(&full)) if pruned > 0.0 && full > 0.0 => format!(
+            "What the scene needs takes **{}**, everything together {}: leaving out what is not called for is **{} ×** as \
+             fast, with {} results.",
+            seconds(pruned),
+            seconds(full),
+            figures(full / pruned, 3),
+            if rows.iter().all(|r| r["identical"].as_bool() != Some(false)) {
+                "bit-identical"
+            } else {
+                "DIFFERENT"
+            }
+        ),
+        _ => String::new(),
+    };
+    let content = Content::Bars { categories, layers: vec![("trace".into(), times)], stacked: true };
+    let axes = [AxisStyle::linear("effects", ""), AxisStyle::linear("time", "s")];
+    let caption = "Median time of the trace by what is compiled into the kernel.";
+    let chart = Chart { content, ..Chart::series("effects", "Time by effect", caption, axes, Vec::new()) };
+    ("What each effect costs".into(), answer, vec![Section::new("Time").with(chart)])
+}
