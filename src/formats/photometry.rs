@@ -68,8 +68,12 @@ impl Photometry {
     /// The same intensities over all planes that symmetry implies.
     ///
     /// Type C: one plane, or planes that end at 90°, 180°, or run from 90° to 270°, become planes from 0° to 360°.
-    /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is.
+    /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is,
+    /// also intensities that do not fill their planes.
     pub fn expanded(&self) -> Self {
+        if self.candela.len() != self.horizontal_deg.len() * self.vertical_deg.len() {
+            return self.clone();
+        }
         let (Some(&first), Some(&last)) = (self.horizontal_deg.first(), self.horizontal_deg.last()) else {
             return self.clone();
         };
@@ -107,8 +111,13 @@ impl Photometry {
     }
 
     /// Lumens of the whole distribution, exact for intensities bilinear in the angles; symmetry is expanded first.
+    ///
+    /// NaN when the intensities do not fill their planes.
     pub fn flux(&self) -> f64 {
         let all = self.expanded();
+        if all.candela.len() != all.horizontal_deg.len() * all.vertical_deg.len() {
+            return f64::NAN;
+        }
         let rows = all.vertical_deg.len();
         // The polar angle's weights: its integrals against the hat functions of its nodes.
         let (polar, offset, turning) = match self.kind {

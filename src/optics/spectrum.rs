@@ -1,5 +1,6 @@
 use super::cie;
 use super::error::{Error, ErrorKind, checked};
+use super::intensity::linear_quantile;
 use super::table::Table;
 
 /// Lumens per watt at 555 nm (540 THz), by definition of the candela.
@@ -165,19 +166,16 @@ impl Wavelengths {
 
     /// A wavelength in nm, drawn in proportion to power; `u` in `[0, 1)`, monotonic in `u` where lines ascend.
     pub fn sample(&self, u: f64) -> f64 {
-        let wanted = u * self.total();
+        // Below the whole, so that rounding never ends in a piece without power.
+        let wanted = (u * self.total()).min(self.total().next_down());
         let i = self.sums.partition_point(|&s| s <= wanted);
         match &self.kind {
             Kind::Lines(nm) => nm[i.min(nm.len() - 1)],
             Kind::Continuous(points) => {
                 let i = i.clamp(1, points.len() - 1);
                 let ([x0, y0], [x1, y1]) = (points[i - 1], points[i]);
-                // The root of the quadratic cumulative, in the form that does not cancel when both ends are equal.
-                let missing = wanted - self.sums[i - 1];
-                let slope = (y1 - y0) / (x1 - x0);
-                let root = (y0 * y0 + 2.0 * slope * missing).max(0.0).sqrt();
-                let step = if y0 + root > 0.0 { 2.0 * missing / (y0 + root) } else { 0.0 };
-                (x0 + step).clamp(x0, x1)
+                let share = (wanted - self.sums[i - 1]) / (self.sums[i] - self.sums[i - 1]);
+                x0 + (x1 - x0) * linear_quantile(y0, y1, share)
             }
         }
     }
