@@ -9,7 +9,11 @@
 //! Known weakness: a verdict "explained" says that the difference lies inside the band that the facets' sag allows; it
 //! does not say that the facets are as good as they could be.
 
+pub mod accuracy;
+pub mod aim;
 pub mod check;
+mod errors;
+pub mod interpolation;
 mod quantiles;
 mod random;
 pub mod rays;
@@ -17,7 +21,9 @@ pub mod records;
 pub mod specimen;
 pub mod stability;
 mod timing;
+mod workshop;
 
 pub use quantiles::{Quantiles, Summary};
 pub use random::Random;
 pub use timing::{Progress, Rounds, Timing};
+pub use workshop::{Meshed, Tree, Workshop, normals_name};

@@ -94,6 +94,14 @@ impl<'a> Clock<'a> {
         let remaining_seconds = (done > 0.01).then(|| elapsed * (1.0 - done).max(0.0) / done);
         (self.report)(Progress { stage: stage.into(), done, remaining_seconds });
     }
+
+    /// Reports a stage with a forecast of the seconds still to come; 0 stands for "not known yet".
+    pub(super) fn forecast(&self, stage: &str, ahead: f64) {
+        let elapsed = self.start.elapsed().as_secs_f64();
+        let known = ahead > 0.0;
+        let done = if known { elapsed / (elapsed + ahead) } else { 0.0 };
+        (self.report)(Progress { stage: stage.into(), done, remaining_seconds: known.then_some(ahead) });
+    }
 }
 
 #[cfg(test)]

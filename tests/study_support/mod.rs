@@ -1,8 +1,8 @@
 //! Intersectors that are slow and obviously right, to judge the judge with.
 #![allow(dead_code, unreachable_pub)]
 
-use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
-use lampyris::math::{FaceId, Point, Ray, Uv, Vector};
+use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector, NormalMode};
+use lampyris::math::{Aabb, FaceId, Point, Ray, Uv, Vector, quadratic_roots};
 use lampyris::mesh::FacetMesh;
 use lampyris::nurbs::conic;
 use std::f64::consts::PI;
@@ -14,35 +14,52 @@ impl Intersector for Brute<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         cost.rays += 1;
         let mut best: Option<Hit> = None;
-        for (i, facet) in self.0.facets.iter().enumerate() {
-            let corners = self.0.corners(i);
-            let vertex = facet.vertices.map(|v| self.0.vertices[v as usize]);
-            let triangles: &[[usize; 3]] = if facet.is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
-            for &[a, b, c] in triangles {
-                let Some((t, v, w)) = triangle(ray, [corners[a], corners[b], corners[c]]) else { continue };
-                if t < ray.t_min || t > best.map_or(ray.t_max, |h| h.t) {
-                    continue;
-                }
-                // The point that the ray leaves, on whichever facets share it.
-                if ray.from.is_some() && t < 1e-12 * (1.0 + ray.origin.length()) {
-                    continue;
-                }
-                let u = 1.0 - v - w;
-                best = Some(Hit {
-                    t,
-                    normal: (vertex[a].normal * u + vertex[b].normal * v + vertex[c].normal * w).normalize(),
-                    geometric_normal: (corners[b] - corners[a]).cross(corners[c] - corners[a]).normalize(),
-                    face: facet.face,
-                    primitive: i as u32,
-                    uv: vertex[a].uv * u + vertex[b].uv * v + vertex[c].uv * w,
-                    certainty: Certainty::Facet,
-                });
-            }
+        for i in 0..self.0.facets.len() {
+            facet_hit(self.0, i, ray, NormalMode::Bilinear, &mut best);
         }
         best
     }
     fn footprint(&self) -> Footprint {
         Footprint { primitives: self.0.facets.len(), ..Footprint::default() }
+    }
+}
+
+fn facet_hit(mesh: &FacetMesh, i: usize, ray: &Ray, normals: NormalMode, best: &mut Option<Hit>) {
+    let facet = &mesh.facets[i];
+    let corners = mesh.corners(i);
+    let vertex = facet.vertices.map(|v| mesh.vertices[v as usize]);
+    let triangles: &[[usize; 3]] = if facet.is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
+    for &[a, b, c] in triangles {
+        let Some((t, v, w)) = triangle(ray, [corners[a], corners[b], corners[c]]) else { continue };
+        if t < ray.t_min || t > best.map_or(ray.t_max, |h| h.t) {
+            continue;
+        }
+        // The point that the ray leaves, on whichever facets share it.
+        if ray.from.is_some() && t < 1e-12 * (1.0 + ray.origin.length()) {
+            continue;
+        }
+        // Weights of the corners in the facet's own parameters (0,0), (1,0), (1,1), (0,1).
+        let (x, y) = match (facet.is_triangle(), b) {
+            (false, 1) => (v + w, w),
+            (false, _) => (v, v + w),
+            _ => (0.0, 0.0),
+        };
+        let weight = if facet.is_triangle() {
+            [1.0 - v - w, v, w, 0.0]
+        } else {
+            [(1.0 - x) * (1.0 - y), x * (1.0 - y), x * y, (1.0 - x) * y]
+        };
+        let flat = (corners[b] - corners[a]).cross(corners[c] - corners[a]).normalize();
+        let blend: Vector = (0..4).map(|k| vertex[k].normal * weight[k]).sum();
+        *best = Some(Hit {
+            t,
+            normal: if normals == NormalMode::Flat { flat } else { blend.normalize() },
+            geometric_normal: flat,
+            face: facet.face,
+            primitive: i as u32,
+            uv: (0..4).map(|k| vertex[k].uv * weight[k]).sum(),
+            certainty: Certainty::Facet,
+        });
     }
 }
 
@@ -118,5 +135,123 @@ impl<F: Fn(&Ray, Option<Hit>) -> Option<Hit> + Sync> Intersector for Changed<'_,
     }
     fn footprint(&self) -> Footprint {
         self.0.footprint()
+    }
+}
+
+/// The same facets as `Brute`, under a median-split tree of boxes, with normals of a kind.
+pub struct Boxes<'a> {
+    mesh: &'a FacetMesh,
+    normals: NormalMode,
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+    centres: Vec<Point>,
+}
+
+struct Node {
+    bounds: Aabb,
+    /// First facet and count for a leaf; children for an inner node.
+    leaf: Option<(usize, usize)>,
+    children: [usize; 2],
+}
+
+impl<'a> Boxes<'a> {
+    pub fn new(mesh: &'a FacetMesh, normals: NormalMode) -> Self {
+        let mut boxes = Self {
+            mesh,
+            normals,
+            nodes: Vec::new(),
+            order: (0..mesh.facets.len() as u32).collect(),
+            centres: (0..mesh.facets.len()).map(|f| mesh.corners(f).into_iter().sum()).collect(),
+        };
+        boxes.build(0, mesh.facets.len());
+        boxes
+    }
+
+    fn build(&mut self, begin: usize, end: usize) -> usize {
+        let bounds = Aabb::around(self.order[begin..end].iter().flat_map(|&f| self.mesh.corners(f as usize)));
+        let at = self.nodes.len();
+        let leaf = (end - begin <= 4).then_some((begin, end - begin));
+        self.nodes.push(Node { bounds: bounds.grown(1e-9 * (1.0 + bounds.diagonal())), leaf, children: [0; 2] });
+        if leaf.is_none() {
+            let size = bounds.size();
+            let axis = if size.x >= size.y && size.x >= size.z {
+                0
+            } else if size.y >= size.z {
+                1
+            } else {
+                2
+            };
+            let centres = &self.centres;
+            let key = |f: &u32| centres[*f as usize][axis];
+            self.order[begin..end].select_nth_unstable_by((end - begin) / 2, |a, b| key(a).total_cmp(&key(b)));
+            let middle = (begin + end) / 2;
+            let children = [self.build(begin, middle), self.build(middle, end)];
+            self.nodes[at].children = children;
+        }
+        at
+    }
+}
+
+impl Intersector for Boxes<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        cost.rays += 1;
+        let mut best: Option<Hit> = None;
+        let mut stack = vec![0];
+        while let Some(at) = stack.pop() {
+            let node = &self.nodes[at];
+            let reach = ray.within(ray.t_min, best.map_or(ray.t_max, |h| h.t));
+            if node.bounds.clip(&reach).is_none() {
+                continue;
+            }
+            match node.leaf {
+                None => stack.extend(node.children),
+                Some((begin, count)) => {
+                    for &f in &self.order[begin..begin + count] {
+                        facet_hit(self.mesh, f as usize, ray, self.normals, &mut best);
+                    }
+                }
+            }
+        }
+        best
+    }
+    fn footprint(&self) -> Footprint {
+        Footprint { primitives: self.mesh.facets.len(), ..Footprint::default() }
+    }
+}
+
+/// The bowl z = (x² + y²)/4f over a square of that half width, in closed form; the one face, u = x, v = y.
+pub struct Bowl {
+    pub focus: f64,
+    pub half: f64,
+}
+
+impl Intersector for Bowl {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        cost.rays += 1;
+        let (o, d, f) = (ray.origin, ray.direction, 4.0 * self.focus);
+        let a = d.x * d.x + d.y * d.y;
+        let b = 2.0 * (o.x * d.x + o.y * d.y) - f * d.z;
+        let c = o.x * o.x + o.y * o.y - f * o.z;
+        let (near, far) = quadratic_roots(a, b, c);
+        let inside = |t: f64| {
+            let p = ray.at(t);
+            t >= ray.t_min && t <= ray.t_max && p.x.abs() <= self.half && p.y.abs() <= self.half
+        };
+        let t = [near, far].into_iter().flatten().find(|&t| inside(t))?;
+        let p = ray.at(t);
+        let n = Vector::new(-2.0 * p.x / f, -2.0 * p.y / f, 1.0).normalize();
+        let uv = Uv::new(p.x, p.y);
+        Some(Hit {
+            t,
+            normal: n,
+            geometric_normal: n,
+            face: FaceId(0),
+            primitive: 0,
+            uv,
+            certainty: Certainty::Certified,
+        })
+    }
+    fn footprint(&self) -> Footprint {
+        Footprint { primitives: 1, ..Footprint::default() }
     }
 }

@@ -1,0 +1,375 @@
+//! What accuracy costs: tolerance × kind of normal × intersector, each against the exact hits of the same rays.
+//!
+//! Theory for a mirror of radius R met at incidence i by a facet of sag s: flat normals err by up to 2·acos(1 − s/R), order
+//! ½ in s; bilinear ones by 2·s·tan i/R, order 1. In facet length that is order 1 and 2.
+
+use super::errors::{Errors, slope};
+use super::rays::{RaySource, Uniform};
+use super::timing::Clock;
+use super::workshop::{Tree, Workshop, answer, normals_name};
+use super::{Progress, Rounds, Timing};
+use crate::intersect::{Hit, Intersector, NormalMode};
+use crate::math::Ray;
+use serde::Serialize;
+use std::sync::Mutex;
+use std::time::Instant;
+
+/// What is swept and how long.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Tolerances `[min, max]`, mm, coarse first.
+    pub tolerances: Vec<[f64; 2]>,
+    /// Kinds of normals.
+    pub normals: Vec<NormalMode>,
+    /// Structures over the facets.
+    pub trees: Vec<Tree>,
+    /// Rays: both the timed and the judged ones.
+    pub rays: u64,
+    /// Timed rounds.
+    pub rounds: usize,
+    /// Numbers of threads; 1 or that of the current rayon pool.
+    pub threads: Vec<usize>,
+    /// Of the rays.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let uniform = [1.6, 0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125].map(|t| [t, t]);
+        let all = rayon::current_num_threads();
+        Self {
+            tolerances: uniform.into_iter().chain([[0.05, 0.2]]).collect(),
+            normals: vec![
+                NormalMode::Flat,
+                NormalMode::Nearest,
+                NormalMode::Bilinear,
+                NormalMode::Cubic,
+                NormalMode::Exact,
+            ],
+            trees: vec![Tree::Octree, Tree::CwBvh],
+            rays: 50_000,
+            rounds: 3,
+            threads: if all == 1 { vec![1] } else { vec![1, all] },
+            seed: 1,
+        }
+    }
+}
+
+/// One combination, measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the model.
+    pub model: String,
+    /// Uniform tolerance, or the lower end of the adaptive one; none for the spline.
+    pub tolerance_mm: Option<f64>,
+    /// Whether the tolerance was a range.
+    pub adaptive: bool,
+    /// Kind of normals.
+    pub normals: String,
+    /// `octree`, `cwbvh` or `exact`.
+    pub intersector: String,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Facets (patches for the spline).
+    pub facets: usize,
+    /// Bytes of mesh and structure.
+    pub bytes: usize,
+    /// Sampled on the facets, mm.
+    pub sag_mean_mm: Option<f64>,
+    /// Sampled on the facets, mm.
+    pub sag_max_mm: Option<f64>,
+    /// Seconds.
+    pub seconds_tessellate: Option<f64>,
+    /// Seconds.
+    pub seconds_build: f64,
+    /// Seconds for all rays.
+    pub seconds_trace_min: f64,
+    /// Seconds for all rays.
+    pub seconds_trace_median: f64,
+    /// Seconds for all rays.
+    pub seconds_trace_p90: f64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Distance between hit and exact hit, mm.
+    pub hit_error_mm_p50: f64,
+    /// Distance between hit and exact hit, mm.
+    pub hit_error_mm_p99: f64,
+    /// Of the mirrored ray, degrees.
+    pub direction_error_deg_p50: f64,
+    /// Of the mirrored ray, degrees; grazing rays dominate it.
+    pub direction_error_deg_rms: f64,
+    /// Of the mirrored ray, degrees.
+    pub direction_error_deg_p99: f64,
+    /// Of the mirrored ray, degrees.
+    pub direction_error_deg_max: f64,
+    /// Of the ray refracted into n = 1.5, degrees.
+    pub refracted_error_deg_rms: f64,
+    /// Of the ray refracted into n = 1.5, degrees.
+    pub refracted_error_deg_p99: f64,
+    /// Rays that hit only one of the two, or another face.
+    pub flips: u64,
+}
+
+impl Row {
+    /// Seconds from the model to the answer.
+    pub fn seconds(&self) -> f64 {
+        self.seconds_tessellate.unwrap_or(0.0) + self.seconds_build + self.seconds_trace_median
+    }
+}
+
+/// How errors fall with the sag and with the facets' length, beside theory.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Slope {
+    /// Kind of normals.
+    pub normals: String,
+    /// Exponent of the median direction error over the mean sag.
+    pub in_sag: f64,
+    /// Exponent over the facets' length, taken as facets^(−½).
+    pub in_length: f64,
+    /// What theory says for smooth surfaces, where it says something.
+    pub theory_in_sag: Option<f64>,
+    /// Tolerances that entered.
+    pub points: usize,
+}
+
+/// The study.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Accuracy {
+    /// Every combination.
+    pub rows: Vec<Row>,
+    /// For each kind of normals.
+    pub slopes: Vec<Slope>,
+    /// Indices of rows that no other row beats in both error (p99) and time, by falling error.
+    pub front: Vec<usize>,
+    /// The answer in one sentence.
+    pub answer: String,
+}
+
+/// Sweeps a model. Runs on the current rayon pool.
+pub fn accuracy(
+    name: &str,
+    workshop: &dyn Workshop,
+    settings: &Settings,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Accuracy {
+    let clock = Clock::new(progress);
+    let coarse = workshop.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
+    let source = Uniform::new(&coarse.mesh.bounds(), settings.seed, settings.rays);
+    let rays = source.rays(0..source.len());
+    let mut study = Sweep { name, workshop, settings, rays: &rays, truth: Vec::new(), rows: Vec::new() };
+    study.exact();
+    let mut ahead = Forecast::default();
+    for (i, &tolerance) in settings.tolerances.iter().enumerate() {
+        let stage = format!("tolerance {} mm", tolerance[0]);
+        clock.forecast(&stage, ahead.seconds(&settings.tolerances[i..]));
+        ahead.learn(tolerance, study.tolerance(tolerance));
+    }
+    clock.at("done", 1.0);
+    let rows = study.rows;
+    let answer = sentence(&rows, 0.05);
+    Accuracy { slopes: slopes(&rows), front: front(&rows), answer, rows }
+}
+
+/// Time left: preparing grows with the number of facets, 1/tolerance; tracing hardly grows.
+#[derive(Default)]
+struct Forecast {
+    prepare: f64,
+    trace: f64,
+}
+
+impl Forecast {
+    fn learn(&mut self, tolerance: [f64; 2], (prepare, trace): (f64, f64)) {
+        (self.prepare, self.trace) = (prepare * tolerance[0], trace);
+    }
+    fn seconds(&self, tolerances: &[[f64; 2]]) -> f64 {
+        let growth = |i: usize| 1.0 + 0.1 * i as f64;
+        tolerances.iter().enumerate().map(|(i, t)| self.prepare / t[0] + self.trace * growth(i)).sum()
+    }
+}
+
+struct Sweep<'a> {
+    name: &'a str,
+    workshop: &'a dyn Workshop,
+    settings: &'a Settings,
+    rays: &'a [Ray],
+    truth: Vec<Option<Hit>>,
+    rows: Vec<Row>,
+}
+
+/// One structure in the race, with its latest hits.
+struct Runner<'a> {
+    who: &'a dyn Intersector,
+    hits: Mutex<Vec<Option<Hit>>>,
+}
+
+impl Sweep<'_> {
+    fn race(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
+        let mut rounds = Rounds::default();
+        for runner in runners {
+            rounds.add("", || {
+                if let Ok(mut hits) = runner.hits.lock() {
+                    answer(runner.who, self.rays, threads, &mut hits);
+                }
+            });
+        }
+        rounds.run(self.settings.rounds).into_iter().map(|r| r.1).collect()
+    }
+
+    fn runner<'a>(&self, who: &'a dyn Intersector) -> Runner<'a> {
+        Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
+    }
+
+    fn exact(&mut self) {
+        let who = self.workshop.exact();
+        let runners = [self.runner(who)];
+        for &threads in &self.settings.threads {
+            let timing = self.race(&runners, threads)[0];
+            let footprint = who.footprint();
+            let row = Row { facets: footprint.primitives, bytes: footprint.bytes, ..Row::default() };
+            let row = Row {
+                normals: "exact".into(),
+                intersector: "exact".into(),
+                seconds_build: footprint.build_seconds,
+                ..row
+            };
+            self.push(row, timing, threads);
+        }
+        let [runner] = runners;
+        self.truth = runner.hits.into_inner().unwrap_or_default();
+    }
+
+    /// Seconds of preparing and of tracing.
+    fn tolerance(&mut self, tolerance: [f64; 2]) -> (f64, f64) {
+        let start = Instant::now();
+        let meshed = self.workshop.mesh(tolerance);
+        let mut combinations = Vec::new();
+        for &tree in &self.settings.trees {
+            for &normals in &self.settings.normals {
+                combinations.push((tree, normals, self.workshop.build(&meshed.mesh, tree, normals)));
+            }
+        }
+        let prepare = start.elapsed().as_secs_f64();
+        let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(&*c.2)).collect();
+        for &threads in &self.settings.threads {
+            let timings = self.race(&runners, threads);
+            for (((tree, normals, who), runner), timing) in combinations.iter().zip(&runners).zip(timings) {
+                let hits = runner.hits.lock().map(|h| h.clone()).unwrap_or_default();
+                let errors = Errors::of(self.rays, &hits, &self.truth);
+                let footprint = who.footprint();
+                let row = Row {
+                    tolerance_mm: Some(tolerance[0]),
+                    adaptive: tolerance[0] != tolerance[1],
+                    normals: normals_name(*normals).into(),
+                    intersector: tree.name().into(),
+                    facets: meshed.mesh.facets.len(),
+                    bytes: footprint.bytes + meshed.mesh.bytes(),
+                    sag_mean_mm: Some(meshed.sag_mean),
+                    sag_max_mm: Some(meshed.sag_max),
+                    seconds_tessellate: Some(meshed.seconds),
+                    seconds_build: footprint.build_seconds,
+                    hit_error_mm_p50: errors.position.at(0.5),
+                    hit_error_mm_p99: errors.position.at(0.99),
+                    direction_error_deg_p50: errors.reflected.at(0.5),
+                    direction_error_deg_rms: errors.reflected.rms(),
+                    direction_error_deg_p99: errors.reflected.at(0.99),
+                    direction_error_deg_max: errors.reflected.max(),
+                    refracted_error_deg_rms: errors.refracted.rms(),
+                    refracted_error_deg_p99: errors.refracted.at(0.99),
+                    flips: errors.flips,
+                    ..Row::default()
+                };
+                self.push(row, timing, threads);
+            }
+        }
+        (prepare, start.elapsed().as_secs_f64() - prepare)
+    }
+
+    fn push(&mut self, row: Row, timing: Timing, threads: usize) {
+        self.rows.push(Row {
+            model: self.name.into(),
+            threads,
+            seconds_trace_min: timing.min,
+            seconds_trace_median: timing.median,
+            seconds_trace_p90: timing.p90,
+            rays: self.rays.len() as u64,
+            ..row
+        });
+    }
+}
+
+/// Slopes over the uniform tolerances of the first tree, of the median error: the error goes with tan i, whose mean square
+/// over isotropic rays has no limit, so an rms follows the few most grazing rays instead of the facets.
+fn slopes(rows: &[Row]) -> Vec<Slope> {
+    let mut names: Vec<&str> = Vec::new();
+    for r in rows.iter().filter(|r| r.tolerance_mm.is_some()) {
+        if !names.contains(&r.normals.as_str()) {
+            names.push(&r.normals);
+        }
+    }
+    let of = |name: &str| {
+        let first = rows.iter().find(|r| r.normals == name && r.tolerance_mm.is_some())?;
+        let own = |r: &&Row| {
+            r.normals == name && r.intersector == first.intersector && r.threads == first.threads && !r.adaptive
+        };
+        // Below 1e-7° an error is rounding and follows no power law.
+        let used: Vec<&Row> = rows
+            .iter()
+            .filter(own)
+            .filter(|r| r.tolerance_mm.is_some() && r.direction_error_deg_p50 > 1e-7)
+            .collect();
+        let sag: Vec<_> = used.iter().map(|r| (r.sag_mean_mm.unwrap_or(0.0), r.direction_error_deg_p50)).collect();
+        let length: Vec<_> =
+            used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), r.direction_error_deg_p50)).collect();
+        let theory_in_sag = match name {
+            "flat" | "nearest" => Some(0.5),
+            "bilinear" => Some(1.0),
+            _ => None,
+        };
+        Some(Slope {
+            normals: name.into(),
+            in_sag: slope(&sag)?,
+            in_length: slope(&length)?,
+            theory_in_sag,
+            points: used.len(),
+        })
+    };
+    names.into_iter().filter_map(of).collect()
+}
+
+/// Rows that are not dominated, among those with the most threads.
+fn front(rows: &[Row]) -> Vec<usize> {
+    let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
+    let mut order: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].threads == threads).collect();
+    let key = |i: usize| (rows[i].seconds(), rows[i].direction_error_deg_p99);
+    order.sort_by(|&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let mut best = f64::INFINITY;
+    order.retain(|&i| {
+        let keep = key(i).1 < best;
+        best = best.min(key(i).1);
+        keep
+    });
+    order
+}
+
+/// "For 0.05° take …": the cheapest combination whose p99 direction error is within `target` degrees.
+pub fn sentence(rows: &[Row], target: f64) -> String {
+    let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
+    let timed =
+        |facets: bool| rows.iter().filter(move |r| r.threads == threads && r.tolerance_mm.is_some() == facets);
+    let good = timed(true).filter(|r| r.direction_error_deg_p99 <= target);
+    let cheapest = good.min_by(|a, b| a.seconds().total_cmp(&b.seconds()));
+    let exact =
+        timed(false).next().map_or(String::new(), |e| format!("; the exact spline costs {:.3} s", e.seconds()));
+    match cheapest {
+        Some(r) => format!(
+            "For {target}° take {}{} mm with {} normals in the {}: {:.3} s for {} rays on {threads} threads{exact}.",
+            if r.adaptive { "adaptively from " } else { "" },
+            r.tolerance_mm.unwrap_or(0.0),
+            r.normals,
+            r.intersector,
+            r.seconds(),
+            r.rays
+        ),
+        None => format!("No swept combination of facets reaches {target}°{exact}."),
+    }
+}

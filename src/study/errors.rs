@@ -1,0 +1,69 @@
+use super::workshop::{reflect, refract};
+use super::{Quantiles, check::angle_deg};
+use crate::intersect::Hit;
+use crate::math::Ray;
+
+/// Relative index of the refraction that direction errors are given for: air to glass.
+pub(super) const GLASS: f64 = 1.5;
+
+/// Errors of one intersector's hits against the exact hits of the same rays.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Errors {
+    /// Distance between the two hit points, mm.
+    pub(super) position: Quantiles,
+    /// Angle between the mirrored directions, degrees.
+    pub(super) reflected: Quantiles,
+    /// Angle between the directions refracted into glass, degrees.
+    pub(super) refracted: Quantiles,
+    /// Euclidean distance of the unit normals.
+    pub(super) normal: Quantiles,
+    /// Rays where only one hits, or where they hit different faces.
+    pub(super) flips: u64,
+}
+
+impl Errors {
+    pub(super) fn of(rays: &[Ray], hits: &[Option<Hit>], exact: &[Option<Hit>]) -> Self {
+        let mut e = Self::default();
+        for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {
+            let (h, t) = match (hit, truth) {
+                (None, None) => continue,
+                (Some(h), Some(t)) if h.face == t.face => (h, t),
+                _ => {
+                    e.flips += 1;
+                    continue;
+                }
+            };
+            e.position.add((h.t - t.t).abs());
+            e.normal.add(h.normal.distance(t.normal));
+            e.reflected.add(angle_deg(reflect(ray.direction, h.normal), reflect(ray.direction, t.normal)));
+            if let (Some(a), Some(b)) =
+                (refract(ray.direction, h.normal, GLASS), refract(ray.direction, t.normal, GLASS))
+            {
+                e.refracted.add(angle_deg(a, b));
+            }
+        }
+        e
+    }
+}
+
+/// Slope of log y over log x by least squares; `None` with fewer than two usable points.
+pub(super) fn slope(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> =
+        points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
+    let n = logs.len() as f64;
+    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let (sxy, sxx) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));
+    (logs.len() >= 2 && sxx > 1e-12).then(|| sxy / sxx)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slope_of_a_power_law() {
+        let points: Vec<_> = (1..6).map(|i| (f64::from(i), 3.0 * f64::from(i).powf(1.5))).collect();
+        assert!((slope(&points).unwrap() - 1.5).abs() < 1e-12);
+        assert_eq!(slope(&points[..1]), None);
+    }
+}

@@ -1,0 +1,110 @@
+use crate::intersect::{Cost, Hit, Intersector, NormalMode};
+use crate::math::{Ray, Vector};
+use crate::mesh::FacetMesh;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// A mesh and what it took.
+#[derive(Clone, Debug)]
+pub struct Meshed {
+    /// The facets.
+    pub mesh: FacetMesh,
+    /// Seconds to make it.
+    pub seconds: f64,
+    /// Mean distance between facets and spline, sampled, mm.
+    pub sag_mean: f64,
+    /// Largest distance, sampled, mm.
+    pub sag_max: f64,
+}
+
+/// Which structure answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tree {
+    /// The octree.
+    Octree,
+    /// obvhs' 8-wide BVH, cured.
+    CwBvh,
+}
+
+impl Tree {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Octree => "octree",
+            Self::CwBvh => "cwbvh",
+        }
+    }
+}
+
+/// Makes what a study compares. The product's is [`super::Product`]; tests bring their own to judge the studies.
+pub trait Workshop: Sync {
+    /// Facets within a tolerance `[min, max]`, mm.
+    fn mesh(&self, tolerance: [f64; 2]) -> Meshed;
+    /// A structure over facets whose hits carry normals of that kind; `Exact` moves the hits to the spline.
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
+    /// The certified spline.
+    fn exact(&self) -> &dyn Intersector;
+}
+
+/// As on the command line.
+pub fn normals_name(normals: NormalMode) -> &'static str {
+    match normals {
+        NormalMode::Flat => "flat",
+        NormalMode::Nearest => "nearest",
+        NormalMode::Bilinear => "bilinear",
+        NormalMode::Cubic => "cubic",
+        NormalMode::Exact => "exact",
+    }
+}
+
+/// Rays of one task.
+const CHUNK: usize = 4096;
+
+/// All answers, on the current rayon pool or (for one thread) on this thread.
+pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: &mut [Option<Hit>]) -> Cost {
+    if threads == 1 {
+        let mut cost = Cost::default();
+        who.intersect_batch(rays, hits, &mut cost);
+        return cost;
+    }
+    let one = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
+        let mut cost = Cost::default();
+        who.intersect_batch(rays, hits, &mut cost);
+        cost
+    };
+    let sum = |mut a: Cost, b: Cost| {
+        a += b;
+        a
+    };
+    rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).map(one).reduce(Cost::default, sum)
+}
+
+/// The mirrored direction.
+pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
+    d - n * (2.0 * d.dot(n))
+}
+
+/// The direction behind a surface whose far side has the relative index `eta`; `None` for total reflection. The normal
+/// may point to either side.
+pub(super) fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
+    let n = if d.dot(n) > 0.0 { -n } else { n };
+    let cos_i = -d.dot(n);
+    let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
+    (sin2_t < 1.0).then(|| d / eta + n * (cos_i / eta - (1.0 - sin2_t).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn snell_and_mirror() {
+        let d = Vector::new(0.6, 0.0, -0.8);
+        assert_eq!(reflect(d, Vector::Z), Vector::new(0.6, 0.0, 0.8));
+        let t = refract(d, Vector::Z, 1.5).unwrap();
+        assert!((t.x - 0.4).abs() < 1e-15 && (t.length() - 1.0).abs() < 1e-15 && t.z < 0.0);
+        assert_eq!(refract(d, -Vector::Z, 1.5), Some(t));
+        assert!(refract(Vector::new(0.8, 0.0, -0.6), Vector::Z, 1.0 / 1.5).is_none());
+    }
+}

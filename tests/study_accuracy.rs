@@ -1,0 +1,105 @@
+//! The accuracy study against theory: closed-form surfaces, facets of a plain grid, a plain tree of boxes.
+
+mod study_support;
+
+use lampyris::intersect::{Intersector, NormalMode};
+use lampyris::math::{Frame, Homogeneous, Point};
+use lampyris::mesh::FacetMesh;
+use lampyris::model::Model;
+use lampyris::nurbs::{ControlPoint, Surface, sweep};
+use lampyris::study::accuracy::{Settings, accuracy};
+use lampyris::study::{Meshed, Tree, Workshop, specimen};
+use std::f64::consts::PI;
+use study_support::{Balls, Bowl, Boxes};
+
+struct Plain {
+    model: Model,
+    exact: Box<dyn Intersector>,
+}
+
+impl Workshop for Plain {
+    /// The coarsest grid of 2, 4, 8 … facets a side that keeps the tolerance.
+    fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
+        let sag = |m: &FacetMesh| m.sag.iter().copied().fold(0.0, f64::max) / 1.15;
+        let halvings = (sag(&specimen::grid_mesh(&self.model, 2)) / tolerance[1]).sqrt().log2().ceil().max(0.0);
+        let divisions = 2 << halvings as usize;
+        let mesh = specimen::grid_mesh(&self.model, divisions);
+        let sag_mean = mesh.sag.iter().sum::<f64>() / mesh.sag.len() as f64 / 1.15;
+        Meshed { sag_max: sag(&mesh), mesh, seconds: 1e-3 * divisions as f64, sag_mean }
+    }
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, _: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
+        Box::new(Boxes::new(mesh, normals))
+    }
+    fn exact(&self) -> &dyn Intersector {
+        &*self.exact
+    }
+}
+
+fn ball(radius: f64) -> Plain {
+    let s = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+    Plain { model: specimen::model("ball", [s]), exact: Box::new(Balls(vec![(Point::ZERO, radius)])) }
+}
+
+fn bowl(focus: f64, half: f64) -> Plain {
+    let (s1, s2) = ([-half, 0.0, half], [half * half, -half * half, half * half]);
+    let at =
+        |i: usize, j: usize| Homogeneous::weighted(Point::new(s1[i], s1[j], (s2[i] + s2[j]) / (4.0 * focus)), 1.0);
+    let knots = vec![-half, -half, -half, half, half, half];
+    let points = (0..3).flat_map(|i| (0..3).map(move |j| at(i, j))).collect();
+    let surface = Surface { degree: [2, 2], knots: [knots.clone(), knots], points };
+    Plain { model: specimen::model("bowl", [surface]), exact: Box::new(Bowl { focus, half }) }
+}
+
+fn settings() -> Settings {
+    Settings {
+        // Five halvings of the facets' length.
+        tolerances: [2.0, 0.5, 0.125, 0.031, 0.0078].map(|t| [t, t]).into(),
+        normals: vec![NormalMode::Flat, NormalMode::Bilinear],
+        trees: vec![Tree::Octree],
+        rays: 10_000,
+        rounds: 1,
+        threads: vec![1],
+        seed: 3,
+    }
+}
+
+#[test]
+fn slopes_on_ball_and_paraboloid_are_those_of_theory() {
+    for (name, workshop) in
+        [("ball lens", ball(50.0)), ("sphere mirror", ball(200.0)), ("paraboloid", bowl(25.0, 40.0))]
+    {
+        let study = accuracy(name, &workshop, &settings(), &|_| ());
+        assert_eq!(study.rows.len(), 1 + 5 * 2);
+        assert!(study.slopes.len() == 2);
+        for s in &study.slopes {
+            let theory = s.theory_in_sag.unwrap();
+            assert!(s.points >= 5, "{name}: {s:?}");
+            assert!((s.in_sag - theory).abs() < 0.1, "{name}: {s:?}");
+            assert!((s.in_length - 2.0 * theory).abs() < 0.2, "{name}: {s:?}");
+        }
+    }
+}
+
+#[test]
+fn bilinear_normals_on_a_mirror_ball_stay_within_the_formula() {
+    // 2·s·tan i/R bounds the error; over isotropic chords p99 of tan i is √(0.99/0.01).
+    let study = accuracy("ball", &ball(50.0), &settings(), &|_| ());
+    for r in study.rows.iter().filter(|r| r.normals == "bilinear") {
+        let bound = (2.0 * r.sag_max_mm.unwrap() * (99f64).sqrt() / 50.0).to_degrees();
+        assert!(r.direction_error_deg_p99 < bound, "{r:?}");
+        assert!(r.direction_error_deg_rms > 0.0 && r.direction_error_deg_rms < r.direction_error_deg_max);
+    }
+    assert!(study.answer.starts_with("For 0.05° take"), "{}", study.answer);
+    // The front falls in error and rises in time.
+    let key = |&i: &usize| (study.rows[i].seconds(), study.rows[i].direction_error_deg_p99);
+    assert!(study.front.windows(2).all(|w| key(&w[0]).0 <= key(&w[1]).0 && key(&w[0]).1 > key(&w[1]).1));
+}
+
+#[test]
+fn progress_rises_to_one() {
+    let seen = std::sync::Mutex::new(Vec::new());
+    accuracy("ball", &ball(50.0), &Settings { rays: 500, ..settings() }, &|p| seen.lock().unwrap().push(p.done));
+    let seen = seen.into_inner().unwrap();
+    assert_eq!(seen.last(), Some(&1.0));
+    assert!(seen.iter().all(|d| (0.0..=1.0).contains(d)), "{seen:?}");
+}
