@@ -11,6 +11,8 @@
 mod basis;
 pub mod conic;
 mod patch;
+pub mod project;
+pub mod sanitise;
 mod spline;
 mod surface;
 pub mod sweep;

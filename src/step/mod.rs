@@ -1,1 +1,51 @@
-//! Part 21 text to entities to [`crate::model::Model`], with an account of every face.
+//! STEP files to [`Model`](crate::model::Model)s: Part 21 text, units, assemblies, trimmed surfaces, and an account of every face.
+//!
+//! Sources: ISO 10303-21:2016 (text), ISO 10303-42 (geometry and topology), ISO 10303-43/44 (representations and
+//! assemblies). The way of a face: its surface becomes a chart with the parameters of ISO 10303-42 (`chart`); every edge
+//! is located in it (`fit`), by closed forms or by Newton steps with a search behind them; the loops are chained,
+//! unwrapped and closed over seams and poles (`loops`, `arrange`); then the rectangle they cover becomes one rational
+//! B-spline.
+//!
+//! Guarantee: what [`crate::model`] promises, with uv curves within [`Settings::uv_tolerance`] of the foot points of
+//! their edges wherever they were checked; each face is converted, repaired (said how) or refused (said why). Known
+//! weakness: parameter curves of the file are not used, edges are always located anew; mirrored placements are taken
+//! as they are.
+//!
+//! ```no_run
+//! use lampyris::step::{Settings, read};
+//! let import = read(std::path::Path::new("lens.stp"), &Settings::default())?;
+//! println!("{} faces, {} refused", import.report.faces.converted, import.report.faces.refused);
+//! # Ok::<(), lampyris::step::Error>(())
+//! ```
+
+// Negated comparisons refuse NaN together with what is out of range.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
+mod arrange;
+mod assembly;
+mod bounds;
+mod chart;
+mod composite;
+mod curves;
+mod edges;
+mod error;
+mod face;
+mod fit;
+mod geometry;
+mod import;
+mod loops;
+mod loose;
+mod part;
+mod part21;
+mod report;
+mod seams;
+mod settings;
+mod styles;
+mod surfaces;
+mod topology;
+mod units;
+
+pub use error::{Error, ErrorKind};
+pub use import::{Import, read, read_bytes};
+pub use report::{FaceCounts, ImportReport, Note, PlacedCounts, Seconds, SurfaceCounts, UnitNames};
+pub use settings::Settings;

@@ -1,0 +1,287 @@
+//! Makes usable splines of what files hold: unclamped, periodic, with near-equal knots, bad counts or weights.
+//!
+//! Guarantee: what comes out satisfies the invariants of [`Curve`] and [`Surface`] and is the same shape over the
+//! domain `[knots[degree], knots[n]]`, up to knots that are merged because they differ by less than 1e-10 of the
+//! domain. Known weakness: a knot whose multiplicity exceeds the degree inside the domain splits the spline; the
+//! multiplicity is then cut to the degree, which closes a gap if there was one.
+
+// Negated comparisons refuse NaN together with what is out of range.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
+use super::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface};
+use crate::math::{Homogeneous, Point};
+
+/// Most control points in one spline: 2²⁴ would be 0.5 GB.
+const MAX_POINTS: usize = 1 << 22;
+
+/// Control points of several lines, their common knots, and what was changed.
+type Conformed = (Vec<Vec<Homogeneous>>, Vec<f64>, Repairs);
+
+/// Why a spline cannot be repaired.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Defect {
+    /// Degree 0 or above [`MAX_DEGREE`].
+    #[error("degree is 0 or above {MAX_DEGREE}")]
+    Degree,
+    /// Knots and control points do not fit together.
+    #[error("the number of knots does not fit the control points and the degree")]
+    Counts,
+    /// Knots decrease or are no numbers.
+    #[error("knots decrease or are not finite")]
+    Knots,
+    /// The domain is empty.
+    #[error("the knots leave no domain")]
+    Domain,
+    /// A weight is not positive.
+    #[error("a weight is not positive")]
+    Weights,
+    /// A coordinate is no number.
+    #[error("a control point is not finite")]
+    Points,
+}
+
+/// What had to be changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Repairs {
+    /// The spline was unclamped.
+    pub clamped: bool,
+    /// Knots that were all but equal were merged.
+    pub merged_knots: bool,
+    /// Multiplicities above the degree were cut.
+    pub cut_multiplicity: bool,
+}
+
+impl Repairs {
+    /// Whether anything was changed.
+    pub fn any(&self) -> bool {
+        *self != Self::default()
+    }
+
+    fn and(self, o: Self) -> Self {
+        Self {
+            clamped: self.clamped || o.clamped,
+            merged_knots: self.merged_knots || o.merged_knots,
+            cut_multiplicity: self.cut_multiplicity || o.cut_multiplicity,
+        }
+    }
+}
+
+/// Distinct knots with multiplicities as one knot vector; `None` when the sum is beyond reason or the lists differ.
+pub fn expand_knots(distinct: &[f64], multiplicities: &[usize]) -> Option<Vec<f64>> {
+    if distinct.len() != multiplicities.len() {
+        return None;
+    }
+    let total = multiplicities.iter().try_fold(0usize, |s, &m| s.checked_add(m))?;
+    if total > MAX_POINTS + 2 * MAX_DEGREE {
+        return None;
+    }
+    Some(distinct.iter().zip(multiplicities).flat_map(|(&k, &m)| std::iter::repeat_n(k, m)).collect())
+}
+
+/// A curve from its parts.
+pub fn curve(
+    degree: usize,
+    knots: Vec<f64>,
+    points: &[Point],
+    weights: Option<&[f64]>,
+) -> Result<(Curve, Repairs), Defect> {
+    let points = homogeneous(points, weights)?;
+    let (knots, fixed) = check_knots(degree, knots, points.len())?;
+    let (lines, knots, repairs) = conform(degree, knots, vec![points], fixed)?;
+    let points = lines.into_iter().next().unwrap_or_default();
+    Ok((Curve { degree, knots, points }, repairs))
+}
+
+/// A surface from its parts; `points[i * count_v + j]`.
+pub fn surface(
+    degree: [usize; 2],
+    knots: [Vec<f64>; 2],
+    counts: [usize; 2],
+    points: &[Point],
+    weights: Option<&[f64]>,
+) -> Result<(Surface, Repairs), Defect> {
+    let [nu, nv] = counts;
+    if nu.checked_mul(nv) != Some(points.len()) || points.is_empty() {
+        return Err(Defect::Counts);
+    }
+    let points = homogeneous(points, weights)?;
+    let [ku, kv] = knots;
+    let (ku, fixed_u) = check_knots(degree[0], ku, nu)?;
+    let (kv, fixed_v) = check_knots(degree[1], kv, nv)?;
+    let columns = (0..nv).map(|j| (0..nu).map(|i| points[i * nv + j]).collect()).collect();
+    let (columns, ku, repairs_u) = conform(degree[0], ku, columns, fixed_u)?;
+    let nu = columns[0].len();
+    let rows = (0..nu).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
+    let (rows, kv, repairs_v) = conform(degree[1], kv, rows, fixed_v)?;
+    let points = rows.into_iter().flatten().collect();
+    Ok((Surface { degree, knots: [ku, kv], points }, repairs_u.and(repairs_v)))
+}
+
+fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogeneous>, Defect> {
+    if points.len() > MAX_POINTS || weights.is_some_and(|w| w.len() != points.len()) {
+        return Err(Defect::Counts);
+    }
+    // Only ratios of weights matter: scaled so that the largest is 1.
+    let largest = weights.map_or(1.0, |w| w.iter().copied().fold(0.0, f64::max));
+    if !(largest > 0.0 && largest.is_finite()) {
+        return Err(Defect::Weights);
+    }
+    let scale = if largest.log2().abs() > 20.0 { 1.0 / largest } else { 1.0 };
+    let weight = |i: usize| weights.map_or(1.0, |w| w[i] * scale);
+    points
+        .iter()
+        .enumerate()
+        .map(|(i, &p)| {
+            let w = weight(i);
+            if !(w > 1e-12) {
+                Err(Defect::Weights)
+            } else if !(p.is_finite() && p.abs().max_element() < 1e15) {
+                Err(Defect::Points)
+            } else {
+                Ok(Homogeneous::weighted(p, w))
+            }
+        })
+        .collect()
+}
+
+/// Checks order and count, and merges near-equal knots.
+fn check_knots(degree: usize, mut knots: Vec<f64>, points: usize) -> Result<(Vec<f64>, Repairs), Defect> {
+    if degree == 0 || degree > MAX_DEGREE {
+        return Err(Defect::Degree);
+    }
+    if points < degree + 1 || knots.len() != points + degree + 1 {
+        return Err(Defect::Counts);
+    }
+    let mut repairs = Repairs::default();
+    if knots.iter().any(|k| !k.is_finite()) {
+        return Err(Defect::Knots);
+    }
+    let extent = knots[knots.len() - 1] - knots[0];
+    if !(extent > 0.0) {
+        return Err(Defect::Domain);
+    }
+    // Differences below rounding of the parameter itself are noise as well.
+    let magnitude = knots[0].abs().max(knots[knots.len() - 1].abs());
+    let same = (1e-10 * extent).max(4.0 * f64::EPSILON * magnitude);
+    for i in 1..knots.len() {
+        let step = knots[i] - knots[i - 1];
+        if step < -same {
+            return Err(Defect::Knots);
+        }
+        if step != 0.0 && step <= same {
+            knots[i] = knots[i - 1];
+            repairs.merged_knots = true;
+        }
+    }
+    if !(knots[points] > knots[degree]) {
+        return Err(Defect::Domain);
+    }
+    Ok((knots, repairs))
+}
+
+/// Cuts excess multiplicities and clamps, for several lines over the same knots.
+fn conform(
+    degree: usize,
+    mut knots: Vec<f64>,
+    mut lines: Vec<Vec<Homogeneous>>,
+    mut repairs: Repairs,
+) -> Result<Conformed, Defect> {
+    let p = degree;
+    // A knot inside the domain, or a doubled end, at most `degree` (at the ends `degree + 1`) times.
+    let mut i = 0;
+    while i < knots.len() {
+        let run = knots[i..].iter().take_while(|&&k| k == knots[i]).count();
+        let at_end = i == 0 || i + run == knots.len();
+        let allowed = if at_end { p + 1 } else { p };
+        if run > allowed && lines[0].len() > p + 1 {
+            repairs.cut_multiplicity = true;
+            // Of control points that share all their knots with a neighbour, the inner one is redundant.
+            let excess = run - allowed;
+            for _ in 0..excess {
+                if lines[0].len() <= p + 1 {
+                    return Err(Defect::Counts);
+                }
+                let drop = if i == 0 { 0 } else { i.min(lines[0].len() - 1) };
+                knots.remove(i);
+                for line in &mut lines {
+                    line.remove(drop);
+                }
+            }
+            i += allowed;
+        } else {
+            i += run;
+        }
+    }
+    let n = lines[0].len();
+    let (a, b) = (knots[p], knots[n]);
+    if !(b > a) {
+        return Err(Defect::Domain);
+    }
+    let first = Spline { degree, knots: knots.clone(), points: lines[0].clone() };
+    if first.is_clamped() {
+        return Ok((lines, knots, repairs));
+    }
+    repairs.clamped = true;
+    let cut: Vec<Curve> =
+        lines.into_iter().map(|points| Spline { degree, knots: knots.clone(), points }.restricted(a, b)).collect();
+    let knots = cut[0].knots.clone();
+    Ok((cut.into_iter().map(|c| c.points).collect(), knots, repairs))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn zigzag(n: usize) -> Vec<Point> {
+        (0..n).map(|i| Point::new(i as f64, (i % 2) as f64, (i % 3) as f64)).collect()
+    }
+
+    #[test]
+    fn an_unclamped_spline_is_clamped_on_its_domain() {
+        let knots: Vec<f64> = (0..10).map(f64::from).collect();
+        let raw = Curve {
+            degree: 3,
+            knots: knots.clone(),
+            points: zigzag(6).into_iter().map(|p| Homogeneous::weighted(p, 1.0)).collect(),
+        };
+        let (c, repairs) = curve(3, knots, &zigzag(6), None).unwrap();
+        assert!(repairs.clamped && c.is_clamped());
+        assert_eq!(c.domain(), [3.0, 6.0]);
+        for i in 0..=30 {
+            let t = 3.0 + 0.1 * f64::from(i);
+            assert!((c.evaluate(t) - raw.evaluate(t)).length() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn near_equal_knots_are_merged() {
+        let knots = vec![0.0, 0.0, 0.0, 0.5, 0.5 + 1e-14, 1.0, 1.0, 1.0];
+        let (c, repairs) = curve(2, knots, &zigzag(5), None).unwrap();
+        assert!(repairs.merged_knots);
+        assert_eq!(c.knots[3], c.knots[4]);
+    }
+
+    #[test]
+    fn too_many_equal_end_knots_are_cut() {
+        let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        let (c, repairs) = curve(2, knots, &zigzag(4), None).unwrap();
+        assert!(repairs.cut_multiplicity);
+        assert_eq!(c.points.len() + c.degree + 1, c.knots.len());
+        assert_eq!(c.evaluate(0.0), zigzag(4)[1]);
+    }
+
+    #[test]
+    fn hopeless_input_is_refused_with_its_defect() {
+        let p = zigzag(3);
+        assert_eq!(curve(0, vec![0.0; 4], &p, None).unwrap_err(), Defect::Degree);
+        assert_eq!(curve(2, vec![0.0; 5], &p, None).unwrap_err(), Defect::Counts);
+        assert_eq!(curve(2, vec![0.0; 6], &p, None).unwrap_err(), Defect::Domain);
+        let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        assert_eq!(curve(2, knots.clone(), &p, Some(&[1.0, 0.0, 1.0])).unwrap_err(), Defect::Weights);
+        assert_eq!(curve(2, vec![0.0, 0.0, 1.0, 0.0, 1.0, 1.0], &p, None).unwrap_err(), Defect::Knots);
+        let far = [Point::ZERO, Point::splat(f64::NAN), Point::ONE];
+        assert_eq!(curve(2, knots, &far, None).unwrap_err(), Defect::Points);
+        assert_eq!(expand_knots(&[0.0, 1.0], &[1_000_000_000, 2]), None);
+    }
+}

@@ -1,0 +1,316 @@
+//! Products, occurrences and representations: which representation stands where.
+//!
+//! Walks from the products that no other product uses, along NEXT_ASSEMBLY_USAGE_OCCURRENCEs and their
+//! CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs, and inside representations along relationships and MAPPED_ITEMs.
+//! What holds shapes and is reached by no product is placed where it is.
+
+use super::geometry::Geometry;
+use super::part21::{Entity, File};
+use super::units::Units;
+use crate::math::Frame;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Deepest nesting of assemblies.
+const MAX_DEPTH: usize = 64;
+/// Most placed representations.
+const MAX_PLACED: usize = 1 << 20;
+
+/// A representation where it stands.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub(super) representation: u64,
+    pub(super) placement: Frame,
+    /// Name of the occurrence, empty when it had none.
+    pub(super) name: String,
+    /// Name of the product, empty when it had none.
+    pub(super) product: String,
+    /// Entities that may carry a style for this occurrence.
+    pub(super) owners: Vec<u64>,
+}
+
+/// A directed relationship: what it leads to, and how that is placed.
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    to: u64,
+    placement: Frame,
+}
+
+struct Usage {
+    child: u64,
+    name: String,
+    id: u64,
+}
+
+/// Structure of the file.
+pub(super) struct Assembly<'f, 'a> {
+    file: &'f File<'a>,
+    /// Units by context.
+    units: FxHashMap<u64, Units>,
+    fallback: Units,
+    /// Product definition → its representations.
+    shapes: FxHashMap<u64, Vec<u64>>,
+    /// Representations that stand for a product.
+    owned: FxHashSet<u64>,
+    usages: FxHashMap<u64, Vec<Usage>>,
+    /// Usage → placement of the child in the parent.
+    placements: FxHashMap<u64, Frame>,
+    links: FxHashMap<u64, Vec<Link>>,
+    /// Things that could not be placed.
+    pub(super) problems: Vec<String>,
+    placed: Vec<Placed>,
+    reached: FxHashSet<u64>,
+}
+
+impl<'f, 'a> Assembly<'f, 'a> {
+    /// Reads the structure.
+    pub(super) fn read(file: &'f File<'a>, units: FxHashMap<u64, Units>, fallback: Units) -> Self {
+        let mut a = Self {
+            file,
+            units,
+            fallback,
+            shapes: FxHashMap::default(),
+            owned: FxHashSet::default(),
+            usages: FxHashMap::default(),
+            placements: FxHashMap::default(),
+            links: FxHashMap::default(),
+            problems: Vec::new(),
+            placed: Vec::new(),
+            reached: FxHashSet::default(),
+        };
+        let mut contextual = Vec::new();
+        let mut relations = Vec::new();
+        for e in file.entities() {
+            if let Some(args) = e.own("SHAPE_DEFINITION_REPRESENTATION", 0) {
+                a.shape_definition(args.entity(0), args.id(1));
+            } else if let Some(args) = e.own("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
+                if let (Some(parent), Some(child)) = (args.id(3), args.id(4)) {
+                    let name = args.text(1).filter(|n| !n.is_empty()).or_else(|| args.text(0)).unwrap_or_default();
+                    a.usages.entry(parent).or_default().push(Usage { child, name, id: e.id });
+                }
+            } else if e.is("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
+                contextual.push(e);
+            } else if e.is_any(&["SHAPE_REPRESENTATION_RELATIONSHIP", "REPRESENTATION_RELATIONSHIP"]) {
+                relations.push(e);
+            }
+        }
+        let mut used = FxHashSet::default();
+        for e in contextual {
+            a.contextual(e, &mut used);
+        }
+        for e in relations {
+            if !used.contains(&e.id) {
+                a.relation(e);
+            }
+        }
+        a
+    }
+
+    /// Units of a representation.
+    pub(super) fn units_of(&self, representation: u64) -> Units {
+        let context = self
+            .file
+            .entity(representation)
+            .and_then(|e| e.own("REPRESENTATION", 0).and_then(|a| a.id(2)).or_else(|| e.args().id(2)));
+        context.and_then(|c| self.units.get(&c)).copied().unwrap_or(self.fallback)
+    }
+
+    fn geometry(&self, representation: u64) -> Geometry<'f, 'a> {
+        Geometry { file: self.file, units: self.units_of(representation) }
+    }
+
+    /// Items of a representation.
+    pub(super) fn items(&self, representation: u64) -> Vec<u64> {
+        let Some(e) = self.file.entity(representation) else { return Vec::new() };
+        let args = e.own("REPRESENTATION", 0).unwrap_or_else(|| e.args());
+        args.list(1).ids()
+    }
+
+    fn shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
+        let (Some(definition), Some(representation)) = (definition, representation) else { return };
+        // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
+        let Some(owner) = definition.own("PROPERTY_DEFINITION", 2).or_else(|| Some(definition.args())) else {
+            return;
+        };
+        let target = owner.entity(if definition.keyword().is_empty() { 0 } else { 2 });
+        let Some(target) = target.filter(|t| t.keywords().any(|k| k.starts_with("PRODUCT_DEFINITION"))) else {
+            return;
+        };
+        let shapes = self.shapes.entry(target.id).or_default();
+        if !shapes.contains(&representation) {
+            shapes.push(representation);
+        }
+        self.owned.insert(representation);
+    }
+
+    /// The two representations of a relationship and the placement of the first in the second, if it has one.
+    fn related(&self, e: Entity<'f, 'a>) -> Option<(u64, u64, Option<Frame>)> {
+        let base = e.own("REPRESENTATION_RELATIONSHIP", 0).unwrap_or_else(|| e.args());
+        let (first, second) = (base.id(2)?, base.id(3)?);
+        let simple = e.keyword() == "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
+        let operator = e.own("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION", 4);
+        let operator =
+            operator.and_then(|a| a.entity(0)).or_else(|| if simple { e.args().entity(4) } else { None });
+        let placement = operator.and_then(|t| {
+            let args = t.own("ITEM_DEFINED_TRANSFORMATION", 0)?;
+            let (from, to) = (args.id(2)?, args.id(3)?);
+            // Each placement is in the units of the representation that holds it.
+            let (mut holder_from, mut holder_to) = (first, second);
+            if self.items(first).contains(&to) && self.items(second).contains(&from) {
+                (holder_from, holder_to) = (second, first);
+            }
+            let from = self.geometry(holder_from).placement(from).ok()?;
+            let to = self.geometry(holder_to).placement(to).ok()?;
+            let whole = to.compose(&from.inverse());
+            Some(if holder_from == first { whole } else { whole.inverse() })
+        });
+        Some((first, second, placement))
+    }
+
+    fn contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
+        let args = e.args();
+        let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
+        used.insert(relation.id);
+        let usage = shape.own("PROPERTY_DEFINITION", 2).unwrap_or_else(|| shape.args());
+        let Some(usage) = usage.id(if shape.keyword().is_empty() { 0 } else { 2 }) else { return };
+        let Some((first, second, placement)) = self.related(relation) else { return };
+        let Some(mut placement) = placement else { return };
+        // The first representation is the child's; some writers swap them.
+        let ends = self.file.entity(usage).and_then(|u| u.own("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
+        if let Some((parent, child)) = ends.and_then(|a| Some((a.id(3)?, a.id(4)?))) {
+            let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
+            if has(parent, first) && has(child, second) && !has(child, first) {
+                placement = placement.inverse();
+            }
+        }
+        self.placements.entry(usage).or_insert(placement);
+    }
+
+    fn relation(&mut self, e: Entity<'f, 'a>) {
+        let Some((first, second, placement)) = self.related(e) else { return };
+        match placement {
+            Some(placement) => self.links.entry(second).or_default().push(Link { to: first, placement }),
+            None => {
+                let same = Frame::IDENTITY;
+                self.links.entry(first).or_default().push(Link { to: second, placement: same });
+                self.links.entry(second).or_default().push(Link { to: first, placement: same });
+            }
+        }
+    }
+
+    /// Every placed representation, in the order of the file.
+    pub(super) fn walk(mut self) -> (Vec<Placed>, Self) {
+        let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
+        let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
+        products.sort_unstable();
+        products.dedup();
+        let roots: Vec<u64> = products.iter().copied().filter(|p| !children.contains(p)).collect();
+        for root in roots {
+            self.product(root, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+        }
+        // Products in a cycle, and shapes without a product.
+        for product in products {
+            let seen = self.shapes.get(&product).is_some_and(|s| s.iter().any(|r| self.reached.contains(r)));
+            if !seen && self.shapes.contains_key(&product) {
+                self.product(product, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+            }
+        }
+        self.orphans();
+        (std::mem::take(&mut self.placed), self)
+    }
+
+    /// Representations with shapes that no product reaches.
+    fn orphans(&mut self) {
+        let candidates: Vec<u64> = self
+            .file
+            .entities()
+            .filter(|e| e.keywords().any(|k| k.ends_with("SHAPE_REPRESENTATION") || k == "REPRESENTATION"))
+            .map(|e| e.id)
+            .collect();
+        let mapped: FxHashSet<u64> =
+            self.file.entities().filter_map(|e| e.own("REPRESENTATION_MAP", 0)?.id(1)).collect();
+        for id in candidates {
+            if !self.reached.contains(&id) && !mapped.contains(&id) {
+                self.representation(id, Frame::IDENTITY, ("", ""), &mut Vec::new(), &[]);
+            }
+        }
+    }
+
+    fn product_name(&self, definition: u64) -> String {
+        let product = || {
+            let formation = self.file.entity(definition)?.own("PRODUCT_DEFINITION", 0)?.entity(2)?;
+            let product = formation.args().entity(2)?;
+            let args = product.own("PRODUCT", 0)?;
+            args.text(1).filter(|n| !n.trim().is_empty()).or_else(|| args.text(0))
+        };
+        product().unwrap_or_default()
+    }
+
+    fn product(&mut self, definition: u64, placement: Frame, name: String, path: &mut Vec<u64>, owners: &[u64]) {
+        if path.len() >= MAX_DEPTH || path.contains(&definition) {
+            self.problems.push(format!("#{definition}: products contain each other"));
+            return;
+        }
+        path.push(definition);
+        let product = self.product_name(definition);
+        for representation in self.shapes.get(&definition).cloned().unwrap_or_default() {
+            self.representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
+        }
+        let usages = self.usages.remove(&definition).unwrap_or_default();
+        for usage in &usages {
+            let at = match self.placements.get(&usage.id) {
+                Some(p) => *p,
+                None => Frame::IDENTITY,
+            };
+            let mut inner = owners.to_vec();
+            inner.push(usage.id);
+            self.product(usage.child, placement.compose(&at), usage.name.clone(), path, &inner);
+        }
+        self.usages.insert(definition, usages);
+        path.pop();
+    }
+
+    fn representation(
+        &mut self,
+        id: u64,
+        placement: Frame,
+        (name, product): (&str, &str),
+        path: &mut Vec<u64>,
+        owners: &[u64],
+    ) {
+        if path.len() >= MAX_DEPTH || path.contains(&id) || self.placed.len() >= MAX_PLACED {
+            return;
+        }
+        path.push(id);
+        self.reached.insert(id);
+        self.placed.push(Placed {
+            representation: id,
+            placement,
+            name: name.to_string(),
+            product: product.to_string(),
+            owners: owners.to_vec(),
+        });
+        let geometry = self.geometry(id);
+        for item in self.items(id) {
+            let Some(mapped) = self.file.entity(item).and_then(|e| e.own("MAPPED_ITEM", 1)) else { continue };
+            let Some(map) = mapped.entity(0).and_then(|m| m.own("REPRESENTATION_MAP", 0)) else { continue };
+            let (Some(origin), Some(to), Some(target)) = (map.id(0), map.id(1), mapped.id(1)) else { continue };
+            let origin = self.geometry(to).placement(origin);
+            let target = geometry.transformation(target);
+            let (Ok(origin), Ok(target)) = (origin, target) else {
+                self.problems.push(format!("#{item} MAPPED_ITEM: its placement cannot be read"));
+                continue;
+            };
+            let inner = [owners, &[item]].concat();
+            let at = placement.compose(&target.compose(&origin.inverse()));
+            self.representation(to, at, (name, product), path, &inner);
+        }
+        for link in self.links.get(&id).cloned().unwrap_or_default() {
+            // A representation of another product is placed by its own usage.
+            let elsewhere = self.owned.contains(&link.to) && link.placement.is_identity();
+            if !path.contains(&link.to) && !elsewhere {
+                self.representation(link.to, placement.compose(&link.placement), (name, product), path, owners);
+            }
+        }
+        path.pop();
+    }
+}

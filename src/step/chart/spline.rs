@@ -1,0 +1,243 @@
+//! Inversion of spline surfaces: Newton from a nearby start, a search over Bézier patches when there is none.
+
+use super::Pole;
+use crate::math::{Aabb, Point, Uv};
+use crate::nurbs::{BezierPatch, ControlPoint, Curve, Surface};
+use std::cell::Cell;
+use std::sync::OnceLock;
+
+/// Samples per direction in a patch that seed the search.
+const SEEDS: usize = 4;
+
+/// A spline surface that knows where it closes and contracts.
+#[derive(Debug)]
+pub(in crate::step) struct SplineChart {
+    pub(in crate::step) surface: Surface,
+    pub(super) size: f64,
+    closed: [bool; 2],
+    /// Collapsed sides: `[direction][low, high]`.
+    collapsed: [[bool; 2]; 2],
+    patches: OnceLock<Vec<(BezierPatch, Aabb)>>,
+    /// Distance from the surface that edges of this face have shown; larger residuals start a search.
+    expected: Cell<f64>,
+}
+
+impl Clone for SplineChart {
+    fn clone(&self) -> Self {
+        Self::new(self.surface.clone())
+    }
+}
+
+impl SplineChart {
+    pub(in crate::step) fn new(surface: Surface) -> Self {
+        let size = surface.bounds().diagonal();
+        let near = 1e-6 * size.min(1000.0) + 1e-9;
+        let [nu, nv] = surface.counts();
+        let at = |i: usize, j: usize| surface.points[i * nv + j].position();
+        let equal = |a: Point, b: Point| (a - b).length() <= near;
+        let closed =
+            [(0..nv).all(|j| equal(at(0, j), at(nu - 1, j))), (0..nu).all(|i| equal(at(i, 0), at(i, nv - 1)))];
+        let collapsed = [
+            [0, nu - 1].map(|i| (1..nv).all(|j| equal(at(i, 0), at(i, j)))),
+            [0, nv - 1].map(|j| (1..nu).all(|i| equal(at(0, j), at(i, j)))),
+        ];
+        let expected = Cell::new(1e-4);
+        Self { surface, size, closed, collapsed, patches: OnceLock::new(), expected }
+    }
+
+    pub(super) fn period(&self) -> [Option<f64>; 2] {
+        let domain = self.surface.domain();
+        [0, 1].map(|d| (self.closed[d] && self.collapsed[d] == [false; 2]).then(|| domain[d][1] - domain[d][0]))
+    }
+
+    pub(super) fn poles(&self) -> Vec<Pole> {
+        let domain = self.surface.domain();
+        let mut poles = Vec::new();
+        for fixed in 0..2 {
+            for side in 0..2 {
+                if self.collapsed[fixed][side] {
+                    let at = domain[fixed][side];
+                    let corner = if fixed == 0 { Uv::new(at, domain[1][0]) } else { Uv::new(domain[0][0], at) };
+                    poles.push(Pole { fixed, at, point: self.surface.evaluate(corner) });
+                }
+            }
+        }
+        poles
+    }
+
+    /// Parameters of the nearest point, in the base period.
+    pub(super) fn locate(&self, p: Point, hint: Option<Uv>) -> Uv {
+        let mut best: Option<(Uv, f64)> = None;
+        if let Some(hint) = hint {
+            let found = self.newton(p, self.wrap(hint));
+            if found.1 <= self.expected.get() {
+                return found.0;
+            }
+            best = Some(found);
+        }
+        let (uv, distance) = self.search(p, best);
+        // Edges that stay off the surface by this much need no search at every point.
+        if distance > self.expected.get() && distance < 1e-2 * self.size {
+            self.expected.set(1.5 * distance);
+        }
+        uv
+    }
+
+    fn wrap(&self, uv: Uv) -> Uv {
+        let domain = self.surface.domain();
+        let one = |d: usize| {
+            let [a, b] = domain[d];
+            if uv[d] >= a && uv[d] <= b {
+                uv[d]
+            } else if self.closed[d] {
+                a + (uv[d] - a).rem_euclid(b - a)
+            } else {
+                uv[d].clamp(a, b)
+            }
+        };
+        Uv::new(one(0), one(1))
+    }
+
+    /// Gauss–Newton with the curvature of the residual, halved while it does not descend, held inside the domain.
+    fn newton(&self, p: Point, start: Uv) -> (Uv, f64) {
+        let domain = self.surface.domain();
+        let extent = [domain[0][1] - domain[0][0], domain[1][1] - domain[1][0]];
+        let mut uv = start;
+        let mut d = self.surface.derivatives(uv);
+        let mut at = (d.point - p).length();
+        for _ in 0..25 {
+            let r = d.point - p;
+            let (gu, gv) = (d.du.dot(r), d.dv.dot(r));
+            let (mut e, f, mut g) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
+            // A direction along which the surface stands still moves nothing.
+            let floor = 1e-18 * (e * extent[0] * extent[0]).max(g * extent[1] * extent[1]);
+            e = e.max(floor / (extent[0] * extent[0]));
+            g = g.max(floor / (extent[1] * extent[1]));
+            let held = |d: usize, gradient: f64| {
+                !self.closed[d]
+                    && (uv[d] <= domain[d][0] && gradient > 0.0 || uv[d] >= domain[d][1] && gradient < 0.0)
+            };
+            let (hold_u, hold_v) = (held(0, gu), held(1, gv));
+            let det = e * g - f * f;
+            let step = if hold_u && hold_v || !(e > 0.0 && g > 0.0) {
+                break;
+            } else if hold_u {
+                Uv::new(0.0, -gv / g)
+            } else if hold_v {
+                Uv::new(-gu / e, 0.0)
+            } else if det > 1e-12 * e * g {
+                Uv::new((-gu * g + gv * f) / det, (-gv * e + gu * f) / det)
+            } else {
+                Uv::new(-gu / e, -gv / g) * 0.5
+            };
+            // At most a quarter of the domain at once.
+            let limit = (step.x.abs() / (0.25 * extent[0])).max(step.y.abs() / (0.25 * extent[1])).max(1.0);
+            let mut step = step / limit;
+            let mut moved = false;
+            for _ in 0..8 {
+                let next = self.wrap_step(uv, step, domain);
+                let next_d = self.surface.derivatives(next);
+                let distance = (next_d.point - p).length();
+                if distance < at {
+                    moved = true;
+                    uv = next;
+                    d = next_d;
+                    at = distance;
+                    break;
+                }
+                step *= 0.5;
+            }
+            if !moved || step.x.abs() <= 1e-15 * extent[0] && step.y.abs() <= 1e-15 * extent[1] {
+                break;
+            }
+        }
+        (uv, at)
+    }
+
+    fn wrap_step(&self, uv: Uv, step: Uv, domain: [[f64; 2]; 2]) -> Uv {
+        let one = |d: usize| {
+            let [a, b] = domain[d];
+            let x = uv[d] + step[d];
+            if self.closed[d] && (x < a || x > b) { a + (x - a).rem_euclid(b - a) } else { x.clamp(a, b) }
+        };
+        Uv::new(one(0), one(1))
+    }
+
+    /// Patches in the order of the distance to their boxes, Newton from the best sample of each that may hold a nearer
+    /// point than is known.
+    fn search(&self, p: Point, known: Option<(Uv, f64)>) -> (Uv, f64) {
+        let patches = self.patches.get_or_init(|| {
+            self.surface
+                .bezier_patches()
+                .into_iter()
+                .map(|b| {
+                    let bounds = b.bounds();
+                    (b, bounds)
+                })
+                .collect()
+        });
+        let mut order: Vec<(f64, usize)> =
+            patches.iter().enumerate().map(|(i, (_, b))| ((p.clamp(b.min, b.max) - p).length(), i)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let domain = self.surface.domain();
+        let middle = Uv::new(0.5 * (domain[0][0] + domain[0][1]), 0.5 * (domain[1][0] + domain[1][1]));
+        let mut best = known.unwrap_or((middle, f64::INFINITY));
+        for (tried, (bound, i)) in order.into_iter().enumerate() {
+            if bound >= best.1 || best.1 < 1e-9 || tried > 200 {
+                break;
+            }
+            let patch = &patches[i].0;
+            let mut seeds: Vec<(f64, Uv)> = Vec::with_capacity(SEEDS * SEEDS);
+            for a in 0..SEEDS {
+                for b in 0..SEEDS {
+                    let local = Uv::new((a as f64 + 0.5) / SEEDS as f64, (b as f64 + 0.5) / SEEDS as f64);
+                    let q = patch.homogeneous(local)[0].position();
+                    seeds.push(((q - p).length(), patch.surface_uv(local)));
+                }
+            }
+            seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for &(_, seed) in &seeds[..2] {
+                let found = self.newton(p, seed);
+                if found.1 < best.1 {
+                    best = found;
+                }
+            }
+        }
+        best
+    }
+
+    /// The surface over a rectangle that may run over the seams of closed directions.
+    pub(super) fn covering(&self, domain: [[f64; 2]; 2]) -> Surface {
+        let base = self.surface.domain();
+        let mut surface = self.surface.clone();
+        for d in 0..2 {
+            let [a, b] = domain[d];
+            let near = 1e-9 * (base[d][1] - base[d][0]);
+            if a < base[d][0] - near || b > base[d][1] + near {
+                let period = self.period()[d];
+                surface = surface.map_direction(d, |c| covering(&c, [a, b], period));
+            }
+        }
+        surface
+    }
+}
+
+/// A curve over a range, repeated by its period as far as needed; without a period its own domain stays.
+pub(super) fn covering(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> Curve {
+    let [t0, t1] = curve.domain();
+    let Some(period) = period else { return curve.clone() };
+    let near = 1e-9 * period;
+    if a >= t0 - near && b <= t1 + near {
+        return curve.clone();
+    }
+    let first = ((a - t0) / period + 1e-9).floor() as i64;
+    let last = (((b - t0) / period - 1e-9).ceil() as i64 - 1).clamp(first, first + 4);
+    let start = t0 + first as f64 * period;
+    let copy = curve.reparametrised([start, start + period]);
+    let mut whole = copy.clone();
+    for _ in first..last {
+        whole = crate::step::curves::joined(&whole, curve);
+    }
+    let [w0, w1] = whole.domain();
+    whole.restricted(a.clamp(w0, w1), b.clamp(w0, w1))
+}

@@ -1,0 +1,86 @@
+//! Revolution and extrusion of any curve: one parameter in closed form, the other by projection to the curve.
+
+use super::Chart;
+use crate::math::{Frame, Point, Uv, Vector};
+use crate::nurbs::{ControlPoint, Curve, Derivatives, project};
+
+/// u from the azimuth, v from the projection to the meridian in the half plane of radius and height.
+///
+/// `azimuth` is that of a meridian in a half plane through the axis.
+pub(super) fn locate_revolution(
+    (frame, meridian, azimuth): (&Frame, &Curve, Option<f64>),
+    p: Point,
+    hint: Option<Uv>,
+    size: f64,
+) -> Uv {
+    let q = frame.local_point(p);
+    let target = Vector::new(q.x.hypot(q.y), 0.0, q.z);
+    let expected = 1e-6 * size + 1e-6;
+    match azimuth {
+        Some(azimuth) => {
+            let (s, c) = azimuth.sin_cos();
+            let turned = frame.point(Point::new(target.x * c, target.x * s, target.z));
+            let v = match hint {
+                Some(h) => project::nearest_from(meridian, turned, h.y, expected).0,
+                None => project::nearest(meridian, turned).0,
+            };
+            Uv::new(q.y.atan2(q.x) - azimuth, v)
+        }
+        None => {
+            let v = nearest_profile(frame, meridian, target);
+            let m = frame.local_point(meridian.evaluate(v));
+            Uv::new(q.y.atan2(q.x) - m.y.atan2(m.x), v)
+        }
+    }
+}
+
+/// The parameter of the profile `(radius, height)` nearest to a target, for a meridian that leaves every plane through
+/// the axis: samples, then golden sections.
+fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
+    let distance = |v: f64| {
+        let m = frame.local_point(meridian.evaluate(v));
+        (Vector::new(m.x.hypot(m.y), 0.0, m.z) - target).length()
+    };
+    let [a, b] = meridian.domain();
+    let n = (16 * meridian.breakpoints().len()).min(2000);
+    let sample = |i: usize| a + (b - a) * i as f64 / n as f64;
+    let best = (0..=n).map(|i| (i, distance(sample(i)))).min_by(|x, y| x.1.total_cmp(&y.1)).map_or(0, |x| x.0);
+    let (mut lo, mut hi) = (sample(best.saturating_sub(1)), sample((best + 1).min(n)));
+    for _ in 0..60 {
+        let (x, y) = (lo + 0.381966 * (hi - lo), hi - 0.381966 * (hi - lo));
+        if distance(x) < distance(y) { hi = y } else { lo = x }
+    }
+    0.5 * (lo + hi)
+}
+
+/// The azimuth of a meridian that lies in a half plane through the axis.
+pub(super) fn azimuth(frame: &Frame, meridian: &Curve) -> Option<f64> {
+    let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
+    let far = local.iter().copied().max_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))?;
+    let r = far.x.hypot(far.y);
+    let near = 1e-9 * r * r;
+    let flat =
+        local.iter().all(|p| (far.x * p.y - far.y * p.x).abs() <= near && far.x * p.x + far.y * p.y >= -near);
+    (flat && r > 0.0).then(|| far.y.atan2(far.x))
+}
+
+pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives {
+    let d = meridian.derivatives(uv.y);
+    let (m, t) = (frame.local_point(d.point), frame.local_direction(d.first) / frame.scale);
+    let (s, c) = uv.x.sin_cos();
+    let turn = |p: Vector| Vector::new(c * p.x - s * p.y, s * p.x + c * p.y, p.z);
+    let p = turn(m);
+    Derivatives { point: frame.point(p), du: frame.vector(Vector::new(-p.y, p.x, 0.0)), dv: frame.vector(turn(t)) }
+}
+
+/// u from the projection along the direction, v from what remains.
+pub(super) fn locate_extrusion(base: &Curve, direction: Vector, p: Point, hint: Option<Uv>, chart: &Chart) -> Uv {
+    let square = direction.length_squared();
+    let flat = |q: Point| {
+        let d = q - p;
+        d - direction * (d.dot(direction) / square)
+    };
+    let start = hint.map(|h| (chart.wrap(h).x, 1e-6 * chart.size + 1e-6));
+    let u = project::nearest_by(base, flat, start).0;
+    Uv::new(u, (p - base.evaluate(u)).dot(direction) / square)
+}

@@ -1,0 +1,167 @@
+//! Bounded curves as splines: trimmed, composite, and whole curves.
+
+use super::curves::{Directed, MAX_DEPTH, Shape, joined};
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part21::{Args, Entity};
+use crate::math::{Homogeneous, Point};
+use crate::nurbs::Curve;
+use std::f64::consts::PI;
+
+/// Most segments of one composite curve.
+const MAX_SEGMENTS: usize = 100_000;
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// A curve with two ends (or closed), in its own direction.
+    pub(super) fn bounded(&self, id: u64, depth: usize) -> Outcome<Curve> {
+        let e = self.entity(id)?;
+        if depth > MAX_DEPTH {
+            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+        }
+        if let Some(trimmed) = e.own("TRIMMED_CURVE", 1) {
+            return self.trimmed(e, trimmed, depth);
+        }
+        if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
+            let curve = e.own("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
+            let basis = self.follow(e, curve, "curve_3d of the surface curve")?;
+            return self.bounded(basis.id, depth + 1);
+        }
+        if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {
+            return Err(Refusal::of(e, "a curve given only in the parameter plane is not supported"));
+        }
+        let Directed { shape, reversed } = self.curve(id, depth)?;
+        let whole = match &shape {
+            Shape::Ellipse { .. } => shape.segment(0.0, 2.0 * PI),
+            Shape::Spline { curve, .. } => curve.clone(),
+            _ => return Err(Refusal::of(e, "an unbounded curve where a bounded one is needed")),
+        };
+        Ok(if reversed { whole.reversed() } else { whole })
+    }
+
+    fn trimmed(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        let basis = self.follow(e, args.id(0), "basis curve")?;
+        let Directed { shape, reversed } = self.curve(basis.id, depth + 1)?;
+        let sense = args.flag(3) != Some(false);
+        let by_point = args.word(4) == Some("CARTESIAN");
+        let scale = match &shape {
+            Shape::Ellipse { .. } => self.units.angle,
+            _ => 1.0,
+        };
+        let limit = |list: Args<'f, 'a>| -> Option<f64> {
+            let point = || (0..list.len()).find_map(|i| self.point(list.id(i)?).ok()).map(|p| shape.parameter(p));
+            let number = || (0..list.len()).find_map(|i| list.real(i)).map(|x| x * scale);
+            if by_point { point().or_else(number) } else { number().or_else(point) }
+        };
+        let (Some(t1), Some(t2)) = (limit(args.list(1)), limit(args.list(2))) else {
+            return Err(Refusal::of(e, "a trimming value is missing"));
+        };
+        let (from, mut to) = if sense { (t1, t2) } else { (t2, t1) };
+        if let Some(period) = shape.period() {
+            to = from + (to - from).rem_euclid(period);
+            if to - from <= 1e-12 * period {
+                to = from + period;
+            }
+        }
+        if !(to > from) {
+            return Err(Refusal::of(e, "trimming values are in the wrong order or equal"));
+        }
+        let curve = shape.segment(from, to);
+        Ok(if sense == reversed { curve.reversed() } else { curve })
+    }
+
+    /// The segments of a composite curve, in its direction.
+    pub(super) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
+        let own = ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]
+            .into_iter()
+            .find_map(|n| e.own(n, 1).filter(|a| a.list(0).len() > 0));
+        let Some(own) = own else { return Err(Refusal::of(e, "composite curve without segments")) };
+        let list = own.list(0);
+        if list.len() > MAX_SEGMENTS {
+            return Err(Refusal::of(e, "composite curve with too many segments"));
+        }
+        let mut curves: Vec<Curve> = Vec::with_capacity(list.len());
+        for i in 0..list.len() {
+            let segment = self.follow(e, list.id(i), "segment")?;
+            let args = segment.own("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args());
+            let parent = self.follow(segment, args.id(2), "parent curve")?;
+            let curve = if parent.is_any(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE"]) && depth < MAX_DEPTH {
+                self.composite(parent, depth + 1)?
+            } else {
+                self.bounded(parent.id, depth + 1)?
+            };
+            curves.push(if args.flag(1) == Some(false) { curve.reversed() } else { curve });
+        }
+        // Senses are often wrong: turn a segment around when that joins it better.
+        let ends = |c: &Curve| {
+            let [a, b] = c.domain();
+            (c.evaluate(a), c.evaluate(b))
+        };
+        for i in 1..curves.len() {
+            let end = ends(&curves[i - 1]).1;
+            let (a, b) = ends(&curves[i]);
+            if (b - end).length() < 0.5 * (a - end).length() {
+                curves[i] = curves[i].reversed();
+            }
+        }
+        Ok(curves)
+    }
+
+    /// A composite curve as one spline.
+    pub(super) fn composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        if depth > MAX_DEPTH {
+            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+        }
+        let segments = self.segments(e, depth)?;
+        let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
+        let mut parts = segments.iter().map(|c| elevated(c, degree));
+        let first = parts.next().ok_or_else(|| Refusal::of(e, "composite curve without segments"))?;
+        Ok(parts.fold(first, |whole, part| joined(&whole, &part)))
+    }
+}
+
+/// The same curve with a higher degree, piecewise Bézier.
+fn elevated(curve: &Curve, degree: usize) -> Curve {
+    if curve.degree == degree {
+        return curve.clone();
+    }
+    let mut points: Vec<Homogeneous> = Vec::new();
+    for mut piece in curve.bezier_pieces() {
+        while piece.len() <= degree {
+            let n = piece.len();
+            let mut up = vec![piece[0]];
+            up.extend(
+                (1..n).map(|i| piece[i - 1] * (i as f64 / n as f64) + piece[i] * (1.0 - i as f64 / n as f64)),
+            );
+            up.push(piece[n - 1]);
+            piece = up;
+        }
+        points.extend(&piece[usize::from(!points.is_empty())..]);
+    }
+    let breaks = curve.breakpoints();
+    let mut knots = vec![breaks[0]];
+    knots.extend(breaks.iter().flat_map(|&b| std::iter::repeat_n(b, degree)));
+    knots.push(breaks[breaks.len() - 1]);
+    Curve { degree, knots, points }
+}
+
+/// Whether two points are the same within the accuracy of files.
+pub(super) fn same(a: Point, b: Point, tolerance: f64) -> bool {
+    (a - b).length() <= tolerance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::conic;
+
+    #[test]
+    fn elevation_keeps_the_curve() {
+        let c = conic::arc(&Frame::IDENTITY, 2.0, [0.0, 5.0]);
+        let e = elevated(&c, 4);
+        assert_eq!(e.knots.len(), e.points.len() + 5);
+        for i in 0..=40 {
+            let t = 0.125 * f64::from(i);
+            assert!((c.evaluate(t) - e.evaluate(t)).length() < 1e-13);
+        }
+    }
+}

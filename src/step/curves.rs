@@ -1,0 +1,346 @@
+//! Curves of the file: closed forms where there is one, rational splines for the rest.
+
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part21::Entity;
+use crate::math::{Frame, Homogeneous, Point, Vector};
+use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
+use std::f64::consts::PI;
+
+/// Deepest chain of curves that refer to curves.
+pub(super) const MAX_DEPTH: usize = 16;
+
+/// A curve, not yet cut.
+#[derive(Clone, Debug)]
+pub(super) enum Shape {
+    /// `origin + t·direction`.
+    Line { origin: Point, direction: Vector },
+    /// `(a cos t, b sin t)`; a circle when equal.
+    Ellipse { frame: Frame, a: f64, b: f64 },
+    /// `(a cosh t, b sinh t)`.
+    Hyperbola { frame: Frame, a: f64, b: f64 },
+    /// `(f t², 2 f t)`.
+    Parabola { frame: Frame, f: f64 },
+    /// A spline over its domain.
+    Spline { curve: Curve, closed: bool },
+}
+
+/// A curve with the direction in which it is run.
+#[derive(Clone, Debug)]
+pub(super) struct Directed {
+    pub(super) shape: Shape,
+    /// Against its parameter.
+    pub(super) reversed: bool,
+}
+
+impl Shape {
+    pub(super) fn spline(curve: Curve) -> Self {
+        let [a, b] = curve.domain();
+        let size = curve.bounds().diagonal();
+        let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= 1e-6 * size + 1e-9;
+        Self::Spline { curve, closed }
+    }
+
+    /// Parameter difference after which the curve repeats.
+    pub(super) fn period(&self) -> Option<f64> {
+        match self {
+            Self::Ellipse { .. } => Some(2.0 * PI),
+            Self::Spline { curve, closed: true } => {
+                let [a, b] = curve.domain();
+                Some(b - a)
+            }
+            _ => None,
+        }
+    }
+
+    /// Parameter of the nearest point.
+    pub(super) fn parameter(&self, p: Point) -> f64 {
+        match self {
+            Self::Line { origin, direction } => (p - *origin).dot(*direction) / direction.length_squared(),
+            Self::Ellipse { frame, a, b } => {
+                let q = frame.local_point(p);
+                if a == b { q.y.atan2(q.x) } else { ellipse_angle(q, *a, *b) }
+            }
+            Self::Hyperbola { frame, b, .. } => (frame.local_point(p).y / b).asinh(),
+            Self::Parabola { frame, f } => frame.local_point(p).y / (2.0 * f),
+            Self::Spline { curve, .. } => project::nearest(curve, p).0,
+        }
+    }
+
+    /// The piece over `[t0, t1]`, `t0 < t1`, as a spline; over a period at most, and inside the domain of an open spline.
+    pub(super) fn segment(&self, t0: f64, t1: f64) -> Curve {
+        match self {
+            Self::Line { origin, direction } => {
+                Curve::line(*origin + t0 * *direction, *origin + t1 * *direction, [t0, t1])
+            }
+            Self::Ellipse { frame, a, b } => {
+                let unit = conic::arc(&Frame::IDENTITY, 1.0, [t0, t1]);
+                mapped(unit, |q| frame.point(Point::new(a * q.x, b * q.y, 0.0)))
+            }
+            Self::Hyperbola { frame, a, b } => {
+                // Middle control point on the crossing of the tangents, weight cosh of half the range.
+                let (middle, half) = (0.5 * (t0 + t1), 0.5 * (t1 - t0));
+                let w = half.cosh();
+                let at = |t: f64, k: f64| frame.point(Point::new(a * t.cosh() / k, b * t.sinh() / k, 0.0));
+                let points = vec![
+                    Homogeneous::weighted(at(t0, 1.0), 1.0),
+                    Homogeneous::weighted(at(middle, w), w),
+                    Homogeneous::weighted(at(t1, 1.0), 1.0),
+                ];
+                Curve { degree: 2, knots: vec![t0, t0, t0, t1, t1, t1], points }
+            }
+            Self::Parabola { frame, f } => {
+                // The blossom of (f t², 2 f t).
+                let at = |s: f64, t: f64| frame.point(Point::new(f * s * t, f * (s + t), 0.0));
+                let points = [at(t0, t0), at(t0, t1), at(t1, t1)].map(|p| Homogeneous::weighted(p, 1.0)).to_vec();
+                Curve { degree: 2, knots: vec![t0, t0, t0, t1, t1, t1], points }
+            }
+            Self::Spline { curve, closed } => {
+                let [a, b] = curve.domain();
+                let period = b - a;
+                if *closed && (t1 > b || t0 < a) {
+                    let shift = ((t0 - a) / period).floor() * period;
+                    let (s0, s1) = ((t0 - shift).clamp(a, b), (t1 - shift).clamp(a, a + 2.0 * period));
+                    return wrapped(curve, s0, s1).reparametrised([t0, t1]);
+                }
+                curve.restricted(t0.clamp(a, b), t1.clamp(a, b))
+            }
+        }
+    }
+}
+
+/// A closed spline over a range that runs past its end.
+fn wrapped(curve: &Curve, s0: f64, s1: f64) -> Curve {
+    let [a, b] = curve.domain();
+    let period = b - a;
+    if s1 <= b {
+        return curve.restricted(s0, s1);
+    }
+    if b - s0 <= 1e-12 * period {
+        let end = (s1 - period).max(a + 1e-9 * period);
+        return curve.restricted(a, end.min(b)).reparametrised([b, b + (end - a)]);
+    }
+    let head = curve.restricted(s0, b);
+    let tail = curve.restricted(a, (s1 - period).clamp(a + 1e-9 * period, b));
+    joined(&head, &tail)
+}
+
+/// Two curves of one degree, the second behind the first; its parameter follows on.
+pub(super) fn joined(head: &Curve, tail: &Curve) -> Curve {
+    let p = head.degree;
+    let (end, start) = (head.domain()[1], tail.domain()[0]);
+    // One control point at the joint: weights are scaled to agree there.
+    let scale = head.points[head.points.len() - 1].w / tail.points[0].w;
+    let mut points = head.points.clone();
+    points.extend(tail.points[1..].iter().map(|&q| q * scale));
+    let mut knots = head.knots[..head.knots.len() - 1].to_vec();
+    knots.extend(tail.knots[p + 1..].iter().map(|k| end + (k - start)));
+    Curve { degree: p, knots, points }
+}
+
+/// A spline with its control points moved by an affine map.
+pub(super) fn mapped(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
+    let points = curve.points.iter().map(|p| Homogeneous::weighted(map(p.position()), p.w)).collect();
+    Curve { points, ..curve }
+}
+
+/// Angle of the nearest point of an ellipse, by Newton from the angle of the scaled point.
+fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
+    let mut t = (q.y / b).atan2(q.x / a);
+    for _ in 0..20 {
+        let (s, c) = t.sin_cos();
+        let slope = (a * c - q.x) * (-a * s) + (b * s - q.y) * (b * c);
+        let bend = a * a * s * s + b * b * c * c + (a * c - q.x) * (-a * c) + (b * s - q.y) * (-b * s);
+        if !(bend > 0.0) {
+            break;
+        }
+        let step = slope / bend;
+        t -= step;
+        if step.abs() < 1e-15 {
+            break;
+        }
+    }
+    t
+}
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// A curve in space with its direction; trimming is left to the caller's vertices.
+    pub(super) fn curve(&self, id: u64, depth: usize) -> Outcome<Directed> {
+        let e = self.entity(id)?;
+        if depth > MAX_DEPTH {
+            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+        }
+        let ahead = |shape| Ok(Directed { shape, reversed: false });
+        if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
+            let own = e.own("SURFACE_CURVE", 1).or_else(|| Some(e.args()).filter(|a| a.id(1).is_some()).and(None));
+            let curve = own.and_then(|a| a.id(0)).or_else(|| e.args().id(1));
+            let basis = self.follow(e, curve, "curve_3d of the surface curve")?;
+            return self.curve(basis.id, depth + 1);
+        }
+        if let Some(trimmed) = e.own("TRIMMED_CURVE", 1) {
+            let basis = self.follow(e, trimmed.id(0), "basis curve")?;
+            let mut curve = self.curve(basis.id, depth + 1)?;
+            curve.reversed ^= trimmed.flag(3) == Some(false);
+            return Ok(curve);
+        }
+        if e.is_any(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]) {
+            return ahead(Shape::spline(self.composite(e, depth + 1)?));
+        }
+        if let Some(own) = e.own("CURVE_REPLICA", 1) {
+            let parent = self.follow(e, own.id(0), "parent curve")?;
+            let frame = self.transformation(own.id(1).unwrap_or(0))?;
+            let bounded = self.bounded(parent.id, depth + 1)?;
+            return ahead(Shape::spline(mapped(bounded, |p| frame.point(p))));
+        }
+        ahead(self.shape(e)?)
+    }
+
+    /// An elementary curve or a spline.
+    fn shape(&self, e: Entity<'f, 'a>) -> Outcome<Shape> {
+        let mm = self.units.length;
+        let positive = |x: Option<f64>, what: &str| {
+            x.map(|x| x * mm)
+                .filter(|x| *x > 0.0 && x.is_finite())
+                .ok_or_else(|| Refusal::of(e, format!("{what} is not positive")))
+        };
+        if let Some(a) = e.own("LINE", 1) {
+            let origin = self.point(self.follow(e, a.id(0), "point")?.id)?;
+            let direction = self.vector(self.follow(e, a.id(1), "direction")?.id)?;
+            return Ok(Shape::Line { origin, direction });
+        }
+        let conic =
+            |name: &str| e.own(name, 1).map(|a| (a, e.own("CONIC", 1).and_then(|c| c.id(0)).or_else(|| a.id(0))));
+        // In a complex instance the position belongs to CONIC, so the sizes come first.
+        let offset = usize::from(!e.keyword().is_empty());
+        if let Some((a, at)) = conic("CIRCLE") {
+            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let r = positive(a.real(offset), "radius")?;
+            return Ok(Shape::Ellipse { frame, a: r, b: r });
+        }
+        if let Some((a, at)) = conic("ELLIPSE") {
+            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let [x, y] = [positive(a.real(offset), "semi-axis 1")?, positive(a.real(offset + 1), "semi-axis 2")?];
+            return Ok(Shape::Ellipse { frame, a: x, b: y });
+        }
+        if let Some((a, at)) = conic("HYPERBOLA") {
+            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let [x, y] =
+                [positive(a.real(offset), "semi-axis")?, positive(a.real(offset + 1), "imaginary semi-axis")?];
+            return Ok(Shape::Hyperbola { frame, a: x, b: y });
+        }
+        if let Some((a, at)) = conic("PARABOLA") {
+            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            return Ok(Shape::Parabola { frame, f: positive(a.real(offset), "focal distance")? });
+        }
+        if let Some(a) = e.own("POLYLINE", 1) {
+            let points = a.list(0).ids().into_iter().map(|p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
+            return polyline(&points).map(Shape::spline).ok_or_else(|| Refusal::of(e, "polyline without length"));
+        }
+        if e.is_any(&[
+            "B_SPLINE_CURVE",
+            "B_SPLINE_CURVE_WITH_KNOTS",
+            "BEZIER_CURVE",
+            "UNIFORM_CURVE",
+            "QUASI_UNIFORM_CURVE",
+        ]) {
+            return self.spline_curve(e).map(Shape::spline);
+        }
+        Err(Refusal::of(e, "this kind of curve is not supported"))
+    }
+
+    /// A B-spline curve in any of its forms.
+    fn spline_curve(&self, e: Entity<'f, 'a>) -> Outcome<Curve> {
+        let base = e.own("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
+        let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
+        let degree = base.count(shift).unwrap_or(0);
+        let ids = base.list(shift + 1).ids();
+        let points = ids.iter().map(|&p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
+        let weights = e.own("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());
+        let form = knot_form(e, "CURVE");
+        let knots = match e.own("B_SPLINE_CURVE_WITH_KNOTS", 6) {
+            Some(a) => explicit_knots(a.list(0), a.list(1)),
+            None => form.knots(degree, points.len()),
+        };
+        let knots = knots.ok_or_else(|| Refusal::of(e, "knots and multiplicities do not fit"))?;
+        sanitise::curve(degree, knots, &points, weights.as_deref())
+            .map(|(c, _)| c)
+            .map_err(|d| Refusal::of(e, d.to_string()))
+    }
+}
+
+/// A polyline by arc length; repeated points are dropped. `None` when nothing is left.
+pub(super) fn polyline(points: &[Point]) -> Option<Curve> {
+    let mut kept: Vec<Point> = Vec::with_capacity(points.len());
+    let mut lengths = Vec::with_capacity(points.len());
+    for &p in points {
+        match kept.last() {
+            None => {
+                kept.push(p);
+                lengths.push(0.0);
+            }
+            Some(&q) => {
+                let length = (p - q).length();
+                if length > 1e-9 {
+                    kept.push(p);
+                    lengths.push(lengths[lengths.len() - 1] + length);
+                }
+            }
+        }
+    }
+    (kept.len() > 1).then(|| Curve::polyline(&lengths, &kept))
+}
+
+/// How knots follow from the subtype when they are not given.
+#[derive(Clone, Copy)]
+pub(super) enum KnotForm {
+    Uniform,
+    QuasiUniform,
+    Bezier,
+}
+
+/// The form of a spline without knots.
+pub(super) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
+    let is = |prefix: &str| e.keywords().any(|k| k.strip_prefix(prefix).is_some_and(|rest| rest == kind));
+    if is("UNIFORM_") {
+        KnotForm::Uniform
+    } else if is("BEZIER_") {
+        KnotForm::Bezier
+    } else {
+        KnotForm::QuasiUniform
+    }
+}
+
+impl KnotForm {
+    /// The knot vector for a degree and a number of control points.
+    pub(super) fn knots(self, degree: usize, points: usize) -> Option<Vec<f64>> {
+        if degree == 0 || degree > crate::nurbs::MAX_DEGREE || points <= degree {
+            return None;
+        }
+        let inner = points - degree;
+        Some(match self {
+            Self::Uniform => (0..points + degree + 1).map(|i| i as f64 - degree as f64).collect(),
+            Self::QuasiUniform => {
+                let ends = |x: f64| std::iter::repeat_n(x, degree);
+                ends(0.0).chain((0..=inner).map(|i| i as f64)).chain(ends(inner as f64)).collect()
+            }
+            Self::Bezier => {
+                if !(points - 1).is_multiple_of(degree) {
+                    return None;
+                }
+                let spans = (points - 1) / degree;
+                let mut knots = vec![0.0];
+                knots.extend((0..=spans).flat_map(|i| std::iter::repeat_n(i as f64, degree)));
+                knots.push(spans as f64);
+                knots
+            }
+        })
+    }
+}
+
+/// Multiplicities and distinct knots as a knot vector.
+pub(super) fn explicit_knots(
+    multiplicities: super::part21::Args<'_, '_>,
+    knots: super::part21::Args<'_, '_>,
+) -> Option<Vec<f64>> {
+    let m: Vec<usize> = (0..multiplicities.len()).map(|i| multiplicities.count(i)).collect::<Option<_>>()?;
+    sanitise::expand_knots(&knots.reals()?, &m)
+}

@@ -1,0 +1,46 @@
+use std::path::PathBuf;
+
+/// Why a file could not be read at all. Faces and records that cannot be converted are no errors: they are
+/// listed in [`super::ImportReport`].
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct Error(#[from] ErrorKind);
+
+/// What kind of [`Error`] it is.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The operating system does not give the file.
+    #[error("{path}: cannot be read: {source}; check the path and its permissions")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The bytes are no Part 21 text.
+    #[error(
+        "{file}: line 1: 'ISO-10303-21;' is missing, this is not a STEP file (Part 21 clear text); export the model as STEP"
+    )]
+    NotStep {
+        /// Name of the file.
+        file: String,
+    },
+    /// Longer than 4 GiB.
+    #[error("{file}: longer than 4 GiB; split the assembly into several files")]
+    TooLarge {
+        /// Name of the file.
+        file: String,
+    },
+}
+
+impl Error {
+    pub(super) fn new(kind: ErrorKind) -> Self {
+        Self(kind)
+    }
+
+    /// What kind of error it is.
+    pub fn kind(&self) -> &ErrorKind {
+        &self.0
+    }
+}

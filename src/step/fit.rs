@@ -1,0 +1,228 @@
+//! Edges in the parameter plane: cubic Hermite curves over the edge's own parameter, to a stated error in space.
+//!
+//! Guarantee: at three interior points of every piece, `surface(uv(t))` lies within the tolerance of the foot point of
+//! `curve(t)`. Known weakness: what happens between those points is not bounded, only unlikely: the error of a cubic
+//! piece is symmetric, and pieces are halved until it is met.
+
+use super::chart::Pole;
+use crate::math::{Point, Uv};
+use crate::nurbs::{ControlPoint, Curve, Derivatives, UvCurve};
+use std::cell::Cell;
+
+/// Deepest halving of a Bézier span of the edge.
+const MAX_DEPTH: u32 = 18;
+
+/// Counts work, so that no face takes for ever.
+#[derive(Debug)]
+pub(super) struct Budget(Cell<u64>);
+
+impl Budget {
+    pub(super) fn new(steps: u64) -> Self {
+        Self(Cell::new(steps))
+    }
+
+    fn spend(&self) -> Result<(), Overrun> {
+        let left = self.0.get();
+        self.0.set(left.saturating_sub(1));
+        if left == 0 { Err(Overrun) } else { Ok(()) }
+    }
+}
+
+/// The work budget of the face is used up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Overrun;
+
+/// The surface as the fit sees it.
+pub(super) struct Target<'t> {
+    /// Parameters of a point, given the edge's parameter and what is expected.
+    pub(super) locate: &'t dyn Fn(f64, Point, Option<Uv>) -> Uv,
+    /// Position and first derivatives.
+    pub(super) derivatives: &'t dyn Fn(Uv) -> Derivatives,
+    pub(super) poles: &'t [Pole],
+    /// Nearer than this is at the pole, mm.
+    pub(super) pole_tolerance: f64,
+    /// Allowed error in space, mm.
+    pub(super) tolerance: f64,
+    pub(super) budget: &'t Budget,
+}
+
+/// An edge in the parameter plane.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) curve: UvCurve,
+    /// Largest distance between the edge and the surface at the fitted parameters, mm.
+    pub(super) gap: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Node {
+    t: f64,
+    uv: Uv,
+    /// d(uv)/dt inside the piece.
+    slope: Uv,
+}
+
+impl Target<'_> {
+    /// Foot point and slope at `t` of a Bézier piece; `inward` leads from an end into the piece.
+    fn node(&self, piece: &Curve, t: f64, inward: f64, hint: Option<Uv>) -> Result<Node, Overrun> {
+        self.budget.spend()?;
+        let [a, b] = piece.domain();
+        let d = piece.derivatives(t);
+        let near = |p: &&Pole| (p.point - d.point).length() <= self.pole_tolerance;
+        if let Some(pole) = self.poles.iter().find(near) {
+            let step = 1e-4 * (b - a) * inward;
+            let (t1, t2) = (t + step, t + 2.0 * step);
+            let second = (self.locate)(t2, piece.evaluate(t2), hint);
+            let first = (self.locate)(t1, piece.evaluate(t1), Some(second));
+            let slope = (second - first) / step;
+            let mut uv = first * 2.0 - second;
+            uv[pole.fixed] = pole.at;
+            return Ok(Node { t, uv, slope });
+        }
+        let uv = (self.locate)(t, d.point, hint);
+        let s = (self.derivatives)(uv);
+        let (e, f, g) = (s.du.length_squared(), s.du.dot(s.dv), s.dv.length_squared());
+        let det = e * g - f * f;
+        if det > 1e-14 * e * g && det.is_normal() {
+            let (x, y) = (s.du.dot(d.first), s.dv.dot(d.first));
+            return Ok(Node { t, uv, slope: Uv::new((x * g - y * f) / det, (y * e - x * f) / det) });
+        }
+        let step = 1e-5 * (b - a) * inward;
+        let beside = (self.locate)(t + step, piece.evaluate(t + step), Some(uv));
+        Ok(Node { t, uv, slope: (beside - uv) / step })
+    }
+
+    /// Whether the cubic between two nodes is good enough; and the gap seen.
+    fn accepts(&self, piece: &Curve, a: Node, b: Node, gap: &mut f64) -> Result<bool, Overrun> {
+        for s in [0.5, 0.2, 0.8] {
+            self.budget.spend()?;
+            let t = a.t + s * (b.t - a.t);
+            let guess = hermite(a, b, s);
+            let p = piece.evaluate(t);
+            let at = (self.derivatives)(guess);
+            let miss = at.point - p;
+            if miss.length() <= self.tolerance {
+                *gap = gap.max(miss.length());
+                continue;
+            }
+            // Off the surface by a gap of the file's own, or off the foot point by our fit?
+            let foot = (self.locate)(t, p, Some(guess));
+            let d = guess - foot;
+            let error = at.du * d.x + at.dv * d.y;
+            if !(error.length() <= self.tolerance) {
+                return Ok(false);
+            }
+            *gap = gap.max(miss.length());
+        }
+        Ok(true)
+    }
+
+    /// Fits an edge.
+    pub(super) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
+        let breaks = curve.breakpoints();
+        let spans = breaks.len() - 1;
+        let pieces = if curve.degree == 1 { 1 } else { 4usize.div_ceil(spans) };
+        let mut nodes: Vec<(Node, Node)> = Vec::new();
+        let mut hint = None;
+        let mut gap = 0f64;
+        for (points, pair) in curve.bezier_pieces().into_iter().zip(breaks.windows(2)) {
+            let degree = curve.degree;
+            let knots = [vec![pair[0]; degree + 1], vec![pair[1]; degree + 1]].concat();
+            let piece = Curve { degree, knots, points };
+            let mut a = self.node(&piece, pair[0], 1.0, hint)?;
+            for k in 1..=pieces {
+                let t =
+                    if k == pieces { pair[1] } else { pair[0] + (pair[1] - pair[0]) * k as f64 / pieces as f64 };
+                let expected = a.uv + a.slope * (t - a.t);
+                let _ = expected;
+                let b = self.node(&piece, t, -1.0, Some(a.uv))?;
+                self.halve(&piece, a, b, 0, &mut nodes, &mut gap)?;
+                a = b;
+            }
+            hint = Some(a.uv);
+        }
+        Ok(Fit { curve: assemble(&nodes), gap })
+    }
+
+    fn halve(
+        &self,
+        piece: &Curve,
+        a: Node,
+        b: Node,
+        depth: u32,
+        nodes: &mut Vec<(Node, Node)>,
+        gap: &mut f64,
+    ) -> Result<(), Overrun> {
+        let mut seen = *gap;
+        if depth >= MAX_DEPTH || self.accepts(piece, a, b, &mut seen)? {
+            *gap = seen;
+            nodes.push((a, b));
+            return Ok(());
+        }
+        let t = 0.5 * (a.t + b.t);
+        let middle = self.node(piece, t, 1.0, Some(hermite(a, b, 0.5)))?;
+        self.halve(piece, a, middle, depth + 1, nodes, gap)?;
+        self.halve(piece, middle, b, depth + 1, nodes, gap)
+    }
+}
+
+/// The cubic between two nodes at the fraction `s`.
+fn hermite(a: Node, b: Node, s: f64) -> Uv {
+    let h = b.t - a.t;
+    let r = 1.0 - s;
+    a.uv * (r * r * (1.0 + 2.0 * s)) + b.uv * (s * s * (3.0 - 2.0 * s)) + a.slope * (h * s * r * r)
+        - b.slope * (h * s * s * r)
+}
+
+/// One spline of all pieces: C¹ where slopes agree, a corner where they do not, a straight line where all is straight.
+fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
+    let (first, last) = (pieces[0].0, pieces[pieces.len() - 1].1);
+    let line = UvCurve::line(first.uv, last.uv, [first.t, last.t]);
+    let size = (last.uv - first.uv).abs().max_element();
+    let straight = pieces.iter().all(|(a, b)| {
+        [0.0, 0.3, 0.7, 1.0].iter().all(|&s| {
+            let t = a.t + s * (b.t - a.t);
+            (hermite(*a, *b, s) - line.evaluate(t)).abs().max_element() <= 1e-13 * size.max(1e-3)
+        })
+    });
+    if straight {
+        return line;
+    }
+    let mut knots = vec![first.t; 4];
+    let mut points = vec![UvCurve::line(first.uv, last.uv, [0.0, 1.0]).points[0]];
+    for (i, (a, b)) in pieces.iter().enumerate() {
+        let third = (b.t - a.t) / 3.0;
+        points.push((a.uv + a.slope * third).extend(1.0));
+        points.push((b.uv - b.slope * third).extend(1.0));
+        match pieces.get(i + 1) {
+            None => {
+                points.push(b.uv.extend(1.0));
+                knots.extend([b.t; 4]);
+            }
+            Some((next, _)) => {
+                let smooth = (b.slope - next.slope).length() <= 1e-9 * (b.slope.length() + next.slope.length())
+                    && (b.uv - next.uv).abs().max_element() <= 1e-15 * size;
+                if !smooth {
+                    points.push(b.uv.extend(1.0));
+                }
+                knots.extend(std::iter::repeat_n(b.t, if smooth { 2 } else { 3 }));
+            }
+        }
+    }
+    UvCurve { degree: 3, knots, points }
+}
+
+/// An edge on a plane, exactly: its control points in the plane's coordinates.
+pub(super) fn project(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
+    let mut gap = 0f64;
+    let points = curve
+        .points
+        .iter()
+        .map(|p| {
+            let (uv, height) = flat(p.position());
+            gap = gap.max(height.abs());
+            <glam::DVec3 as ControlPoint>::weighted(uv, p.w)
+        })
+        .collect();
+    Fit { curve: UvCurve { degree: curve.degree, knots: curve.knots.clone(), points }, gap }
+}

@@ -1,0 +1,160 @@
+//! Points, directions and placements of one unit system.
+
+use super::part21::{Entity, File};
+use super::units::Units;
+use crate::math::{Frame, Point, Vector};
+
+/// Why a piece of geometry cannot be had: the entity and the reason.
+#[derive(Clone, Debug)]
+pub(super) struct Refusal {
+    /// The `#id` that is to blame.
+    pub(super) id: u64,
+    /// Its name in the file.
+    pub(super) entity: String,
+    /// What is wrong with it.
+    pub(super) reason: String,
+}
+
+pub(super) type Outcome<T> = Result<T, Refusal>;
+
+impl Refusal {
+    pub(super) fn of(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
+        Self { id: entity.id, entity: entity.name(), reason: reason.into() }
+    }
+}
+
+/// Reads geometry in mm and radians.
+#[derive(Clone, Copy)]
+pub(super) struct Geometry<'f, 'a> {
+    pub(super) file: &'f File<'a>,
+    pub(super) units: Units,
+}
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// The instance with an id, or a refusal that says that it is missing.
+    pub(super) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
+        self.file.entity(id).ok_or_else(|| Refusal {
+            id,
+            entity: String::new(),
+            reason: format!("#{id} is referred to but is not in the file"),
+        })
+    }
+
+    /// The instance that a parameter refers to.
+    pub(super) fn follow(
+        &self,
+        from: Entity<'f, 'a>,
+        position: Option<u64>,
+        what: &str,
+    ) -> Outcome<Entity<'f, 'a>> {
+        match position {
+            Some(id) => self.entity(id),
+            None => Err(Refusal::of(from, format!("{what} is missing"))),
+        }
+    }
+
+    /// A CARTESIAN_POINT, mm.
+    pub(super) fn point(&self, id: u64) -> Outcome<Point> {
+        let e = self.entity(id)?;
+        let xs = e.own("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
+        match xs.as_deref() {
+            Some([x, y, z]) => Ok(self.units.length * Point::new(*x, *y, *z)),
+            Some([x, y]) => Ok(self.units.length * Point::new(*x, *y, 0.0)),
+            _ => Err(Refusal::of(e, "is no point with three coordinates")),
+        }
+    }
+
+    /// A VERTEX_POINT, mm.
+    pub(super) fn vertex(&self, id: u64) -> Outcome<Point> {
+        let e = self.entity(id)?;
+        match e.own("VERTEX_POINT", 1).and_then(|a| a.id(0)) {
+            Some(point) => self.point(point),
+            None if e.is("CARTESIAN_POINT") => self.point(id),
+            None => Err(Refusal::of(e, "is no vertex with a point")),
+        }
+    }
+
+    /// A DIRECTION, not normalised; `None` when absent or zero.
+    pub(super) fn direction(&self, id: Option<u64>) -> Option<Vector> {
+        let e = self.file.entity(id?)?;
+        let xs = e.own("DIRECTION", 1)?.list(0).reals()?;
+        let d = match xs.as_slice() {
+            [x, y, z] => Vector::new(*x, *y, *z),
+            [x, y] => Vector::new(*x, *y, 0.0),
+            _ => return None,
+        };
+        (d.is_finite() && d.length_squared() > 0.0).then_some(d)
+    }
+
+    /// A VECTOR with its magnitude, mm.
+    pub(super) fn vector(&self, id: u64) -> Outcome<Vector> {
+        let e = self.entity(id)?;
+        let args = e.own("VECTOR", 1);
+        let direction = args.and_then(|a| self.direction(a.id(0))).and_then(|d| d.try_normalize());
+        let magnitude = args.and_then(|a| a.real(1)).filter(|m| *m != 0.0).unwrap_or(1.0);
+        match direction {
+            Some(d) => Ok(d * (magnitude * self.units.length)),
+            None => Err(Refusal::of(e, "is no vector with a direction")),
+        }
+    }
+
+    /// An AXIS1_PLACEMENT, AXIS2_PLACEMENT_2D or AXIS2_PLACEMENT_3D as a right-handed frame, mm.
+    pub(super) fn placement(&self, id: u64) -> Outcome<Frame> {
+        let e = self.entity(id)?;
+        let args = ["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT", "AXIS2_PLACEMENT_2D"];
+        let Some((name, args)) = args.into_iter().find_map(|n| {
+            let inherited = if e.keyword().is_empty() { 0 } else { 1 };
+            Some((n, e.own(n, inherited)?))
+        }) else {
+            return Err(Refusal::of(e, "is no placement"));
+        };
+        // In complex form the location belongs to PLACEMENT.
+        let separate = e.own("PLACEMENT", 1).filter(|_| e.keyword().is_empty());
+        let location = separate.map_or_else(|| args.id(0), |p| p.id(0));
+        let first = if separate.is_some() { 0 } else { 1 };
+        let origin = match location {
+            Some(point) => self.point(point)?,
+            None => Point::ZERO,
+        };
+        Ok(match name {
+            "AXIS2_PLACEMENT_2D" => Frame::from_axis(origin, Vector::Z, self.direction(args.id(first))),
+            _ => {
+                let axis = self.direction(args.id(first)).unwrap_or(Vector::Z);
+                Frame::from_axis(origin, axis, self.direction(args.id(first + 1)))
+            }
+        })
+    }
+
+    /// A placement or CARTESIAN_TRANSFORMATION_OPERATOR_3D: the target of a mapped item.
+    pub(super) fn transformation(&self, id: u64) -> Outcome<Frame> {
+        let e = self.entity(id)?;
+        let Some(args) = e.own("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
+            // The simple form has all attributes behind the name of the representation item (and its own).
+            let skip = if e.args().len() >= 7 { 2 } else { 1 };
+            e.own("CARTESIAN_TRANSFORMATION_OPERATOR_3D", skip)
+        }) else {
+            return self.placement(id);
+        };
+        let origin = match args.id(2) {
+            Some(point) => self.point(point)?,
+            None => Point::ZERO,
+        };
+        let scale = args.real(3).unwrap_or(1.0);
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(Refusal::of(e, "scale is not positive"));
+        }
+        let axis3 = if e.keyword().is_empty() {
+            e.own("CARTESIAN_TRANSFORMATION_OPERATOR_3D", 0).and_then(|a| a.id(0))
+        } else {
+            args.id(4)
+        };
+        let axis1 = self.direction(args.id(0));
+        let axis2 = self.direction(args.id(1));
+        let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
+        let mut frame = Frame::from_axis(origin, z, axis1);
+        if axis2.is_some_and(|y| y.dot(frame.y) < 0.0) {
+            frame.y = -frame.y;
+        }
+        Ok(Frame { scale, ..frame })
+    }
+}

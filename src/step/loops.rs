@@ -1,0 +1,217 @@
+//! Loops in the unwrapped parameter plane: edge uses chained end to end, poles closed by their sides.
+
+use super::chart::{Chart, Pole};
+use crate::math::Uv;
+use crate::nurbs::{ControlPoint, UvCurve};
+
+/// Where a piece of a loop comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Source {
+    /// An edge of the part.
+    Edge(usize),
+    /// A seam that was added to this face.
+    Seam(usize),
+    /// A pole, or a small step between edges that do not meet.
+    Nothing,
+}
+
+/// A part of a loop.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    pub(super) source: Source,
+    pub(super) reversed: bool,
+    /// Over the parameter of its edge.
+    pub(super) curve: UvCurve,
+}
+
+impl Piece {
+    fn at(&self, end: bool) -> Uv {
+        let n = self.curve.points.len() - 1;
+        self.curve.points[if end { n } else { 0 }].position()
+    }
+
+    pub(super) fn start(&self) -> Uv {
+        self.at(self.reversed)
+    }
+
+    pub(super) fn end(&self) -> Uv {
+        self.at(!self.reversed)
+    }
+
+    fn middle(&self) -> Uv {
+        let [a, b] = self.curve.domain();
+        self.curve.evaluate(0.5 * (a + b))
+    }
+
+    pub(super) fn shifted(mut self, by: Uv) -> Self {
+        if by != Uv::ZERO {
+            for p in &mut self.curve.points {
+                let w = p.z;
+                *p += (by * w).extend(0.0);
+            }
+        }
+        self
+    }
+
+    /// A straight step.
+    pub(super) fn step(from: Uv, to: Uv) -> Self {
+        Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
+    }
+
+    /// Points along the piece in the direction of the loop, without the last.
+    pub(super) fn sample(&self, into: &mut Vec<Uv>) {
+        let start = into.len();
+        let breaks = self.curve.breakpoints();
+        let per_span = if self.curve.degree == 1 { 1 } else { 16usize.div_ceil(breaks.len() - 1).max(3) };
+        for pair in breaks.windows(2) {
+            for k in 0..per_span {
+                into.push(self.curve.evaluate(pair[0] + (pair[1] - pair[0]) * k as f64 / per_span as f64));
+            }
+        }
+        into.push(self.at(true));
+        if self.reversed {
+            into[start..].reverse();
+        }
+        into.pop();
+    }
+}
+
+/// A chain of pieces that closes up to whole periods.
+#[derive(Clone, Debug)]
+pub(super) struct Chain {
+    pub(super) pieces: Vec<Piece>,
+    /// Periods from the start of the first piece to the end of the last.
+    pub(super) winding: [i32; 2],
+    /// Largest step that had to be bridged, mm.
+    pub(super) bridged: f64,
+}
+
+impl Chain {
+    pub(super) fn closed(pieces: Vec<Piece>) -> Self {
+        Self { pieces, winding: [0, 0], bridged: 0.0 }
+    }
+
+    pub(super) fn polygon(&self) -> Vec<Uv> {
+        let mut points = Vec::new();
+        for piece in &self.pieces {
+            piece.sample(&mut points);
+        }
+        points
+    }
+
+    pub(super) fn is_winding(&self) -> bool {
+        self.winding != [0, 0]
+    }
+
+    pub(super) fn shift(&mut self, by: Uv) {
+        self.pieces = std::mem::take(&mut self.pieces).into_iter().map(|p| p.shifted(by)).collect();
+    }
+
+    /// The same loop run the other way.
+    pub(super) fn reverse(&mut self) {
+        self.pieces.reverse();
+        for piece in &mut self.pieces {
+            piece.reversed = !piece.reversed;
+        }
+        self.winding = self.winding.map(|w| -w);
+    }
+
+    /// The displacement that the winding stands for.
+    pub(super) fn displacement(&self, chart: &Chart) -> Uv {
+        let one = |d: usize| chart.period[d].unwrap_or(0.0) * f64::from(self.winding[d]);
+        Uv::new(one(0), one(1))
+    }
+}
+
+/// Twice the signed area of a polygon, halved: positive counter-clockwise.
+pub(super) fn signed_area(polygon: &[Uv]) -> f64 {
+    let n = polygon.len();
+    let Some(&o) = polygon.first() else { return 0.0 };
+    0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
+}
+
+/// Whether a point is inside a polygon, by crossings.
+pub(super) fn contains(polygon: &[Uv], p: Uv) -> bool {
+    let n = polygon.len();
+    let mut inside = false;
+    for i in 0..n {
+        let (a, b) = (polygon[i], polygon[(i + 1) % n]);
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+/// Chains edge uses; each is shifted by whole periods to begin where the one before ends.
+pub(super) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
+    let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
+    let count = uses.len();
+    for (i, next) in uses.into_iter().enumerate() {
+        if i == 0 {
+            chain.pieces.push(next);
+            continue;
+        }
+        let shift = connect(&mut chain, &next, chart, tolerance);
+        chain.pieces.push(next.shifted(shift));
+    }
+    let Some(first) = chain.pieces.first().cloned() else { return chain };
+    let _ = count;
+    // Back to the start: what the shift says is the winding.
+    let shift = connect(&mut chain, &first, chart, tolerance);
+    for d in 0..2 {
+        chain.winding[d] = chart.period[d].map_or(0, |p| (shift[d] / p).round() as i32);
+    }
+    chain
+}
+
+/// Steps from the end of the chain to the start of `next`, adding pole sides; the shift that `next` needs.
+fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64) -> Uv {
+    let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
+    let (from, start) = (last.end(), next.start());
+    let near = chart.near(start, from);
+    let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
+    let pole = chart.poles.iter().find(|pole| {
+        (pole.point - p).length() <= tolerance.max(1e-9) * 4.0
+            && (pole.point - q).length() <= tolerance.max(1e-9) * 4.0
+    });
+    let Some(pole) = pole else {
+        let distance = (p - q).length();
+        if distance > 10.0 * tolerance {
+            chain.bridged = chain.bridged.max(distance);
+            chain.pieces.push(Piece::step(from, near));
+        }
+        return near - start;
+    };
+    let free = 1 - pole.fixed;
+    let same_edge = last.source == next.source;
+    let amount = around_pole(pole, chart, &last, start[free] - from[free], same_edge);
+    let target = from[free] + amount;
+    // Down to the pole, along it, and back: the first and last step are usually empty.
+    let mut corner = from;
+    for (d, value) in [(pole.fixed, pole.at), (free, target), (pole.fixed, start[pole.fixed])] {
+        let mut to = corner;
+        to[d] = value;
+        if (to[d] - corner[d]).abs() > 1e-9 * (1.0 + value.abs()) {
+            chain.pieces.push(Piece::step(corner, to));
+            corner = to;
+        }
+    }
+    let mut shift = Uv::ZERO;
+    shift[free] = target - start[free];
+    shift
+}
+
+/// How far the loop runs along a pole, with the material on its left.
+fn around_pole(pole: &Pole, chart: &Chart, last: &Piece, difference: f64, same_edge: bool) -> f64 {
+    let free = 1 - pole.fixed;
+    let Some(period) = chart.period[free] else { return difference };
+    let low = last.middle()[pole.fixed] > pole.at;
+    // Along v = low run to +u, along v = high to -u; along u = high to +v, along u = low to -v.
+    let forward = if pole.fixed == 1 { low } else { !low };
+    let amount = if forward { difference.rem_euclid(period) } else { (-difference).rem_euclid(period) };
+    let noise = 1e-5 * period;
+    let amount =
+        if amount < noise || amount > period - noise { if same_edge { period } else { 0.0 } } else { amount };
+    if forward { amount } else { -amount }
+}

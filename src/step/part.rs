@@ -1,0 +1,245 @@
+//! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
+
+use super::edges::CutEdge;
+use super::face::{Built, EdgeShape, Task, build, trim_loops};
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::loops::Source;
+use super::part21::File;
+use super::settings::Settings;
+use super::styles::Styles;
+use super::topology::{EdgeKey, FacePlan, Items, face, number_edges};
+use super::units::Units;
+use crate::math::{Aabb, Point};
+use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
+use crate::nurbs::Curve;
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A part with the account of its conversion.
+#[derive(Debug, Default)]
+pub(super) struct Converted {
+    pub(super) part: Part,
+    /// Faces the file has, distinct.
+    pub(super) found: usize,
+    pub(super) refused: Vec<Refusal>,
+    /// Faces that were repaired, and how.
+    pub(super) repaired: Vec<Refusal>,
+}
+
+/// Converts the items of a representation.
+pub(super) fn convert(
+    file: &File<'_>,
+    units: Units,
+    items: &Items,
+    styles: &Styles,
+    settings: &Settings,
+) -> Converted {
+    let geometry = Geometry { file, units };
+    let mut out = Converted { refused: items.refused.clone(), ..Converted::default() };
+    out.found += items.refused.len();
+    // A face that occurs in several shells is converted once.
+    let mut seen = FxHashSet::default();
+    let ids: Vec<u64> =
+        items.shells.iter().flat_map(|s| &s.faces).map(|f| f.0).filter(|f| seen.insert(*f)).collect();
+    out.found += ids.len();
+    let plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, face(file, id))).collect();
+    let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
+    let (keys, index) = number_edges(in_order);
+    let edges: Vec<Outcome<CutEdge>> = keys.par_iter().map(|&key| cut(&geometry, key)).collect();
+    let mut part = Part::default();
+    let mut vertices: FxHashMap<u64, VertexId> = FxHashMap::default();
+    // Positions of edges in the part; edges without length or that failed have none.
+    let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
+    for (key, edge) in keys.iter().zip(&edges) {
+        let Ok(CutEdge { curve: Some(curve), .. }) = edge else {
+            numbers.push(None);
+            continue;
+        };
+        let [a, b] = curve.domain();
+        let ends = vertex_ids(file, *key);
+        let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
+            *vertices.entry(id).or_insert_with(|| {
+                part.vertices.push(geometry.vertex(id).unwrap_or_else(|_| curve.evaluate(t)));
+                VertexId(part.vertices.len() as u32 - 1)
+            })
+        });
+        let entity = if let EdgeKey::Entity(id) = key { Some(*id) } else { None };
+        numbers.push(Some(EdgeId(part.edges.len() as u32)));
+        part.edges.push(Edge { curve: curve.clone(), vertices, entity });
+    }
+    let built: Vec<(u64, Outcome<Built>)> = ids
+        .par_iter()
+        .map(|id| {
+            let plan = match &plans[id] {
+                Ok(plan) => plan,
+                Err(refusal) => return (*id, Err(refusal.clone())),
+            };
+            (*id, build_face(&geometry, *id, plan, &edges, &index, settings))
+        })
+        .collect();
+    let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
+    for (id, outcome) in built {
+        match outcome {
+            Ok(built) => {
+                if !built.repairs.is_empty() {
+                    let entity = file.entity(id).map(|e| e.name()).unwrap_or_default();
+                    out.repaired.push(Refusal { id, entity, reason: built.repairs.join("; ") });
+                }
+                let name = plans[&id].as_ref().map(|p| p.name.clone()).unwrap_or_default();
+                faces.insert(id, place(built, id, name, &mut part, &numbers, styles));
+            }
+            Err(refusal) => out.refused.push(refusal),
+        }
+    }
+    for plan in &items.shells {
+        let own = plan.faces.iter().filter_map(|(id, flip)| {
+            let mut face = faces.get(id)?.clone();
+            face.reversed ^= flip;
+            Some(face)
+        });
+        let shell = Shell {
+            faces: own.collect(),
+            closed: plan.closed,
+            colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
+            name: plan.name.clone(),
+        };
+        if !shell.faces.is_empty() {
+            part.shells.push(shell);
+        }
+    }
+    super::loose::convert(&geometry, items, styles, settings, &mut part, &mut out);
+    out.part = part;
+    out
+}
+
+/// Vertex entities of an edge.
+fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [u64; 2] {
+    match key {
+        EdgeKey::Straight(a, b) => [a, b],
+        EdgeKey::Entity(id) => {
+            let args = file.entity(id).and_then(|e| e.own("EDGE", 1).or_else(|| e.own("EDGE_CURVE", 1)));
+            [0, 1].map(|i| args.and_then(|a| a.id(i)).unwrap_or(0))
+        }
+    }
+}
+
+fn cut(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<CutEdge> {
+    match key {
+        EdgeKey::Entity(id) => geometry.edge(id),
+        EdgeKey::Straight(a, b) => {
+            let (p, q) = (geometry.point(a)?, geometry.point(b)?);
+            let length = (q - p).length();
+            Ok(CutEdge { curve: (length > 1e-9).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
+        }
+    }
+}
+
+fn build_face(
+    geometry: &Geometry<'_, '_>,
+    id: u64,
+    plan: &FacePlan,
+    edges: &[Outcome<CutEdge>],
+    index: &FxHashMap<EdgeKey, usize>,
+    settings: &Settings,
+) -> Outcome<Built> {
+    let entity = geometry.entity(id)?;
+    let mut shapes: FxHashMap<usize, EdgeShape<'_>> = FxHashMap::default();
+    let mut loops = Vec::with_capacity(plan.loops.len());
+    let mut bounds = Aabb::EMPTY;
+    let mut edge_gap = 0f64;
+    for uses in &plan.loops {
+        let mut kept = Vec::with_capacity(uses.len());
+        for (key, reversed) in uses {
+            let k = index[key];
+            let edge = edges[k].as_ref().map_err(|r| Refusal {
+                id,
+                entity: entity.name(),
+                reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
+            })?;
+            edge_gap = edge_gap.max(edge.gap);
+            let Some(curve) = &edge.curve else { continue };
+            let [a, b] = curve.domain();
+            let ends = [curve.evaluate(a), curve.evaluate(b)];
+            bounds = bounds.union(curve.bounds());
+            shapes.entry(k).or_insert(EdgeShape { curve, ends });
+            kept.push((k, *reversed));
+        }
+        if !kept.is_empty() {
+            loops.push(kept);
+        }
+    }
+    let reach = if bounds.is_empty() { (Point::ZERO, 0.0) } else { (bounds.center(), 0.5 * bounds.diagonal()) };
+    let chart = geometry.chart(plan.surface, reach, 0).map_err(|r| Refusal {
+        id,
+        entity: entity.name(),
+        reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
+    })?;
+    let stated = geometry.units.accuracy.unwrap_or(1e-6).clamp(1e-6, 1e-2);
+    let task = Task {
+        chart,
+        same_sense: plan.same_sense,
+        loops,
+        edges: shapes,
+        tolerance: settings.uv_tolerance,
+        accuracy: stated.min(1e-3 * bounds.diagonal().max(1e-3)).max(1e-6).max(2.0 * edge_gap.min(0.05)),
+        budget: settings.face_budget,
+    };
+    build(task).map_err(|reason| {
+        let surface = geometry.file.entity(plan.surface).map(|s| s.name()).unwrap_or_default();
+        Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
+    })
+}
+
+/// Numbers a built face's seams and vertices into the part.
+pub(super) fn place(
+    built: Built,
+    id: u64,
+    name: String,
+    part: &mut Part,
+    numbers: &[Option<EdgeId>],
+    styles: &Styles,
+) -> Face {
+    // Vertices that the face knows; ends of seams are looked up among them.
+    let sources =
+        built.loops.iter().flatten().filter_map(|u| if let Source::Edge(e) = u.source { numbers[e] } else { None });
+    let mut known: Vec<VertexId> = sources.flat_map(|e| part.edges[e.0 as usize].vertices).collect();
+    known.sort();
+    known.dedup();
+    let near = 1e-5 + 4.0 * built.gap.min(0.1);
+    let seams: Vec<EdgeId> = built
+        .seams
+        .into_iter()
+        .map(|seam| {
+            let vertices = seam.ends.map(|p| {
+                let distance = |v: &VertexId| (part.vertices[v.0 as usize] - p).length();
+                let found = known.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                match found.filter(|v| distance(v) <= near) {
+                    Some(v) => v,
+                    None => {
+                        part.vertices.push(p);
+                        let v = VertexId(part.vertices.len() as u32 - 1);
+                        known.push(v);
+                        v
+                    }
+                }
+            });
+            part.edges.push(Edge { curve: seam.curve, vertices, entity: None });
+            EdgeId(part.edges.len() as u32 - 1)
+        })
+        .collect();
+    let loops = trim_loops(built.loops, |source| match source {
+        Source::Edge(e) => numbers[e],
+        Source::Seam(k) => Some(seams[k]),
+        Source::Nothing => None,
+    });
+    Face {
+        name,
+        entity: Some(id),
+        colour: styles.colour(id),
+        surface: built.surface,
+        analytic: built.analytic,
+        reversed: built.reversed,
+        loops,
+        gap: built.gap,
+    }
+}

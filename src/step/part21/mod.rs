@@ -1,0 +1,323 @@
+//! The Part 21 clear text: statements, records and values, without knowing any schema.
+//!
+//! One pass over the bytes fills an arena of 16-byte [`Value`]s; names and texts stay spans of the source. Source:
+//! ISO 10303-21:2016. Guarantee: a statement that cannot be read costs that statement alone and is listed with
+//! its line; nesting, memory and time are bounded by the length of the input. Known weakness: one thread, and
+//! sources beyond 4 GiB are refused, because spans are 32 bits.
+
+mod number;
+mod parser;
+mod text;
+
+pub(super) use parser::parse;
+
+use rustc_hash::FxHashMap;
+
+/// A range of the source or of an arena.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Span {
+    start: u32,
+    len: u32,
+}
+
+impl Span {
+    fn range(self) -> std::ops::Range<usize> {
+        self.start as usize..self.start as usize + self.len as usize
+    }
+}
+
+/// One parameter of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Value {
+    /// `#12`.
+    Ref(u64),
+    /// An integer that fits.
+    Integer(i64),
+    /// A real, or an integer that does not fit 64 bits.
+    Real(f64),
+    /// `'…'`, still encoded.
+    Text(Span),
+    /// `.NAME.`.
+    Enum(Span),
+    /// `"…"`.
+    Binary,
+    /// `( … )`, a range of the arena.
+    List(Span),
+    /// `NAME( … )`, an index into the table of typed values.
+    Typed(u32),
+    /// `$`.
+    Null,
+    /// `*`.
+    Derived,
+}
+
+/// A name with its parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    name: Span,
+    values: Span,
+}
+
+/// The records of one instance: several for a complex instance.
+#[derive(Clone, Copy, Debug)]
+struct Instance {
+    id: u64,
+    first: u32,
+    count: u32,
+}
+
+/// A statement that was not understood.
+#[derive(Clone, Debug)]
+pub(super) struct Fault {
+    /// Line in the file, from 1.
+    pub(super) line: usize,
+    /// Instance, when it had come that far.
+    pub(super) id: Option<u64>,
+    /// What was wrong.
+    pub(super) what: &'static str,
+}
+
+/// Finds instances by id.
+#[derive(Debug)]
+enum Index {
+    /// `table[id]` is the position plus one.
+    Dense(Vec<u32>),
+    Sparse(FxHashMap<u64, u32>),
+}
+
+/// A parsed file.
+#[derive(Debug)]
+pub(super) struct File<'a> {
+    source: &'a [u8],
+    values: Vec<Value>,
+    typed: Vec<Record>,
+    records: Vec<Record>,
+    instances: Vec<Instance>,
+    header: Vec<Record>,
+    index: Index,
+    /// The first statements that were skipped.
+    pub(super) faults: Vec<Fault>,
+    /// How many were skipped.
+    pub(super) fault_count: usize,
+}
+
+impl<'a> File<'a> {
+    fn bytes(&self, span: Span) -> &'a [u8] {
+        &self.source[span.range()]
+    }
+
+    /// The instance with an id.
+    pub(super) fn entity(&self, id: u64) -> Option<Entity<'_, 'a>> {
+        let position = match &self.index {
+            Index::Dense(table) => table.get(usize::try_from(id).ok()?).copied()?.checked_sub(1)?,
+            Index::Sparse(map) => *map.get(&id)?,
+        };
+        Some(self.at(position as usize))
+    }
+
+    fn at(&self, position: usize) -> Entity<'_, 'a> {
+        let i = self.instances[position];
+        Entity { file: self, id: i.id, records: &self.records[i.first as usize..(i.first + i.count) as usize] }
+    }
+
+    /// All instances in the order of the file.
+    pub(super) fn entities(&self) -> impl Iterator<Item = Entity<'_, 'a>> {
+        (0..self.instances.len()).map(|i| self.at(i))
+    }
+
+    /// Parameters of a header record such as `FILE_SCHEMA`.
+    pub(super) fn header(&self, name: &str) -> Option<Args<'_, 'a>> {
+        let record = self.header.iter().find(|r| self.bytes(r.name) == name.as_bytes())?;
+        Some(self.args(record.values))
+    }
+
+    fn args(&self, span: Span) -> Args<'_, 'a> {
+        Args { file: self, values: &self.values[span.range()] }
+    }
+}
+
+/// An instance.
+#[derive(Clone, Copy)]
+pub(super) struct Entity<'f, 'a> {
+    file: &'f File<'a>,
+    /// The `#id`.
+    pub(super) id: u64,
+    records: &'f [Record],
+}
+
+impl<'f, 'a> Entity<'f, 'a> {
+    /// The name, or the names of a complex instance joined by `+`.
+    pub(super) fn name(&self) -> String {
+        let names = self.records.iter().map(|r| String::from_utf8_lossy(self.file.bytes(r.name)));
+        names.collect::<Vec<_>>().join("+")
+    }
+
+    /// The name of a simple instance; empty for a complex one.
+    pub(super) fn keyword(&self) -> &'a str {
+        match self.records {
+            [r] => std::str::from_utf8(self.file.bytes(r.name)).unwrap_or(""),
+            _ => "",
+        }
+    }
+
+    /// Names of all records.
+    pub(super) fn keywords(&self) -> impl Iterator<Item = &'a str> + use<'f, 'a> {
+        let file = self.file;
+        self.records.iter().map(move |r| std::str::from_utf8(file.bytes(r.name)).unwrap_or(""))
+    }
+
+    /// Whether one of the records has this name.
+    pub(super) fn is(&self, name: &str) -> bool {
+        self.records.iter().any(|r| self.file.bytes(r.name) == name.as_bytes())
+    }
+
+    /// Whether one of the records has one of these names.
+    pub(super) fn is_any(&self, names: &[&str]) -> bool {
+        self.keywords().any(|k| names.contains(&k))
+    }
+
+    /// The parameters that the record `name` adds: all of them in a complex instance, those after the `inherited`
+    /// first ones in a simple instance.
+    pub(super) fn own(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
+        let record = self.records.iter().find(|r| self.file.bytes(r.name) == name.as_bytes())?;
+        let args = self.file.args(record.values);
+        let skip = if self.records.len() == 1 { inherited } else { 0 };
+        Some(Args { values: args.values.get(skip..).unwrap_or(&[]), ..args })
+    }
+
+    /// All parameters of a simple instance, or of the first record of a complex one.
+    pub(super) fn args(&self) -> Args<'f, 'a> {
+        match self.records.first() {
+            Some(r) => self.file.args(r.values),
+            None => Args { file: self.file, values: &[] },
+        }
+    }
+
+    /// Parameters of every record.
+    pub(super) fn all_args(&self) -> impl Iterator<Item = Args<'f, 'a>> + use<'f, 'a> {
+        let file = self.file;
+        self.records.iter().map(move |r| file.args(r.values))
+    }
+}
+
+/// A list of parameters.
+#[derive(Clone, Copy)]
+pub(super) struct Args<'f, 'a> {
+    file: &'f File<'a>,
+    values: &'f [Value],
+}
+
+impl<'f, 'a> Args<'f, 'a> {
+    /// Number of parameters.
+    pub(super) fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// The parameter at a position.
+    pub(super) fn value(&self, i: usize) -> Option<Value> {
+        self.values.get(i).copied()
+    }
+
+    /// A number, whether written as an integer or a real, also inside a typed parameter.
+    pub(super) fn real(&self, i: usize) -> Option<f64> {
+        match self.value(i)? {
+            Value::Real(x) => Some(x),
+            Value::Integer(x) => Some(x as f64),
+            Value::Typed(_) => self.typed(i)?.1.real(0),
+            _ => None,
+        }
+    }
+
+    /// A non-negative integer, also when written as a real.
+    pub(super) fn count(&self, i: usize) -> Option<usize> {
+        match self.value(i)? {
+            Value::Integer(x) => usize::try_from(x).ok(),
+            Value::Real(x) if x >= 0.0 && x.fract() == 0.0 && x < 1e15 => Some(x as usize),
+            _ => None,
+        }
+    }
+
+    /// The id that is referred to.
+    pub(super) fn id(&self, i: usize) -> Option<u64> {
+        match self.value(i)? {
+            Value::Ref(id) => Some(id),
+            _ => None,
+        }
+    }
+
+    /// The instance that is referred to.
+    pub(super) fn entity(&self, i: usize) -> Option<Entity<'f, 'a>> {
+        self.file.entity(self.id(i)?)
+    }
+
+    /// A decoded text.
+    pub(super) fn text(&self, i: usize) -> Option<String> {
+        match self.value(i)? {
+            Value::Text(span) => Some(text::decode(self.file.bytes(span))),
+            Value::Typed(_) => self.typed(i)?.1.text(0),
+            _ => None,
+        }
+    }
+
+    /// An enumeration value without its dots.
+    pub(super) fn word(&self, i: usize) -> Option<&'a str> {
+        match self.value(i)? {
+            Value::Enum(span) => std::str::from_utf8(self.file.bytes(span)).ok(),
+            _ => None,
+        }
+    }
+
+    /// `.T.` or `.F.`.
+    pub(super) fn flag(&self, i: usize) -> Option<bool> {
+        match self.word(i)? {
+            "T" | "TRUE" => Some(true),
+            "F" | "FALSE" => Some(false),
+            _ => None,
+        }
+    }
+
+    /// A list; empty when the parameter is no list.
+    pub(super) fn list(&self, i: usize) -> Args<'f, 'a> {
+        match self.value(i) {
+            Some(Value::List(span)) => self.file.args(span),
+            _ => Args { file: self.file, values: &[] },
+        }
+    }
+
+    /// A typed parameter: its name and what it holds.
+    pub(super) fn typed(&self, i: usize) -> Option<(&'a str, Args<'f, 'a>)> {
+        match self.value(i)? {
+            Value::Typed(t) => {
+                let record = self.file.typed[t as usize];
+                Some((std::str::from_utf8(self.file.bytes(record.name)).ok()?, self.file.args(record.values)))
+            }
+            _ => None,
+        }
+    }
+
+    /// All numbers of the list; `None` when one is no number.
+    pub(super) fn reals(&self) -> Option<Vec<f64>> {
+        (0..self.len()).map(|i| self.real(i)).collect()
+    }
+
+    /// All ids of the list; what is no reference is left out.
+    pub(super) fn ids(&self) -> Vec<u64> {
+        (0..self.len()).filter_map(|i| self.id(i)).collect()
+    }
+
+    /// Every id in the list and in lists inside it.
+    pub(super) fn deep_ids(&self, found: &mut Vec<u64>) {
+        for (i, value) in self.values.iter().enumerate() {
+            match value {
+                Value::Ref(id) => found.push(*id),
+                Value::List(_) => self.list(i).deep_ids(found),
+                Value::Typed(_) => {
+                    if let Some((_, inner)) = self.typed(i) {
+                        inner.deep_ids(found)
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,355 @@
+use super::{Fault, File, Index, Instance, Record, Span, Value, number::number};
+use crate::step::{Error, ErrorKind};
+use rustc_hash::FxHashMap;
+
+/// Deepest nesting of lists; schemas need 3, real files have shown 4.
+const MAX_DEPTH: usize = 32;
+/// Faults that are kept with their lines; the rest is counted.
+const MAX_FAULTS: usize = 100;
+
+/// Parses a whole file. Fails only when the bytes are no Part 21 file at all.
+pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
+    if u32::try_from(source.len()).is_err() {
+        return Err(Error::new(ErrorKind::TooLarge { file: name.into() }));
+    }
+    let mut p = Parser {
+        source,
+        at: if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 },
+        values: Vec::with_capacity(source.len() / 12),
+        typed: Vec::new(),
+        records: Vec::with_capacity(source.len() / 64),
+        instances: Vec::with_capacity(source.len() / 64),
+        header: Vec::new(),
+        stack: Vec::new(),
+        faults: Vec::new(),
+        fault_count: 0,
+        lines: (0, 1),
+        rewound: 0,
+    };
+    let marked = p.statements();
+    if !marked && p.instances.is_empty() {
+        return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
+    }
+    let index = index(&p.instances);
+    Ok(File {
+        source,
+        values: p.values,
+        typed: p.typed,
+        records: p.records,
+        instances: p.instances,
+        header: p.header,
+        index,
+        faults: p.faults,
+        fault_count: p.fault_count,
+    })
+}
+
+fn index(instances: &[Instance]) -> Index {
+    let largest = instances.iter().map(|i| i.id).max().unwrap_or(0);
+    if largest <= 4 * instances.len() as u64 + 1024 {
+        let mut table = vec![0; largest as usize + 1];
+        for (k, i) in instances.iter().enumerate() {
+            table[i.id as usize] = k as u32 + 1;
+        }
+        Index::Dense(table)
+    } else {
+        let mut map = FxHashMap::default();
+        map.extend(instances.iter().enumerate().map(|(k, i)| (i.id, k as u32)));
+        Index::Sparse(map)
+    }
+}
+
+struct Parser<'a> {
+    source: &'a [u8],
+    at: usize,
+    values: Vec<Value>,
+    typed: Vec<Record>,
+    records: Vec<Record>,
+    instances: Vec<Instance>,
+    header: Vec<Record>,
+    /// Values of the lists that are still open.
+    stack: Vec<Value>,
+    faults: Vec<Fault>,
+    fault_count: usize,
+    /// A position and its line, so that lines are counted once.
+    lines: (usize, usize),
+    /// Bytes read again because of faults; bounded, so that time stays linear in the input.
+    rewound: usize,
+}
+
+type Parsed<T> = Result<T, &'static str>;
+
+impl Parser<'_> {
+    /// Reads all statements; whether the file said that it is Part 21.
+    fn statements(&mut self) -> bool {
+        let mut marked = false;
+        loop {
+            let c = self.peek();
+            let start = self.at;
+            match c {
+                0 if self.at >= self.source.len() => return marked,
+                b'#' => {
+                    let (values, records, typed) = (self.values.len(), self.records.len(), self.typed.len());
+                    let mut id = None;
+                    if let Err(what) = self.instance(&mut id) {
+                        self.values.truncate(values);
+                        self.records.truncate(records);
+                        self.typed.truncate(typed);
+                        self.fault(start, id, what);
+                    }
+                }
+                c if c.is_ascii_alphabetic() => {
+                    let keyword = self.identifier();
+                    marked |= &self.source[keyword.range()] == b"ISO-10303-21";
+                    if !marked && self.instances.is_empty() && self.at - start > 64 {
+                        return false;
+                    }
+                    let outcome = if self.peek() == b'(' {
+                        self.list(0).map(|values| self.header.push(Record { name: keyword, values }))
+                    } else {
+                        Ok(())
+                    };
+                    match outcome.and_then(|()| self.end()) {
+                        Ok(()) => {}
+                        Err(what) => self.fault(start, None, what),
+                    }
+                }
+                b';' => self.at += 1,
+                // Section delimiters of edition 3, stray bytes.
+                _ => {
+                    if !marked && self.instances.is_empty() {
+                        return false;
+                    }
+                    self.fault(start, None, "a statement starts with neither '#' nor a letter")
+                }
+            }
+        }
+    }
+
+    /// Notes a fault of the statement that began at `start` and goes on behind it.
+    #[cold]
+    fn fault(&mut self, start: usize, id: Option<u64>, what: &'static str) {
+        self.stack.clear();
+        self.fault_count += 1;
+        if self.faults.len() < MAX_FAULTS {
+            let (from, line) = self.lines;
+            let newlines = self.source[from..start].iter().filter(|&&b| b == b'\n').count();
+            self.lines = (start, line + newlines);
+            self.faults.push(Fault { line: line + newlines, id, what });
+        }
+        // Behind the next ';' that ends a line or a statement; an open text must not swallow the statements after it.
+        let mut i = start;
+        while let Some(offset) = self.source[i..].iter().position(|&b| b == b';') {
+            i += offset + 1;
+            let next = self.source[i..].iter().position(|b| *b > b' ').map(|k| self.source[i + k]);
+            if matches!(next, None | Some(b'#' | b'E' | b'/' | b'D')) {
+                break;
+            }
+            if i >= self.at {
+                break;
+            }
+        }
+        let next = if i == start { self.source.len() } else { i };
+        self.rewound += self.at.saturating_sub(next);
+        // More than 8 passes over the file: it is damaged on purpose.
+        self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };
+    }
+
+    /// Whitespace, comments and print directives.
+    fn skip(&mut self) {
+        loop {
+            while self.at < self.source.len() && self.source[self.at] <= b' ' {
+                self.at += 1;
+            }
+            let rest = &self.source[self.at..];
+            if rest.starts_with(b"/*") {
+                match rest[2..].windows(2).position(|w| w == b"*/") {
+                    Some(p) => self.at += p + 4,
+                    None => self.at = self.source.len(),
+                }
+            } else if rest.starts_with(b"\\N\\") || rest.starts_with(b"\\F\\") {
+                self.at += 3;
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// The next byte that means something, 0 at the end.
+    fn peek(&mut self) -> u8 {
+        if let Some(&c) = self.source.get(self.at)
+            && c > b' '
+            && c != b'/'
+            && c != b'\\'
+        {
+            return c;
+        }
+        self.skip();
+        self.source.get(self.at).copied().unwrap_or(0)
+    }
+
+    fn end(&mut self) -> Parsed<()> {
+        if self.peek() != b';' {
+            return Err("';' is missing at the end of the statement");
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    fn identifier(&mut self) -> Span {
+        let start = self.at;
+        while let Some(c) = self.source.get(self.at) {
+            if !(c.is_ascii_alphanumeric() || matches!(c, b'_' | b'-' | b'!')) {
+                break;
+            }
+            self.at += 1;
+        }
+        Span { start: start as u32, len: (self.at - start) as u32 }
+    }
+
+    fn unsigned(&mut self) -> Parsed<u64> {
+        let start = self.at;
+        let mut x = 0u64;
+        while let Some(c) = self.source.get(self.at).filter(|c| c.is_ascii_digit()) {
+            x = x.saturating_mul(10).saturating_add(u64::from(c - b'0'));
+            self.at += 1;
+        }
+        if self.at == start { Err("digits are missing behind '#'") } else { Ok(x) }
+    }
+
+    fn instance(&mut self, id_out: &mut Option<u64>) -> Parsed<()> {
+        self.at += 1;
+        let id = self.unsigned()?;
+        *id_out = Some(id);
+        if self.peek() != b'=' {
+            return Err("'=' is missing behind the instance's number");
+        }
+        self.at += 1;
+        let first = self.records.len() as u32;
+        if self.peek() == b'(' {
+            self.at += 1;
+            while self.peek() != b')' {
+                self.record()?;
+            }
+            self.at += 1;
+        } else {
+            self.record()?;
+        }
+        let count = self.records.len() as u32 - first;
+        if count == 0 {
+            return Err("a complex instance without records");
+        }
+        let ended = self.end();
+        self.instances.push(Instance { id, first, count });
+        if ended.is_err() {
+            // The record itself is whole: real files lose a ';' now and then. Go on where the next statement starts.
+            if self.peek() == b'#' || self.at >= self.source.len() {
+                return Ok(());
+            }
+            self.instances.pop();
+        }
+        ended
+    }
+
+    fn record(&mut self) -> Parsed<()> {
+        let c = self.peek();
+        if !(c.is_ascii_alphabetic() || c == b'!' || c == b'_') {
+            return Err("a record's name is missing");
+        }
+        let name = self.identifier();
+        if self.peek() != b'(' {
+            return Err("'(' is missing behind a record's name");
+        }
+        let values = self.list(0)?;
+        self.records.push(Record { name, values });
+        Ok(())
+    }
+
+    /// A list from its '(' to behind its ')'.
+    fn list(&mut self, depth: usize) -> Parsed<Span> {
+        if depth > MAX_DEPTH {
+            return Err("lists are nested too deeply");
+        }
+        self.at += 1;
+        let base = self.stack.len();
+        loop {
+            match self.peek() {
+                b')' => break,
+                b',' => self.at += 1,
+                0 => return Err("the file ends inside a list"),
+                c => {
+                    let value = self.value(c, depth)?;
+                    self.stack.push(value);
+                }
+            }
+        }
+        self.at += 1;
+        let span = Span { start: self.values.len() as u32, len: (self.stack.len() - base) as u32 };
+        self.values.extend_from_slice(&self.stack[base..]);
+        self.stack.truncate(base);
+        Ok(span)
+    }
+
+    fn value(&mut self, c: u8, depth: usize) -> Parsed<Value> {
+        Ok(match c {
+            b'#' => {
+                self.at += 1;
+                Value::Ref(self.unsigned()?)
+            }
+            b'\'' => Value::Text(self.text()?),
+            b'(' => Value::List(self.list(depth + 1)?),
+            b'$' => {
+                self.at += 1;
+                Value::Null
+            }
+            b'*' => {
+                self.at += 1;
+                Value::Derived
+            }
+            b'.' if !self.source.get(self.at + 1).is_some_and(u8::is_ascii_digit) => {
+                self.at += 1;
+                let name = self.identifier();
+                if self.source.get(self.at) != Some(&b'.') {
+                    return Err("'.' is missing behind an enumeration value");
+                }
+                self.at += 1;
+                Value::Enum(name)
+            }
+            b'"' => {
+                let rest = &self.source[self.at + 1..];
+                self.at += 2 + rest.iter().position(|&b| b == b'"').ok_or("'\"' is missing behind a binary")?;
+                Value::Binary
+            }
+            b'0'..=b'9' | b'-' | b'+' | b'.' => {
+                let (value, next) = number(self.source, self.at).ok_or("a number cannot be read")?;
+                self.at = next;
+                value
+            }
+            c if c.is_ascii_alphabetic() || c == b'!' => {
+                let name = self.identifier();
+                if self.peek() != b'(' {
+                    return Err("'(' is missing behind the name of a typed value");
+                }
+                let values = self.list(depth + 1)?;
+                self.typed.push(Record { name, values });
+                Value::Typed(self.typed.len() as u32 - 1)
+            }
+            _ => return Err("a value starts with an unexpected byte"),
+        })
+    }
+
+    fn text(&mut self) -> Parsed<Span> {
+        self.at += 1;
+        let start = self.at;
+        loop {
+            let rest = self.source.get(self.at..).unwrap_or(&[]);
+            let end = rest.iter().position(|&b| b == b'\'').ok_or("an apostrophe is missing behind a text")?;
+            self.at += end + 1;
+            if self.source.get(self.at) != Some(&b'\'') {
+                break;
+            }
+            self.at += 1;
+        }
+        Ok(Span { start: start as u32, len: (self.at - 1 - start) as u32 })
+    }
+}

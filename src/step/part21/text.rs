@@ -1,0 +1,90 @@
+//! Texts: `''`, `\S\`, `\P?\`, `\X\`, `\X2\…\X0\`, `\X4\…\X0\`, and raw bytes, which real files hold as UTF-8 or Latin-1.
+
+/// Decodes what stands between the apostrophes; unknown escapes stay as they are.
+pub(super) fn decode(raw: &[u8]) -> String {
+    let mut out = String::with_capacity(raw.len());
+    let mut i = 0;
+    // Raw bytes are UTF-8 if they are valid as such, otherwise Latin-1.
+    let utf8 = std::str::from_utf8(raw).is_ok();
+    let mut plain: Vec<u8> = Vec::new();
+    let flush = |plain: &mut Vec<u8>, out: &mut String| {
+        if utf8 {
+            out.push_str(&String::from_utf8_lossy(plain));
+        } else {
+            out.extend(plain.iter().map(|&b| char::from(b)));
+        }
+        plain.clear();
+    };
+    while i < raw.len() {
+        let rest = &raw[i..];
+        if rest.starts_with(b"''") {
+            plain.push(b'\'');
+            i += 2;
+        } else if rest.starts_with(b"\\\\") {
+            plain.push(b'\\');
+            i += 2;
+        } else if let Some((text, used)) = escape(rest) {
+            flush(&mut plain, &mut out);
+            out.push_str(&text);
+            i += used;
+        } else {
+            if raw[i] >= b' ' {
+                plain.push(raw[i]);
+            }
+            i += 1;
+        }
+    }
+    flush(&mut plain, &mut out);
+    out
+}
+
+/// A control directive at the start of `rest`: what it stands for, and its length.
+fn escape(rest: &[u8]) -> Option<(String, usize)> {
+    if rest.starts_with(b"\\S\\") {
+        return rest.get(3).map(|&b| (char::from(b | 0x80).to_string(), 4));
+    }
+    if rest.starts_with(b"\\P") && rest.get(3) == Some(&b'\\') {
+        return Some((String::new(), 4));
+    }
+    if rest.starts_with(b"\\N\\") || rest.starts_with(b"\\F\\") {
+        return Some((String::new(), 3));
+    }
+    if rest.starts_with(b"\\X\\") {
+        return Some((char::from(hex(rest.get(3..5)?)? as u8).to_string(), 5));
+    }
+    let wide = rest.starts_with(b"\\X4\\");
+    if !wide && !rest.starts_with(b"\\X2\\") {
+        return None;
+    }
+    let end = rest.windows(4).position(|w| w == b"\\X0\\")?;
+    let codes = &rest[4..end];
+    let text = if wide {
+        codes.chunks(8).map(|c| hex(c).and_then(char::from_u32).unwrap_or('\u{fffd}')).collect()
+    } else {
+        let units: Vec<u16> = codes.chunks(4).map(|c| hex(c).unwrap_or(0xfffd) as u16).collect();
+        String::from_utf16_lossy(&units)
+    };
+    Some((text, end + 4))
+}
+
+fn hex(digits: &[u8]) -> Option<u32> {
+    u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decode;
+
+    #[test]
+    fn all_encodings() {
+        assert_eq!(decode(b"it''s"), "it's");
+        assert_eq!(decode(b"\\X\\E9t\\X\\E9"), "été");
+        assert_eq!(decode(b"\\S\\d"), "ä");
+        assert_eq!(decode(b"\\X2\\041B04380441\\X0\\t"), "Лисt");
+        assert_eq!(decode(b"\\X4\\0001F600\\X0\\"), "😀");
+        assert_eq!(decode(b"\xe9t\xe9"), "été");
+        assert_eq!(decode("été".as_bytes()), "été");
+        assert_eq!(decode(b"a\\\\b"), "a\\b");
+        assert_eq!(decode(b"\\X2\\broken"), "\\X2\\broken");
+    }
+}

@@ -1,0 +1,111 @@
+use serde::Serialize;
+
+/// What a file holds and what could not be read: the object of `info --json`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ImportReport {
+    /// Name of the file.
+    pub file: String,
+    /// Its length.
+    pub bytes: u64,
+    /// FILE_SCHEMA.
+    pub schema: Vec<String>,
+    /// Units of its contexts, by name.
+    pub units: UnitNames,
+    /// Distinct shapes.
+    pub parts: usize,
+    /// Placed shapes.
+    pub instances: usize,
+    /// Shells of distinct shapes.
+    pub shells: usize,
+    /// Distinct faces.
+    pub faces: FaceCounts,
+    /// Faces counted once for every instance.
+    pub faces_placed: PlacedCounts,
+    /// Converted distinct faces by the kind of surface.
+    pub by_surface: SurfaceCounts,
+    /// Lower and upper corner of the trimmed faces, mm; `None` without any.
+    pub bbox_mm: Option<[[f64; 3]; 2]>,
+    /// Faces and shapes that were refused.
+    pub refusals: Vec<Note>,
+    /// Names of parts and instances.
+    pub names: Vec<String>,
+    /// Faces that were repaired, and how.
+    pub repairs: Vec<Note>,
+    /// Largest distance between an edge and a face it bounds, mm.
+    pub gap_max_mm: f64,
+    /// Statements and placements that could not be read, with their lines or instances.
+    pub problems: Vec<String>,
+    /// Time taken.
+    pub seconds: Seconds,
+    /// Largest resident size of the process so far, bytes; 0 where the system does not tell.
+    pub peak_bytes: u64,
+}
+
+/// Names of units.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct UnitNames {
+    /// Of lengths.
+    pub length: Vec<String>,
+    /// Of plane angles.
+    pub angle: Vec<String>,
+}
+
+/// The account of distinct faces: `found = converted + refused`; repaired ones are among the converted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FaceCounts {
+    /// In the file.
+    pub found: usize,
+    /// In the model.
+    pub converted: usize,
+    /// Of those, changed on the way.
+    pub repaired: usize,
+    /// Not in the model.
+    pub refused: usize,
+}
+
+/// The account of placed faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PlacedCounts {
+    /// In the file.
+    pub found: usize,
+    /// In the model.
+    pub converted: usize,
+}
+
+/// Distinct converted faces by the kind of surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[allow(missing_docs)]
+pub struct SurfaceCounts {
+    pub plane: usize,
+    pub cylinder: usize,
+    pub cone: usize,
+    pub sphere: usize,
+    pub torus: usize,
+    pub revolution: usize,
+    pub extrusion: usize,
+    pub offset: usize,
+    pub bspline: usize,
+    pub rational: usize,
+    pub tessellated: usize,
+    pub other: usize,
+}
+
+/// A remark about an entity.
+#[derive(Clone, Debug, Serialize)]
+pub struct Note {
+    /// Its `#id`.
+    pub id: u64,
+    /// Its name in the file.
+    pub entity: String,
+    /// What happened, and why.
+    pub reason: String,
+}
+
+/// Time taken, s.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// From bytes to records.
+    pub parse: f64,
+    /// From records to the model.
+    pub convert: f64,
+}

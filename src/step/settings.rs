@@ -1,0 +1,15 @@
+/// How a file is read.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Allowed distance between a uv curve on its surface and the foot points of its edge, mm. Halving it adds about
+    /// a fifth to the pieces of each curve.
+    pub uv_tolerance: f64,
+    /// Surface evaluations that one face may take before it is refused; 1e6 are about a second.
+    pub face_budget: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { uv_tolerance: 1e-6, face_budget: 3_000_000 }
+    }
+}

@@ -1,0 +1,82 @@
+//! Colours: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB.
+
+use super::part21::{Entity, File};
+use crate::model::Colour;
+use rustc_hash::FxHashMap;
+
+/// Most entities looked at for one style.
+const MAX_STEPS: usize = 64;
+
+/// Colours by the item that is styled.
+#[derive(Debug, Default)]
+pub(super) struct Styles(FxHashMap<u64, Colour>);
+
+impl Styles {
+    /// Collects all styles of a file.
+    pub(super) fn read(file: &File<'_>) -> Self {
+        let mut plain = FxHashMap::default();
+        let mut over = FxHashMap::default();
+        for e in file.entities() {
+            let (args, overriding) = match e.own("OVER_RIDING_STYLED_ITEM", 1) {
+                Some(a) if !e.keyword().is_empty() => (Some(a), true),
+                found => (e.own("STYLED_ITEM", 1), found.is_some()),
+            };
+            let Some(args) = args else { continue };
+            let Some(item) = args.id(1) else { continue };
+            let colour = args.list(0).ids().into_iter().find_map(|s| colour(file, s));
+            if let Some(colour) = colour {
+                let table = if overriding { &mut over } else { &mut plain };
+                table.insert(item, colour);
+            }
+        }
+        plain.extend(over);
+        Self(plain)
+    }
+
+    /// The colour given to an item itself.
+    pub(super) fn colour(&self, item: u64) -> Option<Colour> {
+        self.0.get(&item).copied()
+    }
+}
+
+/// The first surface colour that a style leads to.
+fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
+    let mut queue = vec![style];
+    let mut at = 0;
+    while at < queue.len() && at < MAX_STEPS {
+        let e = file.entity(queue[at])?;
+        at += 1;
+        if let Some(found) = rgb(e) {
+            return Some(found);
+        }
+        // Curve and point styles colour lines, not surfaces.
+        if e.is_any(&["CURVE_STYLE", "POINT_STYLE", "TEXT_STYLE"]) {
+            continue;
+        }
+        for args in e.all_args() {
+            let mut ids = Vec::new();
+            args.deep_ids(&mut ids);
+            ids.retain(|id| !queue.contains(id));
+            queue.extend(ids);
+        }
+    }
+    None
+}
+
+fn rgb(e: Entity<'_, '_>) -> Option<Colour> {
+    if let Some(a) = e.own("COLOUR_RGB", 1) {
+        return Some(Colour([a.real(0)?, a.real(1)?, a.real(2)?]));
+    }
+    let a = e.own("DRAUGHTING_PRE_DEFINED_COLOUR", 0)?;
+    Some(Colour(match a.text(0)?.to_ascii_lowercase().as_str() {
+        "red" => [1.0, 0.0, 0.0],
+        "green" => [0.0, 1.0, 0.0],
+        "blue" => [0.0, 0.0, 1.0],
+        "yellow" => [1.0, 1.0, 0.0],
+        "magenta" => [1.0, 0.0, 1.0],
+        "cyan" => [0.0, 1.0, 1.0],
+        "black" => [0.0; 3],
+        "white" => [1.0; 3],
+        _ => return None,
+    }))
+}

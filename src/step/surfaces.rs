@@ -1,0 +1,293 @@
+//! Surfaces of the file as charts.
+
+use super::chart::{Chart, Kind, SplineChart};
+use super::curves::{Shape, explicit_knots, knot_form};
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part21::{Args, Entity};
+use crate::math::{Frame, Point, Vector};
+use crate::model::Analytic;
+use crate::nurbs::{Curve, sanitise};
+use std::f64::consts::PI;
+
+/// Deepest chain of surfaces that refer to surfaces.
+pub(super) const MAX_DEPTH: usize = 8;
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// A surface. `reach` is a point and a radius that contain the face, for curves without ends.
+    pub(super) fn chart(&self, id: u64, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+        let e = self.entity(id)?;
+        if depth > MAX_DEPTH {
+            return Err(Refusal::of(e, "surfaces refer to each other too deeply"));
+        }
+        let position = |name: &str| -> Option<Outcome<(Frame, Args<'f, 'a>)>> {
+            let args = e.own(name, 1)?;
+            // In complex form the position belongs to ELEMENTARY_SURFACE.
+            let separate = e.own("ELEMENTARY_SURFACE", 1).filter(|_| e.keyword().is_empty());
+            let at = separate.map_or_else(|| args.id(0), |p| p.id(0));
+            Some(self.follow(e, at, "position").and_then(|p| self.placement(p.id)).map(|f| (f, args)))
+        };
+        let skip = usize::from(!e.keyword().is_empty());
+        let length = |x: Option<f64>| x.map(|x| x * self.units.length).filter(|x| x.is_finite());
+        let positive = |x: Option<f64>, what: &str| {
+            length(x).filter(|x| *x > 0.0).ok_or_else(|| Refusal::of(e, format!("{what} is not positive")))
+        };
+        if let Some(found) = position("PLANE") {
+            let (frame, _) = found?;
+            return Ok(Chart::new(Kind::Plane { frame }, Analytic::Plane { frame }));
+        }
+        if let Some(found) = position("CYLINDRICAL_SURFACE") {
+            let (frame, a) = found?;
+            let radius = positive(a.real(skip), "radius")?;
+            return Ok(Chart::new(
+                Kind::Cone { frame, radius, half_angle: 0.0 },
+                Analytic::Cylinder { frame, radius },
+            ));
+        }
+        if let Some(found) = position("CONICAL_SURFACE") {
+            let (frame, a) = found?;
+            let radius = length(a.real(skip)).filter(|r| *r >= 0.0);
+            let radius = radius.ok_or_else(|| Refusal::of(e, "radius is negative"))?;
+            let half_angle = a.real(skip + 1).map_or(f64::NAN, |x| x * self.units.angle);
+            if !(half_angle.abs() < 0.5 * PI - 1e-9) {
+                return Err(Refusal::of(e, "half angle is not below 90°"));
+            }
+            if half_angle.abs() < 1e-12 && radius > 0.0 {
+                return Ok(Chart::new(
+                    Kind::Cone { frame, radius, half_angle: 0.0 },
+                    Analytic::Cylinder { frame, radius },
+                ));
+            }
+            return Ok(Chart::new(
+                Kind::Cone { frame, radius, half_angle },
+                Analytic::Cone { frame, radius, half_angle },
+            ));
+        }
+        if let Some(found) = position("SPHERICAL_SURFACE") {
+            let (frame, a) = found?;
+            let radius = positive(a.real(skip), "radius")?;
+            return Ok(Chart::new(
+                Kind::Torus { frame, major: 0.0, minor: radius },
+                Analytic::Sphere { frame, radius },
+            ));
+        }
+        for name in ["TOROIDAL_SURFACE", "DEGENERATE_TOROIDAL_SURFACE"] {
+            if let Some(found) = position(name) {
+                let (frame, a) = found?;
+                let (major, minor) =
+                    (positive(a.real(skip), "major radius")?, positive(a.real(skip + 1), "minor radius")?);
+                let inner = name.starts_with("DEG") && a.flag(skip + 2) == Some(false) && major < minor;
+                let signed = if inner { -major } else { major };
+                let mut chart = Chart::new(
+                    Kind::Torus { frame, major: signed, minor },
+                    Analytic::Torus { frame, major: signed, minor },
+                );
+                chart.flipped = inner;
+                return Ok(chart);
+            }
+        }
+        if let Some(a) = e.own("SURFACE_OF_REVOLUTION", 1) {
+            return self.revolution(e, a, reach, depth);
+        }
+        if let Some(a) = e.own("SURFACE_OF_LINEAR_EXTRUSION", 1) {
+            return self.extrusion(e, a, reach, depth);
+        }
+        if let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1).or_else(|| e.own("CURVE_BOUNDED_SURFACE", 1)) {
+            let basis = self.follow(e, a.id(0), "basis surface")?;
+            return self.chart(basis.id, reach, depth + 1);
+        }
+        const SPLINES: [&str; 5] = [
+            "B_SPLINE_SURFACE",
+            "B_SPLINE_SURFACE_WITH_KNOTS",
+            "BEZIER_SURFACE",
+            "UNIFORM_SURFACE",
+            "QUASI_UNIFORM_SURFACE",
+        ];
+        if e.is_any(&SPLINES) {
+            return self.spline_surface(e);
+        }
+        Err(Refusal::of(e, "this kind of surface is not supported"))
+    }
+
+    /// The curve of a swept surface, cut to what can matter within reach.
+    fn swept_curve(
+        &self,
+        id: u64,
+        (center, radius): (Point, f64),
+        depth: usize,
+    ) -> Outcome<(Curve, Option<(Point, Vector)>)> {
+        let e = self.entity(id)?;
+        if e.is_any(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE"])
+            && let Ok(curve) = self.bounded(id, depth + 1)
+        {
+            return Ok((curve, None));
+        }
+        let directed = self.curve(id, depth + 1)?;
+        let around = |t: f64, speed: f64| {
+            let reach = 1.1 * radius.max(1e-3) / speed;
+            directed.shape.segment(t - reach, t + reach)
+        };
+        let curve = match &directed.shape {
+            Shape::Line { origin, direction } => {
+                let curve = around(directed.shape.parameter(center), direction.length());
+                let line = Some((*origin, *direction));
+                return Ok((curve, line));
+            }
+            Shape::Ellipse { .. } => directed.shape.segment(0.0, 2.0 * PI),
+            Shape::Hyperbola { a, b, .. } => {
+                let t = directed.shape.parameter(center);
+                let reach = (1.0 + 2.0 * radius / a.min(*b)).asinh() + t.abs();
+                directed.shape.segment(-reach, reach)
+            }
+            Shape::Parabola { f, .. } => {
+                let t = directed.shape.parameter(center);
+                let reach = t.abs() + (2.0 * radius / f).sqrt().max(radius / f);
+                directed.shape.segment(-reach, reach)
+            }
+            Shape::Spline { curve, .. } => curve.clone(),
+        };
+        Ok((if directed.reversed { curve.reversed() } else { curve }, None))
+    }
+
+    fn revolution(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+        let axis = self.follow(e, a.id(1), "axis")?;
+        let frame = self.placement(axis.id)?;
+        let profile = self.follow(e, a.id(0), "swept curve")?;
+        // The profile passes the same heights and radii as the face, at another azimuth.
+        let local = frame.local_point(reach.0);
+        let around = (reach.0, reach.1 + 2.0 * local.x.hypot(local.y));
+        let (curve, line) = self.swept_curve(profile.id, around, depth)?;
+        if let Some((origin, direction)) = line
+            && let Some(chart) = revolved_line(&frame, origin, direction)
+        {
+            return Ok(chart);
+        }
+        Ok(Chart::revolution(frame, cut_at_axis(&frame, curve, reach.0)))
+    }
+
+    fn extrusion(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+        let axis = self.follow(e, a.id(1), "extrusion axis")?;
+        let direction = self.vector(axis.id)?;
+        let profile = self.follow(e, a.id(0), "swept curve")?;
+        // Moved along the direction, the face may lie anywhere beside the profile.
+        let base_point = self.curve(profile.id, depth + 1).map(|c| match c.shape {
+            Shape::Line { origin, .. } => origin,
+            Shape::Ellipse { frame, .. } | Shape::Hyperbola { frame, .. } | Shape::Parabola { frame, .. } => {
+                frame.origin
+            }
+            Shape::Spline { .. } => reach.0,
+        });
+        let d = base_point.map_or(0.0, |b| (b - reach.0).length());
+        let (base, _) = self.swept_curve(profile.id, (reach.0, reach.1 + d), depth)?;
+        Ok(Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion))
+    }
+
+    /// A B-spline surface in any of its forms.
+    fn spline_surface(&self, e: Entity<'f, 'a>) -> Outcome<Chart> {
+        let simple = !e.keyword().is_empty();
+        let base = e.own("B_SPLINE_SURFACE", 1).unwrap_or_else(|| e.args());
+        let shift = usize::from(simple && e.keyword() != "B_SPLINE_SURFACE");
+        let degree = [base.count(shift).unwrap_or(0), base.count(shift + 1).unwrap_or(0)];
+        let rows = base.list(shift + 2);
+        let nu = rows.len();
+        let nv = rows.list(0).len();
+        let mut points = Vec::with_capacity(nu.saturating_mul(nv).min(1 << 16));
+        for i in 0..nu {
+            let row = rows.list(i).ids();
+            if row.len() != nv {
+                return Err(Refusal::of(e, "rows of control points differ in length"));
+            }
+            for id in row {
+                points.push(self.point(id)?);
+            }
+        }
+        let weights = e.own("RATIONAL_B_SPLINE_SURFACE", 7).map(|a| {
+            let rows = a.list(0);
+            (0..rows.len()).map(|i| rows.list(i).reals()).collect::<Option<Vec<_>>>().map(|w| w.concat())
+        });
+        let weights = match weights {
+            Some(None) => return Err(Refusal::of(e, "weights are no numbers")),
+            Some(w) => w,
+            None => None,
+        };
+        let form = knot_form(e, "SURFACE");
+        let knots = match e.own("B_SPLINE_SURFACE_WITH_KNOTS", 7) {
+            Some(a) => (
+                explicit_knots(a.list(if simple { 1 } else { 0 }), a.list(if simple { 3 } else { 2 })),
+                explicit_knots(a.list(if simple { 2 } else { 1 }), a.list(if simple { 4 } else { 3 })),
+            ),
+            None => (form.knots(degree[0], nu), form.knots(degree[1], nv)),
+        };
+        let (Some(ku), Some(kv)) = knots else {
+            return Err(Refusal::of(e, "knots and multiplicities do not fit"));
+        };
+        let rational = weights.as_ref().is_some_and(|w| w.iter().any(|x| (x - w[0]).abs() > 1e-12 * w[0].abs()));
+        let (surface, _) = sanitise::surface(degree, [ku, kv], [nu, nv], &points, weights.as_deref())
+            .map_err(|d| Refusal::of(e, d.to_string()))?;
+        let analytic = if rational { Analytic::Rational } else { Analytic::Bspline };
+        Ok(Chart::new(Kind::Spline(SplineChart::new(surface)), analytic))
+    }
+}
+
+/// A line turned about an axis in its plane: a plane, cylinder or cone, with the orientation of the revolution.
+fn revolved_line(frame: &Frame, origin: Point, direction: Vector) -> Option<Chart> {
+    let (o, d) = (frame.local_point(origin), frame.local_direction(direction.try_normalize()?));
+    // Only lines that lie in a plane through the axis.
+    let out_of_plane = o.cross(d).z.abs();
+    let r = o.x.hypot(o.y);
+    if out_of_plane > 1e-9 * (1.0 + r) {
+        return None;
+    }
+    if d.x.hypot(d.y) < 1e-9 && r > 1e-9 {
+        let mut chart = Chart::new(
+            Kind::Cone { frame: *frame, radius: r, half_angle: 0.0 },
+            Analytic::Cylinder { frame: *frame, radius: r },
+        );
+        chart.flipped = d.z < 0.0;
+        return Some(chart);
+    }
+    None
+}
+
+/// A meridian that crosses the axis is cut there: the side nearer to the face stays.
+fn cut_at_axis(frame: &Frame, curve: Curve, near: Point) -> Curve {
+    let [a, b] = curve.domain();
+    let n = 256;
+    let at = |t: f64| frame.local_point(curve.evaluate(t));
+    let far = (0..=n).map(|i| at(a + (b - a) * f64::from(i) / f64::from(n)));
+    let Some(far) = far.max_by(|p, q| p.x.hypot(p.y).total_cmp(&q.x.hypot(q.y))) else { return curve };
+    let side = |t: f64| {
+        let p = at(t);
+        far.x * p.x + far.y * p.y
+    };
+    let size = far.x.hypot(far.y);
+    let sample = |i: i32| a + (b - a) * f64::from(i) / f64::from(n);
+    let mut cuts = vec![a];
+    for i in 0..n {
+        let (mut lo, mut hi) = (sample(i), sample(i + 1));
+        let (s_lo, s_hi) = (side(lo), side(hi));
+        if s_lo.abs().max(s_hi.abs()) > 1e-9 * size * size && s_lo * s_hi < 0.0 {
+            for _ in 0..100 {
+                let middle = 0.5 * (lo + hi);
+                if side(middle) * s_lo > 0.0 { lo = middle } else { hi = middle }
+            }
+            cuts.push(0.5 * (lo + hi));
+        }
+    }
+    cuts.push(b);
+    if cuts.len() == 2 {
+        return curve;
+    }
+    let target = frame.local_point(near);
+    let target = Vector::new(target.x.hypot(target.y), 0.0, target.z);
+    let distance = |lo: f64, hi: f64| {
+        (0..=32).fold(f64::INFINITY, |m: f64, i| {
+            let p = at(lo + (hi - lo) * f64::from(i) / 32.0);
+            m.min((Vector::new(p.x.hypot(p.y), 0.0, p.z) - target).length())
+        })
+    };
+    let pair = cuts
+        .windows(2)
+        .filter(|w| w[1] - w[0] > 1e-9 * (b - a))
+        .min_by(|x, y| distance(x[0], x[1]).total_cmp(&distance(y[0], y[1])));
+    pair.map_or(curve.clone(), |w| curve.restricted(w[0], w[1]))
+}

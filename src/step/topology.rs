@@ -1,0 +1,278 @@
+//! Shells, faces and loops of a representation as lists of ids, before any geometry is computed.
+
+use super::geometry::{Outcome, Refusal};
+use super::part21::{Entity, File};
+use rustc_hash::FxHashMap;
+
+/// Names of solids that hold no faces but a recipe.
+const RECIPES: [&str; 16] = [
+    "CSG_SOLID",
+    "BOOLEAN_RESULT",
+    "EXTRUDED_AREA_SOLID",
+    "REVOLVED_AREA_SOLID",
+    "EXTRUDED_FACE_SOLID",
+    "REVOLVED_FACE_SOLID",
+    "SURFACE_CURVE_SWEPT_AREA_SOLID",
+    "SWEPT_DISK_SOLID",
+    "HALF_SPACE_SOLID",
+    "BLOCK",
+    "SPHERE",
+    "RIGHT_CIRCULAR_CYLINDER",
+    "RIGHT_CIRCULAR_CONE",
+    "TORUS",
+    "RIGHT_ANGULAR_WEDGE",
+    "SOLID_REPLICA",
+];
+
+/// A shell to be converted.
+#[derive(Clone, Debug)]
+pub(super) struct ShellPlan {
+    pub(super) name: String,
+    pub(super) closed: bool,
+    /// Faces, and whether the shell turns them around.
+    pub(super) faces: Vec<(u64, bool)>,
+    /// Entities whose style the shell inherits, the nearest first.
+    pub(super) owners: Vec<u64>,
+}
+
+/// An edge as loops name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum EdgeKey {
+    /// An EDGE_CURVE.
+    Entity(u64),
+    /// The straight line between two points of POLY_LOOPs, the smaller id first.
+    Straight(u64, u64),
+}
+
+/// A face's topology.
+#[derive(Clone, Debug)]
+pub(super) struct FacePlan {
+    pub(super) name: String,
+    pub(super) surface: u64,
+    pub(super) same_sense: bool,
+    pub(super) loops: Vec<Vec<(EdgeKey, bool)>>,
+}
+
+/// What the items of a representation amount to.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Items {
+    pub(super) shells: Vec<ShellPlan>,
+    /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
+    pub(super) surfaces: Vec<u64>,
+    /// Tessellated solids, shells and faces.
+    pub(super) tessellated: Vec<u64>,
+    pub(super) refused: Vec<Refusal>,
+}
+
+impl Items {
+    /// Whether there is nothing to convert or to refuse.
+    pub(super) fn is_empty(&self) -> bool {
+        self.shells.is_empty() && self.surfaces.is_empty() && self.tessellated.is_empty() && self.refused.is_empty()
+    }
+
+    /// Sorts one item in; what is no shape is left out.
+    pub(super) fn add(&mut self, file: &File<'_>, id: u64) {
+        let Some(e) = file.entity(id) else { return };
+        let name = e.own("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).text(0).unwrap_or_default();
+        if let Some(a) = e.own("MANIFOLD_SOLID_BREP", 1).or_else(|| e.own("FACETED_BREP", 1)) {
+            self.shell(file, a.id(0), &name, &[id], true, e);
+            if let Some(v) = e.own("BREP_WITH_VOIDS", 2) {
+                self.voids(file, e, v.list(0).ids(), &name);
+            }
+        } else if let Some(a) = e.own("BREP_WITH_VOIDS", 1) {
+            self.shell(file, a.id(0), &name, &[id], true, e);
+            self.voids(file, e, a.list(1).ids(), &name);
+        } else if let Some(a) =
+            e.own("SHELL_BASED_SURFACE_MODEL", 1).or_else(|| e.own("FACE_BASED_SURFACE_MODEL", 1))
+        {
+            for shell in a.list(0).ids() {
+                self.shell(file, Some(shell), &name, &[id], false, e);
+            }
+        } else if e.is_any(&[
+            "OPEN_SHELL",
+            "CLOSED_SHELL",
+            "CONNECTED_FACE_SET",
+            "ORIENTED_OPEN_SHELL",
+            "ORIENTED_CLOSED_SHELL",
+        ]) {
+            self.shell(file, Some(id), &name, &[], false, e);
+        } else if e.is_any(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+            self.shells.push(ShellPlan { name, closed: false, faces: vec![(id, false)], owners: vec![] });
+        } else if let Some(a) = e.own("GEOMETRIC_SET", 1) {
+            for element in a.list(0).ids() {
+                self.element(file, element);
+            }
+        } else if e.keywords().any(is_tessellated) {
+            self.tessellated.push(id);
+        } else if e.is_any(&RECIPES) {
+            self.refused.push(Refusal::of(e, "solids given as a recipe (CSG, sweeps of areas) are not converted; export them as a boundary representation"));
+        } else if is_surface(e) {
+            self.surfaces.push(id);
+        }
+    }
+
+    fn element(&mut self, file: &File<'_>, id: u64) {
+        if file.entity(id).is_some_and(is_surface) {
+            self.surfaces.push(id);
+        }
+    }
+
+    fn voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
+        for shell in shells {
+            self.shell(file, Some(shell), name, &[e.id], true, e);
+        }
+    }
+
+    fn shell(
+        &mut self,
+        file: &File<'_>,
+        id: Option<u64>,
+        name: &str,
+        owners: &[u64],
+        solid: bool,
+        owner: Entity<'_, '_>,
+    ) {
+        let Some(mut e) = id.and_then(|id| file.entity(id)) else {
+            self.refused.push(Refusal::of(owner, "its shell is missing"));
+            return;
+        };
+        let mut owners = [&[e.id], owners].concat();
+        let mut flip = false;
+        // Oriented shells refer to a shell; a chain of them must end.
+        for _ in 0..4 {
+            let Some(a) = e.own("ORIENTED_CLOSED_SHELL", 2).or_else(|| e.own("ORIENTED_OPEN_SHELL", 2)) else {
+                break;
+            };
+            flip ^= a.flag(1) == Some(false);
+            let Some(inner) = a.entity(0) else { break };
+            e = inner;
+            owners.insert(0, e.id);
+        }
+        let own = e
+            .own("CONNECTED_FACE_SET", 1)
+            .or_else(|| Some(e.args()).filter(|_| e.keyword() != ""))
+            .map(|a| if e.keyword().is_empty() { a.list(0) } else { e.args().list(1) });
+        let mut faces = Vec::new();
+        for face in own.map(|l| l.ids()).unwrap_or_default() {
+            let mut turned = flip;
+            let mut face = face;
+            for _ in 0..4 {
+                let Some(a) = file.entity(face).and_then(|f| f.own("ORIENTED_FACE", 2)) else { break };
+                turned ^= a.flag(1) == Some(false);
+                let Some(inner) = a.id(0) else { break };
+                face = inner;
+            }
+            faces.push((face, turned));
+        }
+        let closed = solid || e.is("CLOSED_SHELL");
+        self.shells.push(ShellPlan { name: name.to_string(), closed, faces, owners });
+    }
+}
+
+fn is_tessellated(keyword: &str) -> bool {
+    matches!(
+        keyword,
+        "TESSELLATED_SOLID"
+            | "TESSELLATED_SHELL"
+            | "TRIANGULATED_FACE"
+            | "COMPLEX_TRIANGULATED_FACE"
+            | "TRIANGULATED_SURFACE_SET"
+            | "COMPLEX_TRIANGULATED_SURFACE_SET"
+            | "TESSELLATED_GEOMETRIC_SET"
+    )
+}
+
+/// Whether an entity is a surface.
+pub(super) fn is_surface(e: Entity<'_, '_>) -> bool {
+    e.keywords().any(|k| {
+        k.ends_with("_SURFACE")
+            || k.starts_with("SURFACE_OF_")
+            || k == "PLANE"
+            || k == "B_SPLINE_SURFACE_WITH_KNOTS"
+    })
+}
+
+/// Reads the bounds of a face.
+pub(super) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
+    let Some(e) = file.entity(id) else {
+        return Err(Refusal {
+            id,
+            entity: String::new(),
+            reason: format!("#{id} is referred to but is not in the file"),
+        });
+    };
+    let complex = e.keyword().is_empty();
+    let (bounds, surface, sense) = if complex {
+        let bounds = e.own("FACE", 0).map(|a| a.list(0));
+        let own = e.own("FACE_SURFACE", 0);
+        (bounds, own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))
+    } else if e.is_any(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+        let a = e.args();
+        (Some(a.list(1)), a.id(2), a.flag(3))
+    } else {
+        return Err(Refusal::of(e, "this kind of face is not supported"));
+    };
+    let Some(surface) = surface else { return Err(Refusal::of(e, "its surface is missing")) };
+    let mut loops = Vec::new();
+    for bound in bounds.map(|b| b.ids()).unwrap_or_default() {
+        let Some(bound) = file.entity(bound) else { continue };
+        let a =
+            bound.own("FACE_BOUND", 1).or_else(|| bound.own("FACE_OUTER_BOUND", 1)).unwrap_or_else(|| bound.args());
+        let Some(edges) = a.entity(0).map(|l| edge_loop(l)).transpose()? else { continue };
+        let mut edges = edges;
+        if a.flag(1) == Some(false) {
+            edges.reverse();
+            edges.iter_mut().for_each(|x| x.1 = !x.1);
+        }
+        if !edges.is_empty() {
+            loops.push(edges);
+        }
+    }
+    let name = if complex { String::new() } else { e.args().text(0).unwrap_or_default() };
+    Ok(FacePlan { name, surface, same_sense: sense != Some(false), loops })
+}
+
+/// Edges of a loop in its order; none for a VERTEX_LOOP.
+fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
+    if e.is("VERTEX_LOOP") {
+        return Ok(Vec::new());
+    }
+    if let Some(a) = e.own("POLY_LOOP", 1) {
+        let points = a.list(0).ids();
+        let n = points.len();
+        return Ok((0..n)
+            .map(|i| (points[i], points[(i + 1) % n]))
+            .filter(|(a, b)| a != b)
+            .map(|(a, b)| (EdgeKey::Straight(a.min(b), a.max(b)), a > b))
+            .collect());
+    }
+    let list = e.own("EDGE_LOOP", 1).or_else(|| e.own("PATH", 1)).map(|a| a.list(0));
+    let Some(list) = list else { return Err(Refusal::of(e, "this kind of loop is not supported")) };
+    let mut edges = Vec::with_capacity(list.len());
+    for i in 0..list.len() {
+        let Some(mut edge) = list.entity(i) else { return Err(Refusal::of(e, "an edge of the loop is missing")) };
+        let mut reversed = false;
+        for _ in 0..4 {
+            let Some(a) = edge.own("ORIENTED_EDGE", 3) else { break };
+            reversed ^= a.flag(1) == Some(false);
+            let Some(inner) = a.entity(0) else { return Err(Refusal::of(edge, "its edge is missing")) };
+            edge = inner;
+        }
+        edges.push((EdgeKey::Entity(edge.id), reversed));
+    }
+    Ok(edges)
+}
+
+/// Edges in the order of first use.
+pub(super) fn number_edges<'p>(
+    faces: impl Iterator<Item = &'p FacePlan>,
+) -> (Vec<EdgeKey>, FxHashMap<EdgeKey, usize>) {
+    let (mut keys, mut index) = (Vec::new(), FxHashMap::default());
+    for (key, _) in faces.flat_map(|f| f.loops.iter().flatten()) {
+        index.entry(*key).or_insert_with(|| {
+            keys.push(*key);
+            keys.len() - 1
+        });
+    }
+    (keys, index)
+}

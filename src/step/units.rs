@@ -1,0 +1,129 @@
+//! Units of a representation context: one file may mix several.
+
+use super::part21::{Args, Entity, File};
+use crate::math::units::{DEGREE, INCH, METRE, si_prefix};
+
+/// Deepest chain of conversion-based units.
+const MAX_DEPTH: usize = 8;
+
+/// Factors from a context's units to mm and radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Units {
+    /// Millimetres per unit of length.
+    pub(super) length: f64,
+    /// Radians per unit of plane angle.
+    pub(super) angle: f64,
+    /// The file's own distance accuracy in mm, when it states one.
+    pub(super) accuracy: Option<f64>,
+}
+
+impl Units {
+    /// Millimetres and radians.
+    pub(super) const DEFAULT: Self = Self { length: 1.0, angle: 1.0, accuracy: None };
+}
+
+/// Units that a context assigns, with their names for the report.
+#[derive(Clone, Debug)]
+pub(super) struct Assigned {
+    pub(super) units: Units,
+    pub(super) length_name: Option<String>,
+    pub(super) angle_name: Option<String>,
+}
+
+/// Reads the units of a representation context; what it does not assign is mm and radians.
+pub(super) fn of_context(context: Entity<'_, '_>) -> Assigned {
+    let mut assigned = Assigned { units: Units::DEFAULT, length_name: None, angle_name: None };
+    if let Some(args) = context.own("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
+        let units = args.list(0);
+        for i in 0..units.len() {
+            let Some(unit) = units.entity(i) else { continue };
+            match measure(unit, 0) {
+                Some((Kind::Length, factor, name)) if assigned.length_name.is_none() => {
+                    assigned.units.length = factor;
+                    assigned.length_name = Some(name);
+                }
+                Some((Kind::Angle, factor, name)) if assigned.angle_name.is_none() => {
+                    assigned.units.angle = factor;
+                    assigned.angle_name = Some(name);
+                }
+                _ => {}
+            }
+        }
+    }
+    if let Some(args) = context.own("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", 2) {
+        let list = args.list(0);
+        let values = (0..list.len()).filter_map(|i| list.entity(i));
+        let lengths = values.filter_map(|m| m.all_args().find_map(|a| a.real(0))).filter(|&x| x > 0.0);
+        assigned.units.accuracy = lengths.reduce(f64::min).map(|x| x * assigned.units.length);
+    }
+    assigned
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Length,
+    Angle,
+}
+
+/// Kind, factor and name of a unit.
+fn measure(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)> {
+    if depth > MAX_DEPTH {
+        return None;
+    }
+    if let Some(si) = unit.own("SI_UNIT", 1) {
+        return si_unit(si);
+    }
+    let conversion = unit.own("CONVERSION_BASED_UNIT", 1)?;
+    let name = conversion.text(0).unwrap_or_default();
+    let declared = if unit.is("LENGTH_UNIT") {
+        Some(Kind::Length)
+    } else if unit.is("PLANE_ANGLE_UNIT") {
+        Some(Kind::Angle)
+    } else {
+        None
+    };
+    let by_measure = || {
+        let with_unit = conversion.entity(1)?;
+        let args = with_unit
+            .own("MEASURE_WITH_UNIT", 0)
+            .or_else(|| Some(with_unit.args()))
+            .filter(|a| a.real(0).is_some())?;
+        let value = args.real(0).filter(|x| *x > 0.0)?;
+        let (kind, factor, _) = measure(args.entity(1)?, depth + 1)?;
+        Some((kind, value * factor))
+    };
+    let by_name = || known(&name);
+    let (kind, factor) = by_measure().or_else(by_name)?;
+    (declared.is_none_or(|d| d == kind)).then_some((kind, factor, name))
+}
+
+fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
+    let prefix = args.word(0);
+    let factor = prefix.map_or(Some(1.0), si_prefix)?;
+    let base = args.word(1)?;
+    let name = prefix.map_or_else(|| base.to_string(), |p| format!("{p} {base}"));
+    match base {
+        "METRE" => Some((Kind::Length, factor * METRE, name)),
+        "RADIAN" => Some((Kind::Angle, factor, name)),
+        _ => None,
+    }
+}
+
+/// Units whose definition is missing or broken, by their usual names.
+fn known(name: &str) -> Option<(Kind, f64)> {
+    Some(match name.to_ascii_uppercase().trim_end_matches('S') {
+        "INCH" | "INCHE" => (Kind::Length, INCH),
+        "FOOT" | "FEET" => (Kind::Length, 12.0 * INCH),
+        "MILLIMETRE" | "MILLIMETER" => (Kind::Length, 1.0),
+        "CENTIMETRE" | "CENTIMETER" => (Kind::Length, 10.0),
+        "METRE" | "METER" => (Kind::Length, METRE),
+        "DEGREE" => (Kind::Angle, DEGREE),
+        "RADIAN" => (Kind::Angle, 1.0),
+        _ => return None,
+    })
+}
+
+/// All contexts of a file that assign units.
+pub(super) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
+    file.entities().filter(|e| e.is("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, of_context(e)))
+}
