@@ -25,7 +25,7 @@ fn corner_mesh() -> FacetMesh {
 }
 
 fn two_parts(mesh: &FacetMesh) -> Facets<'_> {
-    let group = |name: &str, colour, index_ratio| Group { name: name.into(), colour, index_ratio };
+    let group = |name: &str, colour, index_ratio| Group { index_ratio, ..Group::solid(name, colour) };
     Facets {
         groups: vec![group("clear cover", [0.2, 0.5, 1.0], 1.0 / 1.4906), group("housing", [1.0, 0.0, 0.0], 1.0)],
         group_of_face: vec![0, 1],

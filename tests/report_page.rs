@@ -31,9 +31,8 @@ fn saddle(n: u32) -> FacetMesh {
 
 fn sample(n: u32) -> Report {
     let mesh = saddle(n);
-    let group = |name: &str, colour| Group { name: name.into(), colour, index_ratio: 1.0 };
     let facets = Facets {
-        groups: vec![group("left </script><b>", [0.2, 0.5, 0.9]), group("right", [0.9, 0.6, 0.2])],
+        groups: vec![Group::solid("left </script><b>", [0.2, 0.5, 0.9]), Group::solid("right", [0.9, 0.6, 0.2])],
         group_of_face: vec![0, 1],
         ..Facets::plain(&mesh, "")
     };
@@ -80,9 +79,13 @@ fn sample(n: u32) -> Report {
         title: "A sample".into(),
         answer: "The answer is **42 cd** & no <more>.".into(),
         sections: vec![
-            Section::new("Light")
-                .with(Chart::map("far", "Far field", "Straight ahead is 0, 0.", grid))
-                .with(View::of_facets("facets", "Facets", &facets).paths("rays", &paths, 20.0, [1.0, 0.7, 0.1])),
+            Section::new("Light").with(Chart::map("far", "Far field", "Straight ahead is 0, 0.", grid)).with(
+                View::of_facets("facets", "Facets", &facets).lines(
+                    "rays",
+                    &paths.inside(&mesh.bounds().grown(20.0)),
+                    [1.0, 0.7, 0.1],
+                ),
+            ),
             Section::new("Cost")
                 .with(Chart::series("front", "Front", "Lower left is better.", axes, series))
                 .with(bars)

@@ -30,14 +30,23 @@ pub struct Group {
     pub name: String,
     /// Red, green, blue in `[0, 1]`, as displayed (sRGB).
     pub colour: [f64; 3],
+    /// From 0, invisible, to 1: how solid viewers show it.
+    pub opacity: f64,
     /// Refractive index in front of the facet over the one behind it (Data_2); 1 where light does not pass.
     pub index_ratio: f64,
+}
+
+impl Group {
+    /// An opaque group.
+    pub fn solid(name: &str, colour: [f64; 3]) -> Self {
+        Self { name: name.into(), colour, opacity: 1.0, index_ratio: 1.0 }
+    }
 }
 
 impl<'a> Facets<'a> {
     /// A mesh of one group.
     pub fn plain(mesh: &'a FacetMesh, name: &str) -> Self {
-        let group = Group { name: name.into(), colour: [0.62, 0.68, 0.75], index_ratio: 1.0 };
+        let group = Group::solid(name, [0.62, 0.68, 0.75]);
         Self {
             mesh,
             groups: vec![group],

@@ -92,7 +92,8 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         }
         let [r, g, b] = group.colour.map(linear);
         materials.push(json!({"name": group.name, "doubleSided": true,
-            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.1, "roughnessFactor": 0.5}}));
+            "alphaMode": if group.opacity < 1.0 { "BLEND" } else { "OPAQUE" },
+            "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, group.opacity], "metallicFactor": 0.1, "roughnessFactor": 0.5}}));
         meshes.push(group_mesh(&mut buffer, facets, &list, middle, materials.len() - 1));
         nodes.push(json!({"name": group.name, "mesh": meshes.len() - 1}));
     }

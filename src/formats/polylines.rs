@@ -1,4 +1,4 @@
-use crate::math::Point;
+use crate::math::{Aabb, Point};
 
 /// Open polylines with one value each of any number of quantities: ray paths, usually.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,5 +24,42 @@ impl Polylines {
             let start = if k == 0 { 0 } else { self.ends[k - 1] };
             &self.points[start..self.ends[k]]
         })
+    }
+
+    /// The lines cut off where they first leave a box, so that rays to infinity do not decide what a viewer shows; values stay with
+    /// their lines, lines that start outside become single points.
+    pub fn inside(&self, bounds: &Aabb) -> Self {
+        let mut cut = Self { values: self.values.clone(), ..Self::default() };
+        for line in self.lines() {
+            let mut kept: Vec<Point> = line.iter().copied().take_while(|p| bounds.contains(*p)).collect();
+            if let (Some(&a), Some(&b)) = (kept.last(), line.get(kept.len()))
+                && let Some(direction) = (b - a).try_normalize()
+                && let Some((_, far)) = bounds.clip(&crate::math::Ray::new(a, direction))
+            {
+                kept.push(a + direction * far);
+            }
+            if kept.is_empty() {
+                kept.extend(line.first());
+            }
+            cut.push(kept);
+        }
+        cut
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_at_the_wall_they_leave_through() {
+        let mut lines = Polylines::default();
+        lines.push([Point::splat(0.5), Point::new(0.5, 0.5, 0.9), Point::new(0.5, 0.5, 1e5)]);
+        lines.push([Point::splat(3.0), Point::splat(0.5)]);
+        let cut = lines.inside(&Aabb { min: Point::ZERO, max: Point::ONE });
+        let points: Vec<&[Point]> = cut.lines().collect();
+        assert_eq!(points[0].len(), 3);
+        assert!((points[0][2] - Point::new(0.5, 0.5, 1.0)).length() < 1e-14);
+        assert_eq!(points[1], [Point::splat(3.0)]);
     }
 }

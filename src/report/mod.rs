@@ -10,6 +10,7 @@
 mod chart;
 mod document;
 mod html;
+mod light;
 mod number;
 mod plotly;
 mod provenance;
@@ -22,6 +23,7 @@ mod write;
 
 pub use chart::{AxisStyle, Chart, Content, Series, SeriesStyle};
 pub use document::{Block, Report, Section};
+pub use light::{Light, file_stem, path_lines, receiver_grid, verdict};
 pub use number::{bytes, figures, grouped, seconds};
 pub use provenance::Provenance;
 pub use studies::study_report;

@@ -88,7 +88,7 @@ impl View {
                 points,
                 triangles,
                 colour: group.colour,
-                opacity: 1.0,
+                opacity: group.opacity,
                 values: None,
             });
         }
@@ -135,36 +135,15 @@ impl View {
         self
     }
 
-    /// The view with ray paths, each cut where it leaves `reach` mm around what is shown already.
-    pub fn paths(mut self, name: &str, paths: &Polylines, reach: f64, colour: [f64; 3]) -> Self {
-        let Some(bounds) = self.bounds() else { return self };
-        let inside = |p: &[f32; 3]| {
-            (0..3).all(|k| {
-                f64::from(p[k]) >= f64::from(bounds[0][k]) - reach
-                    && f64::from(p[k]) <= f64::from(bounds[1][k]) + reach
-            })
-        };
-        let mut lines = Vec::new();
-        for path in paths.lines() {
-            let points: Vec<[f32; 3]> = path.iter().map(|p| p.as_vec3().to_array()).collect();
-            let mut line: Vec<[f32; 3]> = Vec::new();
-            for p in points {
-                if inside(&p) {
-                    line.push(p);
-                    continue;
-                }
-                // The first point outside is pulled back along its segment to the reach.
-                if let Some(&last) = line.last() {
-                    let [a, b] = [glam::Vec3::from(last), glam::Vec3::from(p)];
-                    line.push((a + (b - a).clamp_length_max(reach as f32)).to_array());
-                }
-                break;
-            }
-            if line.len() > 1 {
-                lines.push(line);
-            }
+    /// The view with polylines; those of a single point are left out.
+    pub fn lines(mut self, name: &str, lines: &Polylines, colour: [f64; 3]) -> Self {
+        let lines: Vec<Vec<[f32; 3]>> = (lines.lines())
+            .filter(|line| line.len() > 1)
+            .map(|line| line.iter().map(|p| p.as_vec3().to_array()).collect())
+            .collect();
+        if !lines.is_empty() {
+            self.shapes.push(Shape::Lines { name: name.into(), lines, colour, width: 1.5 });
         }
-        self.shapes.push(Shape::Lines { name: name.into(), lines, colour, width: 1.5 });
         self
     }
 

@@ -1,0 +1,114 @@
+//! STEP files and scenes from disk, with the exit codes that their errors deserve.
+
+use super::context::Context;
+use super::{Failure, Outcome};
+use crate::model::Model;
+use crate::simulate::{self, Scene};
+use crate::step::{self, Import, ImportReport};
+use std::path::Path;
+use std::time::Instant;
+
+/// A model with the accounts of the files it was read from.
+pub(super) struct Loaded {
+    pub(super) model: Model,
+    pub(super) reports: Vec<ImportReport>,
+    pub(super) seconds: f64,
+}
+
+/// What a FILE argument turned out to be.
+pub(super) enum Input {
+    /// A CAD model.
+    Step(Loaded),
+    /// A scene with its models in one.
+    Scene(Box<Scene>, Loaded),
+}
+
+/// Reads one STEP file.
+pub(super) fn step_file(path: &Path, context: &Context) -> Result<Import, Failure> {
+    let spinner = context.spinner(&format!("reading {}", path.display()));
+    let import = step::read(path, &step::Settings::default());
+    spinner.finish_and_clear();
+    Ok(import?)
+}
+
+/// A STEP file as a model.
+pub(super) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failure> {
+    let start = Instant::now();
+    let Import { model, report } = step_file(path, context)?;
+    if model.placed_face_count() == 0 {
+        let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
+        return Err(failure.help("run `lampyris info` on it to see what it holds and what was refused"));
+    }
+    Ok(Loaded { model, reports: vec![report], seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Reads the models of a scene with `read`, which gets the name of each as the scene has it.
+pub(super) fn scene_models(
+    scene: &Scene,
+    read: impl Fn(&str) -> Result<Import, Failure>,
+) -> Result<Loaded, Failure> {
+    let start = Instant::now();
+    let (mut models, mut reports) = (Vec::new(), Vec::new());
+    for entry in &scene.models {
+        let Import { model, report } = read(&entry.file)?;
+        models.push(model);
+        reports.push(report);
+    }
+    let model = scene.assemble(models)?;
+    Ok(Loaded { model, reports, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Reads a scene file and the models it names.
+pub(super) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loaded), Failure> {
+    let scene = Scene::read(path)?;
+    let loaded = scene_models(&scene, |file| step_file(&scene.resolve(file), context))?;
+    Ok((scene, loaded))
+}
+
+/// A scene when the name ends in `.toml`, a STEP file otherwise.
+pub(super) fn either(path: &Path, context: &Context) -> Result<Input, Failure> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let (scene, loaded) = scene_file(path, context)?;
+        return Ok(Input::Scene(Box::new(scene), loaded));
+    }
+    Ok(Input::Step(model_file(path, context)?))
+}
+
+/// Says what was refused and whether that is more than allowed.
+pub(super) fn account(reports: &[ImportReport], max_refused: f64, context: &Context) -> Outcome {
+    let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
+    if refused == 0 {
+        return Outcome::Done;
+    }
+    context.say(format_args!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons"));
+    if refused as f64 > max_refused * found as f64 { Outcome::Incomplete } else { Outcome::Done }
+}
+
+impl From<step::Error> for Failure {
+    fn from(e: step::Error) -> Self {
+        Self::input(e.to_string())
+    }
+}
+
+impl From<simulate::Error> for Failure {
+    fn from(e: simulate::Error) -> Self {
+        use simulate::ErrorKind;
+        let place = match (e.file(), e.line()) {
+            ("", _) => String::new(),
+            (file, None) => format!("{file}: "),
+            (file, Some((line, column))) => format!("{file}:{line}:{column}: "),
+        };
+        let message = format!("{place}{}", e.message());
+        let mut failure = match e.kind() {
+            ErrorKind::Unreadable => Self::input(e.message()),
+            _ => Self::arguments(message),
+        };
+        if let Some(advice) = e.advice() {
+            failure = failure.help(advice);
+        }
+        match (e.text(), e.span()) {
+            (Some(text), Some(span)) => failure.shows(e.file(), text, span, "here"),
+            _ => failure,
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! A fair sample of the very rays of a run, to be asked again of other intersectors.
+
+use crate::intersect::{Cost, Footprint, Hit, Intersector};
+use crate::math::{Point, Ray};
+use crate::mesh::FacetMesh;
+use std::sync::Mutex;
+
+/// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
+pub(super) struct Witness<'a> {
+    inner: &'a dyn Intersector,
+    threshold: u64,
+    noted: Mutex<Vec<(u64, Ray)>>,
+}
+
+impl<'a> Witness<'a> {
+    /// Notes about `wanted` and a fifth more of `expected` rays.
+    pub(super) fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
+        let share = (1.2 * wanted as f64 / expected.max(1) as f64).min(1.0);
+        Self { inner, threshold: (share * u64::MAX as f64) as u64, noted: Mutex::new(Vec::new()) }
+    }
+
+    fn note(&self, ray: &Ray) {
+        let hash = hash(ray);
+        if hash <= self.threshold {
+            self.noted.lock().unwrap_or_else(|e| e.into_inner()).push((hash, *ray));
+        }
+    }
+
+    /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts `lift` mm
+    /// above the facet it left, in free space, so that all intersectors are asked the same question whatever they take
+    /// for the surface.
+    pub(super) fn rays(self, wanted: usize, mesh: &FacetMesh, lift: f64) -> Vec<Ray> {
+        let mut noted = self.noted.into_inner().unwrap_or_else(|e| e.into_inner());
+        noted.sort_by_key(|(hash, _)| *hash);
+        noted.truncate(wanted);
+        noted.into_iter().map(|(_, ray)| lifted(ray, mesh, lift)).collect()
+    }
+}
+
+fn lifted(ray: Ray, mesh: &FacetMesh, lift: f64) -> Ray {
+    let Some(departure) = ray.from.filter(|d| (d.primitive as usize) < mesh.facets.len()) else {
+        return Ray { from: None, ..ray };
+    };
+    let [a, b, c, d] = mesh.corners(departure.primitive as usize);
+    let normal = (c - a).cross(d - b).normalize_or_zero();
+    let side = if normal.dot(ray.direction) < 0.0 { -lift } else { lift };
+    Ray::new(ray.origin + side * normal, ray.direction)
+}
+
+/// Mixes the bits of origin and direction (the finaliser of SplitMix64, Steele et al. 2014).
+fn hash(ray: &Ray) -> u64 {
+    let mix = |p: Point, h: u64| p.to_array().into_iter().fold(h, |h, x| h.rotate_left(17) ^ x.to_bits());
+    let mut z = mix(ray.direction, mix(ray.origin, 0x9e37_79b9_7f4a_7c15)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+impl Intersector for Witness<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.note(ray);
+        self.inner.intersect(ray, cost)
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        rays.iter().for_each(|r| self.note(r));
+        self.inner.intersect_batch(rays, hits, cost);
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.inner.footprint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vector;
+
+    struct Nothing;
+    impl Intersector for Nothing {
+        fn intersect(&self, _: &Ray, _: &mut Cost) -> Option<Hit> {
+            None
+        }
+        fn footprint(&self) -> Footprint {
+            Footprint::default()
+        }
+    }
+
+    #[test]
+    fn the_sample_does_not_depend_on_the_order_of_questions() {
+        let rays: Vec<Ray> =
+            (0..20_000).map(|k| Ray::new(Point::splat(f64::from(k)), Vector::new(0.6, 0.0, 0.8))).collect();
+        let sample = |rays: &[Ray]| {
+            let witness = Witness::new(&Nothing, 500, rays.len() as u64);
+            witness.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
+            witness.rays(500, &FacetMesh::default(), 0.1)
+        };
+        let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
+        assert_eq!(forward.len(), 500);
+        assert_eq!(forward, backward);
+        let mean = forward.iter().map(|r| r.origin.x).sum::<f64>() / 500.0;
+        // The mean of 500 uniform draws from 0..20,000 has a standard error of 258.
+        assert!((mean - 10_000.0).abs() < 1300.0, "{mean}");
+    }
+}

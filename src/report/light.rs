@@ -1,0 +1,375 @@
+//! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
+
+use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View, figures, grouped, seconds};
+use crate::formats::{Axis, Facets, Grid, Polylines};
+use crate::math::Vector;
+use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
+use crate::study::check::{Cause, Check};
+
+/// Everything that the report of a traced scene speaks of.
+pub struct Light<'a> {
+    /// Title of the scene.
+    pub title: String,
+    /// What the simulation found.
+    pub results: &'a Results,
+    /// The traced facets in their groups.
+    pub facets: &'a Facets<'a>,
+    /// Whether the powers of the sources are lumens.
+    pub photometric: bool,
+    /// The same rays asked of octree, BVH and spline.
+    pub check: Option<&'a Check>,
+    /// More tables: of the model, of the facets.
+    pub tables: Vec<Table>,
+    /// Sentences that compare with figures from elsewhere.
+    pub comparison: Vec<String>,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+}
+
+/// The cells of a receiver with their axes; `None` for a receiver that has one number only.
+pub fn receiver_grid(r: &ReceiverResult, photometric: bool) -> Option<Grid> {
+    if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
+        return None;
+    }
+    let (labels, unit) = match r.kind {
+        "plane" => (["x", "y"], "mm"),
+        _ if r.angles == Some(crate::simulate::scene::FarFieldType::C) => (["C", "gamma"], "deg"),
+        _ => (["H", "V"], "deg"),
+    };
+    let axis = |k: usize| Axis {
+        label: labels[k].into(),
+        unit: unit.into(),
+        range: [r.middle[k] - r.half[k], r.middle[k] + r.half[k]],
+        cells: r.grid[k],
+    };
+    let (quantity, unit) = match (r.kind, photometric) {
+        ("far_field", true) => ("luminous intensity", "cd"),
+        ("far_field", false) => ("radiant intensity", r.unit),
+        (_, true) => ("illuminance", "lx"),
+        (_, false) => ("irradiance", r.unit),
+    };
+    Some(Grid {
+        name: r.name.clone(),
+        quantity: quantity.into(),
+        unit: unit.into(),
+        axes: [axis(0), axis(1)],
+        values: r.cells.clone(),
+        error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
+    })
+}
+
+/// Recorded paths as polylines with the power at their start and how they end; the ends are the second value.
+pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
+    let mut lines = Polylines::default();
+    let (mut power, mut rays, mut ends) = (Vec::new(), Vec::new(), Vec::new());
+    for path in paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
+        lines.push(path.iter().map(|v| v.point));
+        power.push(path[0].power);
+        rays.push(path[0].ray as f64);
+        ends.push(path[path.len() - 1].event);
+    }
+    lines.values = vec![("power_share".into(), power), ("ray".into(), rays)];
+    (lines, ends)
+}
+
+/// The lines of the paths that end so.
+fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, most: usize) -> Polylines {
+    let mut kept = Polylines::default();
+    for (line, _) in lines.lines().zip(ends).filter(|(_, e)| wanted(**e)).take(most) {
+        kept.push(line.iter().copied());
+    }
+    kept
+}
+
+impl Light<'_> {
+    fn unit(&self) -> &'static str {
+        if self.photometric { "lm" } else { "W" }
+    }
+
+    fn share(&self, power: f64) -> String {
+        format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
+    }
+
+    /// The answer in a paragraph.
+    pub fn answer(&self) -> String {
+        let r = self.results;
+        let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit());
+        let parts: Vec<String> = (r.receivers.iter())
+            .map(|x| format!("**{}** ({}) meet {}", self.share(x.power), figures(x.power, 4), spoken(&x.name)))
+            .collect();
+        text += &if parts.is_empty() { "no receiver counts any".into() } else { parts.join(", ") };
+        text += ". ";
+        for grid in
+            r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(|x| receiver_grid(x, self.photometric))
+        {
+            if let Some(([h, v], peak)) = grid.peak() {
+                text += &format!(
+                    "The brightest direction is {} = {}°, {} = {}° with **{} {}**. ",
+                    grid.axes[0].label,
+                    figures(h, 2),
+                    grid.axes[1].label,
+                    figures(v, 2),
+                    figures(peak, 3),
+                    grid.unit
+                );
+            }
+        }
+        text += &format!(
+            "**{} rays** ({} segments) took **{}** on {} threads: {} million rays/s. {} rays were lost. ",
+            grouped(r.rays),
+            grouped(r.segments),
+            seconds(r.seconds.trace),
+            r.threads,
+            figures(r.mrays_per_s, 3),
+            if r.lost_rays == 0 { "No".into() } else { grouped(r.lost_rays) }
+        );
+        if let Some(check) = self.check {
+            text += &verdict(check);
+        }
+        text
+    }
+
+    /// The whole report.
+    pub fn report(&self) -> Report {
+        let mut sections = vec![self.light(), self.energy()];
+        if let Some(check) = self.check {
+            sections.push(self.cross_check(check));
+        }
+        sections.extend([self.effects(), self.cost()]);
+        Report { title: self.title.clone(), answer: self.answer(), sections, provenance: self.provenance.clone() }
+    }
+
+    fn light(&self) -> Section {
+        let mut section = Section::new("Light");
+        let mut maps: Vec<(&ReceiverResult, Grid)> = (self.results.receivers.iter())
+            .filter_map(|r| Some((r, receiver_grid(r, self.photometric)?)))
+            .collect();
+        // Directions first: what a lamp is judged by.
+        maps.sort_by_key(|(r, _)| r.kind != "far_field");
+        let (lines, ends) = path_lines(&self.results.paths);
+        let around = self.facets.mesh.bounds();
+        let lines = lines.inside(&around.grown(0.35 * around.diagonal().max(1.0)));
+        let out = ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
+        let stay = ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
+        let note = "Facets as traced, parts in their colours, with some ray paths of the run.";
+        let mut view = Some(
+            View::of_facets("facets", "Facets and ray paths", self.facets)
+                .lines("rays that leave", &out, [1.0, 0.72, 0.12])
+                .lines("rays that end inside", &stay, [0.85, 0.30, 0.30])
+                .caption(note),
+        );
+        for (r, grid) in maps {
+            let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
+            let chart = Chart::map(&file_stem(&r.name), &title, &reading(r, &grid), grid);
+            section = section.with(chart);
+            if let Some(view) = view.take() {
+                section = section.with(view);
+            }
+        }
+        if let Some(view) = view {
+            section = section.with(view);
+        }
+        for sentence in &self.comparison {
+            section = section.with(sentence.as_str());
+        }
+        section
+    }
+
+    fn energy(&self) -> Section {
+        let p = &self.results.power;
+        let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit()), ("share", "%")])
+            .caption(format!(
+                "Emitted is the sum of the others to {} of it. Received counts receivers that end light; one that lets it pass \
+                 counts it again.",
+                figures(p.imbalance(), 1)
+            ));
+        let mut row = |name: &str, power: f64| {
+            table.row([name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)]);
+        };
+        row("emitted", p.emitted);
+        row("received", p.received);
+        for a in &self.results.absorbed {
+            row(&format!("absorbed in {} ({})", a.name, a.r#in), a.power);
+        }
+        row("escaped", p.escaped);
+        row("cut off by limits", p.cut_off);
+        row("lost", p.lost);
+        let columns = [
+            ("receiver", ""),
+            ("power", self.unit()),
+            ("± (1σ)", self.unit()),
+            ("largest", ""),
+            ("unit", ""),
+            ("mean position 1", "mm or °"),
+            ("mean position 2", "mm or °"),
+            ("rms 1", "mm or °"),
+            ("rms 2", "mm or °"),
+        ];
+        let mut receivers = Table::new("receivers", "Receivers", &columns);
+        for r in &self.results.receivers {
+            let unit = receiver_grid(r, self.photometric).map_or(r.unit.to_owned(), |g| g.unit);
+            receivers.row([
+                r.name.as_str().into(),
+                Cell::Number(r.power, 6),
+                Cell::Number(r.power_error, 2),
+                r.max.into(),
+                unit.into(),
+                r.centroid[0].into(),
+                r.centroid[1].into(),
+                r.rms[0].into(),
+                r.rms[1].into(),
+            ]);
+        }
+        Section::new("Energy").with(table).with(receivers)
+    }
+
+    fn cross_check(&self, check: &Check) -> Section {
+        let f = &check.facets_vs_exact;
+        let e = &f.explained;
+        let mut table = Table::new("cross-check", "The same rays, three intersectors", &[("", ""), ("rays", "")]);
+        for (name, count) in [
+            ("asked", check.rays),
+            ("hit the facets", check.hits),
+            ("octree and BVH disagree", check.octree_vs_bvh.disagree),
+            ("facets hit, spline misses, or the reverse", f.hit_miss),
+            ("facets and spline name another face", f.other_face),
+            ("explained: within the facets' sag", e.within_sag),
+            ("explained: silhouette", e.silhouette),
+            ("explained: trim edge", e.trim_edge),
+            ("explained: coincident faces", e.coincident),
+            ("explained: tangent", e.tangent),
+            ("explained: a face that has no facets or no surface", e.unmeshed + e.no_surface),
+            ("unexplained", f.unexplained),
+            ("spline hits proved to be the first", check.exact.certified),
+            ("spline hits not proved", check.exact.uncertified),
+        ] {
+            table.row([name.into(), Cell::from(count)]);
+        }
+        let mut errors = Table::new(
+            "facet-errors",
+            "Facets against the spline, same crossing",
+            &[("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")],
+        );
+        for (name, s, unit) in
+            [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
+        {
+            errors.row([name.into(), Cell::from(s.p50), s.p99.into(), s.max.into(), unit.into()]);
+        }
+        let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
+            certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
+            asked the same question.";
+        let mut section = Section::new("Cross-check").with(text).with(table).with(errors);
+        let strange: Vec<_> = (check.disagreements.iter())
+            .filter(|d| d.facets_differ || matches!(d.cause, Some(Cause::Unexplained(_))))
+            .collect();
+        if !strange.is_empty() {
+            let mut lines = Polylines::default();
+            for d in strange.iter().take(200) {
+                let far = d.octree.or(d.exact).map_or(50.0, |h| h.t);
+                lines.push([d.ray.origin, d.ray.origin + far * Vector::from(d.ray.direction)]);
+            }
+            let view = View::of_facets("disagreeing", "Rays without an explanation", self.facets);
+            section = section.with(view.lines("unexplained", &lines, [1.0, 0.1, 0.1]));
+        }
+        section
+    }
+
+    fn effects(&self) -> Section {
+        let used = &self.results.effects;
+        let mut table = Table::new("effects", "Effects", &[("effect", ""), ("simulated", ""), ("because", "")])
+            .caption(format!(
+                "The kernel '{}' was compiled for exactly these effects; leaving the others out changes no bit of the result.",
+                used.kernel
+            ));
+        for (list, word) in [(&used.simulated, "yes"), (&used.not_simulated, "no")] {
+            for b in list {
+                let name = serde_json::to_value(b.effect).ok().and_then(|v| v.as_str().map(spoken));
+                let name = name.unwrap_or_else(|| format!("{:?}", b.effect));
+                table.row([name.into(), word.into(), b.because.as_str().into()]);
+            }
+        }
+        Section::new("What was simulated, what not, and why").with(table)
+    }
+
+    fn cost(&self) -> Section {
+        let s = &self.results.seconds;
+        let mut table = Table::new("times", "Times", &[("step", ""), ("time", "s"), ("what", "")]);
+        for (name, time, what) in [
+            ("read", s.read, "STEP files to trimmed splines".to_owned()),
+            ("tessellate", s.tessellate, format!("{} facets", grouped(self.facets.mesh.facets.len() as u64))),
+            ("build", s.build, "the intersector".to_owned()),
+            (
+                "trace",
+                s.trace,
+                format!(
+                    "{} million rays/s, {} million segments/s, {} segments a ray",
+                    figures(self.results.mrays_per_s, 3),
+                    figures(self.results.msegments_per_s, 3),
+                    figures(self.results.segments as f64 / self.results.rays as f64, 4)
+                ),
+            ),
+        ] {
+            table.row([name.into(), Cell::Number(time, 3), what.into()]);
+        }
+        let section = Section::new("Model, facets and times").with(table);
+        self.tables.iter().cloned().fold(section, |s, t| s.with(Block::Table(t)))
+    }
+}
+
+/// What the cross-check found, in a sentence.
+pub fn verdict(check: &Check) -> String {
+    let f = &check.facets_vs_exact;
+    let between = match check.octree_vs_bvh.disagree {
+        0 => "octree and BVH agree on every one".to_owned(),
+        n => format!("octree and BVH **disagree on {}**", grouped(n)),
+    };
+    let beside = match f.unexplained {
+        0 => "every difference from the exact spline is explained by the facets' sag".to_owned(),
+        n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
+    };
+    format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
+}
+
+fn reading(r: &ReceiverResult, grid: &Grid) -> String {
+    let peak = grid.peak().map(|([x, y], value)| {
+        format!(
+            "Peak {} {} at {} {} {}, {} {} {}. ",
+            figures(value, 3),
+            grid.unit,
+            grid.axes[0].label,
+            figures(x, 3),
+            grid.axes[0].unit,
+            grid.axes[1].label,
+            figures(y, 3),
+            grid.axes[1].unit
+        )
+    });
+    // The relative error where the light is: weighted by the light itself.
+    let error = grid.error.as_ref().map(|e| {
+        let sum: f64 = grid.values.iter().sum();
+        format!(
+            "Statistical error of a cell, weighted by its light: {} %. ",
+            figures(100.0 * e.iter().sum::<f64>() / sum.max(1e-300), 2)
+        )
+    });
+    let cells = format!(
+        "{} × {} cells of {} {}.",
+        r.grid[0],
+        r.grid[1],
+        figures(grid.axes[0].step(), 3),
+        grid.axes[0].unit
+    );
+    [peak, error, Some(cells)].into_iter().flatten().collect()
+}
+
+/// A name as words.
+fn spoken(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// A name that is safe in a path.
+pub fn file_stem(name: &str) -> String {
+    let safe: String =
+        name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+    if safe.is_empty() { "unnamed".into() } else { safe }
+}
