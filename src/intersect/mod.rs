@@ -2,6 +2,9 @@
 //!
 //! All intersectors answer through [`Intersector`]; all of them always count what they do in a [`Cost`].
 
+pub mod exact;
+pub mod polish;
+
 use crate::math::{FaceId, Ray, Uv, Vector};
 
 /// Finds the nearest hit of a ray.

@@ -1,0 +1,220 @@
+//! The model as the tracer sees it: placed faces in world orientation, cut into Bézier patches about centres of their own.
+
+use super::net::{self, Jet, Net, V4};
+use super::trim::Trim;
+use crate::math::{FaceId, Frame, Point, Uv, Vector};
+use crate::model::{Face, Model, Part, PlacedFace};
+use crate::nurbs::{BezierPatch, Curve};
+use rustc_hash::FxHashMap;
+
+/// One placed face.
+#[derive(Debug)]
+pub(super) struct FaceRecord {
+    pub(super) id: FaceId,
+    /// −1 where the outward normal is `-(Su × Sv)` in the world.
+    pub(super) sign: f64,
+    /// Index into [`Geometry::trims`].
+    pub(super) trim: u32,
+    /// First patch; patches of a face lie row by row in u.
+    pub(super) first_patch: u32,
+    /// Index into [`Geometry::grids`].
+    pub(super) grid: u32,
+    /// From the part to the world.
+    pub(super) placement: Frame,
+    /// Index into [`Geometry::edges`].
+    pub(super) part: u32,
+    /// Distance from a trim within which the side of the shared edge decides, mm.
+    pub(super) band: f64,
+}
+
+/// Break lines of a surface's patches.
+#[derive(Debug)]
+pub(super) struct PatchGrid {
+    pub(super) breaks: [Vec<f64>; 2],
+    /// Whether the surface closes on itself in u and in v.
+    pub(super) closed: [bool; 2],
+}
+
+/// A rational Bézier patch in world orientation.
+#[derive(Debug)]
+pub(super) struct Patch {
+    /// Index into [`Geometry::faces`].
+    pub(super) face: u32,
+    pub(super) degree: [u8; 2],
+    /// Control points about `center`, weight 1 in the middle of the patch.
+    pub(super) net: Net,
+    pub(super) center: Point,
+    /// The rectangle of the surface's domain.
+    pub(super) domain: [[f64; 2]; 2],
+}
+
+/// Everything but the search structure.
+#[derive(Debug, Default)]
+pub(super) struct Geometry {
+    pub(super) faces: Vec<FaceRecord>,
+    pub(super) patches: Vec<Patch>,
+    pub(super) trims: Vec<Trim>,
+    pub(super) grids: Vec<PatchGrid>,
+    /// Edge curves of each part, in its own coordinates.
+    pub(super) edges: Vec<Vec<Curve>>,
+    /// Smallest distance from a trim that is flagged, mm.
+    pub(super) band: f64,
+    /// Position in `faces` of each placed face that has a surface.
+    pub(super) by_id: FxHashMap<FaceId, u32>,
+    /// Placed faces left out: ready meshes, and surfaces with non-finite points or weights that are not positive.
+    pub(super) skipped: Vec<FaceId>,
+}
+
+impl Geometry {
+    pub(super) fn new(model: &Model, band: f64) -> Self {
+        let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
+        let mut geometry = Self { band, edges: model.parts.iter().map(curves).collect(), ..Self::default() };
+        // Instances share the trims and break lines of their part.
+        let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
+        for placed in model.placed_faces() {
+            match placed.face {
+                Some(face) if is_usable(face) => {
+                    let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
+                        geometry.trims.push(Trim::new(face, band.max(2.0 * face.gap.min(0.05))));
+                        geometry.grids.push(PatchGrid::new(face));
+                        (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
+                    });
+                    geometry.place(&placed, face, trim, grid);
+                }
+                _ => geometry.skipped.push(placed.id),
+            }
+        }
+        geometry
+    }
+
+    fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, trim: u32, grid: u32) {
+        let record = self.faces.len() as u32;
+        let sign = if face.reversed != placed.placement.is_mirrored() { -1.0 } else { 1.0 };
+        self.by_id.insert(placed.id, record);
+        let first_patch = self.patches.len() as u32;
+        let placement = *placed.placement;
+        // A file's edge may lie off its faces by `gap`: both faces must look that far.
+        let band = (self.band).max(2.0 * face.gap.min(0.05) * placement.scale);
+        let part = placed.part.0;
+        self.faces.push(FaceRecord { id: placed.id, sign, trim, first_patch, grid, placement, part, band });
+        self.patches.extend(face.surface.bezier_patches().iter().map(|p| Patch::new(p, record, placed)));
+    }
+
+    /// The patch of a face that holds the parameters.
+    pub(super) fn patch_at(&self, face: &FaceRecord, uv: Uv) -> u32 {
+        let grid = &self.grids[face.grid as usize];
+        let span = |d: usize, x: f64| {
+            let inner = &grid.breaks[d][1..grid.breaks[d].len() - 1];
+            inner.partition_point(|&b| b <= x) as u32
+        };
+        face.first_patch + span(0, uv.x) * (grid.breaks[1].len() as u32 - 1) + span(1, uv.y)
+    }
+}
+
+/// Whether a surface can be traced at all.
+fn is_usable(face: &Face) -> bool {
+    let s = &face.surface;
+    let [nu, nv] = s.counts();
+    let ordered = s.knots.iter().all(|k| k.iter().all(|x| x.is_finite()) && k.is_sorted());
+    let [[u0, u1], [v0, v1]] = s.domain();
+    s.points.len() == nu * nv
+        && s.degree.iter().all(|&d| (1..=crate::nurbs::MAX_DEGREE).contains(&d))
+        && ordered
+        && u0 < u1
+        && v0 < v1
+        && s.points.iter().all(|p| p.is_finite() && p.w > 0.0)
+}
+
+impl PatchGrid {
+    fn new(face: &Face) -> Self {
+        let s = &face.surface;
+        let counts = s.counts();
+        let breaks = [0, 1].map(|d| {
+            let mut b = s.knots[d][s.degree[d]..=counts[d]].to_vec();
+            b.dedup();
+            b
+        });
+        let domain = s.domain();
+        let tolerance = 1e-9 * (1.0 + s.bounds().diagonal());
+        let closed = [0, 1].map(|d| {
+            (0..5).all(|k| {
+                let other = domain[1 - d][0] + (domain[1 - d][1] - domain[1 - d][0]) * k as f64 / 4.0;
+                let point = |x: f64| s.evaluate(if d == 0 { Uv::new(x, other) } else { Uv::new(other, x) });
+                point(domain[d][0]).distance(point(domain[d][1])) <= tolerance
+            })
+        });
+        Self { breaks, closed }
+    }
+}
+
+impl Patch {
+    fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
+        let middle = patch.homogeneous(Uv::splat(0.5))[0];
+        // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
+        let center = middle.project();
+        let net = patch
+            .points
+            .iter()
+            .map(|p| {
+                let w = p.w / middle.w;
+                let a = placed.placement.vector((p.truncate() - center * p.w) / middle.w);
+                [a.x, a.y, a.z, w]
+            })
+            .collect();
+        Self {
+            face,
+            degree: patch.degree.map(|d| d as u8),
+            net,
+            center: placed.placement.point(center),
+            domain: patch.domain,
+        }
+    }
+
+    /// Local parameters of surface parameters.
+    pub(super) fn local(&self, uv: Uv) -> [f64; 2] {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        [(uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0)]
+    }
+
+    /// Surface parameters of local parameters.
+    pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        Uv::new(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v)
+    }
+
+    /// Homogeneous point about the centre, and derivatives.
+    pub(super) fn jet(&self, [u, v]: [f64; 2]) -> Jet {
+        net::evaluate(&self.net, self.degree, u, v)
+    }
+}
+
+/// Position about the centre and first derivatives of a homogeneous jet.
+#[inline(always)]
+pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
+    let inv = 1.0 / jet.s[3];
+    let xyz = |a: &V4| Vector::new(a[0], a[1], a[2]);
+    let p = xyz(&jet.s) * inv;
+    (p, (xyz(&jet.su) - p * jet.su[3]) * inv, (xyz(&jet.sv) - p * jet.sv[3]) * inv)
+}
+
+/// Unit normal along `Su × Sv` at local parameters; at a singular point the limit from the middle of the net.
+pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet) -> Vector {
+    let (_, du, dv) = project(jet);
+    let n = du.cross(dv);
+    if n.length_squared() > 1e-18 * du.length_squared() * dv.length_squared() {
+        let ratio = du.length_squared() / dv.length_squared();
+        if ratio > 1e-18 && ratio < 1e18 {
+            return n.normalize();
+        }
+    }
+    // Where a derivative vanishes the normal is the limit; 1e-6 of the net away it is right to about 1e-6 rad.
+    for step in [1e-6, 1e-4, 1e-2] {
+        let toward = |x: f64| x + step * (0.5 - x);
+        let (_, du, dv) = project(&net::evaluate(net, degree, toward(u), toward(v)));
+        let n = du.cross(dv);
+        if n.length() > 1e-12 * du.length() * dv.length() {
+            return n.normalize();
+        }
+    }
+    Vector::Z
+}

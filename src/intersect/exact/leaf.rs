@@ -1,0 +1,274 @@
+//! Leaves: pieces of patches so flat that a ray usually meets each at most once, provably.
+//!
+//! A leaf stores its net about its own centre, boxes around the homogeneous derivatives over its domain enlarged by
+//! [`EXTENSION`], an axis-parallel and an oriented box. Patches are halved until the derivative boxes, preconditioned by the
+//! inverse of their middles, deviate from the identity by less than `Settings::flatness` when seen along the normal.
+
+use super::geometry::{Geometry, Patch};
+use super::net::{self, Net, Slopes, V4};
+use super::trim::Region;
+use crate::math::Vector;
+
+/// How far beyond its domain a leaf's derivative boxes hold, in local parameters.
+pub(super) const EXTENSION: f64 = 0.1;
+/// Half an ulp of 1: the relative error of one rounded operation.
+pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
+
+/// A piece of a patch.
+#[derive(Clone, Debug)]
+pub(super) struct Leaf {
+    /// Centre in the world.
+    pub(super) center: Vector,
+    /// Derivative boxes over the enlarged domain.
+    pub(super) slopes: Slopes,
+    /// The homogeneous point in the middle.
+    pub(super) middle: V4,
+    /// Axis-parallel box in the world.
+    pub(super) lo: Vector,
+    pub(super) hi: Vector,
+    /// Axes of the oriented box: tangent, tangent, normal.
+    pub(super) axes: [Vector; 3],
+    /// The oriented box about the centre, along `axes`.
+    pub(super) olo: Vector,
+    pub(super) ohi: Vector,
+    /// Largest coordinate of a control point about the centre.
+    pub(super) radius: f64,
+    /// Bound of the error of the control points, mm.
+    pub(super) slop: f64,
+    /// How far roots beyond the domain still count, local units: positive where a trim may lie on the border.
+    pub(super) beyond: [f64; 2],
+    /// First control point in the pool.
+    pub(super) net: u32,
+    pub(super) patch: u32,
+    pub(super) face: u32,
+    pub(super) degree: [u8; 2],
+    /// Whether no trim passes: every root counts.
+    pub(super) whole: bool,
+    /// The rectangle of the patch's local domain.
+    pub(super) rect: [[f64; 2]; 2],
+}
+
+/// Leaves and their control points.
+#[derive(Debug, Default)]
+pub(super) struct Leaves {
+    pub(super) leaves: Vec<Leaf>,
+    pub(super) pool: Vec<V4>,
+}
+
+/// When to stop cutting.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cutting {
+    pub(super) flatness: f64,
+    pub(super) depth: u32,
+}
+
+impl Leaf {
+    pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
+        let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
+        &pool[self.net as usize..self.net as usize + n]
+    }
+
+    /// Local parameters of the patch at local parameters of the leaf.
+    #[inline]
+    pub(super) fn in_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let [[u0, u1], [v0, v1]] = self.rect;
+        [u0 + (u1 - u0) * u, v0 + (v1 - v0) * v]
+    }
+
+    /// Local parameters of the leaf at local parameters of the patch.
+    pub(super) fn of_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let [[u0, u1], [v0, v1]] = self.rect;
+        [(u - u0) / (u1 - u0), (v - v0) / (v1 - v0)]
+    }
+}
+
+fn xyz(a: &V4) -> Vector {
+    Vector::new(a[0], a[1], a[2])
+}
+
+/// Cuts one patch into leaves; those that lie outside the trims are dropped.
+pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
+    let patch = &geometry.patches[index as usize];
+    let trim = &geometry.trims[geometry.faces[patch.face as usize].trim as usize];
+    let mut out = Leaves::default();
+    let mut stack = vec![(patch.net.clone(), [[0.0, 1.0]; 2], 0)];
+    while let Some((piece, rect, depth)) = stack.pop() {
+        let [u, v] = rect;
+        let (from, to) = (patch.uv([u[0], v[0]]), patch.uv([u[1], v[1]]));
+        let region = trim.region([[from.x, to.x], [from.y, to.y]]);
+        if region == Region::Outside {
+            continue;
+        }
+        let (mut leaf, centred) = describe(patch, &piece, rect, depth);
+        let weights = centred.iter().fold((f64::INFINITY, 0f64), |(lo, hi), p| (lo.min(p[3]), hi.max(p[3])));
+        let flat = deviation(&leaf) < cutting.flatness && weights.1 < 1.5 * weights.0;
+        if flat || depth >= cutting.depth {
+            leaf.whole = region == Region::Inside;
+            leaf.patch = index;
+            leaf.face = patch.face;
+            widen_border(&mut leaf, trim.whole, geometry.faces[patch.face as usize].band);
+            leaf.net = out.pool.len() as u32;
+            out.pool.extend(centred);
+            out.leaves.push(leaf);
+            continue;
+        }
+        let direction = steeper(&leaf, &centred, depth);
+        let [low, high] = net::halves(&piece, patch.degree, direction);
+        let middle = 0.5 * (rect[direction][0] + rect[direction][1]);
+        let (mut a, mut b) = (rect, rect);
+        a[direction][1] = middle;
+        b[direction][0] = middle;
+        stack.push((high, b, depth + 1));
+        stack.push((low, a, depth + 1));
+    }
+    out
+}
+
+fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Leaf, Net) {
+    let degree = patch.degree;
+    let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
+    let center = patch.center + xyz(&middle) / middle[3];
+    // The offset as the rounded centre has it, so that the net and the centre agree.
+    let offset = center - patch.center;
+    let centred: Net = piece
+        .iter()
+        .map(|p| {
+            let a = (xyz(p) - offset * p[3]) / middle[3];
+            [a.x, a.y, a.z, p[3] / middle[3]]
+        })
+        .collect();
+    let mut enlarged = centred.clone();
+    for d in 0..2 {
+        net::restrict(&mut enlarged, degree, d, [-EXTENSION, 1.0 + EXTENSION]);
+    }
+    let mut slopes = net::slopes(&enlarged, degree);
+    for four in [&mut slopes.u, &mut slopes.v, &mut slopes.ru, &mut slopes.rv] {
+        four.iter_mut().for_each(|x| *x /= 1.0 + 2.0 * EXTENSION);
+    }
+    let axes = tangent_frame(xyz(&slopes.u), xyz(&slopes.v));
+    let at = |p: &V4| xyz(p) / p[3];
+    let size = |net: &[V4]| net.iter().map(|p| at(p).abs().max_element()).fold(0.0, f64::max);
+    let radius = size(&centred);
+    // Each halving and the extraction before it err by at most one rounding a step and degree, relative to the patch.
+    let steps = (degree[0] as f64 + degree[1] as f64 + 4.0) * (depth as f64 + 4.0);
+    let slop = steps * ROUND * (size(piece) + offset.abs().max_element() + radius);
+    let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
+    let (mut olo, mut ohi) = (lo, hi);
+    for p in &centred {
+        let p = at(p);
+        (lo, hi) = (lo.min(p), hi.max(p));
+        let along = Vector::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
+        (olo, ohi) = (olo.min(along), ohi.max(along));
+    }
+    let pad = slop + 8.0 * ROUND * (center.abs().max_element() + radius);
+    let leaf = Leaf {
+        center,
+        slopes,
+        middle: net::evaluate(&centred, degree, 0.5, 0.5).s,
+        lo: center + lo - pad,
+        hi: center + hi + pad,
+        axes,
+        olo: olo - pad,
+        ohi: ohi + pad,
+        radius,
+        slop,
+        beyond: [1e-12; 2],
+        net: 0,
+        patch: 0,
+        face: 0,
+        degree,
+        whole: false,
+        rect,
+    };
+    (leaf, centred)
+}
+
+/// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
+/// side of the shared edge decides there, not the end of the surface.
+fn widen_border(leaf: &mut Leaf, untrimmed: bool, band: f64) {
+    if untrimmed || leaf.whole {
+        return;
+    }
+    for (d, slope) in [&leaf.slopes.u, &leaf.slopes.v].into_iter().enumerate() {
+        leaf.beyond[d] = (2.0 * band / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
+    }
+    leaf.lo -= 2.0 * band;
+    leaf.hi += 2.0 * band;
+    leaf.olo -= 2.0 * band;
+    leaf.ohi += 2.0 * band;
+}
+
+fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
+    let longer = if sv.length() > su.length() { sv } else { su };
+    let x = longer.try_normalize().unwrap_or(Vector::X);
+    let n = su.cross(sv);
+    let z = if n.length() > 1e-12 * su.length() * sv.length() { n.try_normalize() } else { None }
+        .unwrap_or_else(|| x.any_orthonormal_vector());
+    [x, z.cross(x), z]
+}
+
+/// The Jacobian in the tangent plane, and the rule that measures four-vectors along a tangent.
+fn tangent_jacobian(leaf: &Leaf) -> [f64; 4] {
+    let p = |a: &V4, e: Vector| xyz(a).dot(e);
+    let [x, y, _] = leaf.axes;
+    [p(&leaf.slopes.u, x), p(&leaf.slopes.v, x), p(&leaf.slopes.u, y), p(&leaf.slopes.v, y)]
+}
+
+fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
+    a[0] * e.x.abs() + a[1] * e.y.abs() + a[2] * e.z.abs() + a[3] * radius
+}
+
+/// Largest row sum of `|J⁻¹| R` for a ray along the normal.
+fn deviation(leaf: &Leaf) -> f64 {
+    let [a, b, c, d] = tangent_jacobian(leaf);
+    let det = a * d - b * c;
+    if !(det.abs() > 0.0) {
+        return f64::INFINITY;
+    }
+    let r = |e: Vector| measure(&leaf.slopes.ru, e, leaf.radius) + measure(&leaf.slopes.rv, e, leaf.radius);
+    let (rx, ry) = (r(leaf.axes[0]), r(leaf.axes[1]));
+    ((d.abs() * rx + b.abs() * ry) / det.abs()).max((c.abs() * rx + a.abs() * ry) / det.abs())
+}
+
+/// The direction whose halving leaves the smaller deviation, predicted from second differences.
+fn steeper(leaf: &Leaf, net: &[V4], depth: u32) -> usize {
+    let [p, q] = leaf.degree.map(usize::from);
+    let m = q + 1;
+    let (mut uu, mut uv, mut vv) = ([0f64; 4], [0f64; 4], [0f64; 4]);
+    let (fp, fq) = (p as f64, q as f64);
+    for i in 0..=p {
+        for j in 0..=q {
+            let at = |a: usize, b: usize| &net[a * m + b];
+            for c in 0..4 {
+                if i + 2 <= p {
+                    let x = fp * (fp - 1.0) * (at(i + 2, j)[c] - 2.0 * at(i + 1, j)[c] + at(i, j)[c]);
+                    uu[c] = uu[c].max(x.abs());
+                }
+                if j + 2 <= q {
+                    let x = fq * (fq - 1.0) * (at(i, j + 2)[c] - 2.0 * at(i, j + 1)[c] + at(i, j)[c]);
+                    vv[c] = vv[c].max(x.abs());
+                }
+                if i < p && j < q {
+                    let x = fp * fq * (at(i + 1, j + 1)[c] - at(i + 1, j)[c] - at(i, j + 1)[c] + at(i, j)[c]);
+                    uv[c] = uv[c].max(x.abs());
+                }
+            }
+        }
+    }
+    let [a, b, c, d] = tangent_jacobian(leaf);
+    let det = a * d - b * c;
+    let alternate = depth as usize % 2;
+    if !(det.abs() > 1e-9 * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
+        let square = |x: &V4| x.iter().map(|c| c * c).sum::<f64>();
+        let (nu, nv) = (square(&uu), square(&vv));
+        return if nu == nv { alternate } else { usize::from(nu < nv) };
+    }
+    let inverse = [[d / det, -b / det], [-c / det, a / det]];
+    let g = |x: &V4, row: usize| {
+        inverse[row][0].abs() * measure(x, leaf.axes[0], leaf.radius)
+            + inverse[row][1].abs() * measure(x, leaf.axes[1], leaf.radius)
+    };
+    let after_u = 2.0 * (g(&uu, 0) / 4.0 + g(&uv, 0) + g(&vv, 0)) + g(&uu, 1) / 4.0 + g(&uv, 1) + g(&vv, 1);
+    let after_v = 2.0 * (g(&vv, 1) / 4.0 + g(&uv, 1) + g(&uu, 1)) + g(&vv, 0) / 4.0 + g(&uv, 0) + g(&uu, 0);
+    if after_u == after_v { alternate } else { usize::from(after_u > after_v) }
+}

@@ -1,0 +1,267 @@
+//! Bernstein control nets of homogeneous points: evaluation, subdivision, hulls.
+//!
+//! A net of degrees `[p, q]` is a slice of `(p + 1)(q + 1)` four-vectors, `net[i * (q + 1) + j]`, over `[0, 1]²`. The degrees that
+//! real files use most have kernels of fixed size; all others run through loops.
+
+use crate::nurbs::MAX_DEGREE;
+use smallvec::SmallVec;
+
+/// Four numbers that are combined alike: `(w·x, w·y, w·z, w)`, or its image in a ray's frame.
+pub(super) type V4 = [f64; 4];
+/// A net that lives on the stack up to bicubic.
+pub(super) type Net = SmallVec<[V4; 16]>;
+
+/// Value and first derivatives with respect to the local parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jet {
+    pub(super) s: V4,
+    pub(super) su: V4,
+    pub(super) sv: V4,
+}
+
+#[inline(always)]
+pub(super) fn axpy(a: &mut V4, k: f64, x: &V4) {
+    for c in 0..4 {
+        a[c] += k * x[c];
+    }
+}
+
+/// Value and derivatives of a net at `(u, v)`, which may lie outside `[0, 1]²`.
+#[inline(always)]
+pub(super) fn evaluate(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
+    match degree {
+        [1, 1] => fixed::<2, 2>(net, u, v),
+        [2, 2] => fixed::<3, 3>(net, u, v),
+        [3, 3] => fixed::<4, 4>(net, u, v),
+        [2, 1] => fixed::<3, 2>(net, u, v),
+        [1, 2] => fixed::<2, 3>(net, u, v),
+        [3, 1] => fixed::<4, 2>(net, u, v),
+        [1, 3] => fixed::<2, 4>(net, u, v),
+        [2, 3] => fixed::<3, 4>(net, u, v),
+        [3, 2] => fixed::<4, 3>(net, u, v),
+        _ => any_degree(net, degree, u, v),
+    }
+}
+
+/// Bernstein values and derivatives of degree `N - 1`.
+#[inline(always)]
+fn bernstein_fixed<const N: usize>(t: f64) -> ([f64; N], [f64; N]) {
+    let s = 1.0 - t;
+    let (mut b, mut d) = ([0.0; N], [0.0; N]);
+    match N {
+        2 => {
+            (b[0], b[1]) = (s, t);
+            (d[0], d[1]) = (-1.0, 1.0);
+        }
+        3 => {
+            (b[0], b[1], b[2]) = (s * s, 2.0 * s * t, t * t);
+            (d[0], d[1], d[2]) = (-2.0 * s, 2.0 * (s - t), 2.0 * t);
+        }
+        _ => {
+            let (t2, s2, st) = (t * t, s * s, s * t);
+            (b[0], b[1], b[2], b[3]) = (s2 * s, 3.0 * s2 * t, 3.0 * s * t2, t2 * t);
+            (d[0], d[1], d[2], d[3]) = (-3.0 * s2, 3.0 * s2 - 6.0 * st, 6.0 * st - 3.0 * t2, 3.0 * t2);
+        }
+    }
+    (b, d)
+}
+
+#[inline(always)]
+fn fixed<const N: usize, const M: usize>(net: &[V4], u: f64, v: f64) -> Jet {
+    let net = &net[..N * M];
+    let (bu, du) = bernstein_fixed::<N>(u);
+    let (bv, dv) = bernstein_fixed::<M>(v);
+    let mut jet = Jet { s: [0.0; 4], su: [0.0; 4], sv: [0.0; 4] };
+    for i in 0..N {
+        let (mut row, mut row_v) = ([0.0; 4], [0.0; 4]);
+        for j in 0..M {
+            axpy(&mut row, bv[j], &net[i * M + j]);
+            axpy(&mut row_v, dv[j], &net[i * M + j]);
+        }
+        axpy(&mut jet.s, bu[i], &row);
+        axpy(&mut jet.su, du[i], &row);
+        axpy(&mut jet.sv, bu[i], &row_v);
+    }
+    jet
+}
+
+#[cold]
+fn any_degree(net: &[V4], [p, q]: [u8; 2], u: f64, v: f64) -> Jet {
+    let (p, q) = (p as usize, q as usize);
+    let (bu, du) = bernstein(p, u);
+    let (bv, dv) = bernstein(q, v);
+    let mut jet = Jet { s: [0.0; 4], su: [0.0; 4], sv: [0.0; 4] };
+    for i in 0..=p {
+        let (mut row, mut row_v) = ([0.0; 4], [0.0; 4]);
+        for j in 0..=q {
+            axpy(&mut row, bv[j], &net[i * (q + 1) + j]);
+            axpy(&mut row_v, dv[j], &net[i * (q + 1) + j]);
+        }
+        axpy(&mut jet.s, bu[i], &row);
+        axpy(&mut jet.su, du[i], &row);
+        axpy(&mut jet.sv, bu[i], &row_v);
+    }
+    jet
+}
+
+/// Bernstein values and derivatives of any degree.
+fn bernstein(n: usize, t: f64) -> ([f64; MAX_DEGREE + 1], [f64; MAX_DEGREE + 1]) {
+    let s = 1.0 - t;
+    let (mut b, mut d) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
+    b[0] = 1.0;
+    for k in 1..=n {
+        if k == n {
+            for i in 0..=n {
+                let before = if i > 0 { b[i - 1] } else { 0.0 };
+                d[i] = n as f64 * (before - if i < n { b[i] } else { 0.0 });
+            }
+        }
+        let mut saved = 0.0;
+        for x in &mut b[..k] {
+            let value = *x;
+            *x = saved + s * value;
+            saved = t * value;
+        }
+        b[k] = saved;
+    }
+    (b, d)
+}
+
+/// Index of control point `k` of the line `line` that runs in `direction`.
+#[inline(always)]
+fn at(direction: usize, q: usize, k: usize, line: usize) -> usize {
+    if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k }
+}
+
+/// The two halves of a net in `direction`, by de Casteljau.
+pub(super) fn halves(net: &[V4], degree: [u8; 2], direction: usize) -> [Net; 2] {
+    let [n, lines] = [degree[direction] as usize, degree[1 - direction] as usize];
+    let q = degree[1] as usize;
+    let (mut low, mut high): (Net, Net) = (net.into(), net.into());
+    let mut w = [[0.0; 4]; MAX_DEGREE + 1];
+    for line in 0..=lines {
+        for k in 0..=n {
+            w[k] = net[at(direction, q, k, line)];
+        }
+        for r in 0..=n {
+            low[at(direction, q, r, line)] = w[0];
+            for k in 0..n - r {
+                for c in 0..4 {
+                    w[k][c] = 0.5 * (w[k][c] + w[k + 1][c]);
+                }
+            }
+        }
+        for k in 0..=n {
+            high[at(direction, q, k, line)] = w[k];
+        }
+    }
+    [low, high]
+}
+
+/// The net over `[a, b]` of `direction`, which may reach outside `[0, 1]`; `b` must not be 0.
+pub(super) fn restrict(net: &mut [V4], degree: [u8; 2], direction: usize, [a, b]: [f64; 2]) {
+    let [n, lines] = [degree[direction] as usize, degree[1 - direction] as usize];
+    let q = degree[1] as usize;
+    let mut w = [[0.0; 4]; MAX_DEGREE + 1];
+    let lerp = |x: V4, y: V4, t: f64| -> V4 { std::array::from_fn(|c| x[c] + (y[c] - x[c]) * t) };
+    for line in 0..=lines {
+        for k in 0..=n {
+            w[k] = net[at(direction, q, k, line)];
+        }
+        if b != 1.0 {
+            for r in 1..=n {
+                for k in (r..=n).rev() {
+                    w[k] = lerp(w[k - 1], w[k], b);
+                }
+            }
+        }
+        if a != 0.0 {
+            for r in 1..=n {
+                for k in 0..=n - r {
+                    w[k] = lerp(w[k], w[k + 1], a / b);
+                }
+            }
+        }
+        for k in 0..=n {
+            net[at(direction, q, k, line)] = w[k];
+        }
+    }
+}
+
+/// Middles and radii of boxes around the two first derivatives over `[0, 1]²`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Slopes {
+    /// Middle of the box around ∂/∂u.
+    pub(super) u: V4,
+    /// Middle of the box around ∂/∂v.
+    pub(super) v: V4,
+    /// Radius of the box around ∂/∂u.
+    pub(super) ru: V4,
+    /// Radius of the box around ∂/∂v.
+    pub(super) rv: V4,
+}
+
+/// Boxes around the derivatives, from the hulls of the difference nets.
+pub(super) fn slopes(net: &[V4], degree: [u8; 2]) -> Slopes {
+    let [p, q] = degree.map(usize::from);
+    let range = |n: f64, pairs: &mut dyn Iterator<Item = (usize, usize)>| {
+        let (mut lo, mut hi) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+        for (a, b) in pairs {
+            for c in 0..4 {
+                let x = n * (net[b][c] - net[a][c]);
+                lo[c] = lo[c].min(x);
+                hi[c] = hi[c].max(x);
+            }
+        }
+        let middle: V4 = std::array::from_fn(|c| 0.5 * (lo[c] + hi[c]));
+        let radius: V4 = std::array::from_fn(|c| 0.5 * (hi[c] - lo[c]));
+        (middle, radius)
+    };
+    let m = q + 1;
+    let mut in_u = (0..p).flat_map(|i| (0..=q).map(move |j| (i * m + j, (i + 1) * m + j)));
+    let (u, ru) = range(p as f64, &mut in_u);
+    let mut in_v = (0..=p).flat_map(|i| (0..q).map(move |j| (i * m + j, i * m + j + 1)));
+    let (v, rv) = range(q as f64, &mut in_v);
+    Slopes { u, v, ru, rv }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(p: usize, q: usize) -> Net {
+        (0..(p + 1) * (q + 1))
+            .map(|k| {
+                let x = k as f64;
+                [(x * 1.3).sin(), (x * 0.7).cos(), (x * 2.1).sin() * 0.5, 1.0 + 0.3 * (x * 0.9).sin()]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn fixed_kernels_halves_and_restrictions_agree_with_loops() {
+        for (p, q) in [(1, 1), (2, 1), (3, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 2), (3, 3), (5, 7), (13, 2)] {
+            let (net, degree) = (sample(p, q), [p as u8, q as u8]);
+            let close = |a: V4, b: V4| (0..4).all(|c| (a[c] - b[c]).abs() < 1e-11);
+            let (u, v) = (0.37, 0.81);
+            let (f, g) = (evaluate(&net, degree, u, v), any_degree(&net, degree, u, v));
+            assert!(close(f.s, g.s) && close(f.su, g.su) && close(f.sv, g.sv), "{p} {q}");
+            for direction in 0..2 {
+                let [low, high] = halves(&net, degree, direction);
+                let (x, half) = if direction == 0 { (u, [2.0 * u, v]) } else { (v, [u, 2.0 * v - 1.0]) };
+                let piece = if x < 0.5 { &low } else { &high };
+                assert!(close(evaluate(piece, degree, half[0], half[1]).s, f.s));
+                let mut cut = net.clone();
+                restrict(&mut cut, degree, direction, [-0.1, 1.1]);
+                let back = (x + 0.1) / 1.2;
+                let (a, b) = if direction == 0 { (back, v) } else { (u, back) };
+                assert!(close(evaluate(&cut, degree, a, b).s, f.s));
+            }
+            let boxes = slopes(&net, degree);
+            for c in 0..4 {
+                assert!((f.su[c] - boxes.u[c]).abs() <= boxes.ru[c] + 1e-12);
+                assert!((f.sv[c] - boxes.v[c]).abs() <= boxes.rv[c] + 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Newton's method from a seed on one face: the last step of polishing, and by itself the plain iterative tracer.
+
+use super::geometry::{self, project};
+use super::{Exact, net};
+use crate::math::{FaceId, Ray, Uv, Vector, orthonormal_pair};
+
+/// A point of a face on a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Distance along the ray, mm; may be negative.
+    pub t: f64,
+    /// Parameters on the face's surface.
+    pub uv: Uv,
+    /// Outward unit normal.
+    pub normal: Vector,
+    /// Distance from the ray, mm.
+    pub residual: f64,
+    /// Whether it lies inside the face's trims.
+    pub inside: bool,
+    /// The patch.
+    pub patch: u32,
+}
+
+impl Exact {
+    /// Follows Newton's method on a face from surface parameters to the ray, from patch to patch; `None` when it has not
+    /// come within 1e-9 mm (or the rounding of the origin) after `steps`.
+    ///
+    /// Nothing is proved: the point found is on the spline and on the ray, and may be any of their common points.
+    pub fn converge(&self, ray: &Ray, face: FaceId, uv: Uv, steps: u32) -> Option<SurfacePoint> {
+        let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
+        let grid = &self.geometry.grids[record.grid as usize];
+        let (n1, n2) = orthonormal_pair(ray.direction);
+        let bounds = [0, 1].map(|d| [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]]);
+        let mut uv = Uv::new(uv.x.clamp(bounds[0][0], bounds[0][1]), uv.y.clamp(bounds[1][0], bounds[1][1]));
+        if !uv.is_finite() {
+            return None;
+        }
+        let mut index = self.geometry.patch_at(record, uv);
+        let mut last = f64::INFINITY;
+        for step in 0..=steps {
+            let patch = &self.geometry.patches[index as usize];
+            let local = patch.local(uv);
+            let jet = patch.jet(local);
+            let (p, du, dv) = project(&jet);
+            let oc = ray.origin - patch.center;
+            let off = p - oc;
+            let (f1, f2) = (n1.dot(off), n2.dot(off));
+            let residual = f1.hypot(f2);
+            let rounding = 8.0 * f64::EPSILON * (oc.abs().max_element() + p.abs().max_element());
+            // Two more steps after 1e-7 reach the last bits; stop when they no longer help.
+            let settled = residual <= rounding || (residual < 1e-9 && residual >= 0.5 * last);
+            if settled || step == steps {
+                if residual > 1e-9 + rounding {
+                    return None;
+                }
+                let normal = record.sign * geometry::normal(&patch.net, patch.degree, local, &jet);
+                let t = ray.direction.dot(off);
+                let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
+                let trim = &self.geometry.trims[record.trim as usize];
+                let (su, sv) = (du / widths[0], dv / widths[1]);
+                let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
+                let inside = trim.whole || trim.locate(uv, metric, 0.0).inside;
+                return Some(SurfacePoint { t, uv, normal, residual, inside, patch: index });
+            }
+            last = residual;
+            let (a, b, c, d) = (n1.dot(du), n1.dot(dv), n2.dot(du), n2.dot(dv));
+            let inv = 1.0 / (a * d - b * c);
+            let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
+            if !(xu.is_finite() && xv.is_finite()) {
+                return None;
+            }
+            uv = patch.uv([local[0] - xu, local[1] - xv]);
+            for k in 0..2 {
+                let [first, last] = bounds[k];
+                if uv[k] < first || uv[k] > last {
+                    let period = last - first;
+                    // Across the seam of a closed surface the walk goes on; else it stops at the border.
+                    uv[k] = if grid.closed[k] && uv[k] > first - period && uv[k] < last + period {
+                        if uv[k] < first { uv[k] + period } else { uv[k] - period }
+                    } else {
+                        uv[k].clamp(first, last)
+                    };
+                }
+            }
+            index = self.geometry.patch_at(record, uv);
+        }
+        None
+    }
+
+    /// Distance from a world point to a face's surface at given parameters, mm.
+    pub fn distance_at(&self, face: FaceId, uv: Uv, point: crate::math::Point) -> Option<f64> {
+        let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
+        let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
+        let jet = net::evaluate(&patch.net, patch.degree, patch.local(uv)[0], patch.local(uv)[1]);
+        Some((point - patch.center - project(&jet).0).length())
+    }
+
+    /// Outward unit normal of a face at surface parameters.
+    pub fn normal_at(&self, face: FaceId, uv: Uv) -> Option<Vector> {
+        let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
+        let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
+        let local = patch.local(uv);
+        Some(record.sign * geometry::normal(&patch.net, patch.degree, local, &patch.jet(local)))
+    }
+}

@@ -1,0 +1,187 @@
+//! Pieces of trimming curves that are monotone in v: what the in/out test counts.
+
+use crate::math::Uv;
+use crate::model::{EdgeId, Face};
+use glam::DVec3;
+use smallvec::SmallVec;
+
+/// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
+#[derive(Clone, Debug)]
+pub(super) struct Piece {
+    pub(super) points: SmallVec<[DVec3; 4]>,
+    /// v at the two ends in order of the curve's parameter; bit-equal with the neighbours of the loop.
+    pub(super) v: [f64; 2],
+    /// Hull of the control points and the ends.
+    pub(super) min: Uv,
+    pub(super) max: Uv,
+    /// The shared edge it belongs to; `None` for seams and poles.
+    pub(super) edge: Option<EdgeId>,
+    /// Whether the loop runs against the piece.
+    pub(super) reversed: bool,
+    /// The edge's parameters at the ends.
+    pub(super) range: [f64; 2],
+}
+
+impl Piece {
+    fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], (edge, reversed): (Option<EdgeId>, bool)) -> Self {
+        let at = |p: &DVec3| p.truncate() / p.z;
+        let v = [at(&points[0]).y, at(&points[points.len() - 1]).y];
+        let (min, max) = (Uv::INFINITY, Uv::NEG_INFINITY);
+        let mut piece = Self { points, v, min, max, edge, reversed, range };
+        piece.update_hull();
+        piece
+    }
+
+    fn update_hull(&mut self) {
+        self.min = Uv::new(f64::INFINITY, self.v[0].min(self.v[1]));
+        self.max = Uv::new(f64::NEG_INFINITY, self.v[0].max(self.v[1]));
+        for p in &self.points {
+            let q = p.truncate() / p.z;
+            self.min = self.min.min(q);
+            self.max = self.max.max(q);
+        }
+    }
+
+    /// Point and derivative at `t` in `[0, 1]`.
+    pub(super) fn evaluate(&self, t: f64) -> (Uv, Uv) {
+        let n = self.points.len() - 1;
+        let mut w: SmallVec<[DVec3; 8]> = self.points.as_slice().into();
+        for r in 1..n {
+            for k in 0..=n - r {
+                w[k] = w[k] + (w[k + 1] - w[k]) * t;
+            }
+        }
+        let d = (w[1] - w[0]) * n as f64;
+        let a = w[0] + (w[1] - w[0]) * t;
+        let p = a.truncate() / a.z;
+        (p, (d.truncate() - p * d.z) / a.z)
+    }
+
+    /// u where the piece crosses height `v`, which must lie in its range.
+    fn u_at(&self, v: f64) -> f64 {
+        let (mut lo, mut hi) = (0.0, 1.0);
+        let rising = self.v[1] > self.v[0];
+        let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
+        let mut u = 0.0;
+        for _ in 0..60 {
+            let (p, d) = self.evaluate(t);
+            u = p.x;
+            let error = p.y - v;
+            if error == 0.0 {
+                break;
+            }
+            if (error > 0.0) == rising {
+                hi = t
+            } else {
+                lo = t
+            }
+            let newton = t - error / d.y;
+            let next = if newton > lo && newton < hi { newton } else { 0.5 * (lo + hi) };
+            if (next - t).abs() <= 1e-15 {
+                break;
+            }
+            t = next;
+        }
+        u
+    }
+
+    /// Whether the half-line from `q` towards +u crosses the piece; heights are half-open, so that a joint counts once.
+    #[inline]
+    pub(super) fn crosses(&self, q: Uv) -> bool {
+        let (low, high) = if self.v[0] < self.v[1] { (self.v[0], self.v[1]) } else { (self.v[1], self.v[0]) };
+        if q.y < low || q.y >= high || q.x > self.max.x {
+            return false;
+        }
+        q.x < self.min.x || q.x < self.u_at(q.y)
+    }
+
+    /// Nearest parameter to `q` and the distance there, in the metric of `u`, `v` ↦ `u·du + v·dv` given by its products
+    /// `[du·du, du·dv, dv·dv]`.
+    pub(super) fn nearest(&self, q: Uv, metric: [f64; 3]) -> (f64, f64) {
+        let [e, f, g] = metric;
+        let inner = |a: Uv, b: Uv| e * a.x * b.x + f * (a.x * b.y + a.y * b.x) + g * a.y * b.y;
+        let n = self.points.len() - 1;
+        let at = |k: usize| self.points[k].truncate() / self.points[k].z;
+        let chord = at(n) - at(0);
+        let mut t = (inner(q - at(0), chord) / inner(chord, chord).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        if n > 1 {
+            for _ in 0..8 {
+                let (p, d) = self.evaluate(t);
+                let next = (t + inner(q - p, d) / inner(d, d).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let done = (next - t).abs() < 1e-12;
+                t = next;
+                if done {
+                    break;
+                }
+            }
+        }
+        let off = q - self.evaluate(t).0;
+        (t, inner(off, off).max(0.0).sqrt())
+    }
+}
+
+/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed.
+pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
+    let mut all = Vec::new();
+    for trim in &face.loops {
+        let first = all.len();
+        for edge_use in &trim.uses {
+            let start = all.len();
+            let breaks = edge_use.uv.breakpoints();
+            for (points, range) in edge_use.uv.bezier_pieces().into_iter().zip(breaks.windows(2)) {
+                if points.iter().all(|p| p.is_finite() && p.z > 0.0) {
+                    let whole = (points.into(), [range[0], range[1]], 0);
+                    split(&mut all, whole, longest, (edge_use.edge, edge_use.reversed));
+                }
+            }
+            if edge_use.reversed {
+                all[start..].reverse();
+            }
+        }
+        // Each piece begins at the very height where the one before it ends, so that parity never slips through.
+        let n = all.len() - first;
+        for k in 0..n {
+            let end = {
+                let piece: &Piece = &all[first + k];
+                piece.v[if piece.reversed { 0 } else { 1 }]
+            };
+            let next: &mut Piece = &mut all[first + (k + 1) % n];
+            next.v[if next.reversed { 1 } else { 0 }] = end;
+            next.update_hull();
+        }
+    }
+    all
+}
+
+/// Control points, parameters at the ends, and how often it was halved.
+type Part = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
+
+fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, edge: (Option<EdgeId>, bool)) {
+    let mut stack = vec![whole];
+    while let Some((points, range, depth)) = stack.pop() {
+        let at = |k: usize| points[k].truncate() / points[k].z;
+        let n = points.len() - 1;
+        let rising = at(n).y >= at(0).y;
+        let monotone = (0..n).all(|k| if rising { at(k + 1).y >= at(k).y } else { at(k + 1).y <= at(k).y });
+        let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
+        let size = hull.1 - hull.0;
+        let flat = size.y < 1e-13 * (longest.y + hull.1.y.abs());
+        let short = size.x <= longest.x && size.y <= longest.y;
+        if ((monotone || flat) && short) || depth >= 24 {
+            out.push(Piece::new(points, range, edge));
+            continue;
+        }
+        let (mut low, mut high) = (points.clone(), points.clone());
+        let mut w = points;
+        for r in 0..=n {
+            low[r] = w[0];
+            for k in 0..n - r {
+                w[k] = 0.5 * (w[k] + w[k + 1]);
+            }
+        }
+        high.copy_from_slice(&w);
+        let middle = 0.5 * (range[0] + range[1]);
+        stack.push((high, [middle, range[1]], depth + 1));
+        stack.push((low, [range[0], middle], depth + 1));
+    }
+}

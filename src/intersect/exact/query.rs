@@ -1,0 +1,168 @@
+//! One ray under way: its frame, what it left, the roots it has met.
+
+use super::geometry::{Geometry, project};
+use super::leaf::Leaf;
+use crate::intersect::Certainty;
+use crate::math::{Ray, Uv, Vector, orthonormal_pair};
+
+/// A point of the spline on the ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Root {
+    pub(super) t: f64,
+    pub(super) leaf: u32,
+    /// Local parameters of the leaf.
+    pub(super) local: [f64; 2],
+    pub(super) certainty: Certainty,
+    /// Within the band of a trimming curve.
+    pub(super) near_trim: bool,
+}
+
+/// The surface point that the ray leaves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Own {
+    pub(super) face: u32,
+    patch: u32,
+    uv: Uv,
+    /// Distance from the ray's origin to the stated surface point.
+    pub(super) off: f64,
+    /// Below this the origin is taken to be that point.
+    tolerance: f64,
+}
+
+/// A ray with everything that each leaf needs of it.
+pub(super) struct Query {
+    pub(super) o: Vector,
+    pub(super) d: Vector,
+    pub(super) n1: Vector,
+    pub(super) n2: Vector,
+    pub(super) inverse: [f64; 3],
+    pub(super) t_min: f64,
+    /// Roots beyond are of no interest; shrinks with each root found in a search for the first.
+    pub(super) t_max: f64,
+    pub(super) own: Option<Own>,
+    pub(super) best: Option<Root>,
+    /// Every root, in a search for all.
+    pub(super) all: Option<Vec<Root>>,
+    /// From here on a region of the ray stayed undecided.
+    pub(super) doubt: f64,
+    /// The nearest root that a trim within its band turned away.
+    pub(super) turned_away: f64,
+    /// Clipping steps left.
+    pub(super) budget: u32,
+    pub(super) leaves_tested: u32,
+    pub(super) nodes: u32,
+    pub(super) clips: u32,
+}
+
+impl Query {
+    pub(super) fn new(ray: &Ray, geometry: &Geometry, budget: u32) -> Self {
+        let d = ray.direction;
+        let (n1, n2) = orthonormal_pair(d);
+        // A finite reciprocal keeps 0 · ∞ out of the slab test; 1e-200 moves no plane.
+        let inverse = d.to_array().map(|x| 1.0 / if x.abs() < 1e-200 { 1e-200f64.copysign(x) } else { x });
+        Self {
+            o: ray.origin,
+            d,
+            n1,
+            n2,
+            inverse,
+            t_min: ray.t_min,
+            t_max: ray.t_max,
+            own: ray.from.and_then(|from| Own::new(ray, from.face, from.uv, geometry)),
+            best: None,
+            all: None,
+            doubt: f64::INFINITY,
+            turned_away: f64::INFINITY,
+            budget,
+            leaves_tested: 0,
+            nodes: 0,
+            clips: 0,
+        }
+    }
+
+    /// Whether a root at `t` would be of use.
+    #[inline(always)]
+    pub(super) fn wants(&self, t: f64) -> bool {
+        t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
+    }
+
+    pub(super) fn accept(&mut self, root: Root) {
+        match &mut self.all {
+            Some(all) => all.push(root),
+            None => {
+                self.t_max = root.t;
+                self.best = Some(root);
+            }
+        }
+    }
+
+    /// Where a box is entered, or infinity; conservative by a few ulp.
+    #[inline(always)]
+    pub(super) fn slab(&self, lo: &[f64; 3], hi: &[f64; 3]) -> f64 {
+        let (mut near, mut far) = (self.t_min, self.t_max);
+        for k in 0..3 {
+            let a = (lo[k] - self.o[k]) * self.inverse[k];
+            let b = (hi[k] - self.o[k]) * self.inverse[k];
+            let (x, y) = if a < b { (a, b) } else { (b, a) };
+            near = if x > near { x } else { near };
+            far = if y < far { y } else { far };
+        }
+        if near <= far + 4.0 * f64::EPSILON * far.abs() { near } else { f64::INFINITY }
+    }
+}
+
+impl Own {
+    fn new(ray: &Ray, face: crate::math::FaceId, uv: Uv, geometry: &Geometry) -> Option<Self> {
+        let face = *geometry.by_id.get(&face)?;
+        if !uv.is_finite() {
+            return None;
+        }
+        let patch = geometry.patch_at(&geometry.faces[face as usize], uv);
+        let p = &geometry.patches[patch as usize];
+        let (s, _, _) = project(&p.jet(p.local(uv)));
+        let off = (ray.origin - p.center - s).length();
+        let tolerance = 1e-9 + 64.0 * f64::EPSILON * ray.origin.abs().max_element();
+        Some(Self { face, patch, uv, off, tolerance })
+    }
+
+    /// The departure in the leaf's parameters; on a neighbouring patch only when it lies on the common border.
+    pub(super) fn in_leaf(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
+        if leaf.face != self.face {
+            return None;
+        }
+        let mut local = geometry.patches[leaf.patch as usize].local(self.uv);
+        if leaf.patch != self.patch {
+            const JOINT: f64 = 1e-9;
+            if local.iter().any(|&x| !(-JOINT..=1.0 + JOINT).contains(&x)) {
+                return None;
+            }
+            local = local.map(|x| x.clamp(0.0, 1.0));
+        }
+        Some(leaf.of_patch(local))
+    }
+
+    /// Whether the only root near the departure, `distance` along the ray, is the departure itself.
+    pub(super) fn is_unique_root(&self, t: f64) -> bool {
+        // An origin that is not where the departure says can be a facet's; its own root is then as near as it is off.
+        self.off <= self.tolerance || t.abs() <= 16.0 * self.off
+    }
+
+    /// Whether a root elsewhere in the parameters is the same point: across a seam, or at a pole.
+    pub(super) fn is_twin(&self, leaf: &Leaf, local: [f64; 2], t: f64, geometry: &Geometry) -> bool {
+        if leaf.face != self.face || t.abs() > 16.0 * (self.tolerance + self.off) {
+            return false;
+        }
+        let grid = &geometry.grids[geometry.faces[self.face as usize].grid as usize];
+        let patch = &geometry.patches[leaf.patch as usize];
+        let uv = patch.uv(leaf.in_patch(local));
+        let on_border = |p: Uv| {
+            (0..2).any(|d| {
+                let b = &grid.breaks[d];
+                let (first, last) = (b[0], b[b.len() - 1]);
+                let reach = 1e-6 * (last - first);
+                p[d] <= first + reach || p[d] >= last - reach
+            })
+        };
+        on_border(uv) && on_border(self.uv)
+    }
+}

@@ -1,0 +1,191 @@
+//! Inside or outside of a trimmed face: a grid of decided cells over the domain, and curve by curve where a trim passes.
+//!
+//! The test counts crossings of a half-line towards +u with pieces monotone in v whose joints are bit-equal, so it has one
+//! answer for every point, however close to a curve. Within `band` mm of a curve the nearest piece is named.
+
+use super::piece::{Piece, pieces_of};
+use crate::math::Uv;
+use crate::model::Face;
+use smallvec::SmallVec;
+
+/// What a cell or rectangle of the domain is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Region {
+    Inside,
+    Outside,
+    Border,
+}
+
+/// Where a point of the domain lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) inside: bool,
+    /// Index of the trimming piece within the band, and the nearest parameter on it.
+    pub(super) near: Option<(u32, f64)>,
+}
+
+/// The trimming of one face.
+#[derive(Debug)]
+pub(super) struct Trim {
+    pub(super) pieces: Vec<Piece>,
+    origin: Uv,
+    /// Cells per unit of u and v.
+    density: Uv,
+    count: [usize; 2],
+    cells: Vec<Region>,
+    /// Pieces that touch each row and rise or fall, for the parity.
+    rows: Vec<Vec<u32>>,
+    /// Pieces near each border cell, by cell index.
+    near: rustc_hash::FxHashMap<u32, SmallVec<[u32; 6]>>,
+    /// The state far away: inside when the loops only cut holes.
+    outside_is_inside: bool,
+    /// Whether the domain is whole: no loops at all.
+    pub(super) whole: bool,
+}
+
+impl Trim {
+    pub(super) fn new(face: &Face, band: f64) -> Self {
+        let [[u0, u1], [v0, v1]] = face.surface.domain();
+        let extent = Uv::new(u1 - u0, v1 - v0);
+        let segments: usize = face.loops.iter().flat_map(|l| &l.uses).map(|u| u.uv.points.len()).sum();
+        let n = match segments {
+            0 => 1,
+            1..=24 => 24,
+            25..=200 => 48,
+            _ => 96,
+        };
+        let cell = extent / n as f64;
+        let mut trim = Self {
+            pieces: pieces_of(face, cell),
+            origin: Uv::new(u0, v0),
+            density: Uv::ONE / cell,
+            count: [n, n],
+            cells: vec![Region::Inside; n * n],
+            rows: vec![Vec::new(); n],
+            near: Default::default(),
+            outside_is_inside: false,
+            whole: false,
+        };
+        if trim.pieces.is_empty() {
+            trim.whole = true;
+            return trim;
+        }
+        trim.outside_is_inside = trim.signed_area() < 0.0;
+        trim.fill_cells(reach(face, extent, band));
+        trim
+    }
+
+    fn signed_area(&self) -> f64 {
+        let ends = |p: &Piece| {
+            let at = |q: &glam::DVec3| q.truncate() / q.z;
+            (at(&p.points[0]), at(&p.points[p.points.len() - 1]))
+        };
+        self.pieces
+            .iter()
+            .map(|p| {
+                let (a, b) = ends(p);
+                let (a, b) = (a - self.origin, b - self.origin);
+                0.5 * a.perp_dot(b) * if p.reversed { -1.0 } else { 1.0 }
+            })
+            .sum()
+    }
+
+    fn cell_range(&self, lo: f64, hi: f64, d: usize) -> std::ops::RangeInclusive<usize> {
+        let at = |x: f64| (((x - self.origin[d]) * self.density[d]).max(0.0) as usize).min(self.count[d] - 1);
+        at(lo)..=at(hi)
+    }
+
+    fn fill_cells(&mut self, reach: Uv) {
+        for (k, piece) in self.pieces.iter().enumerate() {
+            let (lo, hi) = (piece.min - reach, piece.max + reach);
+            for j in self.cell_range(lo.y, hi.y, 1) {
+                if piece.v[0] != piece.v[1] {
+                    self.rows[j].push(k as u32);
+                }
+                for i in self.cell_range(lo.x, hi.x, 0) {
+                    let cell = j * self.count[0] + i;
+                    self.cells[cell] = Region::Border;
+                    self.near.entry(cell as u32).or_default().push(k as u32);
+                }
+            }
+        }
+        for j in 0..self.count[1] {
+            for i in 0..self.count[0] {
+                let cell = j * self.count[0] + i;
+                if self.cells[cell] != Region::Border {
+                    let middle = self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
+                    self.cells[cell] = if self.parity(middle, j) { Region::Inside } else { Region::Outside };
+                }
+            }
+        }
+    }
+
+    fn parity(&self, q: Uv, row: usize) -> bool {
+        let crossings = self.rows[row].iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
+        (crossings % 2 == 1) != self.outside_is_inside
+    }
+
+    /// What a rectangle of the domain is: inside or outside only when all its cells are.
+    pub(super) fn region(&self, [u, v]: [[f64; 2]; 2]) -> Region {
+        if self.whole {
+            return Region::Inside;
+        }
+        let mut found = None;
+        for j in self.cell_range(v[0], v[1], 1) {
+            for i in self.cell_range(u[0], u[1], 0) {
+                let cell = self.cells[j * self.count[0] + i];
+                if cell == Region::Border || found.is_some_and(|f| f != cell) {
+                    return Region::Border;
+                }
+                found = Some(cell);
+            }
+        }
+        found.unwrap_or(Region::Border)
+    }
+
+    /// Whether `q` is inside, and the piece within `band` mm; `metric` as for [`Piece::nearest`].
+    pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
+        let i = *self.cell_range(q.x, q.x, 0).start();
+        let j = *self.cell_range(q.y, q.y, 1).start();
+        let cell = j * self.count[0] + i;
+        match self.cells[cell] {
+            Region::Inside => return Place { inside: true, near: None },
+            Region::Outside => return Place { inside: false, near: None },
+            Region::Border => {}
+        }
+        // How far a millimetre reaches in u and v: from the inverse of the metric.
+        let determinant = (metric[0] * metric[2] - metric[1] * metric[1]).max(f64::MIN_POSITIVE);
+        let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
+        let mut best: Option<(u32, f64, f64)> = None;
+        for &k in self.near.get(&(cell as u32)).into_iter().flatten() {
+            let piece = &self.pieces[k as usize];
+            let outside = q.x < piece.min.x - reach.x
+                || q.y < piece.min.y - reach.y
+                || q.x > piece.max.x + reach.x
+                || q.y > piece.max.y + reach.y;
+            if outside {
+                continue;
+            }
+            let (t, distance) = piece.nearest(q, metric);
+            if distance <= band && best.is_none_or(|b| distance < b.2) {
+                best = Some((k, t, distance));
+            }
+        }
+        Place { inside: self.parity(q, j), near: best.map(|(k, t, _)| (k, t)) }
+    }
+}
+
+/// How far, in u and v, a cell border must keep from a trimming curve so that the band stays in border cells.
+fn reach(face: &Face, extent: Uv, band: f64) -> Uv {
+    let [nu, nv] = face.surface.counts();
+    let point = |i: usize, j: usize| face.surface.points[i * nv + j].project();
+    let longest = |outer: usize, inner: usize, at: &dyn Fn(usize, usize) -> crate::math::Point| {
+        (0..outer)
+            .map(|a| (1..inner).map(|b| at(a, b).distance(at(a, b - 1))).sum::<f64>())
+            .fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let along_u = longest(nv, nu, &|j, i| point(i, j));
+    let along_v = longest(nu, nv, &|i, j| point(i, j));
+    let relative = |length: f64| (8.0 * band / length).clamp(1e-9, 1e-2);
+    Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
+}
