@@ -12,11 +12,15 @@
 pub mod accuracy;
 pub mod aim;
 pub mod check;
+pub mod complexity;
+pub mod effects;
 mod errors;
 pub mod interpolation;
+pub mod lamp;
 mod quantiles;
 mod random;
 pub mod rays;
+pub mod receivers;
 pub mod records;
 pub mod specimen;
 pub mod stability;

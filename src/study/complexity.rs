@@ -1,0 +1,200 @@
+//! The seed paper's table 1: three lamps, the time before and after.
+//!
+//! *Before* is the traditional way, every ray against every spline surface; *after* is facets and tree with the time to make
+//! them. Beside them stands the certified spline. All trace the same light with the same random numbers, and the receivers
+//! must agree.
+
+use super::lamp::{Lamp, lamps};
+use super::timing::Clock;
+use super::{Progress, Rounds, Timing};
+use crate::intersect::Intersector;
+use crate::model::Model;
+use crate::simulate::{BoundScene, Error, RunSettings, Scene, simulate};
+use serde::Serialize;
+use std::cell::Cell;
+use std::path::Path;
+use std::time::Instant;
+
+/// What is handed the prepared intersector and its number of facets (none for splines).
+pub type Use<'u> = dyn FnMut(&dyn Intersector, Option<usize>) + 'u;
+
+/// A way to find hits: prepares itself for a model, then lets itself be used.
+pub struct Method<'a> {
+    /// `traditional`, `octree`, `bvh` or `exact`.
+    pub name: &'static str,
+    /// Everything before the call of its argument is the time to prepare.
+    #[expect(clippy::type_complexity, reason = "one callback in, one out")]
+    pub with: Box<dyn Fn(&Model, &mut Use<'_>) + 'a>,
+}
+
+/// How long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Rays from the sources for the fast methods.
+    pub rays: u64,
+    /// Seconds that one run of the traditional method may take; it gets as many rays as that allows.
+    pub traditional_seconds: f64,
+    /// Timed rounds.
+    pub rounds: usize,
+    /// Threads; 0 for all.
+    pub threads: usize,
+    /// Of the rays.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { rays: 500_000, traditional_seconds: 4.0, rounds: 3, threads: 0, seed: 1 }
+    }
+}
+
+/// One method on one lamp.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Row {
+    /// `simple`, `moderate`, `intricate`; the paper's rows are marked.
+    pub model: String,
+    /// Bézier patches.
+    pub patches: Option<usize>,
+    /// Facets, for facets.
+    pub facets: Option<usize>,
+    /// `traditional`, `octree`, `bvh`, `exact`.
+    pub method: String,
+    /// Meshing and building.
+    pub seconds_prepare: Option<f64>,
+    /// For all rays of this row.
+    pub seconds_trace_median: Option<f64>,
+    /// Rays from the sources.
+    pub rays: Option<u64>,
+    /// Seconds of the traditional method for as many rays (in proportion to its own run), over preparing plus tracing.
+    pub ratio_to_traditional: Option<f64>,
+    /// Power on the wall for the rays of the traditional run.
+    pub receiver_power: Option<f64>,
+    /// Its relative difference from the traditional method's.
+    pub receiver_difference: Option<f64>,
+}
+
+/// The study.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Complexity {
+    /// Our rows, then the paper's.
+    pub rows: Vec<Row>,
+    /// One sentence.
+    pub answer: String,
+}
+
+/// The paper's savings of time on its simple, moderate and intricate lamp.
+const PAPER: [(&str, f64); 3] =
+    [("paper: simple", 0.1875), ("paper: moderate", 0.2545), ("paper: intricate", 0.4665)];
+
+#[derive(Clone, Copy)]
+struct Ready<'r> {
+    name: &'static str,
+    who: &'r dyn Intersector,
+    facets: Option<usize>,
+    prepare: f64,
+}
+
+/// Runs all methods on the three lamps.
+///
+/// # Errors
+/// Those of binding the generated scenes.
+pub fn complexity(
+    methods: &[Method<'_>],
+    settings: &Settings,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Complexity, Error> {
+    let clock = Clock::new(progress);
+    let mut rows = Vec::new();
+    // Shares of the work, about: the traditional method has the same budget on every lamp, facets and rays grow.
+    let shares = [0.0, 0.25, 0.5];
+    for (lamp, share) in lamps().iter().zip(shares) {
+        clock.at(lamp.name, share);
+        let bound = Scene::parse(&lamp.scene, "lamp.toml", Path::new("."))?.bind(&lamp.model)?;
+        gather(methods, &lamp.model, &[], &mut |ready| rows.extend(race(lamp, &bound, ready, settings)));
+    }
+    clock.at("done", 1.0);
+    let answer = sentence(&rows);
+    rows.extend(PAPER.map(|(model, saved)| Row {
+        model: model.into(),
+        method: "octree".into(),
+        ratio_to_traditional: Some(1.0 / (1.0 - saved)),
+        ..Row::default()
+    }));
+    Ok(Complexity { rows, answer })
+}
+
+/// Prepares all methods, one inside the other, so that all are alive at once and rounds can alternate.
+fn gather(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut dyn FnMut(&[Ready<'_>])) {
+    let Some((first, rest)) = methods.split_first() else { return then(ready) };
+    let start = Instant::now();
+    (first.with)(model, &mut |who, facets| {
+        let prepare = start.elapsed().as_secs_f64();
+        let mut more = ready.to_vec();
+        more.push(Ready { name: first.name, who, facets, prepare });
+        gather(rest, model, &more, then);
+    });
+}
+
+fn race(lamp: &Lamp, bound: &BoundScene, ready: &[Ready<'_>], settings: &Settings) -> Vec<Row> {
+    let run = |who: &dyn Intersector, rays: u64| {
+        let settings =
+            RunSettings { rays, seed: settings.seed, threads: settings.threads, ..RunSettings::default() };
+        simulate(bound, who, &settings, &|_| true)
+    };
+    let traditional = ready.iter().find(|r| r.name == "traditional");
+    let few = traditional.map_or(settings.rays, |t| {
+        let start = Instant::now();
+        run(t.who, 256);
+        let affordable = 256.0 * settings.traditional_seconds / start.elapsed().as_secs_f64();
+        (affordable as u64).clamp(256, settings.rays)
+    });
+    let count = |r: &Ready<'_>| if r.name == "traditional" { few } else { settings.rays };
+    let mut rounds = Rounds::default();
+    for r in ready {
+        let (who, rays) = (r.who, count(r));
+        let run = &run;
+        rounds.add(r.name, move || {
+            run(who, rays);
+        });
+    }
+    let timings: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
+    let power = |r: &Ready<'_>| run(r.who, few).receivers.first().map_or(0.0, |x| x.power);
+    let before = Cell::new(None);
+    if let Some(i) = ready.iter().position(|r| r.name == "traditional") {
+        before.set(Some((timings[i].median / few as f64, power(&ready[i]))));
+    }
+    let row = |(r, t): (&Ready<'_>, &Timing)| {
+        let own = power(r);
+        let per_ray = before.get().map(|b: (f64, f64)| b.0);
+        Row {
+            model: lamp.name.into(),
+            patches: Some(lamp.patches),
+            facets: r.facets,
+            method: r.name.into(),
+            seconds_prepare: Some(r.prepare),
+            seconds_trace_median: Some(t.median),
+            rays: Some(count(r)),
+            ratio_to_traditional: per_ray.map(|s| s * count(r) as f64 / (r.prepare + t.median)),
+            receiver_power: Some(own),
+            receiver_difference: before.get().map(|b| (own - b.1).abs() / b.1),
+        }
+    };
+    ready.iter().zip(&timings).map(row).collect()
+}
+
+fn sentence(rows: &[Row]) -> String {
+    let of = |method: &str| {
+        let row = rows.iter().rev().find(|r| r.method == method)?;
+        Some((row.ratio_to_traditional?, row.receiver_difference?, row))
+    };
+    match (of("octree"), of("exact")) {
+        (Some((octree, difference, row)), exact) => format!(
+            "On the {} lamp of {} patches, facets and octree are {octree:.0} times faster than every ray against every surface, meshing included{}; the wall agrees within {:.3} %. The paper's saving is 1.87 times.",
+            row.model,
+            row.patches.unwrap_or(0),
+            exact.map_or(String::new(), |e| format!(", the certified spline {:.0} times", e.0)),
+            100.0 * difference
+        ),
+        _ => "Nothing to compare: the traditional method or the octree was not run.".into(),
+    }
+}

@@ -1,0 +1,98 @@
+//! A receiver's error split in two: geometric (the same rays on facets and on the spline) and statistical.
+//!
+//! Random numbers are keyed by ray and bounce, so a run on facets and one on the spline follow the same paths until the
+//! facets turn them away: the difference of the two maps is the facets' doing, and most of the noise cancels. What the noise
+//! would be comes from the spread over the run's replicates.
+
+use super::workshop::{Tree, Workshop, normals_name};
+use crate::intersect::NormalMode;
+use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
+use serde::Serialize;
+
+/// One receiver under one combination.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the receiver.
+    pub receiver: String,
+    /// Uniform tolerance, mm.
+    pub tolerance_mm: f64,
+    /// Kind of normals.
+    pub normals: String,
+    /// Rays from the sources.
+    pub rays: u64,
+    /// Seconds to trace, on facets.
+    pub seconds_trace: f64,
+    /// Seconds to trace, on the spline.
+    pub seconds_trace_exact: f64,
+    /// Power on the receiver.
+    pub power: f64,
+    /// What facets change of it, relative.
+    pub power_geometric: f64,
+    /// Its standard error, relative.
+    pub power_statistical: f64,
+    /// Root mean square of the cells' differences over that of the cells.
+    pub map_geometric: f64,
+    /// Root mean square of the cells' standard errors over that of the cells.
+    pub map_statistical: f64,
+    /// Relative change of the spot's rms size along both sides.
+    pub spot_geometric: [f64; 2],
+    /// `geometry`, `statistics` or `balanced`: what to spend on next.
+    pub limited_by: String,
+}
+
+/// Traces a scene on the spline once and on facets for every combination.
+pub fn receivers(
+    name: &str,
+    bound: &BoundScene,
+    workshop: &dyn Workshop,
+    combinations: &[(f64, NormalMode)],
+    settings: &RunSettings,
+) -> Vec<Row> {
+    let truth = simulate(bound, workshop.exact(), settings, &|_| true);
+    let mut rows = Vec::new();
+    for &(tolerance, normals) in combinations {
+        let meshed = workshop.mesh([tolerance; 2]);
+        let tree = workshop.build(&meshed.mesh, Tree::Octree, normals);
+        let found = simulate(bound, &*tree, settings, &|_| true);
+        for (f, e) in found.receivers.iter().zip(&truth.receivers) {
+            rows.push(Row {
+                scene: name.into(),
+                tolerance_mm: tolerance,
+                normals: normals_name(normals).into(),
+                rays: found.rays,
+                seconds_trace: found.seconds.trace,
+                seconds_trace_exact: truth.seconds.trace,
+                ..split(f, e)
+            });
+        }
+    }
+    rows
+}
+
+fn split(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
+    let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
+    let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);
+    let geometric = norm(&mut found.cells.iter().zip(&truth.cells).map(|(a, b)| a - b)) / scale;
+    let statistical = norm(&mut truth.errors.iter().copied()) / scale;
+    let relative = |a: f64, b: f64| if b == 0.0 { a.abs() } else { (a / b - 1.0).abs() };
+    let limited_by = if geometric > 2.0 * statistical {
+        "geometry"
+    } else if statistical > 2.0 * geometric {
+        "statistics"
+    } else {
+        "balanced"
+    };
+    Row {
+        receiver: found.name.clone(),
+        power: found.power,
+        power_geometric: relative(found.power, truth.power),
+        power_statistical: truth.power_error / truth.power.max(f64::MIN_POSITIVE),
+        map_geometric: geometric,
+        map_statistical: statistical,
+        spot_geometric: [0, 1].map(|a| relative(found.rms[a], truth.rms[a])),
+        limited_by: limited_by.into(),
+        ..Row::default()
+    }
+}
