@@ -1,5 +1,3 @@
-use super::{Key, Scene, suggest};
-use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -57,18 +55,6 @@ impl<T> OneOrMany<T> {
     }
 }
 
-/// A transparent medium. Exactly one of the ways to give the index.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Medium {
-    /// Name that materials use.
-    pub name: String,
-    /// Refractive index, the same for every wavelength.
-    pub index: Option<f64>,
-    /// Bulk absorption coefficient, 1/mm.
-    pub absorption_per_mm: f64,
-}
-
 /// What the faces that a rule selects are made of. All selectors that are given must hold; `*` in a name stands for anything.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -89,8 +75,49 @@ pub struct Material {
     pub medium: Option<String>,
     /// What happens at the surface.
     pub surface: Option<SurfaceKind>,
-    /// Share of the power that is reflected, constant or `[[angle_deg, share], …]`; 1 for a mirror unless said otherwise.
+    /// Share of the power that is reflected: constant, `[[angle_deg, share], …]` or `[[angle_deg, nm, share], …]` over a full
+    /// grid. 1 for mirrors and diffuse faces, 0 for coatings unless said otherwise.
     pub reflectance: Option<Reflectance>,
+    /// Share of the power that a coating transmits; the rest is absorbed.
+    pub transmittance: Option<f64>,
+    /// Rows of a coating over a full grid: `[angle_deg, nm, R, T]` or `[angle_deg, nm, Rs, Rp, Ts, Tp]`.
+    pub coating: Option<Vec<Vec<f64>>>,
+    /// Complex index `[n, k]` of a metal.
+    pub metal: Option<[f64; 2]>,
+    /// Light that leaves the surface off the specular direction.
+    pub scatter: Option<ScatterKey>,
+}
+
+/// Surface scatter.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScatterKey {
+    /// The lobe.
+    pub lobe: LobeKind,
+    /// Share of the light that scatters; the rest stays specular. All of it unless said otherwise.
+    pub share: Option<f64>,
+    /// Standard deviation of a Gaussian lobe in each direction, degrees.
+    pub sigma_deg: Option<f64>,
+    /// Exponent of a cosine lobe about the specular direction.
+    pub exponent: Option<f64>,
+    /// `[A, B, g]` of an ABg lobe, which says itself how much it scatters.
+    pub abg: Option<[f64; 3]>,
+}
+
+/// The lobes of surface scatter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum LobeKind {
+    /// Equally bright from everywhere.
+    #[default]
+    Lambertian,
+    /// Gaussian about the specular direction.
+    Gaussian,
+    /// cosⁿ about the specular direction.
+    Cosine,
+    /// Harvey–Shack ABg.
+    Abg,
 }
 
 /// A colour as three numbers or as `#rrggbb`.
@@ -125,6 +152,8 @@ pub enum Reflectance {
     Constant(f64),
     /// Pairs of angle of incidence in degrees and share, by rising angle; linear between.
     ByAngle(Vec<[f64; 2]>),
+    /// Angle in degrees, wavelength in nm and share; angles and wavelengths rising, wavelengths fastest.
+    ByAngleAndWavelength(Vec<[f64; 3]>),
 }
 
 /// What happens to light at a surface.
@@ -139,82 +168,11 @@ pub enum SurfaceKind {
     Mirror,
     /// The bare boundary of a medium: refraction and Fresnel reflection.
     Interface,
+    /// Reflects the share `reflectance` by Lambert's law; the rest is absorbed.
+    Diffuse,
+    /// A boundary with `reflectance` and `transmittance`, or with the rows of `coating`.
+    Coating,
+    /// A polished metal of the complex index `metal`.
+    Metal,
 }
 
-pub(super) fn check(scene: &Scene) -> Result<(), Error> {
-    for (i, m) in scene.media.iter().enumerate() {
-        let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
-        if m.name.is_empty() {
-            return Err(scene.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
-        }
-        if scene.media[..i].iter().any(|o| o.name == m.name) {
-            return Err(scene.error(ErrorKind::Value, &at("name"), format!("two media are called '{}'", m.name)));
-        }
-        match m.index {
-            Some(n) if (0.1..=10.0).contains(&n) => {}
-            Some(n) => {
-                return Err(scene.error(ErrorKind::Value, &at("index"), format!("index {n} is not in 0.1 to 10")));
-            }
-            None => {
-                return Err(scene.error(ErrorKind::Value, &at("name"), format!("'{}' has no index", m.name)));
-            }
-        }
-        if m.absorption_per_mm.is_nan() || m.absorption_per_mm < 0.0 {
-            let message = "`absorption_per_mm` must be 0 or more";
-            return Err(scene.error(ErrorKind::Value, &at("absorption_per_mm"), message));
-        }
-    }
-    if let Some(name) = &scene.ambient {
-        known_medium(scene, name, &[Key::Name("ambient")])?;
-    }
-    for (i, m) in scene.materials.iter().enumerate() {
-        let at = |key| [Key::Name("material"), Key::Index(i), Key::Name(key)];
-        if let Some(name) = &m.medium {
-            known_medium(scene, name, &at("medium"))?;
-        }
-        if m.medium.is_none() && m.surface.is_none() {
-            let error = scene.error(ErrorKind::Value, &at(""), "this material says neither `medium` nor `surface`");
-            return Err(error.help("add one of them"));
-        }
-        if let Some(r) = &m.reflectance {
-            r.check().map_err(|e| scene.error(ErrorKind::Value, &at("reflectance"), e))?;
-            if m.surface != Some(SurfaceKind::Mirror) {
-                let error = scene.error(ErrorKind::Value, &at("reflectance"), "`reflectance` belongs to a mirror");
-                return Err(error.help("add `surface = \"mirror\"`"));
-            }
-        }
-        if m.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
-            return Err(scene
-                .error(ErrorKind::Value, &at("colour"), "not a colour")
-                .help("write \"#rrggbb\" or [r, g, b]"));
-        }
-    }
-    Ok(())
-}
-
-fn known_medium(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<(), Error> {
-    if scene.media.iter().any(|m| m.name == name) {
-        return Ok(());
-    }
-    let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
-    Err(match suggest::nearest(name, scene.media.iter().map(|m| m.name.as_str())) {
-        Some(near) => error.help(format!("did you mean '{near}'?")),
-        None => error.help("add a [[medium]] of that name"),
-    })
-}
-
-impl Reflectance {
-    fn check(&self) -> Result<(), String> {
-        let share = |r: f64| (0.0..=1.0).contains(&r);
-        match self {
-            Self::Constant(r) if share(*r) => Ok(()),
-            Self::Constant(r) => Err(format!("a share of {r} is not in 0 to 1")),
-            Self::ByAngle(t) if t.is_empty() => Err("the table is empty".into()),
-            Self::ByAngle(t) if !t.iter().all(|[a, r]| share(*r) && (0.0..=90.0).contains(a)) => {
-                Err("angles must be from 0 to 90 and shares from 0 to 1".into())
-            }
-            Self::ByAngle(t) if !t.windows(2).all(|w| w[0][0] < w[1][0]) => Err("angles must rise".into()),
-            Self::ByAngle(_) => Ok(()),
-        }
-    }
-}

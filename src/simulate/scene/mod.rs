@@ -6,17 +6,24 @@
 
 mod locate;
 mod material;
+pub(crate) mod medium;
 mod receiver;
 mod run;
 mod source;
+mod spectrum;
 pub(crate) mod suggest;
+mod surface;
 
 use super::{Error, ErrorKind};
-pub use material::{Material, Medium, ModelUse, OneOrMany, Placement, Reflectance, SurfaceKind};
+pub use material::{
+    ColourKey, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey, SurfaceKind,
+};
+pub use medium::{ByWavelength, Medium};
 pub use receiver::{FarFieldType, Receiver, ReceiverKind};
-pub use run::{Accuracy, Interfaces, Run, Sampling};
+pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+pub use spectrum::{SpectrumKey, SpectrumName};
 pub use source::{Source, SourceKind};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -134,7 +141,8 @@ impl Scene {
 
     fn check(&self) -> Result<(), Error> {
         self.run.check(self)?;
-        material::check(self)?;
+        medium::check(self)?;
+        surface::check(self)?;
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         let mut names: Vec<&str> = Vec::new();

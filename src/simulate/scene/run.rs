@@ -19,6 +19,10 @@ pub struct Run {
     pub split_floor: f64,
     /// Whether the polarisation of each ray is followed; otherwise light is unpolarised at every hit.
     pub polarisation: bool,
+    /// Wavelength of sources without a spectrum, nm.
+    pub wavelength_nm: f64,
+    /// Unit of the sources' powers, and so of all results.
+    pub unit: PowerUnit,
     /// Hits after which a path ends and counts as cut off.
     pub max_bounces: u32,
     /// Length after which a path ends and counts as cut off, mm.
@@ -40,6 +44,8 @@ impl Default for Run {
             interfaces: Interfaces::Roulette,
             split_floor: 1e-3,
             polarisation: false,
+            wavelength_nm: 587.5618,
+            unit: PowerUnit::Watt,
             max_bounces: 100_000,
             max_length_mm: 1e9,
             power_floor: 1e-6,
@@ -47,6 +53,18 @@ impl Default for Run {
             replicates: 128,
         }
     }
+}
+
+/// Unit of power.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+pub enum PowerUnit {
+    /// Watts: receivers answer in W/m² and W/sr.
+    #[default]
+    #[serde(rename = "W")]
+    Watt,
+    /// Lumens: receivers answer in lx and cd.
+    #[serde(rename = "lm")]
+    Lumen,
 }
 
 /// How a source is sampled.
@@ -96,6 +114,7 @@ impl Run {
             r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
             r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
+            r if !(1.0..=1e6).contains(&r.wavelength_nm) => fail("wavelength_nm", "must be from 1 to 1e6"),
             r if !(0.0..=1.0).contains(&r.glue_mm) => fail("glue_mm", "must be from 0 to 1"),
             _ => Ok(()),
         }

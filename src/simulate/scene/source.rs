@@ -1,4 +1,4 @@
-use super::{Key, OneOrMany, Scene};
+use super::{Key, OneOrMany, Scene, SpectrumKey};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,10 @@ pub struct Source {
     pub exponent: Option<f64>,
     /// Names of the instances that the source lies inside of, outermost first, when it lies in a medium.
     pub inside: Option<OneOrMany<String>>,
+    /// Spectrum; the line `wavelength_nm` of the run unless said otherwise.
+    pub spectrum: Option<SpectrumKey>,
+    /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
+    pub polarised: Option<[f64; 3]>,
     /// Number of its rays; by its share of the power otherwise.
     pub rays: Option<u64>,
 }
@@ -49,6 +53,8 @@ impl Default for Source {
             half_angle_deg: None,
             exponent: None,
             inside: None,
+            spectrum: None,
+            polarised: None,
             rays: None,
         }
     }
@@ -98,6 +104,12 @@ impl Source {
         }
         if self.rays == Some(0) {
             return fail("rays", "`rays` must be positive".into());
+        }
+        if let Some(Err(message)) = self.spectrum.as_ref().map(SpectrumKey::optics) {
+            return fail("spectrum", message);
+        }
+        if self.polarised.is_some() && !scene.run.polarisation {
+            return fail("polarised", "polarised light needs `polarisation = true` in [run]".into());
         }
         match (self.kind, self.half_angle_deg, self.exponent) {
             (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}

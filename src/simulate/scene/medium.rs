@@ -1,0 +1,120 @@
+use super::{Key, Scene, suggest};
+use crate::optics::{self, Absorption, BulkScatter, Index, Table, catalogue};
+use crate::simulate::{Error, ErrorKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A transparent medium, with exactly one of the ways to give its index.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Medium {
+    /// Name that materials use.
+    pub name: String,
+    /// Refractive index, the same for every wavelength.
+    pub index: Option<f64>,
+    /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`.
+    pub catalogue: Option<String>,
+    /// Pairs `[B, C]` of `n² = 1 + Σ B λ²/(λ² − C)`, λ in µm, C in µm².
+    pub sellmeier: Option<Vec<[f64; 2]>>,
+    /// `[A, B, C, …]` of `n = A + B/λ² + C/λ⁴ + …`, λ in µm.
+    pub cauchy: Option<Vec<f64>>,
+    /// `[A0, …, A5]` of `n² = A0 + A1 λ² + A2 λ⁻² + A3 λ⁻⁴ + A4 λ⁻⁶ + A5 λ⁻⁸`, λ in µm.
+    pub schott: Option<[f64; 6]>,
+    /// Pairs `[nm, n]`, linear between.
+    pub index_table: Option<Vec<[f64; 2]>>,
+    /// Bulk absorption coefficient (natural logarithm), 1/mm: a number, or pairs `[nm, 1/mm]`.
+    pub absorption_per_mm: Option<ByWavelength>,
+    /// Scattering events per mm of way.
+    pub scatter_per_mm: Option<f64>,
+    /// Mean cosine of the scattering angle (Henyey and Greenstein's g), in (−1, 1).
+    pub anisotropy: Option<f64>,
+}
+
+/// A value, constant or by wavelength.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ByWavelength {
+    /// At every wavelength.
+    Constant(f64),
+    /// Pairs of wavelength in nm and value, linear between.
+    Table(Vec<[f64; 2]>),
+}
+
+impl Medium {
+    /// The medium in the form the laws of light read.
+    pub(crate) fn optics(&self) -> Result<optics::Medium, String> {
+        let points = |t: &[[f64; 2]]| t.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
+        let mut ways = Vec::new();
+        ways.extend(self.index.map(Index::Constant));
+        if let Some(name) = &self.catalogue {
+            ways.push(catalogued(name)?.index);
+        }
+        ways.extend(self.sellmeier.clone().map(Index::Sellmeier));
+        ways.extend(self.cauchy.clone().map(Index::Cauchy));
+        ways.extend(self.schott.map(Index::Schott));
+        if let Some(t) = &self.index_table {
+            ways.push(Index::Table(Table::new("index", points(t)).map_err(|e| e.to_string())?));
+        }
+        if ways.len() != 1 {
+            let given = if ways.is_empty() { "has no index".into() } else { format!("has {} indices", ways.len()) };
+            return Err(format!("'{}' {given}; give exactly one", self.name));
+        }
+        let mut medium = optics::Medium::clear(self.name.clone(), ways.remove(0));
+        medium.absorption = match &self.absorption_per_mm {
+            None => Absorption::None,
+            Some(ByWavelength::Constant(a)) => Absorption::per_mm(*a).map_err(|e| e.to_string())?,
+            Some(ByWavelength::Table(t)) => Absorption::table(points(t)).map_err(|e| e.to_string())?,
+        };
+        if self.anisotropy.is_some() && self.scatter_per_mm.is_none() {
+            return Err("`anisotropy` needs `scatter_per_mm`".into());
+        }
+        if let Some(s) = self.scatter_per_mm.filter(|s| *s != 0.0) {
+            medium.scatter =
+                Some(BulkScatter::new(s, self.anisotropy.unwrap_or(0.0)).map_err(|e| e.to_string())?);
+        }
+        Ok(medium)
+    }
+}
+
+fn catalogued(name: &str) -> Result<optics::Medium, String> {
+    catalogue::medium(name).ok_or_else(|| {
+        let names: Vec<&str> = catalogue::names().collect();
+        match suggest::nearest(name, names.iter().copied()) {
+            Some(near) => format!("no medium of the catalogue is called '{name}'; did you mean '{near}'?"),
+            None => format!("no medium of the catalogue is called '{name}'; there are: {}", names.join(", ")),
+        }
+    })
+}
+
+/// Finds a medium by name: one of the scene, or one of the catalogue.
+pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
+    if let Some(m) = scene.media.iter().find(|m| m.name == name) {
+        return m.optics().map_err(|e| scene.error(ErrorKind::Value, at, e));
+    }
+    if let Ok(m) = catalogued(name) {
+        return Ok(m);
+    }
+    let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
+    let known = scene.media.iter().map(|m| m.name.as_str()).chain(catalogue::names());
+    Err(match suggest::nearest(name, known) {
+        Some(near) => error.help(format!("did you mean '{near}'?")),
+        None => error.help("add a [[medium]] of that name"),
+    })
+}
+
+pub(super) fn check(scene: &Scene) -> Result<(), Error> {
+    for (i, m) in scene.media.iter().enumerate() {
+        let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
+        if m.name.is_empty() {
+            return Err(scene.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
+        }
+        if scene.media[..i].iter().any(|o| o.name == m.name) {
+            return Err(scene.error(ErrorKind::Value, &at("name"), format!("two media are called '{}'", m.name)));
+        }
+        if m.index.is_some_and(|n| !(0.1..=10.0).contains(&n)) {
+            return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
+        }
+        m.optics().map_err(|e| scene.error(ErrorKind::Value, &at("name"), e))?;
+    }
+    Ok(())
+}

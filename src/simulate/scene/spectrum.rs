@@ -1,0 +1,85 @@
+use crate::optics::{Spectrum, Table, WhiteLed};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The spectrum of a source: `{ kind = … }` with the keys of that kind.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SpectrumKey {
+    /// Which spectrum.
+    pub kind: SpectrumName,
+    /// Pairs `[nm, relative power]` of lines, or `[nm, relative power per nm]` of a table.
+    pub values: Option<Vec<[f64; 2]>>,
+    /// Temperature of a black body.
+    pub kelvin: Option<f64>,
+    /// Wavelengths a black body is cut to, nm; 360 to 830 unless said otherwise.
+    pub range_nm: Option<[f64; 2]>,
+    /// Share of a white LED's power in the blue peak.
+    pub blue_share: Option<f64>,
+    /// Peak of a white LED's phosphor, nm.
+    pub phosphor_nm: Option<f64>,
+}
+
+/// The spectra there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum SpectrumName {
+    /// Separate lines, in `values`.
+    #[default]
+    Lines,
+    /// A table, in `values`.
+    Table,
+    /// Planck's law at `kelvin`.
+    BlackBody,
+    /// The CIE's daylight.
+    D65,
+    /// A blue chip with a yellow phosphor.
+    WhiteLed,
+}
+
+impl SpectrumKey {
+    /// The spectrum in the form the laws of light read.
+    pub(crate) fn optics(&self) -> Result<Spectrum, String> {
+        let values = || self.values.clone().ok_or("this spectrum needs `values`, pairs of nm and power");
+        let allowed: &[&str] = match self.kind {
+            SpectrumName::Lines | SpectrumName::Table => &["values"],
+            SpectrumName::BlackBody => &["kelvin", "range_nm"],
+            SpectrumName::D65 => &[],
+            SpectrumName::WhiteLed => &["blue_share", "phosphor_nm"],
+        };
+        for (key, given) in [
+            ("values", self.values.is_some()),
+            ("kelvin", self.kelvin.is_some()),
+            ("range_nm", self.range_nm.is_some()),
+            ("blue_share", self.blue_share.is_some()),
+            ("phosphor_nm", self.phosphor_nm.is_some()),
+        ] {
+            if given && !allowed.contains(&key) {
+                return Err(format!("`{key}` does not belong to this kind of spectrum"));
+            }
+        }
+        let spectrum = match self.kind {
+            SpectrumName::Lines => Spectrum::Lines(values()?),
+            SpectrumName::Table => {
+                let points = values()?.into_iter().map(|[nm, p]| (nm, p));
+                Spectrum::Table(Table::new("spectrum", points).map_err(|e| e.to_string())?)
+            }
+            SpectrumName::BlackBody => Spectrum::BlackBody {
+                kelvin: self.kelvin.ok_or("a black body needs `kelvin`")?,
+                range_nm: self.range_nm.unwrap_or([360.0, 830.0]),
+            },
+            SpectrumName::D65 => Spectrum::D65,
+            SpectrumName::WhiteLed => {
+                let unset = WhiteLed::default();
+                Spectrum::WhiteLed(WhiteLed {
+                    blue_share: self.blue_share.unwrap_or(unset.blue_share),
+                    phosphor_nm: self.phosphor_nm.unwrap_or(unset.phosphor_nm),
+                    ..unset
+                })
+            }
+        };
+        spectrum.sampler().map_err(|e| e.to_string())?;
+        Ok(spectrum)
+    }
+}

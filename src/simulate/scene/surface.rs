@@ -1,0 +1,122 @@
+use super::{Key, LobeKind, Material, Reflectance, Scene, SurfaceKind, medium};
+use crate::optics::fresnel::Power;
+use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
+use crate::simulate::{Error, ErrorKind};
+
+impl Material {
+    /// The surface as a coating and a scatter, for all kinds but `absorber`; what is wrong with it otherwise, and at which key.
+    pub(crate) fn optics(&self) -> Result<(Coating, Option<Scatter>), (&'static str, String)> {
+        let kind = self.surface.unwrap_or(SurfaceKind::Interface);
+        let coating = match kind {
+            SurfaceKind::Absorber => Coating::ideal(0.0, 0.0).map_err(|e| ("surface", e.to_string())),
+            SurfaceKind::Interface => Ok(Coating::Bare),
+            SurfaceKind::Metal => match self.metal {
+                Some([n, k]) if n > 0.0 && k >= 0.0 && n + k < 1e3 => Ok(Coating::Metal { n, k }),
+                _ => Err(("metal", "a metal needs `metal = [n, k]`, n positive".into())),
+            },
+            SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
+            SurfaceKind::Coating => match &self.coating {
+                Some(rows) => table(rows).map_err(|e| ("coating", e)),
+                None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
+            },
+        }?;
+        let misplaced = |key, given: bool, allowed: bool, whose: &str| match given && !allowed {
+            true => Err((key, format!("`{key}` belongs to {whose}"))),
+            false => Ok(()),
+        };
+        let (mirror, coated) = (matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse), kind == SurfaceKind::Coating);
+        misplaced("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating")?;
+        misplaced("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`")?;
+        misplaced("coating", self.coating.is_some(), coated, "`surface = \"coating\"`")?;
+        misplaced("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`")?;
+        let scatters = !matches!(kind, SurfaceKind::Diffuse | SurfaceKind::Absorber);
+        misplaced("scatter", self.scatter.is_some(), scatters, "a surface that is neither diffuse nor black")?;
+        let scatter = match kind {
+            SurfaceKind::Diffuse => Some(Scatter { share: 1.0, lobe: Lobe::Lambertian }),
+            _ => self.scatter().map_err(|e| ("scatter", e))?,
+        };
+        Ok((coating, scatter))
+    }
+
+    fn scatter(&self) -> Result<Option<Scatter>, String> {
+        let Some(s) = &self.scatter else { return Ok(None) };
+        let lobe = match (s.lobe, s.sigma_deg, s.exponent, s.abg) {
+            (LobeKind::Lambertian, None, None, None) => Lobe::Lambertian,
+            (LobeKind::Gaussian, Some(sigma), None, None) => Lobe::Gaussian { sigma: sigma.to_radians() },
+            (LobeKind::Cosine, None, Some(exponent), None) => Lobe::Cosine { exponent },
+            (LobeKind::Abg, None, None, Some([a, b, g])) => Lobe::Abg(Abg::new(a, b, g).map_err(|e| e.to_string())?),
+            (LobeKind::Lambertian, ..) => return Err("a lambertian lobe has no parameters".into()),
+            (LobeKind::Gaussian, ..) => return Err("a gaussian lobe has `sigma_deg` and nothing else".into()),
+            (LobeKind::Cosine, ..) => return Err("a cosine lobe has `exponent` and nothing else".into()),
+            (LobeKind::Abg, ..) => return Err("an abg lobe has `abg = [A, B, g]` and nothing else".into()),
+        };
+        Scatter::new(s.share.unwrap_or(1.0), lobe).map(Some).map_err(|e| e.to_string())
+    }
+}
+
+fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<Coating, (&'static str, String)> {
+    let same = |r: f64| Split { reflected: Power { rs: r, rp: r }, transmitted: Power { rs: transmittance, rp: transmittance } };
+    match r {
+        None => Coating::ideal(unset, transmittance).map_err(|e| ("transmittance", e.to_string())),
+        Some(Reflectance::Constant(r)) => {
+            Coating::ideal(*r, transmittance).map_err(|e| ("reflectance", e.to_string()))
+        }
+        Some(Reflectance::ByAngle(t)) => {
+            let (angles, cells) = t.iter().map(|[a, r]| (*a, same(*r))).unzip();
+            CoatingTable::new(angles, vec![550.0], cells).map(Coating::Table).map_err(|e| ("reflectance", e.to_string()))
+        }
+        Some(Reflectance::ByAngleAndWavelength(t)) => {
+            grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r)))).map_err(|e| ("reflectance", e))
+        }
+    }
+}
+
+fn table(rows: &[Vec<f64>]) -> Result<Coating, String> {
+    let cells = rows.iter().map(|row| match row[..] {
+        [a, nm, r, t] => {
+            Ok(([a, nm], Split { reflected: Power { rs: r, rp: r }, transmitted: Power { rs: t, rp: t } }))
+        }
+        [a, nm, rs, rp, ts, tp] => {
+            Ok(([a, nm], Split { reflected: Power { rs, rp }, transmitted: Power { rs: ts, rp: tp } }))
+        }
+        _ => Err(format!("a row has {} numbers, not 4 or 6", row.len())),
+    });
+    grid(cells.collect::<Result<Vec<_>, _>>()?.into_iter())
+}
+
+/// A coating table from rows of (angle, wavelength) that make a full grid, wavelengths fastest.
+fn grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String> {
+    let (keys, cells): (Vec<[f64; 2]>, Vec<Split>) = rows.unzip();
+    let first = keys.first().ok_or("the table is empty")?[0];
+    let columns = keys.iter().take_while(|k| k[0] == first).count();
+    let nm: Vec<f64> = keys[..columns].iter().map(|k| k[1]).collect();
+    let angles: Vec<f64> = keys.iter().step_by(columns).map(|k| k[0]).collect();
+    let full = keys.iter().enumerate().all(|(i, k)| *k == [angles[i / columns], nm[i % columns]]);
+    if !full || keys.len() != angles.len() * nm.len() {
+        return Err("the rows are no full grid of angles and wavelengths, wavelengths fastest".into());
+    }
+    CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
+}
+
+pub(super) fn check(scene: &Scene) -> Result<(), Error> {
+    if let Some(name) = &scene.ambient {
+        medium::find(scene, name, &[Key::Name("ambient")])?;
+    }
+    for (i, m) in scene.materials.iter().enumerate() {
+        let at = |key| [Key::Name("material"), Key::Index(i), Key::Name(key)];
+        if let Some(name) = &m.medium {
+            medium::find(scene, name, &at("medium"))?;
+        }
+        if m.medium.is_none() && m.surface.is_none() && m.scatter.is_none() {
+            let error = scene.error(ErrorKind::Value, &at(""), "this material says neither `medium` nor `surface`");
+            return Err(error.help("add one of them"));
+        }
+        m.optics().map_err(|(key, message)| scene.error(ErrorKind::Value, &at(key), message))?;
+        if m.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
+            return Err(scene
+                .error(ErrorKind::Value, &at("colour"), "not a colour")
+                .help("write \"#rrggbb\" or [r, g, b]"));
+        }
+    }
+    Ok(())
+}
