@@ -1,7 +1,7 @@
 //! Which effects a scene calls for, why, and which kernel that needs.
 
-use super::bind::{BoundScene, Surface};
-use crate::optics::{Effect, Effects};
+use super::bind::{AMBIENT, Body, BoundScene, Coated, Surface};
+use crate::optics::{Coating, Effect, Effects};
 use serde::Serialize;
 
 /// An effect with the reason why it is, or is not, simulated.
@@ -33,14 +33,31 @@ pub(crate) enum KernelKind {
     /// And the body it is in.
     Clear,
     /// And a stack of bodies.
+    Nested,
+    /// And a wavelength.
+    Coloured,
+    /// And a state of polarisation.
     Full,
 }
 
 impl KernelKind {
+    /// The smallest kernel that can do these effects where bodies stand apart.
+    pub(crate) fn of(effects: Effects) -> Self {
+        let media = [Effect::Refraction, Effect::Fresnel, Effect::BulkAbsorption, Effect::BulkScatter];
+        match () {
+            () if effects.contains(Effect::Polarisation) => Self::Full,
+            () if effects.contains(Effect::Dispersion) => Self::Coloured,
+            () if media.iter().any(|e| effects.contains(*e)) => Self::Clear,
+            () => Self::Opaque,
+        }
+    }
+
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Opaque => "opaque",
             Self::Clear => "clear",
+            Self::Nested => "nested",
+            Self::Coloured => "coloured",
             Self::Full => "full",
         }
     }
@@ -54,13 +71,25 @@ impl Effects {
 }
 
 pub(crate) fn required(bound: &BoundScene) -> Required {
-    let used = |wanted: fn(&Surface) -> bool| {
+    let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()
     };
-    let mirrors = used(|s| matches!(s, Surface::Mirror(_)));
-    let interfaces = if bound.has_media() { used(|s| matches!(s, Surface::Interface)) } else { 0 };
-    let absorbing: Vec<&str> =
-        bound.bodies.iter().filter(|b| b.absorption > 0.0).map(|b| b.medium.as_str()).collect();
+    let coated = |wanted: &dyn Fn(&Coated) -> bool| used(&|s| matches!(s, Surface::Coated(c) if wanted(c)));
+    let mirrors = used(&|s| matches!(s, Surface::Mirror(_)));
+    let lets_in = |f: &&super::bind::FaceOptics| match &bound.surfaces[f.surface as usize] {
+        Surface::Interface => f.body != AMBIENT,
+        Surface::Coated(c) => f.body != AMBIENT && !c.opaque,
+        _ => false,
+    };
+    let interfaces = bound.faces.iter().filter(lets_in).count();
+    let bare = used(&|s| matches!(s, Surface::Interface)).min(interfaces) + coated(&|c| c.coating == Coating::Bare);
+    let metals = coated(&|c| matches!(c.coating, Coating::Metal { .. }));
+    let in_medium =
+        |wanted: &dyn Fn(&Body) -> bool| bound.bodies.iter().find(|b| wanted(b)).map(|b| b.medium.as_str());
+    let medium = |name: Option<&str>, does: &str, none: &str| match name {
+        Some(name) => (true, format!("the medium '{name}' {does}")),
+        None => (false, none.to_string()),
+    };
     let mut required = Required {
         effects: Effects::NONE,
         simulated: Vec::new(),
@@ -69,19 +98,30 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
     };
     for effect in Effect::ALL {
         let (wanted, because) = match effect {
-            Effect::Reflection => (mirrors > 0, plural(mirrors, "mirror face", "no face is a mirror")),
-            Effect::Refraction | Effect::Fresnel => {
+            Effect::Reflection => {
+                let n = mirrors + coated(&|c| !c.coating.is_reflectionless());
+                (n > 0, plural(n, "reflecting face", "no face is a mirror"))
+            }
+            Effect::Refraction => {
                 (interfaces > 0, plural(interfaces, "interface face", "no face lets light into a medium"))
             }
-            Effect::BulkAbsorption => match absorbing.first() {
-                Some(name) => (true, format!("the medium '{name}' absorbs")),
-                None => (false, "no medium absorbs".into()),
-            },
+            Effect::Fresnel => {
+                let n = bare + metals;
+                (n > 0, plural(n, "bare or metal face", "no face is a bare interface or a metal"))
+            }
+            Effect::BulkAbsorption => medium(in_medium(&Body::absorbs), "absorbs", "no medium absorbs"),
+            Effect::BulkScatter => medium(in_medium(&|b| b.scatter.is_some()), "scatters", "no medium scatters"),
+            Effect::Polarisation if bound.scene.run.polarisation => (true, "the scene asks for it".into()),
             Effect::Polarisation => (false, "the scene does not ask for it".into()),
-            Effect::Dispersion => (false, "no index depends on wavelength".into()),
-            Effect::SurfaceScatter => (false, "no face scatters".into()),
-            Effect::Coating => (false, "no face is coated".into()),
-            Effect::BulkScatter => (false, "no medium scatters".into()),
+            Effect::Dispersion => dispersion(bound, in_medium(&Body::is_dispersive)),
+            Effect::SurfaceScatter => {
+                let n = coated(&|c| c.scatter.is_some());
+                (n > 0, plural(n, "rough or diffuse face", "no face scatters"))
+            }
+            Effect::Coating => {
+                let n = coated(&|c| c.coating != Coating::Bare && !matches!(c.coating, Coating::Metal { .. }));
+                (n > 0, plural(n, "coated face", "no face is coated"))
+            }
         };
         let list = if wanted { &mut required.simulated } else { &mut required.not_simulated };
         list.push(Because { effect, because });
@@ -89,13 +129,32 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
             required.effects.insert(effect);
         }
     }
-    let media = bound.has_media() || bound.bodies[0].absorption > 0.0;
-    required.kernel = match (media, bound.nested || bound.emitters.iter().any(|e| e.inside.len() > 1)) {
+    let nested = bound.nested || bound.emitters.iter().any(|e| e.inside.len() > 1);
+    let media = match (bound.has_media(), nested) {
         (false, _) => KernelKind::Opaque,
         (true, false) => KernelKind::Clear,
-        (true, true) => KernelKind::Full,
+        (true, true) => KernelKind::Nested,
     };
+    required.kernel = KernelKind::of(required.effects).max(media);
     required
+}
+
+/// Whether the wavelength of a ray matters: for a medium, a coating or a receiver.
+fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
+    if !bound.light.coloured {
+        return (false, format!("all light has {} nm", bound.light.wavelength));
+    }
+    if let Some(r) = bound.receivers.iter().find(|r| r.channels.count() > 0) {
+        return (true, format!("the receiver '{}' asks for the spectrum", r.name));
+    }
+    if let Some(name) = medium {
+        return (true, format!("the index or absorption of '{name}' depends on wavelength"));
+    }
+    let coloured = |s: &Surface| matches!(s, Surface::Coated(c) if c.coating.is_dispersive());
+    match bound.faces.iter().any(|f| coloured(&bound.surfaces[f.surface as usize])) {
+        true => (true, "a coating depends on wavelength".into()),
+        false => (false, "no index, absorption or coating depends on wavelength".into()),
+    }
 }
 
 fn plural(n: usize, noun: &str, none: &str) -> String {

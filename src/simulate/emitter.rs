@@ -1,11 +1,12 @@
 //! Sources in the form that makes rays.
 
-use super::bind::Body;
+use super::bind::{Body, Light};
 use super::random::{self, Key, Purpose};
 use super::scene::{self, Sampling, Scene, SourceKind};
 use super::{Error, ErrorKind};
 use crate::math::{Frame, Point, Ray, Vector};
 use crate::model::Model;
+use crate::optics::{Spectrum, Wavelengths};
 use smallvec::SmallVec;
 use std::f64::consts::TAU;
 
@@ -16,6 +17,10 @@ pub(crate) struct Emitter {
     pub(crate) rays: Option<u64>,
     /// Bodies around it, outermost first.
     pub(crate) inside: SmallVec<[u16; 4]>,
+    /// Its spectrum, when the scene has several wavelengths.
+    wavelengths: Option<Wavelengths>,
+    /// Direction of the electric field of polarised light.
+    pub(crate) polarised: Option<Vector>,
     frame: Frame,
     shape: Shape,
     lobe: Lobe,
@@ -77,6 +82,7 @@ impl Emitter {
         s: &scene::Source,
         model: &Model,
         bodies: &[Body],
+        light: &Light,
     ) -> Result<Self, Error> {
         let (direction, at) = (Vector::from_array(s.direction), Point::from_array(s.at));
         let shape = match (s.radius, s.size) {
@@ -103,7 +109,27 @@ impl Emitter {
             inside.push(body as u16 + 1);
         }
         let x = s.x.map(Vector::from_array);
-        Ok(Self { power: s.power, rays: s.rays, inside, frame: Frame::from_axis(at, direction, x), shape, lobe })
+        let wavelengths = match (&s.spectrum, light.coloured) {
+            (_, false) => None,
+            (None, true) => Spectrum::line(scene.run.wavelength_nm).sampler().ok(),
+            (Some(key), true) => key.optics().ok().and_then(|s| s.sampler().ok()),
+        };
+        let polarised = s.polarised.map(Vector::from_array);
+        Ok(Self {
+            wavelengths,
+            polarised,
+            power: s.power,
+            rays: s.rays,
+            inside,
+            frame: Frame::from_axis(at, direction, x),
+            shape,
+            lobe,
+        })
+    }
+
+    /// Wavelength of a ray, nm; absent when the scene has but one.
+    pub(crate) fn wavelength(&self, stream: &Stream, ray: u64, index: u32) -> Option<f64> {
+        self.wavelengths.as_ref().map(|w| w.sample(stream.pair(ray, index, 2)[0]))
     }
 
     /// Ray `ray` of the run, the `index`-th of this source and replicate.

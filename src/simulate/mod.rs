@@ -24,12 +24,14 @@ mod results;
 mod run;
 pub mod scene;
 mod tally;
+mod verify;
 
 pub use bind::BoundScene;
 pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};
 pub use kernel::{Cause, Counts, Event, LostRay, PathVertex, Tallies};
-pub use results::{Absorbed, EffectsUsed, Power, ReceiverResult, Results, Seconds};
+pub use results::{Absorbed, ChannelResult, EffectsUsed, Power, ReceiverResult, Results, Seconds};
 pub use run::{KernelChoice, Progress, RunSettings, simulate};
 pub use scene::Scene;
 pub use tally::{Moments, QUANTA, Sum};
+pub use verify::{EffectCost, Verification, effect_costs, verify_pruning};

@@ -2,6 +2,7 @@
 
 use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Frame, Point, Ray, Vector};
+use crate::optics::xyz_of_watt;
 use std::f64::consts::TAU;
 
 /// A receiver.
@@ -12,6 +13,76 @@ pub(crate) struct Receiver {
     pub(crate) absorbs: bool,
     pub(crate) interactions: Option<u32>,
     pub(crate) shape: Shape,
+    pub(crate) channels: Channels,
+}
+
+/// What a receiver counts besides power.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Channels {
+    None,
+    /// Lumens, by the CIE's V(λ), for sources in watts.
+    Photometric,
+    /// CIE X, Y, Z.
+    Xyz,
+    /// Power between each two wavelengths, nm.
+    Bins(Vec<f64>),
+}
+
+/// Lumens that a quantum of a weighted channel stands for: above all values of 683·x̄, 683·ȳ, 683·z̄.
+pub(crate) const CHANNEL_LUMENS: f64 = 2048.0;
+
+impl Channels {
+    fn new(r: &scene::Receiver) -> Self {
+        match (&r.channels, &r.bins_nm) {
+            (_, Some(bins)) => Self::Bins(bins.clone()),
+            (Some(scene::Channels::Photometric), None) => Self::Photometric,
+            (Some(scene::Channels::Xyz), None) => Self::Xyz,
+            (None, None) => Self::None,
+        }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Photometric => 1,
+            Self::Xyz => 3,
+            Self::Bins(edges) => edges.len() - 1,
+        }
+    }
+
+    /// Name of a channel.
+    pub(crate) fn name(&self, channel: usize) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::Photometric => "lm".into(),
+            Self::Xyz => ["X", "Y", "Z"][channel].into(),
+            Self::Bins(edges) => format!("{}-{} nm", edges[channel], edges[channel + 1]),
+        }
+    }
+
+    /// Hands out the weight of each channel that counts a wavelength.
+    #[inline]
+    pub(crate) fn weigh(&self, nm: f64, mut add: impl FnMut(usize, f64)) {
+        match self {
+            Self::None => {}
+            Self::Photometric => add(0, xyz_of_watt(nm)[1] / CHANNEL_LUMENS),
+            Self::Xyz => (0..3).zip(xyz_of_watt(nm)).for_each(|(c, x)| add(c, x / CHANNEL_LUMENS)),
+            Self::Bins(edges) => {
+                let k = edges.partition_point(|e| *e <= nm);
+                if k > 0 && k < edges.len() {
+                    add(k - 1, 1.0);
+                }
+            }
+        }
+    }
+
+    /// What a quantum of a channel is worth, against a quantum of power.
+    pub(crate) fn worth(&self) -> f64 {
+        match self {
+            Self::Photometric | Self::Xyz => CHANNEL_LUMENS,
+            Self::None | Self::Bins(_) => 1.0,
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -68,11 +139,24 @@ impl Receiver {
             ReceiverKind::Absorbed => Shape::Absorbed { faces },
         };
         let cells = if r.kind == ReceiverKind::Absorbed { [1, 1] } else { r.cells };
-        Self { name: r.name.clone(), cells, absorbs: r.absorbs, interactions: r.interactions, shape }
+        Self {
+            name: r.name.clone(),
+            cells,
+            absorbs: r.absorbs,
+            interactions: r.interactions,
+            shape,
+            channels: Channels::new(r),
+        }
     }
 
+    /// Cells of one channel.
     pub(crate) fn cell_count(&self) -> usize {
         self.cells[0] as usize * self.cells[1] as usize
+    }
+
+    /// Sums to keep: the cells of power, then those of each channel.
+    pub(crate) fn sum_count(&self) -> usize {
+        self.cell_count() * (1 + self.channels.count())
     }
 
     /// Distances at which a ray crosses the receiver, in `(after, before)`; the nearest.

@@ -5,7 +5,7 @@ use super::effects::{Because, KernelKind, Required};
 use super::kernel::{Counts, LostRay, PathVertex, Tallies};
 use super::receiver::{Receiver, Shape};
 use super::run::Plan;
-use super::scene::FarFieldType;
+use super::scene::{FarFieldType, PowerUnit};
 use super::tally::Sum;
 use crate::intersect::Cost;
 use serde::{Serialize, Serializer};
@@ -136,7 +136,7 @@ pub struct ReceiverResult {
     pub max: f64,
     /// Smallest cell, in `unit`.
     pub min: f64,
-    /// Unit of the cells, for sources in watts: `W/m2` or `W/sr`; lx and cd for sources in lumens.
+    /// Unit of the cells: `W/m2` or `W/sr` for sources in watts, `lx` or `cd` for sources in lumens.
     pub unit: &'static str,
     /// Mean position of the light: mm on a plane, degrees in angles.
     pub centroid: [f64; 2],
@@ -153,10 +153,27 @@ pub struct ReceiverResult {
     /// Type of the angles of a far field.
     #[serde(serialize_with = "angle_type")]
     pub angles: Option<FarFieldType>,
+    /// Power, lumens or CIE values of each further channel.
+    pub channels: Vec<ChannelResult>,
     /// Cells row by row, the first coordinate running fastest, in `unit`.
     #[serde(skip)]
     pub cells: Vec<f64>,
     /// Standard error of each cell, in `unit`.
+    #[serde(skip)]
+    pub errors: Vec<f64>,
+}
+
+/// A further channel of a receiver.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChannelResult {
+    /// `lm`, `X`, `Y`, `Z`, or the wavelengths of a bin.
+    pub name: String,
+    /// Sum over the receiver: lumens, CIE values with Y in lumens, or watts of a bin.
+    pub total: f64,
+    /// Cells as those of the receiver, per m² or sr.
+    #[serde(skip)]
+    pub cells: Vec<f64>,
+    /// Standard error of each cell.
     #[serde(skip)]
     pub errors: Vec<f64>,
 }
@@ -205,7 +222,7 @@ impl Results {
                 .receivers
                 .iter()
                 .enumerate()
-                .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum))
+                .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum, bound.scene.run.unit))
                 .collect(),
             ledger: std::mem::take(&mut tallies.ledger),
             paths: std::mem::take(&mut tallies.paths),
@@ -234,22 +251,41 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
 }
 
 impl ReceiverResult {
-    fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64) -> Self {
+    fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64, unit: PowerUnit) -> Self {
         let grid = r.cells.map(|n| n as usize);
         let degrees = |low: [f64; 2], high: [f64; 2]| {
             let half = [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees());
             (half, [0, 1].map(|a| 0.5 * (high[a] + low[a]).to_degrees()))
         };
+        let lumen = unit == PowerUnit::Lumen;
+        let (per_area, per_angle) = if lumen { ("lx", "cd") } else { ("W/m2", "W/sr") };
         let (kind, unit, scale, (half, middle), angles) = match &r.shape {
-            Shape::Plane { half, .. } => ("plane", "W/m2", 1e6, (*half, [0.0; 2]), None),
-            Shape::Sphere { .. } => ("sphere", "W/m2", 1e6, ([180.0, 90.0], [0.0; 2]), None),
+            Shape::Plane { half, .. } => ("plane", per_area, 1e6, (*half, [0.0; 2]), None),
+            Shape::Sphere { .. } => ("sphere", per_area, 1e6, ([180.0, 90.0], [0.0; 2]), None),
             Shape::FarField { angles, low, high, .. } => {
-                ("far_field", "W/sr", 1.0, degrees(*low, *high), Some(*angles))
+                ("far_field", per_angle, 1.0, degrees(*low, *high), Some(*angles))
             }
-            Shape::Absorbed { .. } => ("absorbed", "W", 1.0, ([1.0; 2], [0.0; 2]), None),
+            Shape::Absorbed { .. } => ("absorbed", if lumen { "lm" } else { "W" }, 1.0, ([1.0; 2], [0.0; 2]), None),
         };
         let per = |k: usize| quantum * scale / r.measure(k % grid[0], k / grid[0]);
-        let sums = &tallies.cells[i];
+        let n = r.cell_count();
+        let (sums, further) = tallies.cells[i].split_at(n);
+        let channels = further.chunks(n).enumerate();
+        let channels = channels.map(|(c, sums)| {
+            let worth = r.channels.worth();
+            let total: u128 = sums.iter().map(|s| s.total).sum();
+            ChannelResult {
+                name: r.channels.name(c),
+                total: total as f64 * quantum * worth,
+                cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
+                errors: sums
+                    .iter()
+                    .enumerate()
+                    .map(|(k, s)| s.error(tallies.replicates) * per(k) * worth)
+                    .collect(),
+            }
+        });
+        let channels = channels.collect();
         let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k)).collect();
         let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
         let total = &tallies.receivers[i];
@@ -271,6 +307,7 @@ impl ReceiverResult {
             half,
             middle,
             angles,
+            channels,
             cells,
             errors,
         }

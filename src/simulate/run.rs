@@ -1,11 +1,12 @@
 use super::bind::BoundScene;
 use super::effects::{self, KernelKind};
-use super::kernel::{self, Context, Local, Nothing, OneBody, Stack, Tallies};
+use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, Stack, Tallies};
 use super::receiver::Shape;
 use super::results::Results;
 use super::scene::{Interfaces, Run, Sampling};
 use super::tally::QUANTA;
 use crate::intersect::{Cost, Intersector};
+use crate::optics::Effects;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Instant;
@@ -49,6 +50,8 @@ pub enum KernelChoice {
     /// The smallest that the scene needs.
     #[default]
     Pruned,
+    /// The smallest that the scene needs and that could do these effects too.
+    With(Effects),
     /// The one that can do everything.
     Full,
 }
@@ -171,6 +174,7 @@ pub fn simulate(
     let required = effects::required(bound);
     let kind = match settings.kernel {
         KernelChoice::Pruned => required.kernel,
+        KernelChoice::With(effects) => required.kernel.max(KernelKind::of(effects)),
         KernelChoice::Full => KernelKind::Full,
     };
     let (tallies, plan, cost, seconds, threads) = run(bound, intersector, settings, kind, progress);
@@ -219,7 +223,9 @@ fn run(
             let cost = match kind {
                 KernelKind::Opaque => kernel::trace::<Nothing>(&context, replicate, &mut local),
                 KernelKind::Clear => kernel::trace::<OneBody>(&context, replicate, &mut local),
-                KernelKind::Full => kernel::trace::<Stack>(&context, replicate, &mut local),
+                KernelKind::Nested => kernel::trace::<Stack>(&context, replicate, &mut local),
+                KernelKind::Coloured => kernel::trace::<Coloured>(&context, replicate, &mut local),
+                KernelKind::Full => kernel::trace::<Everything>(&context, replicate, &mut local),
             };
             let rays = done.fetch_add(local.counts.rays, Ordering::Relaxed) + local.counts.rays;
             let mut sums = total.lock().unwrap_or_else(|e| e.into_inner());

@@ -5,7 +5,7 @@ use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
-use lampyris::simulate::{Results, RunSettings, Scene, simulate};
+use lampyris::simulate::{KernelChoice, Results, RunSettings, Scene, simulate};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
@@ -78,6 +78,11 @@ impl World {
         change(&mut settings);
         let results = simulate(&bound, self, &settings, &|_| true);
         assert!(results.power.imbalance() < 1e-9, "energy: {:?}", results.power);
+        let ends: Vec<u128> = results.tallies.ends.iter().map(|s| s.total).collect();
+        assert_eq!(ends[0], ends[1..].iter().sum::<u128>(), "energy closes to the last quantum");
+        let full = RunSettings { kernel: KernelChoice::Full, threads: 3, ..settings };
+        let full = simulate(&bound, self, &full, &|_| true);
+        assert_eq!(results.digest, full.digest, "the full kernel gives the same bits");
         results
     }
 }
@@ -100,7 +105,7 @@ impl Shape {
                 let o = ray.origin - centre;
                 let b = o.dot(ray.direction);
                 let roots = if leaving {
-                    [-2.0 * b, f64::INFINITY]
+                    [-2.0 * b, f64::NAN]
                 } else {
                     let foot = o - ray.direction * b;
                     let root = (radius * radius - foot.length_squared()).sqrt();

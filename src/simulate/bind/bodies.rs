@@ -1,40 +1,111 @@
 use super::nearest::bounds;
-use super::{AMBIENT, Body, Chosen};
+use super::{AMBIENT, Chosen, Light};
 use crate::math::Aabb;
 use crate::model::Model;
-use crate::simulate::scene::{Key, Scene};
+use crate::optics::{self, Absorption, BulkScatter, Index};
+use crate::simulate::scene::{Key, Scene, medium};
 use crate::simulate::{Error, ErrorKind};
+
+/// Something with a medium inside.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Body {
+    /// Index at the wavelength of the scene.
+    index: f64,
+    /// Index by wavelength, when the scene has several and they differ.
+    dispersive: Option<Index>,
+    /// Absorption coefficient at the wavelength of the scene, 1/mm.
+    absorption: f64,
+    /// Absorption by wavelength, when the scene has several and they differ.
+    coloured: Option<Absorption>,
+    /// Scattering inside.
+    pub(crate) scatter: Option<BulkScatter>,
+    /// Instance name.
+    pub(crate) name: String,
+    /// Name of the medium.
+    pub(crate) medium: String,
+}
+
+impl Body {
+    fn new(m: optics::Medium, name: String, light: &Light) -> Self {
+        Self {
+            index: m.index.at(light.wavelength),
+            dispersive: (light.coloured && m.index.is_dispersive()).then_some(m.index),
+            absorption: m.absorption.coefficient(light.wavelength),
+            coloured: (light.coloured && m.absorption.is_dispersive()).then_some(m.absorption),
+            scatter: m.scatter,
+            name,
+            medium: m.name,
+        }
+    }
+
+    /// Refractive index; `wavelength` is absent where it does not matter.
+    #[inline]
+    pub(crate) fn index(&self, wavelength: Option<f64>) -> f64 {
+        match (&self.dispersive, wavelength) {
+            (Some(index), Some(nm)) => index.at(nm),
+            _ => self.index,
+        }
+    }
+
+    /// Absorption coefficient, 1/mm.
+    #[inline]
+    pub(crate) fn absorption(&self, wavelength: Option<f64>) -> f64 {
+        match (&self.coloured, wavelength) {
+            (Some(absorption), Some(nm)) => absorption.coefficient(nm),
+            _ => self.absorption,
+        }
+    }
+
+    /// Whether anything depends on the wavelength of a ray.
+    pub(crate) fn is_dispersive(&self) -> bool {
+        self.dispersive.is_some() || self.coloured.is_some()
+    }
+
+    /// Whether light is absorbed inside.
+    pub(crate) fn absorbs(&self) -> bool {
+        self.absorption > 0.0 || self.coloured.is_some()
+    }
+}
 
 /// The bodies (one for each instance and medium), the body of each face, and whether bodies may touch or nest.
 ///
 /// An instance with two media, given by face, makes two bodies. Bodies whose boxes are farther apart than the glue distance
 /// can neither touch nor nest.
-pub(super) fn find(scene: &Scene, model: &Model, chosen: &Chosen) -> Result<(Vec<Body>, Vec<u16>, bool), Error> {
-    let medium = |name: &str| scene.media.iter().find(|m| m.name == name);
-    let ambient = scene.ambient.as_deref().and_then(medium);
-    let mut bodies = vec![Body {
-        index: ambient.and_then(|m| m.index).unwrap_or(1.0),
-        absorption: ambient.map_or(0.0, |m| m.absorption_per_mm),
-        name: "surroundings".into(),
-        medium: scene.ambient.clone().unwrap_or_else(|| "vacuum".into()),
-    }];
+pub(super) fn find(
+    scene: &Scene,
+    model: &Model,
+    chosen: &Chosen,
+    light: &Light,
+) -> Result<(Vec<Body>, Vec<u16>, bool), Error> {
+    let ambient = match &scene.ambient {
+        Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
+        None => optics::Medium::vacuum(),
+    };
+    let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
     let mut keys: Vec<Option<(usize, &str)>> = vec![None];
     let mut boxes = vec![Aabb::EMPTY];
     let mut of_face = vec![AMBIENT; chosen.len()];
     for (f, &(_, rule)) in model.placed_faces().zip(chosen) {
-        let Some(m) = rule.and_then(|r| scene.materials[r].medium.as_deref()).and_then(medium) else { continue };
-        let key = Some((f.instance, m.name.as_str()));
-        let body = keys.iter().position(|k| *k == key).unwrap_or_else(|| {
-            keys.push(key);
-            boxes.push(Aabb::EMPTY);
-            bodies.push(Body {
-                index: m.index.unwrap_or(1.0),
-                absorption: m.absorption_per_mm,
-                name: model.instances[f.instance].name.clone(),
-                medium: m.name.clone(),
-            });
-            keys.len() - 1
-        });
+        let Some((rule, name)) = rule.and_then(|r| Some((r, scene.materials[r].medium.as_deref()?))) else {
+            continue;
+        };
+        let key = Some((f.instance, name));
+        let body = match keys.iter().position(|k| *k == key) {
+            Some(body) => body,
+            None => {
+                let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
+                let instance = model.instances[f.instance].name.clone();
+                let body = Body::new(medium::find(scene, name, &at)?, instance, light);
+                if !(body.index > 0.0 && body.index.is_finite()) {
+                    let message = format!("'{name}' has no index at {} nm", light.wavelength);
+                    return Err(scene.error(ErrorKind::Value, &at, message));
+                }
+                keys.push(key);
+                boxes.push(Aabb::EMPTY);
+                bodies.push(body);
+                keys.len() - 1
+            }
+        };
         boxes[body] = boxes[body].union(bounds(&f));
         of_face[f.id.index()] = body as u16;
     }

@@ -6,10 +6,12 @@ mod select;
 
 use super::emitter::Emitter;
 use super::receiver::Receiver;
-use super::scene::{Material, OneOrMany, ReceiverKind, Reflectance, Scene, SurfaceKind};
+use super::scene::{Material, OneOrMany, ReceiverKind, Scene, SurfaceKind};
 use super::{Error, ErrorKind};
 use crate::model::Model;
+use crate::optics::{Coating, Scatter};
 use crate::simulate::scene::Key;
+pub(crate) use bodies::Body;
 use nearest::Nearest;
 
 /// What a placed face is to light.
@@ -26,61 +28,34 @@ pub(crate) struct FaceOptics {
 /// The body around everything.
 pub(crate) const AMBIENT: u16 = 0;
 
-/// Something with a medium inside.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Body {
-    /// Refractive index.
-    pub(crate) index: f64,
-    /// Absorption coefficient, 1/mm.
-    pub(crate) absorption: f64,
-    /// Instance name, for messages.
-    pub(crate) name: String,
-    /// Name of the medium.
-    pub(crate) medium: String,
-}
-
 /// What happens at a surface, in the form the kernel reads.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Surface {
     Absorber,
-    Mirror(Share),
+    /// Reflects a constant share.
+    Mirror(f64),
+    /// The bare boundary of a medium.
     Interface,
+    /// Everything else.
+    Coated(Box<Coated>),
 }
 
-/// A share of power, constant or by the cosine of incidence.
+/// A surface with a coating, scatter or both.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Share {
-    Constant(f64),
-    /// Pairs of angle in radians and share, by rising angle.
-    ByAngle(Vec<[f64; 2]>),
+pub(crate) struct Coated {
+    pub(crate) coating: Coating,
+    pub(crate) scatter: Option<Scatter>,
+    /// Whether it never transmits.
+    pub(crate) opaque: bool,
 }
 
-impl Share {
-    fn of(r: Option<&Reflectance>) -> Self {
-        match r {
-            None => Self::Constant(1.0),
-            Some(Reflectance::Constant(r)) => Self::Constant(*r),
-            Some(Reflectance::ByAngle(t)) => Self::ByAngle(t.iter().map(|[a, r]| [a.to_radians(), *r]).collect()),
-        }
-    }
-
-    /// The share at an angle of incidence; beyond the ends of a table, that of its ends.
-    #[inline]
-    pub(crate) fn at(&self, cos_i: f64) -> f64 {
-        match self {
-            Self::Constant(r) => *r,
-            Self::ByAngle(t) => {
-                let angle = cos_i.clamp(0.0, 1.0).acos();
-                let k = t.partition_point(|[a, _]| *a <= angle);
-                match (k.checked_sub(1).map(|i| t[i]), t.get(k)) {
-                    (Some([a, r]), Some([b, s])) => r + (s - r) * (angle - a) / (b - a),
-                    (Some([_, r]), None) => r,
-                    (None, Some([_, s])) => *s,
-                    (None, None) => 0.0,
-                }
-            }
-        }
-    }
+/// The wavelengths of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Light {
+    /// The only wavelength, or one of many, nm.
+    pub(crate) wavelength: f64,
+    /// Whether there are several.
+    pub(crate) coloured: bool,
 }
 
 /// A scene whose rules have found their faces: everything a simulation needs but the intersector.
@@ -90,6 +65,7 @@ pub struct BoundScene {
     pub(crate) faces: Vec<FaceOptics>,
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) bodies: Vec<Body>,
+    pub(crate) light: Light,
     /// Whether bodies may touch or lie inside each other, so that paths need a stack of media.
     pub(crate) nested: bool,
     pub(crate) emitters: Vec<Emitter>,
@@ -106,31 +82,29 @@ impl Scene {
             let error = self.error(ErrorKind::Value, &[], "the scene has no source");
             return Err(error.help("add a [[source]]"));
         }
+        let light = light(self);
         let chosen = chosen_rules(self, model)?;
         let mut surfaces = vec![Surface::Absorber, Surface::Interface];
-        let default = surface_index(&mut surfaces, &surface(self.default_surface, None));
-        let (bodies, body_of_face, nested) = bodies::find(self, model, &chosen)?;
-        let faces = model
-            .placed_faces()
-            .zip(&chosen)
-            .zip(&body_of_face)
-            .map(|((f, (surface_rule, _)), &body)| {
-                let surface = match surface_rule.map(|r| &self.materials[r]) {
-                    Some(rule) => {
-                        surface(rule.surface.unwrap_or(SurfaceKind::Interface), rule.reflectance.as_ref())
-                    }
-                    None if body != AMBIENT => Surface::Interface,
-                    None => surfaces[default as usize].clone(),
-                };
-                let closed = f.shell.is_some_and(|s| model.part(f.part).shells[s].closed);
-                FaceOptics {
-                    surface: surface_index(&mut surfaces, &surface),
-                    body,
-                    sealed: closed && body == AMBIENT && surface != Surface::Interface,
-                }
-            })
-            .collect();
-        let emitters = self.sources.iter().enumerate().map(|(i, s)| Emitter::new(self, i, s, model, &bodies));
+        let default = Material { surface: Some(self.default_surface), ..Material::default() };
+        let (bodies, body_of_face, nested) = bodies::find(self, model, &chosen, &light)?;
+        let mut faces = Vec::with_capacity(chosen.len());
+        for ((f, (rule, _)), &body) in model.placed_faces().zip(&chosen).zip(&body_of_face) {
+            let surface = match rule.map(|r| &self.materials[r]) {
+                Some(rule) => surface(self, rule)?,
+                None if body != AMBIENT => Surface::Interface,
+                None => surface(self, &default)?,
+            };
+            let closed = f.shell.is_some_and(|s| model.part(f.part).shells[s].closed);
+            let opaque = match &surface {
+                Surface::Absorber | Surface::Mirror(_) => true,
+                Surface::Interface => false,
+                Surface::Coated(c) => c.opaque,
+            };
+            let sealed = closed && body == AMBIENT && opaque;
+            faces.push(FaceOptics { surface: surface_index(&mut surfaces, surface), body, sealed });
+        }
+        let emitters =
+            self.sources.iter().enumerate().map(|(i, s)| Emitter::new(self, i, s, model, &bodies, &light));
         let emitters = emitters.collect::<Result<_, _>>()?;
         let mut receivers = Vec::new();
         for (i, r) in self.receivers.iter().enumerate() {
@@ -145,6 +119,7 @@ impl Scene {
             faces,
             surfaces,
             bodies,
+            light,
             nested,
             emitters,
             receivers,
@@ -162,7 +137,7 @@ fn chosen_rules(scene: &Scene, model: &Model) -> Result<Chosen, Error> {
     let mut nearest = Nearest::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
         for face in select::faces(scene, i, rule, model, &mut nearest)? {
-            if rule.surface.is_some() {
+            if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);
             }
             if rule.medium.is_some() {
@@ -173,17 +148,34 @@ fn chosen_rules(scene: &Scene, model: &Model) -> Result<Chosen, Error> {
     Ok(chosen)
 }
 
-fn surface(kind: SurfaceKind, reflectance: Option<&Reflectance>) -> Surface {
-    match kind {
-        SurfaceKind::Absorber => Surface::Absorber,
-        SurfaceKind::Mirror => Surface::Mirror(Share::of(reflectance)),
-        SurfaceKind::Interface => Surface::Interface,
-    }
+fn light(scene: &Scene) -> Light {
+    let line = |s: &super::scene::Source| match &s.spectrum {
+        None => Some(scene.run.wavelength_nm),
+        Some(key) => key.optics().ok().and_then(|s| s.single_line()),
+    };
+    let mut lines = scene.sources.iter().map(line);
+    let first = lines.next().flatten();
+    let coloured = first.is_none() || lines.any(|l| l != first);
+    Light { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
 }
 
-fn surface_index(surfaces: &mut Vec<Surface>, surface: &Surface) -> u16 {
-    let found = surfaces.iter().position(|s| s == surface).unwrap_or_else(|| {
-        surfaces.push(surface.clone());
+fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
+    let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
+    let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
+    Ok(match (kind, coating, scatter) {
+        (SurfaceKind::Absorber, ..) => Surface::Absorber,
+        (_, Coating::Bare, None) => Surface::Interface,
+        (SurfaceKind::Mirror, Coating::Ideal { reflectance, .. }, None) => Surface::Mirror(reflectance),
+        (_, coating, scatter) => {
+            let opaque = coating.is_opaque();
+            Surface::Coated(Box::new(Coated { coating, scatter, opaque }))
+        }
+    })
+}
+
+fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u16 {
+    let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
+        surfaces.push(surface);
         surfaces.len() - 1
     });
     found as u16
@@ -223,8 +215,16 @@ impl BoundScene {
 
     /// Whether any face lets light into a medium.
     pub(crate) fn has_media(&self) -> bool {
-        self.faces.iter().any(|f| f.body != AMBIENT && self.surfaces[f.surface as usize] == Surface::Interface)
+        let lets_in = |f: &FaceOptics| match &self.surfaces[f.surface as usize] {
+            Surface::Interface => f.body != AMBIENT,
+            Surface::Coated(c) => f.body != AMBIENT && !c.opaque,
+            _ => false,
+        };
+        let ambient = &self.bodies[AMBIENT as usize];
+        self.faces.iter().any(lets_in)
             || self.emitters.iter().any(|e| !e.inside.is_empty())
+            || ambient.absorbs()
+            || ambient.scatter.is_some()
     }
 
     /// Name of the instance that a face belongs to.

@@ -1,3 +1,5 @@
+use crate::math::Vector;
+use crate::optics::polarised::Stokes;
 use crate::simulate::bind::AMBIENT;
 
 /// What a ray carries besides place, direction and power: the part of a path that decides which kernel is needed.
@@ -10,6 +12,26 @@ pub(crate) trait Carry: Copy + Send {
     fn body(&self) -> u16;
     /// The same ray on the other side of the boundary of a body; `None` for a crossing that cannot be.
     fn across(&self, body: u16, entering: bool) -> Option<Self>;
+    /// Whether it can carry no more bodies.
+    fn is_full(&self) -> bool {
+        false
+    }
+    /// `across` with the light of `self`: after an interface has changed the polarisation, `across` still has the old one.
+    fn moved(&self, across: Self) -> Self {
+        across
+    }
+    /// Whether it carries a wavelength.
+    const COLOURED: bool = false;
+    /// Its wavelength, nm, when it carries one.
+    fn wavelength(&self) -> Option<f64> {
+        None
+    }
+    /// Its polarisation, of power 1, when it carries one.
+    fn stokes(&mut self) -> Option<&mut Stokes> {
+        None
+    }
+    /// Gives it a colour and a polarisation.
+    fn light(&mut self, _wavelength: Option<f64>, _stokes: impl FnOnce() -> Stokes) {}
 }
 
 /// No media: mirrors and absorbers in empty space.
@@ -68,6 +90,9 @@ pub(crate) struct Stack {
 
 impl Carry for Stack {
     const MEDIA: bool = true;
+    fn is_full(&self) -> bool {
+        self.depth as usize == DEPTH
+    }
     fn inside(bodies: &[u16]) -> Option<Self> {
         let mut stack = Self { bodies: [AMBIENT; DEPTH], depth: bodies.len() as u16 };
         stack.bodies.get_mut(..bodies.len())?.copy_from_slice(bodies);
@@ -94,6 +119,73 @@ impl Carry for Stack {
             next.depth -= 1;
         }
         Some(next)
+    }
+}
+
+/// A stack of bodies and a wavelength.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coloured {
+    stack: Stack,
+    wavelength: Option<f64>,
+}
+
+impl Carry for Coloured {
+    const MEDIA: bool = true;
+    const COLOURED: bool = true;
+    fn is_full(&self) -> bool {
+        self.stack.is_full()
+    }
+    fn inside(bodies: &[u16]) -> Option<Self> {
+        Some(Self { stack: Stack::inside(bodies)?, wavelength: None })
+    }
+    fn body(&self) -> u16 {
+        self.stack.body()
+    }
+    fn across(&self, body: u16, entering: bool) -> Option<Self> {
+        Some(Self { stack: self.stack.across(body, entering)?, ..*self })
+    }
+    fn wavelength(&self) -> Option<f64> {
+        self.wavelength
+    }
+    fn light(&mut self, wavelength: Option<f64>, _: impl FnOnce() -> Stokes) {
+        self.wavelength = wavelength;
+    }
+}
+
+/// A stack of bodies, a wavelength and a state of polarisation: all there is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Everything {
+    coloured: Coloured,
+    stokes: Stokes,
+}
+
+impl Carry for Everything {
+    const MEDIA: bool = true;
+    const COLOURED: bool = true;
+    fn is_full(&self) -> bool {
+        self.coloured.is_full()
+    }
+    fn moved(&self, across: Self) -> Self {
+        Self { stokes: self.stokes, ..across }
+    }
+    fn inside(bodies: &[u16]) -> Option<Self> {
+        Some(Self { coloured: Coloured::inside(bodies)?, stokes: Stokes::unpolarised(1.0, Vector::Z) })
+    }
+    fn body(&self) -> u16 {
+        self.coloured.body()
+    }
+    fn across(&self, body: u16, entering: bool) -> Option<Self> {
+        Some(Self { coloured: self.coloured.across(body, entering)?, ..*self })
+    }
+    fn wavelength(&self) -> Option<f64> {
+        self.coloured.wavelength
+    }
+    fn stokes(&mut self) -> Option<&mut Stokes> {
+        Some(&mut self.stokes)
+    }
+    fn light(&mut self, wavelength: Option<f64>, stokes: impl FnOnce() -> Stokes) {
+        self.coloured.wavelength = wavelength;
+        self.stokes = stokes();
     }
 }
 

@@ -142,7 +142,7 @@ impl Counts {
 impl Local {
     pub(crate) fn new(bound: &BoundScene) -> Self {
         Self {
-            receivers: bound.receivers.iter().map(|r| Grid::new(r.cell_count())).collect(),
+            receivers: bound.receivers.iter().map(|r| Grid::new(r.sum_count())).collect(),
             receiver_totals: vec![0; bound.receivers.len()],
             moments: vec![Moments::default(); bound.receivers.len()],
             absorbed: Grid::new(bound.faces.len()),
@@ -204,7 +204,7 @@ pub struct Tallies {
 impl Tallies {
     pub(crate) fn new(bound: &BoundScene) -> Self {
         Self {
-            cells: bound.receivers.iter().map(|r| vec![Sum::default(); r.cell_count()]).collect(),
+            cells: bound.receivers.iter().map(|r| vec![Sum::default(); r.sum_count()]).collect(),
             receivers: vec![Sum::default(); bound.receivers.len()],
             moments: vec![Moments::default(); bound.receivers.len()],
             faces: vec![Sum::default(); bound.faces.len()],

@@ -7,8 +7,9 @@
 mod carry;
 mod local;
 mod step;
+mod surface;
 
-pub(crate) use carry::{Carry, Nothing, OneBody, Stack};
+pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Stack};
 pub(crate) use local::Local;
 pub use local::{Cause, Counts, Event, LostRay, PathVertex, Tallies};
 
@@ -17,6 +18,7 @@ use super::emitter::Stream;
 use super::run::{Plan, RunSettings};
 use crate::intersect::{Cost, Hit, Intersector};
 use crate::math::Ray;
+use crate::optics::polarised::Stokes;
 
 /// What all replicates share.
 pub(crate) struct Context<'a> {
@@ -50,6 +52,16 @@ pub(crate) struct Path<C> {
 
 /// No receiver ahead.
 pub(crate) const NO_RECEIVER: u32 = u32::MAX;
+/// The ray scatters inside its body at the end of its segment.
+pub(crate) const SCATTERS: u32 = u32::MAX - 1;
+
+impl Context<'_> {
+    /// Whether the polarisation of rays is followed.
+    #[inline]
+    pub(crate) fn polarised(&self) -> bool {
+        self.bound.scene.run.polarisation
+    }
+}
 
 /// Traces the rays of one replicate and adds them to `local`. Returns the intersector's work.
 pub(crate) fn trace<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
@@ -114,7 +126,7 @@ impl<C: Carry> Wave<C> {
         let mut ray = emitter.emit(&start.stream, start.ray, start.index);
         local.counts.rays += 1;
         local.ends.emitted += start.quanta as u64;
-        let Some(carry) = C::inside(&emitter.inside) else {
+        let Some(mut carry) = C::inside(&emitter.inside) else {
             return local.lose(LostRay {
                 ray: start.ray,
                 branch: 0,
@@ -126,6 +138,13 @@ impl<C: Carry> Wave<C> {
                 face: None,
             });
         };
+        if C::COLOURED {
+            let nm = emitter.wavelength(&start.stream, start.ray, start.index);
+            carry.light(nm, || match emitter.polarised {
+                Some(field) => Stokes::linear(1.0, ray.direction, field),
+                None => Stokes::unpolarised(1.0, ray.direction),
+            });
+        }
         let mut path = Path {
             ray: start.ray,
             branch: 0,

@@ -1,16 +1,24 @@
-use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex};
+use super::surface;
+use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex, SCATTERS};
 use crate::intersect::Hit;
 use crate::math::{Departure, FaceId, Point, Ray, Vector};
-use crate::optics::{fresnel, reflect, refract};
-use crate::simulate::bind::Surface;
+use crate::optics::polarised::Stokes;
+use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
 use crate::simulate::random::{Key, Purpose};
-use crate::simulate::scene::Interfaces;
+use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::tally::QUANTA;
 
-/// Ends the ray at the nearest receiver that stops light, unless a face comes first.
+/// Ends the ray at the nearest receiver that stops light or at its next scattering, unless a face comes first.
 #[inline]
-pub(super) fn aim<C>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray) {
+pub(super) fn aim<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray) {
     path.receiver = NO_RECEIVER;
+    if C::MEDIA
+        && let Some(scatter) = &context.bound.bodies[path.carry.body() as usize].scatter
+    {
+        let key = key(context, path);
+        ray.t_max = scatter.free_path(key.unit(Purpose::Bulk));
+        path.receiver = SCATTERS;
+    }
     for &r in &context.blocking {
         if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, ray.t_max) {
             ray.t_max = t;
@@ -46,6 +54,9 @@ pub(super) fn step<C: Carry>(
         attenuate(context, path, end, local);
     }
     let Some(hit) = hit else {
+        if C::MEDIA && path.receiver == SCATTERS {
+            return scatter(context, path, ray, local);
+        }
         leave(context, path, ray, local);
         return false;
     };
@@ -65,43 +76,57 @@ pub(super) fn step<C: Carry>(
         lose(path, ray, Cause::InsideSolid, Some(hit.face), local);
         return false;
     }
+    let meeting = Meeting { hit, face, entering, point };
     let going = match &context.bound.surfaces[face.surface as usize] {
         Surface::Absorber => {
             record(context, path, point, Event::Absorbed, local);
             local.absorb(hit.face, path.quanta);
             return false;
         }
-        Surface::Mirror(share) => {
-            let (normal, cos_i) = shading(ray.direction, hit, local);
-            let kept = (path.quanta * share.at(cos_i)).round();
-            record(context, path, point, Event::Reflected, local);
-            local.absorb(hit.face, path.quanta - kept);
-            path.quanta = kept;
-            mirrored(ray.direction, normal, hit, local)
+        Surface::Mirror(share) => Some(surface::mirror(context, *share, path, ray.direction, &meeting, local)),
+        Surface::Interface if C::MEDIA && face.body != AMBIENT => {
+            surface::interface(context, path, ray, &meeting, local, pending)
         }
-        Surface::Interface if C::MEDIA => {
-            match interface(context, path, ray, hit, face.body, entering, local, pending) {
-                Some(direction) => direction,
-                None => return false,
-            }
-        }
-        Surface::Interface => ray.direction,
+        // A bare face without a medium behind it is not there for light.
+        Surface::Interface => Some(ray.direction),
+        Surface::Coated(c) => surface::coated(context, c, path, ray, &meeting, local, pending),
     };
-    onward(context, path, ray, point, going, hit, local)
+    going.is_some_and(|going| onward(context, path, ray, &meeting, going, local))
+}
+
+/// A ray meets a face.
+pub(super) struct Meeting<'a> {
+    pub(super) hit: &'a Hit,
+    pub(super) face: FaceOptics,
+    pub(super) entering: bool,
+    pub(super) point: Point,
 }
 
 /// Starts the next segment; false when a limit cuts the path off.
 #[inline]
-fn onward<C: Carry>(
+pub(super) fn onward<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
     ray: &mut Ray,
-    point: Point,
+    meeting: &Meeting<'_>,
     going: Vector,
-    hit: &Hit,
     local: &mut Local,
 ) -> bool {
+    let Meeting { hit, point, .. } = *meeting;
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
     path.bounce += 1;
+    proceed(context, path, ray, Ray::new(point, going).leaving(from), local)
+}
+
+/// Takes the next ray of a path, unless a limit cuts the path off.
+#[inline]
+fn proceed<C: Carry>(
+    context: &Context<'_>,
+    path: &mut Path<C>,
+    ray: &mut Ray,
+    next: Ray,
+    local: &mut Local,
+) -> bool {
     let s = context.settings;
     if path.bounce >= s.max_bounces
         || path.length > s.max_length_mm
@@ -111,118 +136,20 @@ fn onward<C: Carry>(
         if path.quanta > 0.0 {
             local.ends.cut_off += path.quanta as u64;
             local.counts.cut_off += 1;
-            record(context, path, point, Event::CutOff, local);
+            record(context, path, next.origin, Event::CutOff, local);
         }
         return false;
     }
-    *ray = Ray::new(point, going).leaving(departure(hit));
+    *ray = next;
     aim(context, path, ray);
     true
-}
-
-fn departure(hit: &Hit) -> Departure {
-    Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv }
-}
-
-/// The normal to shade with and the cosine of incidence. A normal that looks away from the ray is replaced by the facet's.
-#[inline]
-fn shading(direction: Vector, hit: &Hit, local: &mut Local) -> (Vector, f64) {
-    let (shaded, flat) = (direction.dot(hit.normal), direction.dot(hit.geometric_normal));
-    if shaded * flat > 0.0 {
-        (hit.normal, shaded.abs().min(1.0))
-    } else {
-        local.counts.corrected_normals += 1;
-        (hit.geometric_normal, flat.abs().min(1.0))
-    }
-}
-
-/// The reflected direction, on the side of the facet the ray came from.
-#[inline]
-fn mirrored(direction: Vector, normal: Vector, hit: &Hit, local: &mut Local) -> Vector {
-    let flat = hit.geometric_normal;
-    let r = reflect(direction, normal);
-    if r.dot(flat) * direction.dot(flat) < 0.0 {
-        return r;
-    }
-    local.counts.corrected_normals += 1;
-    reflect(direction, flat)
-}
-
-/// Reflection or refraction at the boundary of a body; `None` when the ray is lost.
-#[inline]
-#[expect(clippy::too_many_arguments, reason = "one hit has that many parts; a struct would only rename them")]
-fn interface<C: Carry>(
-    context: &Context<'_>,
-    path: &mut Path<C>,
-    ray: &Ray,
-    hit: &Hit,
-    body: u16,
-    entering: bool,
-    local: &mut Local,
-    pending: &mut Vec<(Path<C>, Ray)>,
-) -> Option<Vector> {
-    let Some(across) = path.carry.across(body, entering) else {
-        record(context, path, ray.at(hit.t), Event::Lost, local);
-        lose(path, ray, Cause::ImpossibleMedium, Some(hit.face), local);
-        return None;
-    };
-    let bodies = &context.bound.bodies;
-    let (here, there) = (path.carry.body(), across.body());
-    if here == there {
-        path.carry = across;
-        return Some(ray.direction);
-    }
-    let eta = bodies[here as usize].index / bodies[there as usize].index;
-    let (mut normal, mut cos_i) = shading(ray.direction, hit, local);
-    let mut transmitted = refract(ray.direction, normal, eta);
-    if transmitted.is_some_and(|t| t.dot(hit.geometric_normal) * ray.direction.dot(hit.geometric_normal) <= 0.0) {
-        local.counts.corrected_normals += 1;
-        normal = hit.geometric_normal;
-        cos_i = ray.direction.dot(normal).abs().min(1.0);
-        transmitted = refract(ray.direction, normal, eta);
-    }
-    let point = ray.at(hit.t);
-    let Some(transmitted) = transmitted else {
-        record(context, path, point, Event::Reflected, local);
-        return Some(mirrored(ray.direction, normal, hit, local));
-    };
-    let share = fresnel::dielectric(cos_i, eta).unpolarised();
-    let s = context.settings;
-    if s.interfaces == Interfaces::Split && path.quanta > s.split_floor * path.first {
-        let kept = (path.quanta * share).round();
-        if kept >= 1.0 {
-            let mut child = Path { quanta: kept, branch: branch(path.branch, path.bounce), ..*path };
-            let going = mirrored(ray.direction, normal, hit, local);
-            let mut child_ray = *ray;
-            record(context, &child, point, Event::Split, local);
-            if onward(context, &mut child, &mut child_ray, point, going, hit, local) {
-                pending.push((child, child_ray));
-            }
-        }
-        path.quanta -= kept;
-    } else {
-        let key = Key { seed: s.seed, ray: path.ray, branch: path.branch, bounce: path.bounce };
-        if key.unit(Purpose::Interface) < share {
-            record(context, path, point, Event::Reflected, local);
-            return Some(mirrored(ray.direction, normal, hit, local));
-        }
-    }
-    record(context, path, point, Event::Transmitted, local);
-    path.carry = across;
-    Some(transmitted)
-}
-
-/// A number for the path that splits off at a hit; it depends on the splits before alone, not on the order of tracing.
-fn branch(parent: u32, bounce: u32) -> u32 {
-    let mixed = (parent ^ bounce.wrapping_mul(0x9e37_79b9)).wrapping_add(0x7f4a_7c15).wrapping_mul(0x85eb_ca6b);
-    (mixed ^ mixed >> 15).max(1)
 }
 
 /// Beer's law over the segment, for bodies that absorb.
 #[inline]
 fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, local: &mut Local) {
     let body = path.carry.body();
-    let alpha = context.bound.bodies[body as usize].absorption;
+    let alpha = context.bound.bodies[body as usize].absorption(path.carry.wavelength());
     if alpha > 0.0 {
         let kept = (path.quanta * (-alpha * length).exp()).round();
         let taken = path.quanta - kept;
@@ -232,8 +159,29 @@ fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, l
     }
 }
 
+/// Scattering inside a body.
+fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
+    let Some(scatter) = &context.bound.bodies[path.carry.body() as usize].scatter else { return false };
+    let point = ray.at(ray.t_max);
+    let numbers = key(context, path).pair(Purpose::BulkDirection);
+    path.length += ray.t_max;
+    path.bounce += 1;
+    record(context, path, point, Event::Scattered, local);
+    let going = scatter.sample(ray.direction, numbers);
+    if let Some(stokes) = path.carry.stokes() {
+        *stokes = Stokes::unpolarised(1.0, going);
+    }
+    proceed(context, path, ray, Ray::new(point, going), local)
+}
+
+/// The key of the random numbers of a path at its present vertex.
+#[inline]
+pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
+    Key { seed: context.settings.seed, ray: path.ray, branch: path.branch, bounce: path.bounce }
+}
+
 /// Counts the light on receivers that let it pass.
-fn pass<C>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &mut Local) {
+fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &mut Local) {
     for &r in &context.passing {
         let mut after = ray.t_min;
         // A sphere may be crossed twice.
@@ -244,22 +192,36 @@ fn pass<C>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &m
     }
 }
 
-fn count<C>(context: &Context<'_>, path: &Path<C>, r: u32, point: Point, local: &mut Local) {
+fn count<C: Carry>(context: &Context<'_>, path: &Path<C>, r: u32, point: Point, local: &mut Local) {
     let receiver = &context.bound.receivers[r as usize];
     if receiver.interactions.is_some_and(|n| n != path.bounce) {
         return;
     }
     if let Some(spot) = receiver.spot(point) {
-        deposit(path.quanta, r, &spot, local);
+        deposit(context, receiver, path, r, &spot, local);
     }
 }
 
 #[inline]
-fn deposit(quanta: f64, r: u32, spot: &crate::simulate::receiver::Spot, local: &mut Local) {
+fn deposit<C: Carry>(
+    context: &Context<'_>,
+    receiver: &Receiver,
+    path: &Path<C>,
+    r: u32,
+    spot: &Spot,
+    local: &mut Local,
+) {
     let r = r as usize;
-    local.receivers[r].add(spot.cell, quanta);
-    local.receiver_totals[r] += quanta as u64;
-    local.moments[r].add(quanta, spot.at, spot.radius2);
+    local.receivers[r].add(spot.cell, path.quanta);
+    local.receiver_totals[r] += path.quanta as u64;
+    local.moments[r].add(path.quanta, spot.at, spot.radius2);
+    if receiver.channels.count() > 0 {
+        let cells = receiver.cell_count();
+        let nm = path.carry.wavelength().unwrap_or(context.bound.light.wavelength);
+        receiver.channels.weigh(nm, |channel, weight| {
+            local.receivers[r].add((channel + 1) * cells + spot.cell, (path.quanta * weight).round());
+        });
+    }
 }
 
 /// The end of a path that meets no face: on a receiver, in the far field, or lost inside a body.
@@ -272,7 +234,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         count(context, path, path.receiver, point, local);
         return;
     }
-    if C::MEDIA && path.carry.body() != crate::simulate::bind::AMBIENT {
+    if C::MEDIA && path.carry.body() != AMBIENT {
         record(context, path, ray.at(1.0), Event::Lost, local);
         return lose(path, ray, Cause::NoExit, None, local);
     }
@@ -282,7 +244,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         if let Some(spot) = receiver.direction(ray.direction) {
             caught = true;
             if receiver.interactions.is_none_or(|n| n == path.bounce) {
-                deposit(path.quanta, r, &spot, local);
+                deposit(context, receiver, path, r, &spot, local);
             }
         }
     }
@@ -292,7 +254,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
 }
 
 #[cold]
-fn lose<C>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<FaceId>, local: &mut Local) {
+pub(super) fn lose<C>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<FaceId>, local: &mut Local) {
     local.lose(LostRay {
         ray: path.ray,
         branch: path.branch,

@@ -24,7 +24,7 @@ pub enum Purpose {
     Interface = 1,
     /// Direction of surface scatter.
     Scatter = 2,
-    /// Distance to the next bulk scatter, and its direction.
+    /// Distance to the next bulk scatter.
     Bulk = 3,
     /// Wavelength at the source.
     Wavelength = 4,
@@ -34,6 +34,8 @@ pub enum Purpose {
     Survival = 6,
     /// Scrambles of the Sobol net.
     Scramble = 7,
+    /// Direction after bulk scatter.
+    BulkDirection = 8,
 }
 
 /// The key of one vertex of one path.

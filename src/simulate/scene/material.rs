@@ -175,4 +175,3 @@ pub enum SurfaceKind {
     /// A polished metal of the complex index `metal`.
     Metal,
 }
-

@@ -69,8 +69,7 @@ impl Medium {
             return Err("`anisotropy` needs `scatter_per_mm`".into());
         }
         if let Some(s) = self.scatter_per_mm.filter(|s| *s != 0.0) {
-            medium.scatter =
-                Some(BulkScatter::new(s, self.anisotropy.unwrap_or(0.0)).map_err(|e| e.to_string())?);
+            medium.scatter = Some(BulkScatter::new(s, self.anisotropy.unwrap_or(0.0)).map_err(|e| e.to_string())?);
         }
         Ok(medium)
     }
@@ -95,7 +94,8 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
         return Ok(m);
     }
     let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
-    let known = scene.media.iter().map(|m| m.name.as_str()).chain(catalogue::names());
+    let mut known: Vec<&str> = catalogue::names().collect();
+    known.extend(scene.media.iter().map(|m| m.name.as_str()));
     Err(match suggest::nearest(name, known) {
         Some(near) => error.help(format!("did you mean '{near}'?")),
         None => error.help("add a [[medium]] of that name"),

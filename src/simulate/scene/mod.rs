@@ -19,12 +19,12 @@ pub use material::{
     ColourKey, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey, SurfaceKind,
 };
 pub use medium::{ByWavelength, Medium};
-pub use receiver::{FarFieldType, Receiver, ReceiverKind};
+pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-pub use spectrum::{SpectrumKey, SpectrumName};
 pub use source::{Source, SourceKind};
+pub use spectrum::{SpectrumKey, SpectrumName};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

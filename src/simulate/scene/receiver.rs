@@ -37,6 +37,10 @@ pub struct Receiver {
     pub h_deg: [f64; 2],
     /// Second angle of a far field (V, or γ), from and to, degrees.
     pub v_deg: [f64; 2],
+    /// What is counted besides power.
+    pub channels: Option<Channels>,
+    /// Edges of spectral bins, rising, nm: power is counted in each.
+    pub bins_nm: Option<Vec<f64>>,
     /// Part whose absorbed flux is counted.
     pub part: Option<OneOrMany<String>>,
     /// Instance whose absorbed flux is counted.
@@ -61,6 +65,8 @@ impl Default for Receiver {
             angles: FarFieldType::A,
             h_deg: [-90.0, 90.0],
             v_deg: [-90.0, 90.0],
+            channels: None,
+            bins_nm: None,
             part: None,
             instance: None,
         }
@@ -82,9 +88,19 @@ pub enum ReceiverKind {
     Absorbed,
 }
 
+/// What a receiver counts besides power, for sources in watts with a spectrum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Channels {
+    /// Lumens: lx and cd.
+    Photometric,
+    /// CIE 1931 X, Y and Z, Y in lumens.
+    Xyz,
+}
+
 /// How directions become two angles (CIE 121, IES LM-75).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[schemars(rename_all = "snake_case")]
 pub enum FarFieldType {
     /// Vertical polar axis, as for headlamps: V is the elevation above the horizontal plane, H turns about the vertical.
     #[default]
@@ -125,6 +141,17 @@ impl Receiver {
         }
         if !self.at.iter().chain(&self.normal).all(|x| x.is_finite()) || self.normal.iter().all(|x| *x == 0.0) {
             return fail("normal", "`at` must be a point and `normal` a direction");
+        }
+        if self.channels.is_some() && self.bins_nm.is_some() {
+            return fail("bins_nm", "a receiver has `channels` or `bins_nm`, not both");
+        }
+        if let Some(b) = &self.bins_nm
+            && (b.len() < 2 || b.len() > 1000 || !b.windows(2).all(|w| w[0] < w[1]))
+        {
+            return fail("bins_nm", "`bins_nm` must be 2 to 1000 rising wavelengths");
+        }
+        if (self.channels.is_some() || self.bins_nm.is_some()) && self.kind == ReceiverKind::Absorbed {
+            return fail("channels", "absorbed flux is counted as power alone");
         }
         match self.kind {
             ReceiverKind::Plane => match self.size {

@@ -24,8 +24,14 @@ impl Material {
             true => Err((key, format!("`{key}` belongs to {whose}"))),
             false => Ok(()),
         };
-        let (mirror, coated) = (matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse), kind == SurfaceKind::Coating);
-        misplaced("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating")?;
+        let (mirror, coated) =
+            (matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse), kind == SurfaceKind::Coating);
+        misplaced(
+            "reflectance",
+            self.reflectance.is_some(),
+            mirror || coated,
+            "`surface` mirror, diffuse or coating",
+        )?;
         misplaced("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`")?;
         misplaced("coating", self.coating.is_some(), coated, "`surface = \"coating\"`")?;
         misplaced("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`")?;
@@ -44,7 +50,9 @@ impl Material {
             (LobeKind::Lambertian, None, None, None) => Lobe::Lambertian,
             (LobeKind::Gaussian, Some(sigma), None, None) => Lobe::Gaussian { sigma: sigma.to_radians() },
             (LobeKind::Cosine, None, Some(exponent), None) => Lobe::Cosine { exponent },
-            (LobeKind::Abg, None, None, Some([a, b, g])) => Lobe::Abg(Abg::new(a, b, g).map_err(|e| e.to_string())?),
+            (LobeKind::Abg, None, None, Some([a, b, g])) => {
+                Lobe::Abg(Abg::new(a, b, g).map_err(|e| e.to_string())?)
+            }
             (LobeKind::Lambertian, ..) => return Err("a lambertian lobe has no parameters".into()),
             (LobeKind::Gaussian, ..) => return Err("a gaussian lobe has `sigma_deg` and nothing else".into()),
             (LobeKind::Cosine, ..) => return Err("a cosine lobe has `exponent` and nothing else".into()),
@@ -55,7 +63,10 @@ impl Material {
 }
 
 fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<Coating, (&'static str, String)> {
-    let same = |r: f64| Split { reflected: Power { rs: r, rp: r }, transmitted: Power { rs: transmittance, rp: transmittance } };
+    let same = |r: f64| Split {
+        reflected: Power { rs: r, rp: r },
+        transmitted: Power { rs: transmittance, rp: transmittance },
+    };
     match r {
         None => Coating::ideal(unset, transmittance).map_err(|e| ("transmittance", e.to_string())),
         Some(Reflectance::Constant(r)) => {
@@ -63,7 +74,9 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
         }
         Some(Reflectance::ByAngle(t)) => {
             let (angles, cells) = t.iter().map(|[a, r]| (*a, same(*r))).unzip();
-            CoatingTable::new(angles, vec![550.0], cells).map(Coating::Table).map_err(|e| ("reflectance", e.to_string()))
+            CoatingTable::new(angles, vec![550.0], cells)
+                .map(Coating::Table)
+                .map_err(|e| ("reflectance", e.to_string()))
         }
         Some(Reflectance::ByAngleAndWavelength(t)) => {
             grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r)))).map_err(|e| ("reflectance", e))
