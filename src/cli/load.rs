@@ -80,7 +80,8 @@ pub(super) fn account(reports: &[ImportReport], max_refused: f64, context: &Cont
     if refused == 0 {
         return Outcome::Done;
     }
-    context.say(format_args!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons"));
+    context
+        .say(format_args!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons"));
     if refused as f64 > max_refused * found as f64 { Outcome::Incomplete } else { Outcome::Done }
 }
 

@@ -14,6 +14,11 @@ pub(super) fn completions(shell: clap_complete::Shell) -> Result<Outcome, Failur
     Ok(Outcome::Done)
 }
 
+pub(super) fn schema() -> Result<Outcome, Failure> {
+    print(&format!("{:#}\n", crate::simulate::Scene::schema()))?;
+    Ok(Outcome::Done)
+}
+
 pub(super) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, Failure> {
     let mut command = Arguments::command();
     command.build();

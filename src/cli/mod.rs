@@ -8,6 +8,8 @@
 mod args;
 mod context;
 mod failure;
+mod info;
+mod load;
 mod machine;
 mod meta;
 mod options;
@@ -53,6 +55,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
     match command {
+        Command::Info { file, limits } => info::run(&file, limits, context),
+        Command::Schema => meta::schema(),
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), context),
         other => Err(Failure::running(format!("'{}' is not built yet", other.name()))),

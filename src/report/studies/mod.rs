@@ -10,7 +10,7 @@ use serde_json::Value;
 pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     let rows: Vec<&Value> = document["rows"].as_array().map(|r| r.iter().collect()).unwrap_or_default();
     let kind = document["study"].as_str().unwrap_or_default();
-    let (title, answer, mut sections) = match kind {
+    let (title, mut answer, mut sections) = match kind {
         "accuracy" => accuracy::report(&rows),
         "interpolation" => others::interpolation(&rows),
         "complexity" => others::complexity(&rows),
@@ -19,6 +19,10 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
         "effects" => others::effects(&rows),
         _ => (format!("Study {kind}"), String::new(), Vec::new()),
     };
+    // The study's own sentence, where it made one, says it better.
+    if let Some(own) = document["answer"].as_str().filter(|a| !a.is_empty()) {
+        answer = own.to_owned();
+    }
     sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
 }

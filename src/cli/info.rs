@@ -1,0 +1,95 @@
+//! `lampyris info`: what a STEP file holds and what could not be read.
+
+use super::args::Refusals;
+use super::context::{Context, print};
+use super::{Failure, Outcome, load};
+use crate::report::{bytes, figures, grouped, seconds};
+use crate::step::ImportReport;
+use comfy_table::{ContentArrangement, Table, presets};
+use std::path::Path;
+
+pub(super) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
+    let report = load::step_file(path, context)?.report;
+    if context.json {
+        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::running(e.to_string()))?;
+        print(&(text + "\n"))?;
+    } else {
+        print(&described(&report, context))?;
+    }
+    let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
+    Ok(if over { Outcome::Incomplete } else { Outcome::Done })
+}
+
+fn described(r: &ImportReport, context: &Context) -> String {
+    let list = |words: &[String]| if words.is_empty() { "none named".to_owned() } else { words.join(", ") };
+    let mut text = format!("{}  {}, {}\n", r.file, bytes(r.bytes), list(&r.schema));
+    let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
+    line("units", format!("length {}; angle {}", list(&r.units.length), list(&r.units.angle)));
+    line("shapes", format!("{} parts, {} instances, {} shells", r.parts, r.instances, r.shells));
+    let f = &r.faces;
+    line(
+        "faces",
+        format!(
+            "{} found, {} converted (of these {} repaired), {} refused; {} as placed",
+            grouped(f.found as u64),
+            grouped(f.converted as u64),
+            f.repaired,
+            f.refused,
+            grouped(r.faces_placed.found as u64)
+        ),
+    );
+    line("surfaces", surfaces(r));
+    match r.bbox_mm {
+        Some([low, high]) => {
+            let side = |k: usize| format!("{} … {}", figures(low[k], 5), figures(high[k], 5));
+            line("box", format!("x {}, y {}, z {} mm", side(0), side(1), side(2)));
+        }
+        None => line("box", "nothing to bound".into()),
+    }
+    let shown: Vec<String> = r.names.iter().take(12).cloned().collect();
+    let more = if r.names.len() > 12 { format!(" and {} more", r.names.len() - 12) } else { String::new() };
+    line("names", list(&shown) + &more);
+    line("read in", format!("{} (parse) + {} (convert)", seconds(r.seconds.parse), seconds(r.seconds.convert)));
+    let notes = (r.refusals.iter().map(|n| ("refused", n))).chain(r.repairs.iter().map(|n| ("repaired", n)));
+    let notes: Vec<_> = notes.collect();
+    let most = if context.verbose > 0 { usize::MAX } else { 20 };
+    if !notes.is_empty() {
+        let mut table = Table::new();
+        table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+        table.set_width(context.width() as u16).set_header(["", "entity", "why"]);
+        for (what, note) in notes.iter().take(most) {
+            table.add_row([(*what).to_owned(), format!("#{} {}", note.id, note.entity), note.reason.clone()]);
+        }
+        text += &format!("{table}\n");
+        if notes.len() > most {
+            text += &format!("  and {} more; -v shows all, --json all with every detail\n", notes.len() - most);
+        }
+    }
+    for problem in r.problems.iter().take(most) {
+        text += &format!("  problem: {problem}\n");
+    }
+    if r.problems.len() > most {
+        text += &format!("  and {} more problems; -v shows all\n", r.problems.len() - most);
+    }
+    text
+}
+
+fn surfaces(r: &ImportReport) -> String {
+    let s = &r.by_surface;
+    let kinds = [
+        ("plane", s.plane),
+        ("cylinder", s.cylinder),
+        ("cone", s.cone),
+        ("sphere", s.sphere),
+        ("torus", s.torus),
+        ("revolution", s.revolution),
+        ("extrusion", s.extrusion),
+        ("offset", s.offset),
+        ("B-spline", s.bspline),
+        ("rational B-spline", s.rational),
+        ("ready mesh", s.tessellated),
+        ("other", s.other),
+    ];
+    let present: Vec<String> = kinds.iter().filter(|k| k.1 > 0).map(|(name, n)| format!("{n} {name}")).collect();
+    if present.is_empty() { "none".into() } else { present.join(", ") }
+}

@@ -1,0 +1,225 @@
+//! The main job: a scene that is read, bound, faceted, traced, checked and written down. `trace` and `demo` share it.
+
+use super::context::Context;
+use super::engine::{self, Choice};
+use super::load::Loaded;
+use super::options::{Meshing, Tracing};
+use super::witness::Witness;
+use super::{Failure, look};
+use crate::formats::{Polylines, write_facets, write_grid_csv, write_grid_npz, write_grid_png, write_vti, write_vtp};
+use crate::intersect::bvh::Bvh;
+use crate::intersect::exact::Exact;
+use crate::report::{Cell, Light, Report, Table, file_stem, path_lines, receiver_grid};
+use crate::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};
+use crate::study::check::{self, Check, Court, check};
+use crate::tessellate::{self, Tessellation};
+use std::path::{Path, PathBuf};
+
+/// What to do beside tracing.
+pub(super) struct Job<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) loaded: &'a Loaded,
+    pub(super) meshing: &'a Meshing,
+    pub(super) tracing: &'a Tracing,
+    /// Whether the powers of the sources are lumens.
+    pub(super) photometric: bool,
+    /// Rays of the run to ask again of BVH and spline; 0 for none.
+    pub(super) recheck: usize,
+}
+
+/// A job whose scene fits its model and whose facets are made.
+pub(super) struct Prepared<'a> {
+    pub(super) job: Job<'a>,
+    pub(super) bound: BoundScene,
+    pub(super) tessellation: Tessellation,
+    pub(super) mesh_settings: tessellate::Settings,
+    pub(super) seconds: f64,
+    pub(super) choice: Choice,
+    pub(super) threads: usize,
+}
+
+/// What came of it.
+pub(super) struct Outcome {
+    pub(super) results: Results,
+    pub(super) check: Option<Check>,
+}
+
+/// Binds the scene (so that its mistakes come before any work) and makes the facets.
+pub(super) fn prepare<'a>(job: Job<'a>, context: &Context) -> Result<Prepared<'a>, Failure> {
+    let threads = engine::threads(job.tracing.threads)?;
+    let choice = Choice::new(job.tracing, Some(job.scene))?;
+    let bound = job.scene.bind(&job.loaded.model)?;
+    let mesh_settings = engine::mesh_settings(job.meshing, Some(job.scene), &job.loaded.model)?;
+    let (tessellation, seconds) = engine::facets(&job.loaded.model, &mesh_settings, context);
+    Ok(Prepared { job, bound, tessellation, mesh_settings, seconds, choice, threads })
+}
+
+impl Prepared<'_> {
+    /// The run's settings: the scene's, with the options over them.
+    pub(super) fn run_settings(&self) -> RunSettings {
+        let mut settings = RunSettings::from(&self.job.scene.run);
+        settings.rays = self.job.tracing.rays.unwrap_or(settings.rays);
+        settings.seed = self.job.tracing.seed.unwrap_or(settings.seed);
+        settings.threads = self.threads;
+        settings.path_samples = 2000.min(settings.rays);
+        settings
+    }
+
+    /// Traces the scene, and asks a sample of its rays again.
+    pub(super) fn trace(&self, kernel: KernelChoice, context: &Context) -> Outcome {
+        let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
+        let settings = RunSettings { kernel, ..self.run_settings() };
+        engine::with_intersector(self.choice, model, mesh, context, |intersector, footprint| {
+            // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
+            let witness = Witness::new(intersector, self.job.recheck as u64, 4 * settings.rays);
+            let bar = context.bar("tracing", "rays", settings.rays);
+            let progress = |p: crate::simulate::Progress| {
+                bar.set_length(p.total);
+                bar.set_position(p.rays);
+                true
+            };
+            let asked: &dyn crate::intersect::Intersector =
+                if self.job.recheck > 0 { &witness } else { intersector };
+            let mut results = simulate(&self.bound, asked, &settings, &progress);
+            bar.finish_and_clear();
+            results.seconds.read = self.job.loaded.seconds;
+            results.seconds.tessellate = self.seconds;
+            results.seconds.build = footprint.build_seconds;
+            let rays = witness.rays(self.job.recheck, mesh, 4.0 * self.mesh_settings.tolerance[1]);
+            let check = (!rays.is_empty()).then(|| self.court(intersector, &rays, context));
+            Outcome { results, check }
+        })
+    }
+
+    fn court(&self, octree: &dyn crate::intersect::Intersector, rays: &Vec<crate::math::Ray>, context: &Context) -> Check {
+        let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
+        let spinner = context.spinner("building BVH and spline for the cross-check");
+        let bvh = Bvh::build(mesh, &Default::default());
+        let exact = Exact::build(model, &Default::default());
+        spinner.finish_and_clear();
+        let bar = context.bar("checking", "rays", rays.len() as u64);
+        let court = Court { model, mesh, octree, bvh: &bvh, exact: &exact };
+        let settings =
+            check::Settings { fallback_band_mm: self.mesh_settings.tolerance[1], ..check::Settings::default() };
+        let total = rays.len() as f64;
+        let found = check(&court, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
+        bar.finish_and_clear();
+        found
+    }
+
+    /// Writes everything into a folder; the report comes last, so that a folder with a report is complete. Gives the document of
+    /// `results.json`.
+    pub(super) fn write(
+        &self,
+        folder: &Path,
+        outcome: &mut Outcome,
+        comparison: Vec<String>,
+        context: &Context,
+    ) -> Result<(serde_json::Value, Report), Failure> {
+        let spinner = context.spinner("writing");
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+        let photometric = self.job.photometric;
+        for receiver in &mut outcome.results.receivers {
+            let Some(grid) = receiver_grid(receiver, photometric) else { continue };
+            let stem = file_stem(&receiver.name);
+            type Writer = fn(&Path, &crate::formats::Grid) -> Result<(), crate::formats::Error>;
+            let writers: [(&str, Writer); 4] = [
+                ("csv", write_grid_csv),
+                ("npz", write_grid_npz),
+                ("png", write_grid_png),
+                ("vti", write_vti),
+            ];
+            for (extension, write) in writers {
+                let name = format!("{stem}.{extension}");
+                write(&folder.join(&name), &grid)?;
+                receiver.files.push(name);
+            }
+        }
+        let (paths, _) = path_lines(&outcome.results.paths);
+        write_vtp(&folder.join("paths.vtp"), &paths)?;
+        let mesh = &self.tessellation.mesh;
+        let bounds = mesh.bounds();
+        let near: Polylines = paths.inside(&bounds.grown(0.35 * bounds.diagonal().max(1.0)));
+        let mut facets = look::facets(&self.job.loaded.model, mesh, Some(self.job.scene));
+        facets.paths = Some(&near);
+        write_facets(&folder.join("facets.glb"), &facets)?;
+        facets.paths = None;
+        let mut document = serde_json::to_value(&outcome.results).map_err(|e| Failure::running(e.to_string()))?;
+        if let Some(check) = &outcome.check {
+            document["check"] = serde_json::to_value(check).map_err(|e| Failure::running(e.to_string()))?;
+        }
+        let provenance = context.provenance(Some(self.run_settings().seed), self.threads);
+        document["provenance"] = serde_json::to_value(&provenance).map_err(|e| Failure::running(e.to_string()))?;
+        let text = serde_json::to_string_pretty(&document).map_err(|e| Failure::running(e.to_string()))? + "\n";
+        crate::formats::write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
+        let title = match self.job.scene.title.as_str() {
+            "" => self.job.loaded.model.name.clone(),
+            title => title.to_owned(),
+        };
+        let light = Light {
+            title,
+            results: &outcome.results,
+            facets: &facets,
+            photometric,
+            check: outcome.check.as_ref(),
+            tables: self.tables(),
+            comparison,
+            provenance,
+        };
+        let report = light.report();
+        report.write(folder)?;
+        spinner.finish_and_clear();
+        Ok((document, report))
+    }
+
+    /// What was read and what the facets are.
+    fn tables(&self) -> Vec<Table> {
+        let mut model = Table::new(
+            "model",
+            "Model",
+            &[("file", ""), ("parts", ""), ("instances", ""), ("faces", ""), ("repaired", ""), ("refused", "")],
+        );
+        for r in &self.job.loaded.reports {
+            model.row([
+                r.file.as_str().into(),
+                r.parts.into(),
+                r.instances.into(),
+                r.faces.found.into(),
+                r.faces.repaired.into(),
+                r.faces.refused.into(),
+            ]);
+        }
+        let mesh = &self.tessellation.mesh;
+        let mut facets = Table::new("facets", "Facets", &[("", ""), ("value", ""), ("unit", "")]);
+        let [low, high] = self.mesh_settings.tolerance;
+        let proved: Vec<f64> = mesh.sag.iter().copied().filter(|s| s.is_finite()).collect();
+        let rows: [(&str, Cell, &str); 7] = [
+            ("facets", mesh.facets.len().into(), ""),
+            ("of these quads", mesh.quad_count().into(), ""),
+            ("tolerance where sharply curved", low.into(), "mm"),
+            ("tolerance where nearly flat", high.into(), "mm"),
+            ("largest proved distance to the spline", proved.iter().copied().fold(0.0, f64::max).into(), "mm"),
+            ("facets without a proof", (mesh.sag.len() - proved.len()).into(), ""),
+            ("memory of the mesh", Cell::Number(mesh.bytes() as f64 / 1e6, 3), "MB"),
+        ];
+        for (name, value, unit) in rows {
+            facets.row([name.into(), value, unit.into()]);
+        }
+        vec![model, facets]
+    }
+}
+
+/// The files of a result folder that a person wants to know of.
+pub(super) fn highlights(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
+    let mut list = vec![
+        (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),
+        (folder.join("results.json"), "every number of the run".into()),
+    ];
+    for r in results.receivers.iter().filter(|r| !r.files.is_empty()) {
+        let stem = file_stem(&r.name);
+        list.push((folder.join(format!("{stem}.csv")), format!("{} cell by cell (also .npz .png .vti)", r.name)));
+    }
+    list.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));
+    list
+}
