@@ -43,6 +43,8 @@ pub(super) struct Patch {
     pub(super) degree: [u8; 2],
     /// Control points about `center`, weight 1 in the middle of the patch.
     pub(super) net: Net,
+    /// Error of the control points, and of derivatives got from them, mm.
+    pub(super) rounding: f64,
     pub(super) center: Point,
     /// The rectangle of the surface's domain.
     pub(super) domain: [[f64; 2]; 2],
@@ -152,18 +154,26 @@ impl Patch {
         let middle = patch.homogeneous(Uv::splat(0.5))[0];
         // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
         let center = middle.project();
-        let net = patch
+        let net: Net = patch
             .points
             .iter()
             .map(|p| {
                 let w = p.w / middle.w;
-                let a = placed.placement.vector((p.truncate() - center * p.w) / middle.w);
+                // Rounded once, so that neighbours still share their border when 1e6 mm are taken off both.
+                let shifted = Vector::new(
+                    f64::mul_add(-center.x, p.w, p.x),
+                    f64::mul_add(-center.y, p.w, p.y),
+                    f64::mul_add(-center.z, p.w, p.z),
+                );
+                let a = placed.placement.vector(shifted / middle.w);
                 [a.x, a.y, a.z, w]
             })
             .collect();
+        let size = net.iter().map(|p: &V4| p[0].abs().max(p[1].abs()).max(p[2].abs()) / p[3]).fold(0.0, f64::max);
         Self {
             face,
             degree: patch.degree.map(|d| d as u8),
+            rounding: 16.0 * f64::EPSILON * size,
             net,
             center: placed.placement.point(center),
             domain: patch.domain,
@@ -198,21 +208,26 @@ pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
 }
 
 /// Unit normal along `Su × Sv` at local parameters; at a singular point the limit from the middle of the net.
-pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet) -> Vector {
+///
+/// `rounding` is the error of the net's points. A derivative must be a million times longer to be trusted: 1e-9 mm from
+/// the pole of a sphere of radius 50 the normal was off by 1e-5 rad otherwise.
+pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet, rounding: f64) -> Vector {
     let (_, du, dv) = project(jet);
     let n = du.cross(dv);
-    if n.length_squared() > 1e-18 * du.length_squared() * dv.length_squared() {
+    let shortest = 1e6 * rounding;
+    let clear = |du: Vector, dv: Vector| du.length_squared().min(dv.length_squared()) > shortest * shortest;
+    if clear(du, dv) && n.length_squared() > 1e-18 * du.length_squared() * dv.length_squared() {
         let ratio = du.length_squared() / dv.length_squared();
         if ratio > 1e-18 && ratio < 1e18 {
             return n.normalize();
         }
     }
     // Where a derivative vanishes the normal is the limit; 1e-6 of the net away it is right to about 1e-6 rad.
-    for step in [1e-6, 1e-4, 1e-2] {
+    for (step, last) in [(1e-6, false), (1e-4, false), (1e-2, false), (1e-2, true)] {
         let toward = |x: f64| x + step * (0.5 - x);
         let (_, du, dv) = project(&net::evaluate(net, degree, toward(u), toward(v)));
         let n = du.cross(dv);
-        if n.length() > 1e-12 * du.length() * dv.length() {
+        if (last || clear(du, dv)) && n.length() > 1e-12 * du.length() * dv.length() {
             return n.normalize();
         }
     }

@@ -151,7 +151,9 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
     let radius = size(&centred);
     // Each halving and the extraction before it err by at most one rounding a step and degree, relative to the patch.
     let steps = (degree[0] as f64 + degree[1] as f64 + 4.0) * (depth as f64 + 4.0);
-    let slop = steps * ROUND * (size(piece) + offset.abs().max_element() + radius);
+    // The centre itself is rounded where it is placed: far from the origin neighbours drift apart by that much.
+    let placed = 8.0 * ROUND * center.abs().max_element();
+    let slop = steps * ROUND * (size(piece) + offset.abs().max_element() + radius) + placed;
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
     let (mut olo, mut ohi) = (lo, hi);
     for p in &centred {

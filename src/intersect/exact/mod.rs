@@ -195,7 +195,7 @@ impl Exact {
         let inside = root.local.map(|x| x.clamp(0.0, 1.0));
         let net = leaf.net(&self.pool);
         let jet = net::evaluate(net, leaf.degree, root.local[0], root.local[1]);
-        let normal: Vector = face.sign * geometry::normal(net, leaf.degree, inside, &jet);
+        let normal: Vector = face.sign * geometry::normal(net, leaf.degree, inside, &jet, patch.rounding);
         let uv: Uv = patch.uv(leaf.in_patch(inside));
         let (t, certainty) = (root.t, root.certainty);
         debug_assert!(q.d.is_finite());

@@ -53,7 +53,7 @@ impl Exact {
                 if residual > 1e-9 + rounding {
                     return None;
                 }
-                let normal = record.sign * geometry::normal(&patch.net, patch.degree, local, &jet);
+                let normal = record.sign * geometry::normal(&patch.net, patch.degree, local, &jet, patch.rounding);
                 let t = ray.direction.dot(off);
                 let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
                 let trim = &self.geometry.trims[record.trim as usize];
@@ -100,6 +100,6 @@ impl Exact {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
         let local = patch.local(uv);
-        Some(record.sign * geometry::normal(&patch.net, patch.degree, local, &patch.jet(local)))
+        Some(record.sign * geometry::normal(&patch.net, patch.degree, local, &patch.jet(local), patch.rounding))
     }
 }
