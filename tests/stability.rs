@@ -2,6 +2,7 @@
 
 mod study_support;
 
+use lampyris::intersect::exact::{self, Exact};
 use lampyris::study::stability::{Ground, Row, Variant, cases};
 use study_support::Brute;
 
@@ -30,6 +31,21 @@ fn brute_force_over_the_facets_signs() {
             rows.push(scene.ask("brute", &Brute(&scene.mesh), Ground::Facets));
         }
     }
+    let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
+    assert!(bad.is_empty(), "{}", table(&bad));
+}
+
+#[test]
+fn the_exact_spline_signs() {
+    let mut rows = Vec::new();
+    for case in cases() {
+        for variant in Variant::ALL {
+            let scene = case.scene(variant);
+            let exact = Exact::build(&scene.model, &exact::Settings::default());
+            rows.push(scene.ask("exact", &exact, Ground::Spline));
+        }
+    }
+    println!("{}", table(&rows));
     let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
     assert!(bad.is_empty(), "{}", table(&bad));
 }

@@ -66,6 +66,13 @@ impl Asker<'_> {
         self.who.intersect(ray, &mut Cost::default())
     }
 
+    /// Whether a miss of the spline is one that the intersector itself is not sure of: it has no hit to carry the flag, but
+    /// it counts a fallback.
+    fn unsure_miss(&self, ray: &Ray) -> bool {
+        let mut cost = Cost::default();
+        self.ground == Ground::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
+    }
+
     fn grade(&self, question: &Question) -> Grade {
         match question {
             Question::First { ray, truth } => {
@@ -100,8 +107,9 @@ impl Asker<'_> {
             (Some(t), Some(h)) => {
                 let close = (self.local_t(h) - t).abs() <= 16.0 * resolution * (1.0 + 1.0 / truth.cos);
                 let normal = truth.normal.map(|n| self.scene.frame.normal(n));
-                // A normal turns by displacement times curvature; 1e-6 is far below what any facet reaches.
-                let along = normal.is_none_or(|n| h.normal.cross(n).length() < 1e-6);
+                // 1e-6 rad is far below what any facet reaches; coordinates rounded to r turn the normal of the surface
+                // itself by r/1e-6 at 1e-6 mm from a pole.
+                let along = normal.is_none_or(|n| h.normal.cross(n).length() < 1e-6 + 1e6 * resolution);
                 (close && along) || (open && self.on_surface(ray, h, resolution))
             }
         };
@@ -109,6 +117,7 @@ impl Asker<'_> {
             (_, Some(h)) if flagged(h) && !open => Grade::Flagged,
             (true, _) => Grade::Right,
             (false, Some(h)) if flagged(h) => Grade::Flagged,
+            (false, None) if self.unsure_miss(&self.scene.ray(ray)) => Grade::Flagged,
             _ => Grade::Wrong,
         }
     }
