@@ -5,7 +5,10 @@
 //! facet whose last two corners are the same vertex. Positions are shared across faces, normals are each face's own,
 //! so creases stay sharp.
 
+mod topology;
+
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
+pub use topology::Topology;
 
 /// A mesh of quad facets; a triangle is a quad whose last two corners coincide.
 #[derive(Clone, Debug, Default, PartialEq)]

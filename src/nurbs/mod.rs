@@ -10,6 +10,7 @@
 
 mod basis;
 pub mod conic;
+mod curvature;
 mod patch;
 pub mod project;
 pub mod sanitise;
@@ -18,6 +19,7 @@ mod surface;
 pub mod sweep;
 
 pub use basis::{MAX_DEGREE, find_span};
+pub use curvature::FundamentalForms;
 pub use patch::BezierPatch;
 pub use spline::{ControlPoint, Curve, CurveDerivatives, Spline, UvCurve};
 pub use surface::{Derivatives, SecondDerivatives, Surface};

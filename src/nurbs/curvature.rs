@@ -1,0 +1,84 @@
+use super::{SecondDerivatives, Surface};
+use crate::math::{Uv, Vector};
+
+/// First and second fundamental form of a surface at a point, with respect to `Su × Sv`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FundamentalForms {
+    /// `Su·Su`, `Su·Sv`, `Sv·Sv`, mm² per parameter².
+    pub first: [f64; 3],
+    /// `Suu·n`, `Suv·n`, `Svv·n`, mm per parameter².
+    pub second: [f64; 3],
+    /// The unit normal along `Su × Sv`.
+    pub normal: Vector,
+}
+
+impl FundamentalForms {
+    /// From derivatives; `None` where they span no plane.
+    pub fn new(d: &SecondDerivatives) -> Option<Self> {
+        let n = d.du.cross(d.dv);
+        let (lu, lv) = (d.du.length(), d.dv.length());
+        let spans = n.length() > 1e-9 * lu * lv && lu.min(lv) > 1e-9 * lu.max(lv);
+        let normal = n.try_normalize().filter(|_| spans)?;
+        Some(Self {
+            first: [d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv)],
+            second: [d.duu.dot(normal), d.duv.dot(normal), d.dvv.dot(normal)],
+            normal,
+        })
+    }
+
+    /// Principal curvatures, 1/mm, the larger one first; positive where the surface bends towards its normal.
+    pub fn principal(&self) -> [f64; 2] {
+        let ([e, f, g], [l, m, n]) = (self.first, self.second);
+        let det = e * g - f * f;
+        let mean = (e * n - 2.0 * f * m + g * l) / (2.0 * det);
+        let gauss = (l * n - m * m) / det;
+        let root = (mean * mean - gauss).max(0.0).sqrt();
+        [mean + root, mean - root]
+    }
+
+    /// The largest absolute normal curvature, 1/mm.
+    pub fn sharpest(&self) -> f64 {
+        let [a, b] = self.principal();
+        a.abs().max(b.abs())
+    }
+
+    /// Normal curvature in a direction of the parameter plane, 1/mm; 0 for a zero direction.
+    pub fn along(&self, d: Uv) -> f64 {
+        let form = |q: [f64; 3]| q[0] * d.x * d.x + 2.0 * q[1] * d.x * d.y + q[2] * d.y * d.y;
+        let length = form(self.first);
+        if length > 0.0 { form(self.second) / length } else { 0.0 }
+    }
+}
+
+impl Surface {
+    /// The fundamental forms at `uv`; `None` at poles and cusps.
+    pub fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
+        FundamentalForms::new(&self.second_derivatives(uv))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_torus_has_its_closed_form_curvatures() {
+        let (major, minor) = (5.0, 2.0);
+        let s = sweep::torus(&Frame::IDENTITY, major, minor, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        for i in 0..16 {
+            let v = 2.0 * PI * i as f64 / 16.0;
+            let phi = crate::nurbs::conic::angle_of_parameter([0.0, 2.0 * PI], v);
+            let forms = s.forms(Uv::new(1.1, v)).unwrap();
+            let around = -phi.cos() / (major + minor * phi.cos());
+            let mut expected = [around, -1.0 / minor];
+            expected.sort_by(|a, b| b.total_cmp(a));
+            for (k, e) in forms.principal().iter().zip(expected) {
+                assert!((k - e).abs() < 1e-11, "{k} {e}");
+            }
+            assert!((forms.along(Uv::Y) + 1.0 / minor).abs() < 1e-11);
+        }
+    }
+}

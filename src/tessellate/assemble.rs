@@ -1,0 +1,188 @@
+//! Parts are meshed once, in parallel over their faces, and copied to where they stand.
+
+use super::edges::{self, Division, Side};
+use super::face::{self, FaceMesh};
+use super::settings::{Field, Place, Settings};
+use super::sheet::Sheet;
+use super::{FacetQuality, Tessellation};
+use crate::math::{FaceId, Frame, Point};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::model::{Face, Instance, Model, Part, TessellatedFace};
+use rayon::prelude::*;
+
+/// A part's faces, in the order of its shells.
+pub(super) struct PartMesh {
+    shared: Vec<Point>,
+    faces: Vec<Option<FaceMesh>>,
+}
+
+/// Times that crossing borders are sampled more densely.
+const TRIES: usize = 3;
+
+/// Meshes every part that is placed.
+pub(super) fn parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
+    (0..model.parts.len())
+        .into_par_iter()
+        .map(|p| {
+            let uses: Vec<usize> =
+                (0..model.instances.len()).filter(|&i| model.instances[i].part.0 as usize == p).collect();
+            let scale = uses.iter().map(|&i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
+            (!uses.is_empty()).then(|| mesh_part(model, &model.parts[p], &uses, scale, settings))
+        })
+        .collect()
+}
+
+fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &Settings) -> PartMesh {
+    let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
+    let firsts: Vec<u32> = uses.iter().map(|&i| model.first_face(i).0).collect();
+    let sheets: Vec<Option<Sheet<'_>>> = faces
+        .par_iter()
+        .enumerate()
+        .map(|(k, f)| {
+            let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
+            let tolerance = tolerance(settings, part, f, &placed);
+            usable(f).then(|| Sheet::new(&f.surface, f.reversed, Field::new(tolerance, settings.radii, scale)))
+        })
+        .collect();
+    let mut denser = vec![0u32; part.edges.len()];
+    let mut tries = 0;
+    loop {
+        let mut sides: Vec<Vec<Side<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
+        for (face, sheet) in faces.iter().zip(&sheets) {
+            let Some(sheet) = sheet else { continue };
+            for side in face.loops.iter().flat_map(|l| &l.uses) {
+                if let Some(list) = side.edge.and_then(|e| sides.get_mut(e.0 as usize)) {
+                    list.push(Side { sheet, side });
+                }
+            }
+        }
+        let (divisions, shared) = edges::divide(part, &sides, &denser);
+        let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| one(part, face, sheet.as_ref()?, &divisions, &shared, settings);
+        let meshes: Vec<Option<FaceMesh>> = faces.par_iter().zip(&sheets).map(mesh).collect();
+        let crossing: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.crossing).map(|e| e.0 as usize).collect();
+        if crossing.is_empty() || tries == TRIES {
+            return PartMesh { shared, faces: meshes };
+        }
+        tries += 1;
+        for e in crossing {
+            denser[e] = tries as u32;
+        }
+    }
+}
+
+fn one(part: &Part, face: &Face, sheet: &Sheet<'_>, divisions: &[Division], shared: &[Point], settings: &Settings) -> Option<FaceMesh> {
+    let known = |e: Option<crate::model::EdgeId>| e.is_none_or(|e| (e.0 as usize) < part.edges.len());
+    let complete = face.loops.iter().flat_map(|l| &l.uses).all(|u| known(u.edge));
+    complete.then(|| face::mesh(part, face, sheet, divisions, shared, settings)).flatten()
+}
+
+/// Whether all numbers of a face are numbers.
+fn usable(face: &Face) -> bool {
+    let s = &face.surface;
+    let [[u0, u1], [v0, v1]] = s.domain();
+    let points = s.points.iter().all(|p| p.is_finite() && p.w > 0.0);
+    points && u0 < u1 && v0 < v1 && (u1 - u0).is_finite() && (v1 - v0).is_finite()
+}
+
+fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> [f64; 2] {
+    let matches = |place: &Place| match place {
+        Place::Part(name) => *name == part.name,
+        Place::Face(name) => *name == face.name,
+        Place::Entity(id) => face.entity == Some(*id),
+        Place::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
+    };
+    settings.overrides.iter().rev().find(|o| matches(&o.place)).map_or(settings.tolerance, |o| o.tolerance)
+}
+
+/// Puts every instance's facets where they belong.
+pub(super) fn place(model: &Model, parts: &[Option<PartMesh>]) -> (Tessellation, Vec<FaceId>) {
+    let mut out = Tessellation::default();
+    let mut failed = Vec::new();
+    for (i, instance) in model.instances.iter().enumerate() {
+        let first = model.first_face(i);
+        let part = model.part(instance.part);
+        let Some(mesh) = &parts[instance.part.0 as usize] else { continue };
+        let shared = out.mesh.positions.len() as u32;
+        out.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
+        for (k, face) in mesh.faces.iter().enumerate() {
+            let id = FaceId(first.0 + k as u32);
+            match face {
+                Some(face) => place_face(&mut out, instance, mesh, shared, face, id),
+                None => failed.push(id),
+            }
+        }
+        for (k, ready) in part.tessellated.iter().enumerate() {
+            place_ready(&mut out, &instance.placement, ready, FaceId(first.0 + (mesh.faces.len() + k) as u32));
+        }
+    }
+    drop_unused(&mut out.mesh);
+    (out, failed)
+}
+
+fn place_face(out: &mut Tessellation, instance: &Instance, mesh: &PartMesh, shared: u32, face: &FaceMesh, id: FaceId) {
+    let (frame, limit) = (&instance.placement, mesh.shared.len() as u32);
+    let own = out.mesh.positions.len() as u32;
+    out.mesh.positions.extend(face.own.iter().map(|&p| frame.point(p)));
+    let corner = out.mesh.vertices.len() as u32;
+    out.mesh.vertices.extend(face.corners.iter().map(|&(p, n, uv)| MeshVertex {
+        position: if p < limit { shared + p } else { own + p - limit },
+        normal: frame.normal(n),
+        uv,
+    }));
+    for ((f, &bound), &tolerance) in face.facets.iter().zip(&face.bounds).zip(&face.tolerances) {
+        let vertices = turned(f.map(|c| c + corner), frame);
+        out.mesh.facets.push(Facet { vertices, face: id });
+        let (bound, tolerance) = (bound * frame.scale, tolerance * frame.scale);
+        let proved = bound <= tolerance;
+        out.mesh.sag.push(if proved { bound } else { f64::INFINITY });
+        out.quality.push(FacetQuality { tolerance, bound, certified: proved });
+    }
+    out.report.faces.repaired += face.repaired as usize;
+}
+
+/// A mirrored placement turns facets around, so that they stay counter-clockwise from outside.
+fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
+    if !frame.is_mirrored() {
+        [a, b, c, d]
+    } else if c == d {
+        [a, c, b, b]
+    } else {
+        [a, d, c, b]
+    }
+}
+
+/// A face that is a mesh in the file is copied as it is: it is its own truth.
+fn place_ready(out: &mut Tessellation, frame: &Frame, ready: &TessellatedFace, id: FaceId) {
+    let (p, v) = (out.mesh.positions.len() as u32, out.mesh.vertices.len() as u32);
+    out.mesh.positions.extend(ready.mesh.positions.iter().map(|&x| frame.point(x)));
+    out.mesh.vertices.extend(ready.mesh.vertices.iter().map(|x| MeshVertex {
+        position: x.position + p,
+        normal: frame.normal(x.normal),
+        uv: x.uv,
+    }));
+    for f in &ready.mesh.facets {
+        out.mesh.facets.push(Facet { vertices: turned(f.vertices.map(|c| c + v), frame), face: id });
+        out.mesh.sag.push(0.0);
+        out.quality.push(FacetQuality { tolerance: 0.0, bound: 0.0, certified: true });
+    }
+}
+
+/// Removes positions that no facet uses: ends of edges without faces, hanging samples of failed faces.
+fn drop_unused(mesh: &mut FacetMesh) {
+    let mut name = vec![u32::MAX; mesh.positions.len()];
+    for v in mesh.facets.iter().flat_map(|f| f.vertices) {
+        name[mesh.vertices[v as usize].position as usize] = 0;
+    }
+    let mut kept = Vec::new();
+    for (slot, &p) in name.iter_mut().zip(&mesh.positions) {
+        if *slot == 0 {
+            *slot = kept.len() as u32;
+            kept.push(p);
+        }
+    }
+    mesh.positions = kept;
+    for v in &mut mesh.vertices {
+        // A corner without facets can only come with a ready mesh; it may point anywhere.
+        v.position = name[v.position as usize].min(mesh.positions.len().saturating_sub(1) as u32);
+    }
+}

@@ -1,0 +1,240 @@
+//! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
+
+use super::bound::from_line;
+use super::sheet::Sheet;
+use crate::math::{Point, Uv, Vector};
+use crate::model::{EdgeUse, Part};
+use crate::nurbs::Curve;
+use rayon::prelude::*;
+
+/// Share of the tolerance that chords of edges may take; the rest is left to rounding and to the proof's slack.
+const SHARE: f64 = 0.96;
+/// Samples that look at a curve's shape before it is divided.
+const LOOKS: usize = 64;
+/// Most chords of one edge.
+const MOST: usize = 20_000;
+
+/// One side of an edge on a face.
+pub(super) struct Side<'s, 'a> {
+    pub(super) sheet: &'s Sheet<'a>,
+    pub(super) side: &'s EdgeUse,
+}
+
+/// Where an edge is divided: parameters ascending, ends included.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Division {
+    pub(super) t: Vec<f64>,
+    /// Index of the first inner point among the part's shared positions.
+    pub(super) first: u32,
+}
+
+/// Divides all edges of a part, and returns the shared positions: vertices, then inner points edge by edge.
+pub(super) fn divide(part: &Part, sides: &[Vec<Side<'_, '_>>], denser: &[u32]) -> (Vec<Division>, Vec<Point>) {
+    let mut divisions: Vec<Division> = part
+        .edges
+        .par_iter()
+        .zip(sides)
+        .zip(denser)
+        .map(|((edge, sides), &denser)| {
+            let t = if sides.is_empty() { edge.curve.domain().to_vec() } else { edge_parameters(&edge.curve, sides, denser) };
+            Division { t, first: 0 }
+        })
+        .collect();
+    let mut positions = part.vertices.clone();
+    for (edge, division) in part.edges.iter().zip(&mut divisions) {
+        division.first = positions.len() as u32;
+        let inner = &division.t[1..division.t.len() - 1];
+        positions.extend(inner.iter().map(|&t| edge.curve.evaluate(t)));
+    }
+    (divisions, positions)
+}
+
+/// Tolerance for chords of a curve on a face at `uv`, running along `along` there: all of the face's tolerance where
+/// the face is straight across the curve, half of it where it bends that way too.
+fn chord_tolerance(sheet: &Sheet<'_>, uv: Uv, along: Vector) -> f64 {
+    if sheet.affine {
+        return sheet.field.loosest();
+    }
+    let xi = sheet.tolerance(uv);
+    let d = sheet.surface.second_derivatives(uv);
+    let Some(forms) = crate::nurbs::FundamentalForms::new(&d) else { return 0.5 * xi };
+    // The direction across, in parameters: orthogonal to `along` in the tangent plane.
+    let across = forms.normal.cross(along);
+    let ([e, f, g], det) = (forms.first, forms.first[0] * forms.first[2] - forms.first[1] * forms.first[1]);
+    let (x, y) = (across.dot(d.du), across.dot(d.dv));
+    let direction = Uv::new((g * x - f * y) / det, (e * y - f * x) / det);
+    let sag = forms.along(direction).abs() * (0.25 * sheet.size).powi(2) / 8.0;
+    xi * (1.0 - (sag / xi).min(0.5))
+}
+
+fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f64> {
+    let at = |t: f64| curve.evaluate(t);
+    let tolerance = |t: f64, along: Vector| {
+        let each = sides.iter().map(|s| chord_tolerance(s.sheet, s.sheet.surface.clamp(s.side.uv.evaluate(t)), along));
+        SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
+    };
+    let mut t = parameters(&breaks(curve), at, tolerance);
+    // In the parameter plane the chord must stay by its curve too, or loops would cross.
+    let slack = |s: &Side<'_, '_>| 2.0 * s.sheet.field.tightest() / 4f64.powi(denser as i32);
+    bisect(&mut t, |a, b| {
+        let chord = [at(a), at(b)];
+        sides.iter().any(|s| {
+            let (ua, ub) = (s.side.uv.evaluate(a), s.side.uv.evaluate(b));
+            [0.25, 0.5, 0.75].iter().any(|&f| {
+                let on = s.sheet.point(s.sheet.surface.clamp(ua.lerp(ub, f)));
+                let reach = (chord[1] - chord[0]).length();
+                let near = nearest_on(&at, a, b, on);
+                let off = (on - near).length();
+                off > slack(s) && off > 0.02 * reach
+            })
+        })
+    });
+    let closed = (at(t[0]) - at(t[t.len() - 1])).length() <= 1e-9 + 1e-9 * curve.bounds().diagonal();
+    let fewest = if closed { 3 } else { 1 };
+    while t.len() <= fewest {
+        bisect_all(&mut t);
+    }
+    t
+}
+
+/// Distance-wise nearest of a few points of the curve over `[a, b]`, refined once.
+fn nearest_on(at: &impl Fn(f64) -> Point, a: f64, b: f64, p: Point) -> Point {
+    let (mut lo, mut hi) = (a, b);
+    let mut best = at(0.5 * (a + b));
+    for _ in 0..3 {
+        let n = 6;
+        let k = (0..=n)
+            .min_by(|&i, &j| {
+                let d = |k: i32| (at(lo + (hi - lo) * k as f64 / n as f64) - p).length();
+                d(i).total_cmp(&d(j))
+            })
+            .unwrap_or(0);
+        let step = (hi - lo) / n as f64;
+        let x = lo + step * k as f64;
+        best = at(x);
+        (lo, hi) = ((x - step).max(a), (x + step).min(b));
+    }
+    best
+}
+
+/// The ends of a curve and the kinks between them, with enough looks in each piece.
+pub(super) fn breaks(curve: &Curve) -> Vec<f64> {
+    let b = curve.breakpoints();
+    let n = b.len();
+    let kink = |i: usize| {
+        let k = b[i];
+        if curve.knots.iter().filter(|&&x| x == k).count() < curve.degree {
+            return false;
+        }
+        let step = 1e-6 * (b[i + 1] - k).min(k - b[i - 1]);
+        let tangent = |t: f64| curve.derivatives(t).first.try_normalize();
+        match (tangent(k - step), tangent(k + step)) {
+            (Some(x), Some(y)) => x.cross(y).length() > 0.05 || x.dot(y) < 0.0,
+            _ => false,
+        }
+    };
+    (0..n).filter(|&i| i == 0 || i + 1 == n || kink(i)).map(|i| b[i]).collect()
+}
+
+/// Parameters so that chords stay within the tolerance, spread evenly in `√(curvature / tolerance)`.
+pub(super) fn parameters(
+    breaks: &[f64],
+    at: impl Fn(f64) -> Point,
+    tolerance: impl Fn(f64, Vector) -> f64,
+) -> Vec<f64> {
+    let mut t = vec![breaks[0]];
+    for pair in breaks.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let looks = if breaks.len() > 10 { 8 } else { LOOKS };
+        let ts: Vec<f64> = (0..=looks).map(|i| a + (b - a) * i as f64 / looks as f64).collect();
+        let p: Vec<Point> = ts.iter().map(|&t| at(t)).collect();
+        // Curvature at each look from the circle through three points; ends take their neighbour's.
+        let bend = |i: usize| {
+            let i = i.clamp(1, looks - 1);
+            let (x, y) = (p[i] - p[i - 1], p[i + 1] - p[i]);
+            let scale = x.length() * y.length() * (p[i + 1] - p[i - 1]).length();
+            if scale > 0.0 { 2.0 * x.cross(y).length() / scale } else { 0.0 }
+        };
+        let chord = [p[0], p[looks]];
+        if p.iter().all(|&q| from_line(q, &chord) <= 1e-12 * (p[looks] - p[0]).length()) {
+            t.push(b);
+            continue;
+        }
+        // Tolerances vary slowly: every fourth look asks for its own.
+        let own = |i: usize| tolerance(ts[i], p[(i + 1).min(looks)] - p[i.saturating_sub(1)]);
+        let some: Vec<f64> = (0..=looks / 4).map(|k| own(4 * k)).collect();
+        let density = |i: usize| {
+            let (k, f) = (i / 4, (i % 4) as f64 / 4.0);
+            let xi = some[k] + (some[(k + 1).min(looks / 4)] - some[k]) * f;
+            (bend(i) / (8.0 * xi)).sqrt()
+        };
+        let d: Vec<f64> = (0..=looks).map(density).collect();
+        let mut sum = vec![0.0];
+        for i in 0..looks {
+            sum.push(sum[i] + 0.5 * (d[i] + d[i + 1]) * (p[i + 1] - p[i]).length());
+        }
+        let total = sum[looks];
+        let mut n = if total.is_finite() { (total - 1e-3).ceil().clamp(1.0, MOST as f64) } else { 1.0 };
+        let spread = |n: f64| -> Vec<f64> {
+            let inner = (1..n as usize).map(|k| {
+                let goal = total * k as f64 / n;
+                let i = sum.partition_point(|&s| s <= goal).clamp(1, looks) - 1;
+                ts[i] + (ts[i + 1] - ts[i]) * (goal - sum[i]) / (sum[i + 1] - sum[i])
+            });
+            inner.collect()
+        };
+        let mut inner = spread(n);
+        // The looks' own chords miss a little of the curve: ask for more while the worst chord is too long.
+        for _ in 0..3 {
+            let ends = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
+            let excess = |k: usize| {
+                let (x, y) = (ends(k), ends(k + 1));
+                let i = (4.0 * ((0.5 * (x + y) - a) / (b - a) * (looks / 4) as f64)) as usize / 4;
+                from_line(at(0.5 * (x + y)), &[at(x), at(y)]) / some[i.min(looks / 4)]
+            };
+            let worst = (0..=inner.len()).map(excess).fold(0.0, f64::max);
+            if worst <= 1.02 || worst > 2.0 {
+                break;
+            }
+            n = (n * worst.sqrt()).ceil().max(n + 1.0);
+            inner = spread(n);
+        }
+        t.extend(inner);
+        t.push(b);
+    }
+    bisect(&mut t, |a, b| {
+        let chord = [at(a), at(b)];
+        let along = chord[1] - chord[0];
+        let xi = tolerance(0.5 * (a + b), along) * 1.03;
+        [0.2, 0.35, 0.5, 0.65, 0.8].iter().any(|f| from_line(at(a + (b - a) * f), &chord) > xi)
+    });
+    t
+}
+
+/// Halves intervals until `coarse` holds for none.
+fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
+    let mut out = Vec::with_capacity(t.len());
+    for pair in t.windows(2) {
+        let mut stack = vec![(pair[0], pair[1], 0)];
+        while let Some((a, b, depth)) = stack.pop() {
+            let m = 0.5 * (a + b);
+            if depth < 12 && a < m && m < b && out.len() < MOST && coarse(a, b) {
+                stack.push((m, b, depth + 1));
+                stack.push((a, m, depth + 1));
+            } else {
+                out.push(a);
+            }
+        }
+    }
+    out.extend(t.last());
+    *t = out;
+}
+
+fn bisect_all(t: &mut Vec<f64>) {
+    let mut out = Vec::with_capacity(2 * t.len());
+    for pair in t.windows(2) {
+        out.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
+    }
+    out.extend(t.last());
+    *t = out;
+}

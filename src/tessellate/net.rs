@@ -1,0 +1,132 @@
+//! A piece of a Bézier patch over a triangle or a segment of its parameters, as a Bézier triangle or curve.
+//!
+//! De Casteljau's steps are taken with linear forms in place of numbers; each step raises the degree by one, so a
+//! patch of degrees (p, q) gives total degree p + q. All steps are convex combinations when the triangle lies in the
+//! patch, so weights stay positive and the control points hull the piece.
+//! Source: T. D. DeRose, *Composing Bézier simplexes*, ACM TOG 7 (1988).
+
+use crate::math::{Homogeneous, Uv};
+use crate::nurbs::BezierPatch;
+
+/// Buffers reused from piece to piece.
+#[derive(Default)]
+pub(super) struct Nets {
+    rows: Vec<Vec<Homogeneous>>,
+    spare: Vec<Homogeneous>,
+    columns: Vec<Vec<Homogeneous>>,
+}
+
+impl Nets {
+    /// Control points over the simplex with 2 or 3 corners, given in local parameters.
+    pub(super) fn expand<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) -> &[Homogeneous] {
+        let [p, q] = patch.degree;
+        let (u, v) = (corners.map(|c| c.x), corners.map(|c| c.y));
+        self.rows.resize_with(self.rows.len().max(p + 1), Vec::new);
+        self.columns.resize_with(self.columns.len().max(q + 1), Vec::new);
+        for j in 0..=q {
+            for i in 0..=p {
+                self.rows[i].clear();
+                self.rows[i].push(patch.points[i * (q + 1) + j]);
+            }
+            reduce::<N>(&mut self.rows[..=p], 0, u, &mut self.spare);
+            std::mem::swap(&mut self.rows[0], &mut self.columns[j]);
+        }
+        reduce::<N>(&mut self.columns[..=q], p, v, &mut self.spare);
+        &self.columns[0]
+    }
+}
+
+/// All de Casteljau steps of one direction; `rows[0]` holds the result.
+fn reduce<const N: usize>(rows: &mut [Vec<Homogeneous>], degree: usize, at: [f64; N], spare: &mut Vec<Homogeneous>) {
+    for step in 0..rows.len() - 1 {
+        for i in 0..rows.len() - 1 - step {
+            blend::<N>(&rows[i], &rows[i + 1], degree + step, at, spare);
+            std::mem::swap(&mut rows[i], spare);
+        }
+    }
+}
+
+/// `(1 − ℓ)·a + ℓ·b` for the linear form ℓ with values `at` at the corners; degree `d` becomes `d + 1`.
+///
+/// The coefficient with exponents (i, j, k) stands at `(j + k)(j + k + 1)/2 + k`, whatever i is.
+fn blend<const N: usize>(
+    a: &[Homogeneous],
+    b: &[Homogeneous],
+    d: usize,
+    at: [f64; N],
+    out: &mut Vec<Homogeneous>,
+) {
+    out.clear();
+    let inv = 1.0 / (d + 1) as f64;
+    if N == 2 {
+        for j in 0..=d + 1 {
+            let i = d + 1 - j;
+            let mut sum = Homogeneous::ZERO;
+            if i > 0 {
+                sum += (a[j] * (1.0 - at[0]) + b[j] * at[0]) * i as f64;
+            }
+            if j > 0 {
+                sum += (a[j - 1] * (1.0 - at[1]) + b[j - 1] * at[1]) * j as f64;
+            }
+            out.push(sum * inv);
+        }
+        return;
+    }
+    for m in 0..=d + 1 {
+        for k in 0..=m {
+            let (i, j) = (d + 1 - m, m - k);
+            let mut sum = Homogeneous::ZERO;
+            if i > 0 {
+                let x = m * (m + 1) / 2 + k;
+                sum += (a[x] * (1.0 - at[0]) + b[x] * at[0]) * i as f64;
+            }
+            if m > 0 {
+                let below = (m - 1) * m / 2;
+                if j > 0 {
+                    let x = below + k;
+                    sum += (a[x] * (1.0 - at[1]) + b[x] * at[1]) * j as f64;
+                }
+                if k > 0 {
+                    let x = below + k - 1;
+                    sum += (a[x] * (1.0 - at[2]) + b[x] * at[2]) * k as f64;
+                }
+            }
+            out.push(sum * inv);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+
+    #[test]
+    fn the_nets_evaluate_to_the_patch() {
+        let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 1.2], [0.3, 1.5]);
+        let patch = &s.bezier_patches()[0];
+        let corners = [Uv::new(0.1, 0.2), Uv::new(0.9, 0.35), Uv::new(0.4, 1.0)];
+        let mut nets = Nets::default();
+        let net = nets.expand(patch, corners).to_vec();
+        let n = patch.degree[0] + patch.degree[1];
+        let b = [0.2, 0.5, 0.3f64];
+        let factorial = |k: usize| (1..=k).map(|x| x as f64).product::<f64>();
+        let mut sum = Homogeneous::ZERO;
+        for m in 0..=n {
+            for k in 0..=m {
+                let (i, j) = (n - m, m - k);
+                let c = factorial(n) / factorial(i) / factorial(j) / factorial(k);
+                sum += net[m * (m + 1) / 2 + k] * c * b[0].powi(i as i32) * b[1].powi(j as i32) * b[2].powi(k as i32);
+            }
+        }
+        let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
+        assert!((sum.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
+        let segment = nets.expand(patch, [corners[0], corners[1]]).to_vec();
+        let middle = (0..=n).fold(Homogeneous::ZERO, |s, j| {
+            s + segment[j] * (factorial(n) / factorial(j) / factorial(n - j) * 0.5f64.powi(n as i32))
+        });
+        let at = 0.5 * (corners[0] + corners[1]);
+        assert!((middle.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
+    }
+}

@@ -1,0 +1,163 @@
+//! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
+
+use super::strip::{Node, Strip, key};
+use crate::math::Uv;
+use rustc_hash::FxHashMap;
+
+/// A facet of the strip; a triangle repeats its third corner.
+pub(super) struct StripFacet {
+    pub(super) nodes: [u32; 4],
+    pub(super) bound: f64,
+    pub(super) tolerance: f64,
+    /// Other parameters for the third corner: a pole, seen in the middle of its facet.
+    pub(super) pole: Option<Uv>,
+}
+
+/// Cosine of the sharpest and bluntest corner that a quad may have.
+const SHARPEST: f64 = 0.9995;
+/// Cosine below which a quad is made before any triangle's lack of mates is looked at.
+const GOOD: f64 = 0.5;
+
+/// Pairs greedily, squarest first. `fixed` edges are not crossed; triangles without area go into their neighbours.
+pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>) -> Vec<StripFacet> {
+    let t = &strip.triangles;
+    let node = |n: u32| strip.nodes[n as usize];
+    let collapsed: Vec<bool> = t.iter().map(|t| flat(t.map(node))).collect();
+    let mut sides: FxHashMap<[u32; 2], (usize, usize)> = FxHashMap::default();
+    let mut candidates: Vec<(f64, usize, usize, [u32; 4])> = Vec::new();
+    for (i, tri) in t.iter().enumerate() {
+        for k in 0..3 {
+            let (c, a) = (tri[k], tri[(k + 1) % 3]);
+            let name = key(a, c);
+            if fixed.contains_key(&name) {
+                continue;
+            }
+            let Some(&(j, m)) = sides.get(&name) else {
+                sides.insert(name, (i, k));
+                continue;
+            };
+            // This triangle is (a, b, c) and the other holds the edge a–c.
+            let (b, d) = (tri[(k + 2) % 3], t[j][(m + 2) % 3]);
+            if collapsed[i] || collapsed[j] {
+                if collapsed[i] != collapsed[j] && node(a).position != node(c).position {
+                    candidates.push((-1.0, i, j, [a, b, c, d]));
+                }
+            } else if let Some(score) = squareness([a, b, c, d].map(node)) {
+                candidates.push((score, i, j, [a, b, c, d]));
+            }
+        }
+    }
+    candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
+    let mut taken = vec![false; t.len()];
+    let mut facets = Vec::new();
+    for c in choose(&candidates, &mut taken) {
+        let (score, i, j, q) = candidates[c];
+        let bound = strip.bounds[i].max(strip.bounds[j]);
+        let tolerance = strip.tolerances[i].min(strip.tolerances[j]);
+        if score < 0.0 {
+            let full = if collapsed[i] { j } else { i };
+            facets.push(with_pole(strip, t[full], q, strip.bounds[full], tolerance));
+        } else {
+            facets.push(StripFacet { nodes: q, bound, tolerance, pole: None });
+        }
+    }
+    for (i, tri) in t.iter().enumerate() {
+        if !taken[i] && !collapsed[i] {
+            facets.push(StripFacet {
+                nodes: [tri[0], tri[1], tri[2], tri[2]],
+                bound: strip.bounds[i],
+                tolerance: strip.tolerances[i],
+                pole: None,
+            });
+        }
+    }
+    facets
+}
+
+/// Pairs to make: good quads in order of squareness, then those of triangles that have but one mate left, then the rest.
+fn choose(candidates: &[(f64, usize, usize, [u32; 4])], taken: &mut [bool]) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let mut of: Vec<[u32; 3]> = vec![[u32::MAX; 3]; taken.len()];
+    for (c, &(score, i, j, _)) in candidates.iter().enumerate() {
+        if score < GOOD && !taken[i] && !taken[j] {
+            (taken[i], taken[j]) = (true, true);
+            chosen.push(c);
+        }
+        for t in [i, j] {
+            if let Some(slot) = of[t].iter_mut().find(|s| **s == u32::MAX) {
+                *slot = c as u32;
+            }
+        }
+    }
+    let mates = |t: usize, taken: &[bool]| -> Vec<usize> {
+        let open = of[t].iter().filter(|&&c| c != u32::MAX).map(|&c| c as usize);
+        open.filter(|&c| !taken[candidates[c].1] && !taken[candidates[c].2]).collect()
+    };
+    let mut single: Vec<usize> = (0..taken.len()).rev().collect();
+    let mut rest = 0..candidates.len();
+    loop {
+        let c = match single.pop() {
+            Some(t) if taken[t] => continue,
+            Some(t) => match mates(t, taken).as_slice() {
+                [one] => *one,
+                _ => continue,
+            },
+            None => match rest.next() {
+                Some(c) if taken[candidates[c].1] || taken[candidates[c].2] => continue,
+                Some(c) => c,
+                None => return chosen,
+            },
+        };
+        let (_, i, j, _) = candidates[c];
+        (taken[i], taken[j]) = (true, true);
+        chosen.push(c);
+        for t in [i, j] {
+            for &c in of[t].iter().filter(|&&c| c != u32::MAX) {
+                let (_, i, j, _) = candidates[c as usize];
+                single.extend([i, j].into_iter().filter(|&x| !taken[x]));
+            }
+        }
+    }
+}
+
+/// Whether a triangle has two corners in one place.
+fn flat(n: [Node; 3]) -> bool {
+    n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position
+}
+
+/// The triangle at a pole, turned so that the pole is its third corner and seen in its middle.
+fn with_pole(strip: &Strip, full: [u32; 3], quad: [u32; 4], bound: f64, tolerance: f64) -> StripFacet {
+    let position = |n: u32| strip.nodes[n as usize].position;
+    let twin = quad.iter().copied().find_map(|n| {
+        let k = full.iter().position(|&f| f != n && position(f) == position(n) && !full.contains(&n))?;
+        Some((k, n))
+    });
+    match twin {
+        Some((k, n)) => {
+            let nodes = [full[(k + 1) % 3], full[(k + 2) % 3], full[k], full[k]];
+            let middle = 0.5 * (strip.nodes[full[k] as usize].uv + strip.nodes[n as usize].uv);
+            StripFacet { nodes, bound, tolerance, pole: Some(middle) }
+        }
+        None => StripFacet { nodes: [full[0], full[1], full[2], full[2]], bound, tolerance, pole: None },
+    }
+}
+
+/// Largest cosine of a corner of a quad; `None` when it is not convex or folds along its diagonal.
+fn squareness(n: [Node; 4]) -> Option<f64> {
+    let p = n.map(|x| x.place);
+    let (n1, n2) = ((p[1] - p[0]).cross(p[2] - p[0]), (p[2] - p[0]).cross(p[3] - p[0]));
+    let (l1, l2) = (n1.length(), n2.length());
+    if !(l1 > 0.0 && l2 > 0.0) || n1.dot(n2) < 0.5 * l1 * l2 {
+        return None;
+    }
+    let up = n1 + n2;
+    let mut worst = 0f64;
+    for i in 0..4 {
+        let (x, y) = (p[(i + 1) % 4] - p[i], p[(i + 3) % 4] - p[i]);
+        if x.cross(y).dot(up) <= 0.0 {
+            return None;
+        }
+        worst = worst.max((x.dot(y) / (x.length() * y.length())).abs());
+    }
+    (worst < SHARPEST).then_some(worst)
+}

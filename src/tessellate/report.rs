@@ -1,0 +1,212 @@
+//! What came out, in the words of `facet --json`.
+
+use super::{Settings, Tessellation, sample};
+use crate::math::FaceId;
+use crate::mesh::Topology;
+use crate::model::Model;
+use serde::Serialize;
+
+/// The geometry part of `facet --json`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Facets of the mesh.
+    pub facets: usize,
+    /// Those with four corners.
+    pub quads: usize,
+    /// Those with three.
+    pub triangles: usize,
+    /// Distinct positions.
+    pub vertices: usize,
+    /// What was asked.
+    pub tolerance_mm: ToleranceRange,
+    /// What was reached.
+    pub sag_mm: Sag,
+    /// Facets whose sampled sag exceeds their local tolerance; `None` when not measured.
+    pub over_tolerance: Option<usize>,
+    /// Bilinear normal against the spline's; `None` when not measured.
+    pub normal_error_deg: Option<Percentiles>,
+    /// Facets proved to be within their local tolerance.
+    pub certified: usize,
+    /// Faces with facets that are not, and how many of each: indices of placed faces.
+    pub not_certified: Vec<NotCertified>,
+    /// Share of the area that is in facets with four corners.
+    pub quad_area_share: f64,
+    /// Area of the facets as traced.
+    pub area_mm2: f64,
+    /// Enclosed volume; `None` unless every shell is closed.
+    pub volume_mm3: Option<f64>,
+    /// Of the placed shells that the file calls closed: how many are, and how many are not.
+    pub shells: ShellCounts,
+    /// Edges with one facet, in shells that the file calls closed.
+    pub open_edges: usize,
+    /// Edges with more than two facets, or two that disagree which side is outside, in those shells.
+    pub nonmanifold_edges: usize,
+    /// Placed faces.
+    pub faces: FaceCounts,
+    /// Times.
+    pub seconds: Seconds,
+    /// Filled in by whoever knows the process; bytes.
+    pub peak_bytes: Option<u64>,
+}
+
+/// Least and largest tolerance asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ToleranceRange {
+    /// mm.
+    pub min: f64,
+    /// mm.
+    pub max: f64,
+}
+
+/// Distances between facets and spline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Sag {
+    /// Largest proved bound of the certified facets, mm.
+    pub bound_max: f64,
+    /// Largest sampled distance, mm; `None` when not measured.
+    pub sampled_max: Option<f64>,
+    /// Mean sampled distance weighted by area, mm; `None` when not measured.
+    pub sampled_mean: Option<f64>,
+}
+
+/// A distribution in three numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// A face that has facets without proof.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct NotCertified {
+    /// Index of the placed face.
+    pub face: u32,
+    /// The `#id` in the file.
+    pub entity: Option<u64>,
+    /// How many of its facets.
+    pub facets: usize,
+}
+
+/// Shells that the file calls closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ShellCounts {
+    /// Closed and consistently oriented.
+    pub closed: usize,
+    /// Not so.
+    pub open: usize,
+}
+
+/// Placed faces by outcome.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FaceCounts {
+    /// With facets.
+    pub meshed: usize,
+    /// Without.
+    pub failed: usize,
+    /// Of those meshed: with something given up (crossing borders, an exhausted budget).
+    pub repaired: usize,
+}
+
+/// Times in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Reading the file; filled in by whoever read it.
+    pub read: f64,
+    /// Tessellating.
+    pub tessellate: f64,
+}
+
+/// Fills in everything but the times.
+pub(super) fn fill(made: &mut Tessellation, model: &Model, settings: &Settings, failed: Vec<FaceId>) {
+    let mut report = std::mem::take(&mut made.report);
+    let mesh = &made.mesh;
+    report.facets = mesh.facets.len();
+    report.quads = mesh.quad_count();
+    report.triangles = report.facets - report.quads;
+    report.vertices = mesh.positions.len();
+    let [a, b] = settings.tolerance;
+    report.tolerance_mm = ToleranceRange { min: a.min(b), max: a.max(b) };
+    report.certified = made.quality.iter().filter(|q| q.certified).count();
+    report.sag_mm.bound_max = made.quality.iter().filter(|q| q.certified).map(|q| q.bound).fold(0.0, f64::max);
+    let areas: Vec<f64> = (0..mesh.facets.len()).map(|f| mesh.facet_area(f)).collect();
+    report.area_mm2 = areas.iter().sum();
+    let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
+    report.quad_area_share = if report.area_mm2 > 0.0 { in_quads / report.area_mm2 } else { 0.0 };
+    report.faces.failed = failed.len();
+    report.faces.meshed = model.placed_face_count() - failed.len();
+    name_uncertified(&mut report, made, model);
+    let all_closed = shells(&mut report, made, model);
+    report.volume_mm3 = (all_closed && report.facets > 0).then(|| made.mesh.volume());
+    if settings.measure {
+        measure(&mut report, made, model, &areas);
+    }
+    made.report = report;
+}
+
+fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
+    for (facet, _) in made.mesh.facets.iter().zip(&made.quality).filter(|(_, q)| !q.certified) {
+        match report.not_certified.last_mut() {
+            Some(last) if last.face == facet.face.0 => last.facets += 1,
+            _ => report.not_certified.push(NotCertified { face: facet.face.0, entity: None, facets: 1 }),
+        }
+    }
+    if !report.not_certified.is_empty() {
+        let entities: Vec<Option<u64>> = model.placed_faces().map(|f| f.entity()).collect();
+        for n in &mut report.not_certified {
+            n.entity = entities[n.face as usize];
+        }
+    }
+}
+
+/// Counts closed shells; whether every shell of the model is closed.
+fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
+    let facets = &made.mesh.facets;
+    let mut all = true;
+    for (i, instance) in model.instances.iter().enumerate() {
+        let mut face = model.first_face(i).0;
+        let part = model.part(instance.part);
+        for shell in &part.shells {
+            let next = face + shell.faces.len() as u32;
+            let start = facets.partition_point(|f| f.face.0 < face);
+            let end = facets.partition_point(|f| f.face.0 < next);
+            face = next;
+            if !shell.closed {
+                all = false;
+                continue;
+            }
+            let Topology { open_edges, nonmanifold_edges, turned_edges } = made.mesh.topology(start..end);
+            report.open_edges += open_edges;
+            report.nonmanifold_edges += nonmanifold_edges + turned_edges;
+            if start < end && open_edges + nonmanifold_edges + turned_edges == 0 {
+                report.shells.closed += 1;
+            } else {
+                report.shells.open += 1;
+                all = false;
+            }
+        }
+        all &= part.tessellated.is_empty();
+    }
+    all
+}
+
+fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
+    let sampled = sample::all(made, model);
+    let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
+    let mean = sampled.iter().zip(areas).map(|(s, a)| s.mean * a).sum::<f64>() / report.area_mm2.max(1e-300);
+    report.sag_mm.sampled_max = Some(max);
+    report.sag_mm.sampled_mean = Some(mean);
+    // A sample on the very tolerance differs by rounding alone.
+    let over = |(s, q): (&sample::Sampled, &super::FacetQuality)| s.sag > q.tolerance * (1.0 + 1e-9) + 1e-10;
+    report.over_tolerance = Some(sampled.iter().zip(&made.quality).filter(|&x| over(x)).count());
+    let mut errors: Vec<f32> = sampled.into_iter().flat_map(|s| s.normal_errors).collect();
+    errors.sort_by(f32::total_cmp);
+    let at = |share: f64| {
+        let i = ((errors.len().saturating_sub(1)) as f64 * share) as usize;
+        errors.get(i).map_or(0.0, |&e| f64::from(e).to_degrees())
+    };
+    report.normal_error_deg = Some(Percentiles { p50: at(0.5), p99: at(0.99), max: at(1.0) });
+}

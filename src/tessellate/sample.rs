@@ -1,0 +1,147 @@
+//! Sag and normal error by dense sampling: evaluates splines by their definition and measures distances its own way, so
+//! that it can judge the bound.
+
+use super::Tessellation;
+use crate::math::{Point, Uv, Vector};
+use crate::mesh::FacetMesh;
+use crate::model::Model;
+use crate::nurbs::Surface;
+use rayon::prelude::*;
+
+/// What sampling found on one facet.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sampled {
+    /// Largest distance found, mm.
+    pub(super) sag: f64,
+    /// Mean distance of the facet's points to the spline, mm.
+    pub(super) mean: f64,
+    /// Angles between the bilinear normal and the spline's, radians.
+    pub(super) normal_errors: Vec<f32>,
+}
+
+/// Surface samples a side of a facet.
+const GRID: usize = 8;
+
+/// Samples every facet; facets of ready meshes give zeros.
+pub(super) fn all(made: &Tessellation, model: &Model) -> Vec<Sampled> {
+    let faces: Vec<_> = model.placed_faces().collect();
+    (0..made.mesh.facets.len())
+        .into_par_iter()
+        .map(|f| {
+            let placed = &faces[made.mesh.facets[f].face.index()];
+            let Some(face) = placed.face else { return Sampled::default() };
+            let scale = placed.placement.scale;
+            let corners = made.mesh.corners(f).map(|p| placed.placement.local_point(p));
+            let sign = if face.reversed { -1.0 } else { 1.0 };
+            let normals = made.mesh.facets[f].vertices.map(|v| {
+                sign * placed.placement.local_direction(made.mesh.vertices[v as usize].normal)
+            });
+            let mut s = facet(&face.surface, &made.mesh, f, corners, normals);
+            s.sag *= scale;
+            s.mean *= scale;
+            s
+        })
+        .collect()
+}
+
+fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
+    let uv = mesh.facets[f].vertices.map(|v| mesh.vertices[v as usize].uv);
+    let triangles: &[[usize; 3]] = if mesh.facets[f].is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
+    let mut out = Sampled::default();
+    let to_facet = |x: Point| {
+        let each = triangles.iter().map(|t| (x - closest(x, t.map(|k| p[k]))).length());
+        each.fold(f64::INFINITY, f64::min)
+    };
+    for t in triangles {
+        for i in 0..=GRID {
+            for j in 0..=GRID - i {
+                let b = [(GRID - i - j) as f64, i as f64, j as f64].map(|x| x / GRID as f64);
+                let at = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];
+                out.sag = out.sag.max(to_facet(surface.evaluate(at)));
+            }
+        }
+    }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for t in triangles {
+        for b in [[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [0.34, 0.33, 0.33], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]] {
+            let x = p[t[0]] * b[0] + p[t[1]] * b[1] + p[t[2]] * b[2];
+            // Parameters linear on the triangle start the search; the foot is what counts.
+            let start = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];
+            let foot = project(surface, x, start);
+            let away = (surface.evaluate(foot) - x).length();
+            out.sag = out.sag.max(away);
+            sum += away;
+            count += 1.0;
+            let bilinear = interpolated(triangles.len() == 1, t, b, n);
+            if let (Some(a), Some(e)) = (bilinear.try_normalize(), surface.normal(foot)) {
+                out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
+            }
+        }
+    }
+    out.mean = sum / count;
+    out
+}
+
+/// The normal at a point of triangle `t`: bilinear in the facet's own parameters, linear on a triangular facet.
+fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Vector {
+    if single {
+        return n[0] * b[0] + n[1] * b[1] + n[2] * b[2];
+    }
+    let (u, v) = if t[1] == 1 { (b[1] + b[2], b[2]) } else { (b[1], b[1] + b[2]) };
+    n[0] * ((1.0 - u) * (1.0 - v)) + n[1] * (u * (1.0 - v)) + n[2] * (u * v) + n[3] * ((1.0 - u) * v)
+}
+
+/// Parameters of a near point of the surface, by Gauss–Newton from a start; never farther away than the start.
+fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
+    let mut best = (surface.clamp(start), (surface.evaluate(start) - x).length());
+    let mut uv = best.0;
+    for _ in 0..6 {
+        let d = surface.derivatives(uv);
+        let e = x - d.point;
+        let (a, b, c) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
+        let det = a * c - b * b;
+        if det <= 1e-14 * a * c {
+            break;
+        }
+        let (r, s) = (e.dot(d.du), e.dot(d.dv));
+        uv = surface.clamp(uv + Uv::new(c * r - b * s, a * s - b * r) / det);
+        let away = (surface.evaluate(uv) - x).length();
+        if away < best.1 {
+            best = (uv, away);
+        }
+    }
+    best.0
+}
+
+/// Nearest point of a triangle: Ericson, *Real-Time Collision Detection*, 5.1.5.
+fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return a + ab * (d1 / (d1 - d3));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return a + ac * (d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let sum = va + vb + vc;
+    a + ab * (vb / sum) + ac * (vc / sum)
+}

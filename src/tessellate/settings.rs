@@ -1,0 +1,114 @@
+use crate::math::FaceId;
+
+/// What the facets must hold to, and how hard to try.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Sag allowed at the sharpest and at the flattest places, mm; equal numbers make it uniform.
+    pub tolerance: [f64; 2],
+    /// Radii of curvature, mm, at and below which the tight tolerance holds, and from which on the loose one does.
+    /// Between them the tolerance rises smoothly with the logarithm of the radius.
+    pub radii: [f64; 2],
+    /// Largest angle between a facet and the surface normals at its corners, degrees; `None` for no such condition.
+    pub angle_deg: Option<f64>,
+    /// Other tolerances for some places; of several that match a face, the last counts.
+    pub overrides: Vec<Override>,
+    /// Most facets for one face; beyond it, cells are left as large as they are and counted as not certified.
+    pub budget: usize,
+    /// What decides whether a facet is good enough.
+    pub judge: Judge,
+    /// Whether [`super::Report`] gets sampled sag and normal errors, which costs about twice the time of meshing.
+    pub measure: bool,
+}
+
+/// Another tolerance for some faces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Override {
+    /// Where it holds.
+    pub place: Place,
+    /// As [`Settings::tolerance`].
+    pub tolerance: [f64; 2],
+}
+
+/// Selects faces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Place {
+    /// All faces of the parts of this name.
+    Part(String),
+    /// All faces of this name.
+    Face(String),
+    /// Faces read from this entity of the file.
+    Entity(u64),
+    /// These placed faces, such as all mirrors of a scene. A part is meshed once, so the tolerance holds in all
+    /// its places.
+    Placed(Vec<FaceId>),
+}
+
+/// What decides whether a facet is good enough.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Judge {
+    /// The proved bound.
+    #[default]
+    Bound,
+    /// Dense sampling of the true distance: proves nothing; it shows what the proof costs in facets.
+    Sampled,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            tolerance: [0.05, 0.2],
+            radii: [5.0, 100.0],
+            angle_deg: None,
+            overrides: Vec::new(),
+            budget: 400_000,
+            judge: Judge::Bound,
+            measure: false,
+        }
+    }
+}
+
+impl Settings {
+    /// The same tolerance everywhere, mm.
+    pub fn uniform(tolerance: f64) -> Self {
+        Self { tolerance: [tolerance; 2], ..Self::default() }
+    }
+}
+
+/// The tolerance as a function of curvature, for one face in its part's own lengths.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Field {
+    range: [f64; 2],
+    radii: [f64; 2],
+}
+
+impl Field {
+    /// `scale` is that of the placement: tolerances hold for the placed part.
+    pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], scale: f64) -> Self {
+        let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { 1e-9 };
+        let [a, b] = tolerance.map(clean);
+        let [r, s] = radii.map(clean);
+        Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)] }
+    }
+
+    /// Tolerance where the sharpest normal curvature is `k`.
+    pub(super) fn at(&self, k: f64) -> f64 {
+        let ([tight, loose], [sharp, flat]) = (self.range, self.radii);
+        if tight == loose || k * flat <= 1.0 {
+            return loose;
+        }
+        if k.is_nan() || k * sharp >= 1.0 {
+            return tight;
+        }
+        let x = (1.0 / (k * sharp)).ln() / (flat / sharp).ln();
+        tight + (loose - tight) * x * x * (3.0 - 2.0 * x)
+    }
+
+    pub(super) fn tightest(&self) -> f64 {
+        self.range[0]
+    }
+
+    pub(super) fn loosest(&self) -> f64 {
+        self.range[1]
+    }
+}

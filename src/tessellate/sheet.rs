@@ -1,0 +1,124 @@
+use super::settings::Field;
+use crate::math::{Point, Uv, Vector};
+use crate::nurbs::{BezierPatch, Surface};
+
+/// A face's surface with its Bézier patches laid out for quick evaluation.
+pub(super) struct Sheet<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) field: Field,
+    /// Whether the outward normal is `-(Su × Sv)`.
+    flip: bool,
+    /// Whether the surface is an affine image of its parameters, so that any facet lies in it.
+    pub(super) affine: bool,
+    patches: Vec<BezierPatch>,
+    /// Distinct knots in u and v.
+    pub(super) breaks: [Vec<f64>; 2],
+    /// Parameters with a crease or corner of the surface, in u and v.
+    pub(super) creases: [Vec<f64>; 2],
+    /// Diagonal of the box around the surface, mm.
+    pub(super) size: f64,
+}
+
+impl<'a> Sheet<'a> {
+    pub(super) fn new(surface: &'a Surface, flip: bool, field: Field) -> Self {
+        let breaks = [0, 1].map(|d| {
+            let n = surface.counts()[d];
+            let mut b = surface.knots[d][surface.degree[d]..=n].to_vec();
+            b.dedup();
+            b
+        });
+        let creases = [creases(surface, 0, &breaks), creases(surface, 1, &breaks)];
+        let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
+        Self { surface, field, flip, affine: is_affine(surface, size), patches, breaks, creases, size }
+    }
+
+    /// Index of the knot interval that holds `x`.
+    pub(super) fn interval(&self, direction: usize, x: f64) -> usize {
+        let b = &self.breaks[direction];
+        b[1..b.len() - 1].partition_point(|&k| k <= x)
+    }
+
+    pub(super) fn patch(&self, a: usize, b: usize) -> &BezierPatch {
+        &self.patches[a * (self.breaks[1].len() - 1) + b]
+    }
+
+    pub(super) fn point(&self, uv: Uv) -> Point {
+        let patch = self.patch(self.interval(0, uv.x), self.interval(1, uv.y));
+        patch.homogeneous(local(patch, uv))[0].project()
+    }
+
+    /// Outward unit normal, where there is one.
+    pub(super) fn normal(&self, uv: Uv) -> Option<Vector> {
+        self.surface.normal(uv).map(|n| if self.flip { -n } else { n })
+    }
+
+    /// Whether facets run clockwise in the parameter plane.
+    pub(super) fn flipped(&self) -> bool {
+        self.flip
+    }
+
+    /// The tolerance at a place.
+    pub(super) fn tolerance(&self, uv: Uv) -> f64 {
+        if self.affine || self.field.tightest() == self.field.loosest() {
+            return self.field.loosest();
+        }
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let forms = self.surface.forms(uv).or_else(|| {
+            // Curvature at a pole is that just beside it.
+            let center = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
+            self.surface.forms(uv.lerp(center, 1e-3))
+        });
+        self.field.at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
+    }
+}
+
+/// Local parameters of `uv` on a patch.
+pub(super) fn local(patch: &BezierPatch, uv: Uv) -> Uv {
+    let [[u0, u1], [v0, v1]] = patch.domain;
+    Uv::new((uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0))
+}
+
+/// Whether all control points lie on one affine image of their Greville points, with equal weights.
+fn is_affine(s: &Surface, size: f64) -> bool {
+    let [nu, nv] = s.counts();
+    let greville = |d: usize, i: usize| s.knots[d][i + 1..=i + s.degree[d]].iter().sum::<f64>() / s.degree[d] as f64;
+    let (g0, g1) = ([greville(0, 0), greville(1, 0)], [greville(0, nu - 1), greville(1, nv - 1)]);
+    let w = s.points[0].w;
+    let at = |i: usize, j: usize| s.points[i * nv + j].project();
+    let (o, x, y) = (at(0, 0), at(nu - 1, 0) - at(0, 0), at(0, nv - 1) - at(0, 0));
+    (0..nu).all(|i| {
+        (0..nv).all(|j| {
+            let a = (greville(0, i) - g0[0]) / (g1[0] - g0[0]);
+            let b = (greville(1, j) - g0[1]) / (g1[1] - g0[1]);
+            let off = (at(i, j) - (o + x * a + y * b)).length();
+            off <= 1e-12 * size && (s.points[i * nv + j].w - w).abs() <= 1e-14 * w
+        })
+    })
+}
+
+/// Interior knots at which the surface may be bent: multiplicity of at least the degree and a jump of the tangent.
+fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2]) -> Vec<f64> {
+    let b = &breaks[d];
+    let knots = &s.knots[d];
+    let inner = b[1..b.len() - 1].iter().enumerate();
+    inner
+        .filter(|(_, k)| knots.iter().filter(|x| x == k).count() >= s.degree[d])
+        .filter(|&(i, &k)| {
+            let step = 1e-6 * (b[i + 2] - k).min(k - b[i]);
+            let across = &breaks[1 - d];
+            let (lo, hi) = (across[0], across[across.len() - 1]);
+            (0..=8).any(|j| {
+                let w = lo + (hi - lo) * (j as f64 + 0.37) / 9.0;
+                let tangent = |x: f64| {
+                    let der = s.derivatives(if d == 0 { Uv::new(x, w) } else { Uv::new(w, x) });
+                    if d == 0 { der.du } else { der.dv }
+                };
+                match (tangent(k - step).try_normalize(), tangent(k + step).try_normalize()) {
+                    (Some(a), Some(c)) => a.cross(c).length() > 1e-3 || a.dot(c) < 0.0,
+                    _ => false,
+                }
+            })
+        })
+        .map(|(_, &k)| k)
+        .collect()
+}

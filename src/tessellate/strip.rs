@@ -1,0 +1,278 @@
+//! Between the whole cells and the border: constrained Delaunay in parameters scaled by curvature, refined where a
+//! triangle cannot be proved.
+
+use super::bound::Prover;
+use super::sheet::Sheet;
+use super::trim::Trim;
+use crate::math::{Point, Uv};
+use rustc_hash::FxHashMap;
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+/// A corner of the strip.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub(super) uv: Uv,
+    pub(super) place: Point,
+    /// Shared or own position; see [`super::rings::RingVertex`].
+    pub(super) position: u32,
+}
+
+/// What is to be triangulated.
+pub(super) struct Outline {
+    pub(super) nodes: Vec<Node>,
+    /// Constraint segments, each turning outside into inside.
+    pub(super) segments: Vec<[u32; 2]>,
+    /// What border segments follow.
+    pub(super) trims: FxHashMap<[u32; 2], Trim>,
+    /// Multiplies parameters before triangulating.
+    pub(super) scale: Uv,
+    /// First free own position.
+    pub(super) next: u32,
+}
+
+/// Triangles on the outline's nodes (refinement appends some), counter-clockwise in parameters.
+pub(super) struct Strip {
+    pub(super) nodes: Vec<Node>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) bounds: Vec<f64>,
+    pub(super) tolerances: Vec<f64>,
+    /// Segments that could not be kept because they cross others.
+    pub(super) conflicts: Vec<[u32; 2]>,
+}
+
+#[derive(Clone, Copy)]
+struct Vertex {
+    at: Point2<f64>,
+    node: u32,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        self.at
+    }
+}
+
+type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
+
+/// Sorted pair of nodes.
+pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Rounds of refinement.
+const ROUNDS: usize = 16;
+
+/// Triangulates; `None` when not even a triangulation of the points exists.
+pub(super) fn triangulate(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, outline: Outline, budget: usize) -> Option<Strip> {
+    let mut work = Work { sheet, nodes: outline.nodes, scale: outline.scale, next: outline.next, cdt: Cdt::new(), odd: FxHashMap::default(), handles: Vec::new() };
+    let mut conflicts = Vec::new();
+    for n in 0..work.nodes.len() as u32 {
+        let handle = work.insert(n)?;
+        work.handles.push(handle);
+    }
+    for &[a, b] in &outline.segments {
+        if !work.constrain(a, b) {
+            conflicts.push([a, b]);
+        }
+    }
+    let rings = (!conflicts.is_empty()).then_some(&outline.segments);
+    let mut known: FxHashMap<[u32; 3], (f64, f64)> = FxHashMap::default();
+    let initial = work.nodes.len();
+    let most = (initial * 6 + 4000).min(budget.max(initial));
+    for round in 0..=ROUNDS {
+        let triangles = work.inside(rings);
+        let mut bad = Vec::new();
+        for &t in &triangles {
+            let name = sorted(t);
+            let (bound, xi) = *known.entry(name).or_insert_with(|| prove(sheet, prover, &work.nodes, t, &outline.trims));
+            if bound > xi {
+                bad.push(t);
+            }
+        }
+        if bad.is_empty() || round == ROUNDS || work.nodes.len() >= most || !work.refine(&bad, &outline.trims, &known) {
+            let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
+            return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts });
+        }
+    }
+    None
+}
+
+fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+    t.sort_unstable();
+    t
+}
+
+/// Bound and tolerance of one triangle, the border's own deviation included.
+fn prove(
+    sheet: &Sheet<'_>,
+    prover: &mut Prover<'_, '_>,
+    nodes: &[Node],
+    t: [u32; 3],
+    trims: &FxHashMap<[u32; 2], Trim>,
+) -> (f64, f64) {
+    let n = t.map(|i| nodes[i as usize]);
+    let uv = n.map(|x| x.uv);
+    let xyz = n.map(|x| x.place);
+    let xi = if sheet.affine {
+        sheet.field.loosest()
+    } else {
+        uv.iter().fold(sheet.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(sheet.tolerance(p)))
+    };
+    if n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position {
+        return (0.0, xi);
+    }
+    let mut worst = 0f64;
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        worst = worst.max(match trims.get(&key(t[i], t[j])) {
+            Some(trim) => trim.bound(prover, xyz, xi),
+            None => prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi),
+        });
+    }
+    if worst > xi {
+        return (worst, xi);
+    }
+    (worst.max(prover.piece(uv, xyz, xi)), xi)
+}
+
+struct Work<'s, 'a> {
+    sheet: &'s Sheet<'a>,
+    nodes: Vec<Node>,
+    scale: Uv,
+    next: u32,
+    cdt: Cdt,
+    /// How often each constraint edge of the triangulation turns outside into inside.
+    odd: FxHashMap<[u32; 2], u32>,
+    handles: Vec<spade::handles::FixedVertexHandle>,
+}
+
+impl Work<'_, '_> {
+    fn insert(&mut self, n: u32) -> Option<spade::handles::FixedVertexHandle> {
+        let clean = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
+        let p = self.nodes[n as usize].uv * self.scale;
+        let at = Point2::new(clean(p.x), clean(p.y));
+        if !(p.is_finite() && p.abs().max_element() < 1e30) {
+            return None;
+        }
+        let before = self.cdt.num_vertices();
+        let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
+        if self.cdt.num_vertices() == before {
+            // The place was taken: its first owner keeps it.
+            let first = self.handles.iter().position(|&h| h == handle).unwrap_or(n as usize) as u32;
+            self.cdt.vertex_data_mut(handle).node = first;
+        }
+        Some(handle)
+    }
+
+    fn constrain(&mut self, a: u32, b: u32) -> bool {
+        let (from, to) = (self.handles[a as usize], self.handles[b as usize]);
+        if from == to {
+            return true;
+        }
+        let made = self.cdt.try_add_constraint(from, to);
+        for edge in &made {
+            let e = self.cdt.directed_edge(*edge);
+            *self.odd.entry(key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
+        }
+        !made.is_empty()
+    }
+
+    /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
+    fn inside(&self, rings: Option<&Vec<[u32; 2]>>) -> Vec<[u32; 3]> {
+        let name = |f: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, (), spade::CdtEdge<()>, ()>| {
+            f.vertices().map(|v| v.data().node)
+        };
+        if let Some(segments) = rings {
+            let uv = |n: u32| self.nodes[n as usize].uv;
+            return self.cdt.inner_faces().map(name).filter(|t| {
+                let p = (uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0;
+                segments.iter().fold(false, |odd, &[a, b]| {
+                    let (a, b) = (uv(a), uv(b));
+                    let crosses =
+                        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+                    odd != crosses
+                })
+            }).collect();
+        }
+        let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];
+        let mut queue = std::collections::VecDeque::from([self.cdt.outer_face().fix()]);
+        state[self.cdt.outer_face().index()] = Some(false);
+        // Breadth first over directed edges; the outer face's are found through the hull.
+        while let Some(face) = queue.pop_front() {
+            let inside = state[face.index()] == Some(true);
+            let edges: Vec<_> = match self.cdt.face(face).as_inner() {
+                Some(inner) => inner.adjacent_edges().to_vec(),
+                None => self.cdt.convex_hull().collect(),
+            };
+            for e in edges {
+                // Hull edges run along the outer face or against it, by version; take the unknown side.
+                for side in [e, e.rev()] {
+                    let next = side.face();
+                    if state[next.index()].is_some() {
+                        continue;
+                    }
+                    let turns = e.is_constraint_edge()
+                        && self.odd.get(&key(e.from().data().node, e.to().data().node)).is_some_and(|n| n % 2 == 1);
+                    state[next.index()] = Some(inside != turns);
+                    queue.push_back(next.fix());
+                }
+            }
+        }
+        self.cdt.inner_faces().filter(|f| state[f.index()] == Some(true)).map(name).collect()
+    }
+
+    /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
+    fn refine(&mut self, bad: &[[u32; 3]], trims: &FxHashMap<[u32; 2], Trim>, known: &FxHashMap<[u32; 3], (f64, f64)>) -> bool {
+        let mut wanted: Vec<Uv> = Vec::new();
+        let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
+        for t in bad {
+            let xi = known[&sorted(*t)].1;
+            let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
+            if sides.iter().any(|&(a, b)| trims.get(&key(a, b)).is_some_and(|trim| trim.deviation > xi)) {
+                continue;
+            }
+            let free = sides.iter().filter(|&&(a, b)| !self.odd.contains_key(&key(a, b)));
+            let best = free
+                .map(|&(a, b)| {
+                    let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
+                    let m = 0.5 * (x.uv + y.uv);
+                    let sag = super::bound::from_line(self.sheet.point(m), &[x.place, y.place]);
+                    ((a, b), m, sag)
+                })
+                .max_by(|a, b| a.2.total_cmp(&b.2));
+            let corners = t.map(|n| self.nodes[n as usize]);
+            let center = (corners[0].uv + corners[1].uv + corners[2].uv) / 3.0;
+            match best {
+                Some(((a, b), m, sag)) if sag > 0.2 * xi => {
+                    if seen.insert(key(a, b), ()).is_none() {
+                        wanted.push(m);
+                    }
+                }
+                _ => wanted.push(center),
+            }
+        }
+        let mut done = false;
+        for uv in wanted {
+            let n = self.nodes.len() as u32;
+            let place = self.sheet.point(uv);
+            self.nodes.push(Node { uv, place, position: self.next });
+            let before = (self.cdt.num_vertices(), self.cdt.num_constraints());
+            match self.insert(n) {
+                Some(h) if self.cdt.num_vertices() > before.0 && self.cdt.num_constraints() == before.1 => {
+                    self.handles.push(h);
+                    self.next += 1;
+                    done = true;
+                }
+                Some(h) if self.cdt.num_vertices() > before.0 => {
+                    // It fell onto a constraint and split it: take it out again.
+                    self.cdt.remove(h);
+                    self.nodes.pop();
+                }
+                _ => {
+                    self.nodes.pop();
+                }
+            }
+        }
+        done
+    }
+}

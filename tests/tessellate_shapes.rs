@@ -1,0 +1,157 @@
+//! Shapes with closed forms: closed meshes, true areas and volumes, nothing over its tolerance.
+
+use lampyris::math::{Frame, Point, Uv, Vector};
+use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId};
+use lampyris::nurbs::{Surface, UvCurve, conic, sweep};
+use lampyris::tessellate::{Settings, Tessellation, tessellate};
+use std::f64::consts::PI;
+
+fn face(surface: Surface, reversed: bool, loops: Vec<TrimLoop>) -> Face {
+    Face {
+        name: String::new(),
+        entity: None,
+        colour: None,
+        surface,
+        analytic: Analytic::Other,
+        reversed,
+        loops,
+        gap: 0.0,
+    }
+}
+
+fn whole(surface: Surface) -> Model {
+    let shell = Shell { faces: vec![face(surface, false, Vec::new())], closed: true, ..Shell::default() };
+    Model::from_part(Part { shells: vec![shell], ..Part::default() })
+}
+
+fn measured(tolerance: f64) -> Settings {
+    Settings { measure: true, ..Settings::uniform(tolerance) }
+}
+
+fn assert_sound(made: &Tessellation, what: &str) {
+    let r = &made.report;
+    assert_eq!(r.faces.failed, 0, "{what}");
+    assert_eq!(r.over_tolerance, Some(0), "{what}: {:?}", r.sag_mm);
+    assert_eq!(r.certified, r.facets, "{what}: {:?}", r.not_certified);
+    assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.open), (0, 0, 0), "{what}");
+}
+
+#[test]
+fn a_whole_sphere_is_closed_and_certified() {
+    for xi in [2.0, 0.2, 0.05] {
+        let s = sweep::sphere(&Frame::translation(Vector::new(5.0, 1.0, 0.0)), 50.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        let made = tessellate(&whole(s), &measured(xi));
+        assert_sound(&made, "sphere");
+        let volume = made.report.volume_mm3.unwrap();
+        let exact = 4.0 / 3.0 * PI * 50f64.powi(3);
+        assert!(volume < exact && exact - volume < 4.0 * PI * 2500.0 * xi, "{volume} {exact}");
+    }
+}
+
+#[test]
+fn a_whole_torus_is_closed_and_certified() {
+    let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+    let made = tessellate(&whole(s), &measured(0.05));
+    assert_sound(&made, "torus");
+    let exact = 2.0 * PI * PI * 40.0 * 144.0;
+    assert!((made.report.volume_mm3.unwrap() - exact).abs() < 0.05 * 4.0 * PI * PI * 40.0 * 12.0);
+}
+
+/// A cylinder of radius `r` and height `h` with two caps; the seam is a real edge used twice.
+fn can(r: f64, h: f64, hole: Option<f64>) -> Part {
+    let turn = [0.0, 2.0 * PI];
+    let up = Frame::translation(Vector::Z * h);
+    let mut part = Part {
+        vertices: vec![Point::new(r, 0.0, 0.0), Point::new(r, 0.0, h)],
+        edges: vec![
+            Edge { curve: conic::arc(&Frame::IDENTITY, r, turn), vertices: [VertexId(0); 2], entity: None },
+            Edge { curve: conic::arc(&up, r, turn), vertices: [VertexId(1); 2], entity: None },
+            Edge {
+                curve: lampyris::nurbs::Curve::line(Point::new(r, 0.0, 0.0), Point::new(r, 0.0, h), [0.0, h]),
+                vertices: [VertexId(0), VertexId(1)],
+                entity: None,
+            },
+        ],
+        ..Part::default()
+    };
+    let line = |a: [f64; 2], b: [f64; 2], t| UvCurve::line(Uv::from(a), Uv::from(b), t);
+    let wall = vec![
+        EdgeUse { edge: Some(EdgeId(0)), reversed: false, uv: line([0.0, 0.0], [2.0 * PI, 0.0], turn) },
+        EdgeUse { edge: Some(EdgeId(2)), reversed: false, uv: line([2.0 * PI, 0.0], [2.0 * PI, h], [0.0, h]) },
+        EdgeUse { edge: Some(EdgeId(1)), reversed: true, uv: line([0.0, h], [2.0 * PI, h], turn) },
+        EdgeUse { edge: Some(EdgeId(2)), reversed: true, uv: line([0.0, 0.0], [0.0, h], [0.0, h]) },
+    ];
+    let flat = |c: &lampyris::nurbs::Curve| UvCurve {
+        degree: c.degree,
+        knots: c.knots.clone(),
+        points: c.points.iter().map(|p| glam::DVec3::new(p.x, p.y, p.w)).collect(),
+    };
+    let cap = |edge: u32, part: &Part| {
+        let uv = flat(&part.edges[edge as usize].curve);
+        vec![TrimLoop { uses: vec![EdgeUse { edge: Some(EdgeId(edge)), reversed: false, uv }] }]
+    };
+    let square = [[-2.0 * r, 2.0 * r]; 2];
+    let mut faces = vec![face(sweep::cylinder(&Frame::IDENTITY, r, turn, [0.0, h]), false, vec![TrimLoop { uses: wall }])];
+    let mut loops = cap(0, &part);
+    if let Some(q) = hole {
+        part.vertices.push(Point::new(q, 0.0, 0.0));
+        part.edges.push(Edge { curve: conic::arc(&Frame::IDENTITY, q, turn), vertices: [VertexId(2); 2], entity: None });
+        let uv = flat(&part.edges[3].curve);
+        loops.push(TrimLoop { uses: vec![EdgeUse { edge: Some(EdgeId(3)), reversed: true, uv }] });
+    }
+    faces.push(face(sweep::plane(&Frame::IDENTITY, square), true, loops));
+    faces.push(face(sweep::plane(&up, square), false, cap(1, &part)));
+    part.shells = vec![Shell { faces, closed: hole.is_none(), ..Shell::default() }];
+    part
+}
+
+#[test]
+fn a_can_shares_its_edges_and_gets_strips() {
+    let made = tessellate(&Model::from_part(can(10.0, 80.0, None)), &measured(0.05));
+    assert_sound(&made, "can");
+    let exact = PI * 100.0 * 80.0;
+    let volume = made.report.volume_mm3.unwrap();
+    assert!(volume < exact && volume > exact - 0.05 * 2.0 * PI * 10.0 * 80.0);
+    // A chord of sag 0.05 on r = 10 spans 0.2 rad: 32 strips; the two caps take about as many triangles, in pairs.
+    assert!(made.report.facets < 32 + 2 * 24, "{}", made.report.facets);
+    let wall = made.mesh.facets.iter().filter(|f| f.face.0 == 0);
+    assert!(wall.clone().count() < 36 && wall.clone().all(|f| !f.is_triangle()), "{}", wall.count());
+}
+
+#[test]
+fn a_mirrored_and_scaled_instance_stays_turned_outward() {
+    let mut model = Model::from_part(can(10.0, 30.0, None));
+    let placement = Frame { x: -Vector::X, scale: 2.0, ..Frame::translation(Vector::X * 100.0) };
+    model.instances.push(Instance { name: String::new(), part: PartId(0), placement, colour: None });
+    let made = tessellate(&model, &measured(0.1));
+    assert_sound(&made, "mirrored");
+    let exact = PI * 100.0 * 30.0 * 9.0;
+    assert!((made.report.volume_mm3.unwrap() - exact).abs() < 0.02 * exact);
+    for f in 0..made.mesh.facets.len() {
+        let [a, b, c, _] = made.mesh.corners(f);
+        let n = made.mesh.vertices[made.mesh.facets[f].vertices[0] as usize].normal;
+        assert!((b - a).cross(c - a).dot(n) > 0.0, "facet {f}");
+    }
+}
+
+#[test]
+fn a_hole_stays_a_hole() {
+    let made = tessellate(&Model::from_part(can(10.0, 5.0, Some(4.0))), &measured(0.01));
+    let plate: f64 = (0..made.mesh.facets.len())
+        .filter(|&f| made.mesh.facets[f].face.0 == 1)
+        .map(|f| made.mesh.facet_area(f))
+        .sum();
+    assert!((plate - PI * (100.0 - 16.0)).abs() < 0.01 * 2.0 * PI * 14.0);
+    assert_eq!(made.report.over_tolerance, Some(0));
+}
+
+#[test]
+fn threads_do_not_matter() {
+    let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+    let model = whole(s);
+    let run = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        pool.install(|| tessellate(&model, &Settings::uniform(0.2)))
+    };
+    assert_eq!(run(1).mesh, run(4).mesh);
+}
