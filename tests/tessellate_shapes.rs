@@ -1,7 +1,9 @@
 //! Shapes with closed forms: closed meshes, true areas and volumes, nothing over its tolerance.
 
 use lampyris::math::{Frame, Point, Uv, Vector};
-use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId};
+use lampyris::model::{
+    Analytic, Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId,
+};
 use lampyris::nurbs::{Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use std::f64::consts::PI;
@@ -39,7 +41,12 @@ fn assert_sound(made: &Tessellation, what: &str) {
 #[test]
 fn a_whole_sphere_is_closed_and_certified() {
     for xi in [2.0, 0.2, 0.05] {
-        let s = sweep::sphere(&Frame::translation(Vector::new(5.0, 1.0, 0.0)), 50.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        let s = sweep::sphere(
+            &Frame::translation(Vector::new(5.0, 1.0, 0.0)),
+            50.0,
+            [0.0, 2.0 * PI],
+            [-PI / 2.0, PI / 2.0],
+        );
         let made = tessellate(&whole(s), &measured(xi));
         assert_sound(&made, "sphere");
         let volume = made.report.volume_mm3.unwrap();
@@ -91,11 +98,16 @@ fn can(r: f64, h: f64, hole: Option<f64>) -> Part {
         vec![TrimLoop { uses: vec![EdgeUse { edge: Some(EdgeId(edge)), reversed: false, uv }] }]
     };
     let square = [[-2.0 * r, 2.0 * r]; 2];
-    let mut faces = vec![face(sweep::cylinder(&Frame::IDENTITY, r, turn, [0.0, h]), false, vec![TrimLoop { uses: wall }])];
+    let mut faces =
+        vec![face(sweep::cylinder(&Frame::IDENTITY, r, turn, [0.0, h]), false, vec![TrimLoop { uses: wall }])];
     let mut loops = cap(0, &part);
     if let Some(q) = hole {
         part.vertices.push(Point::new(q, 0.0, 0.0));
-        part.edges.push(Edge { curve: conic::arc(&Frame::IDENTITY, q, turn), vertices: [VertexId(2); 2], entity: None });
+        part.edges.push(Edge {
+            curve: conic::arc(&Frame::IDENTITY, q, turn),
+            vertices: [VertexId(2); 2],
+            entity: None,
+        });
         let uv = flat(&part.edges[3].curve);
         loops.push(TrimLoop { uses: vec![EdgeUse { edge: Some(EdgeId(3)), reversed: true, uv }] });
     }

@@ -57,9 +57,12 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
             }
         }
         let (divisions, shared) = edges::divide(part, &sides, &denser);
-        let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| one(part, face, sheet.as_ref()?, &divisions, &shared, settings);
+        let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| {
+            one(part, face, sheet.as_ref()?, &divisions, &shared, settings)
+        };
         let meshes: Vec<Option<FaceMesh>> = faces.par_iter().zip(&sheets).map(mesh).collect();
-        let crossing: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.crossing).map(|e| e.0 as usize).collect();
+        let crossing: Vec<usize> =
+            meshes.iter().flatten().flat_map(|m| &m.crossing).map(|e| e.0 as usize).collect();
         if crossing.is_empty() || tries == TRIES {
             return PartMesh { shared, faces: meshes };
         }
@@ -70,7 +73,14 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
     }
 }
 
-fn one(part: &Part, face: &Face, sheet: &Sheet<'_>, divisions: &[Division], shared: &[Point], settings: &Settings) -> Option<FaceMesh> {
+fn one(
+    part: &Part,
+    face: &Face,
+    sheet: &Sheet<'_>,
+    divisions: &[Division],
+    shared: &[Point],
+    settings: &Settings,
+) -> Option<FaceMesh> {
     let known = |e: Option<crate::model::EdgeId>| e.is_none_or(|e| (e.0 as usize) < part.edges.len());
     let complete = face.loops.iter().flat_map(|l| &l.uses).all(|u| known(u.edge));
     complete.then(|| face::mesh(part, face, sheet, divisions, shared, settings)).flatten()
@@ -119,7 +129,14 @@ pub(super) fn place(model: &Model, parts: &[Option<PartMesh>]) -> (Tessellation,
     (out, failed)
 }
 
-fn place_face(out: &mut Tessellation, instance: &Instance, mesh: &PartMesh, shared: u32, face: &FaceMesh, id: FaceId) {
+fn place_face(
+    out: &mut Tessellation,
+    instance: &Instance,
+    mesh: &PartMesh,
+    shared: u32,
+    face: &FaceMesh,
+    id: FaceId,
+) {
     let (frame, limit) = (&instance.placement, mesh.shared.len() as u32);
     let own = out.mesh.positions.len() as u32;
     out.mesh.positions.extend(face.own.iter().map(|&p| frame.point(p)));

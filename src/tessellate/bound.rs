@@ -163,7 +163,8 @@ fn refine<const N: usize>(
     };
     if N == 2 {
         let m = 0.5 * (at[0] + at[1]);
-        let _ = take([at[0], m].as_slice().try_into().expect("two")) || take([m, at[1]].as_slice().try_into().expect("two"));
+        let _ = take([at[0], m].as_slice().try_into().expect("two"))
+            || take([m, at[1]].as_slice().try_into().expect("two"));
     } else {
         let (a, b, c) = (0.5 * (at[0] + at[1]), 0.5 * (at[1] + at[2]), 0.5 * (at[2] + at[0]));
         let subs = [[a, b, c], [at[0], a, c], [a, at[1], b], [c, b, at[2]]];
@@ -257,6 +258,9 @@ mod tests {
         let p = clip(&tri, [[0.5, 3.0], [-1.0, 0.5]]);
         let area: f64 = (1..p.len() - 1).map(|k| 0.5 * (p[k] - p[0]).perp_dot(p[k + 1] - p[0])).sum();
         assert!((area - (0.5 * 0.5 + 0.5 * (1.0 + 0.5) - 0.25)).abs() < 1e-12 || area > 0.0);
-        assert_eq!(clip(&[Uv::ZERO, Uv::new(4.0, 0.0)], [[1.0, 2.0], [-1.0, 1.0]]).as_slice(), [Uv::X, 2.0 * Uv::X]);
+        assert_eq!(
+            clip(&[Uv::ZERO, Uv::new(4.0, 0.0)], [[1.0, 2.0], [-1.0, 1.0]]).as_slice(),
+            [Uv::X, 2.0 * Uv::X]
+        );
     }
 }

@@ -58,15 +58,10 @@ pub(super) fn split(
     max_angle: Option<f64>,
 ) -> Leaves {
     let mut leaves = Leaves::default();
-    let segments: Vec<[Uv; 2]> = rings
-        .rings
-        .iter()
-        .flat_map(|r| (0..r.len()).map(move |i| [r[i].uv, r[(i + 1) % r.len()].uv]))
-        .collect();
-    let (lo, hi) = segments
-        .iter()
-        .flatten()
-        .fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+    let segments: Vec<[Uv; 2]> =
+        rings.rings.iter().flat_map(|r| (0..r.len()).map(move |i| [r[i].uv, r[(i + 1) % r.len()].uv])).collect();
+    let (lo, hi) =
+        segments.iter().flatten().fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     if !(lo.x < hi.x && lo.y < hi.y) || sheet.affine {
         return leaves;
     }
@@ -138,7 +133,8 @@ impl Tree<'_, '_, '_> {
     }
 
     fn fits(&mut self, cell: Cell, look: &Look, inside: bool) -> bool {
-        let xi = cell.corners().iter().fold(self.sheet.tolerance(cell.center()), |x, &c| x.min(self.sheet.tolerance(c)));
+        let xi =
+            cell.corners().iter().fold(self.sheet.tolerance(cell.center()), |x, &c| x.min(self.sheet.tolerance(c)));
         if look.sag[0].max(look.sag[1]) > xi {
             return false;
         }

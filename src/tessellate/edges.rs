@@ -36,7 +36,11 @@ pub(super) fn divide(part: &Part, sides: &[Vec<Side<'_, '_>>], denser: &[u32]) -
         .zip(sides)
         .zip(denser)
         .map(|((edge, sides), &denser)| {
-            let t = if sides.is_empty() { edge.curve.domain().to_vec() } else { edge_parameters(&edge.curve, sides, denser) };
+            let t = if sides.is_empty() {
+                edge.curve.domain().to_vec()
+            } else {
+                edge_parameters(&edge.curve, sides, denser)
+            };
             Division { t, first: 0 }
         })
         .collect();
@@ -70,7 +74,8 @@ fn chord_tolerance(sheet: &Sheet<'_>, uv: Uv, along: Vector) -> f64 {
 fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f64> {
     let at = |t: f64| curve.evaluate(t);
     let tolerance = |t: f64, along: Vector| {
-        let each = sides.iter().map(|s| chord_tolerance(s.sheet, s.sheet.surface.clamp(s.side.uv.evaluate(t)), along));
+        let each =
+            sides.iter().map(|s| chord_tolerance(s.sheet, s.sheet.surface.clamp(s.side.uv.evaluate(t)), along));
         SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
     };
     let mut t = parameters(&breaks(curve), at, tolerance);

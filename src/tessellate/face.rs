@@ -83,11 +83,13 @@ pub(super) fn mesh(
         }
     }
     let fixed: FxHashMap<[u32; 2], ()> = segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
-    let outline = Outline { nodes, segments, trims, scale: scale(sheet, &rings), next: (shared.len() + own.len()) as u32 };
+    let outline =
+        Outline { nodes, segments, trims, scale: scale(sheet, &rings), next: (shared.len() + own.len()) as u32 };
     let strip = strip::triangulate(sheet, &mut prover, outline, settings.budget)?;
     let known = shared.len() + own.len();
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
-    let mut out = FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
+    let mut out =
+        FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
     out.crossing = strip.conflicts.iter().filter_map(|s| followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };
     for f in &grid.facets {
@@ -124,8 +126,10 @@ impl Emit<'_, '_, '_> {
                 },
             }
         });
-        let [a, b, c, d] = if corner[3] == u32::MAX { [corner[0], corner[1], corner[2], corner[2]] } else { corner };
-        let turned = if self.sheet.flipped() { if c == d { [a, c, b, b] } else { [a, d, c, b] } } else { [a, b, c, d] };
+        let [a, b, c, d] =
+            if corner[3] == u32::MAX { [corner[0], corner[1], corner[2], corner[2]] } else { corner };
+        let turned =
+            if self.sheet.flipped() { if c == d { [a, c, b, b] } else { [a, d, c, b] } } else { [a, b, c, d] };
         self.out.facets.push(turned);
         self.out.bounds.push(bound);
         self.out.tolerances.push(tolerance);

@@ -173,7 +173,9 @@ fn resolve(
         }
         taken[a] = true;
         let t = triangles[a];
-        let mate = (a + 1..triangles.len()).filter(|&b| !taken[b]).find_map(|b| join(t, triangles[b], &at).map(|q| (b, q)));
+        let mate = (a + 1..triangles.len())
+            .filter(|&b| !taken[b])
+            .find_map(|b| join(t, triangles[b], &at).map(|q| (b, q)));
         let (corners, quad) = match mate {
             Some((b, q)) => {
                 taken[b] = true;

@@ -37,7 +37,12 @@ impl Nets {
 }
 
 /// All de Casteljau steps of one direction; `rows[0]` holds the result.
-fn reduce<const N: usize>(rows: &mut [Vec<Homogeneous>], degree: usize, at: [f64; N], spare: &mut Vec<Homogeneous>) {
+fn reduce<const N: usize>(
+    rows: &mut [Vec<Homogeneous>],
+    degree: usize,
+    at: [f64; N],
+    spare: &mut Vec<Homogeneous>,
+) {
     for step in 0..rows.len() - 1 {
         for i in 0..rows.len() - 1 - step {
             blend::<N>(&rows[i], &rows[i + 1], degree + step, at, spare);
@@ -49,13 +54,7 @@ fn reduce<const N: usize>(rows: &mut [Vec<Homogeneous>], degree: usize, at: [f64
 /// `(1 − ℓ)·a + ℓ·b` for the linear form ℓ with values `at` at the corners; degree `d` becomes `d + 1`.
 ///
 /// The coefficient with exponents (i, j, k) stands at `(j + k)(j + k + 1)/2 + k`, whatever i is.
-fn blend<const N: usize>(
-    a: &[Homogeneous],
-    b: &[Homogeneous],
-    d: usize,
-    at: [f64; N],
-    out: &mut Vec<Homogeneous>,
-) {
+fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f64; N], out: &mut Vec<Homogeneous>) {
     out.clear();
     let inv = 1.0 / (d + 1) as f64;
     if N == 2 {
@@ -117,7 +116,8 @@ mod tests {
             for k in 0..=m {
                 let (i, j) = (n - m, m - k);
                 let c = factorial(n) / factorial(i) / factorial(j) / factorial(k);
-                sum += net[m * (m + 1) / 2 + k] * c * b[0].powi(i as i32) * b[1].powi(j as i32) * b[2].powi(k as i32);
+                sum +=
+                    net[m * (m + 1) / 2 + k] * c * b[0].powi(i as i32) * b[1].powi(j as i32) * b[2].powi(k as i32);
             }
         }
         let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];

@@ -54,7 +54,13 @@ pub(super) fn loops(face: &Face) -> Vec<TrimLoop> {
 }
 
 /// Builds the polygons; shared positions are `positions`.
-pub(super) fn build(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, divisions: &[Division], positions: &[Point]) -> Rings {
+pub(super) fn build(
+    part: &Part,
+    loops: &[TrimLoop],
+    sheet: &Sheet<'_>,
+    divisions: &[Division],
+    positions: &[Point],
+) -> Rings {
     let mut rings = Rings::default();
     let near = 1e-6 * sheet.size + 1e-9;
     let mut own = Own { shared: positions, own: Vec::new(), near };
@@ -69,7 +75,9 @@ pub(super) fn build(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, division
                 let of = |u: &EdgeUse, end: usize| {
                     u.edge.map(|e| part.edges[e.0 as usize].vertices[if u.reversed { 1 - end } else { end }].0)
                 };
-                of(here, 0).or(of(before, 1)).unwrap_or_else(|| own.find(sheet.point(sheet.surface.clamp(here.start()))))
+                of(here, 0)
+                    .or(of(before, 1))
+                    .unwrap_or_else(|| own.find(sheet.point(sheet.surface.clamp(here.start()))))
             })
             .collect();
         let mut ring: Vec<RingVertex> = Vec::new();
@@ -134,9 +142,9 @@ fn without_edge(
         ring.push(RingVertex { uv: uv(0.0), position: from, follows: Follows::Pole });
         return;
     }
-    let partner = seams.iter().find(|s| {
-        s.points.iter().rev().zip(&looks).all(|(a, b)| (*a - *b).length() <= 1e-5 * sheet.size)
-    });
+    let partner = seams
+        .iter()
+        .find(|s| s.points.iter().rev().zip(&looks).all(|(a, b)| (*a - *b).length() <= 1e-5 * sheet.size));
     let (fractions, inner): (Vec<f64>, Vec<u32>) = match partner {
         Some(s) => {
             (s.fractions.iter().rev().map(|f| 1.0 - f).collect(), s.positions.iter().rev().copied().collect())
@@ -146,7 +154,9 @@ fn without_edge(
             let inner: Vec<f64> = u.uv.breakpoints()[1..].iter().map(|t| (t - t0) / (t1 - t0)).collect();
             let kinks: Vec<f64> = if inner.len() < 30 && u.uv.degree == 1 { inner } else { vec![1.0] };
             let mut breaks = vec![0.0];
-            breaks.extend(kinks.iter().map(|&f| if u.reversed { 1.0 - f } else { f }).filter(|f| *f > 0.0 && *f < 1.0));
+            breaks.extend(
+                kinks.iter().map(|&f| if u.reversed { 1.0 - f } else { f }).filter(|f| *f > 0.0 && *f < 1.0),
+            );
             breaks.push(1.0);
             breaks.sort_by(f64::total_cmp);
             let fs = edges::parameters(&breaks, at, |f, _| 0.48 * sheet.tolerance(uv(f)));

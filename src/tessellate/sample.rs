@@ -33,9 +33,9 @@ pub(super) fn all(made: &Tessellation, model: &Model) -> Vec<Sampled> {
             let scale = placed.placement.scale;
             let corners = made.mesh.corners(f).map(|p| placed.placement.local_point(p));
             let sign = if face.reversed { -1.0 } else { 1.0 };
-            let normals = made.mesh.facets[f].vertices.map(|v| {
-                sign * placed.placement.local_direction(made.mesh.vertices[v as usize].normal)
-            });
+            let normals = made.mesh.facets[f]
+                .vertices
+                .map(|v| sign * placed.placement.local_direction(made.mesh.vertices[v as usize].normal));
             let mut s = facet(&face.surface, &made.mesh, f, corners, normals);
             s.sag *= scale;
             s.mean *= scale;
@@ -46,7 +46,8 @@ pub(super) fn all(made: &Tessellation, model: &Model) -> Vec<Sampled> {
 
 fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
     let uv = mesh.facets[f].vertices.map(|v| mesh.vertices[v as usize].uv);
-    let triangles: &[[usize; 3]] = if mesh.facets[f].is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
+    let triangles: &[[usize; 3]] =
+        if mesh.facets[f].is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
     let mut out = Sampled::default();
     let to_facet = |x: Point| {
         let each = triangles.iter().map(|t| (x - closest(x, t.map(|k| p[k]))).length());
@@ -63,7 +64,14 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
     }
     let (mut sum, mut count) = (0.0, 0.0);
     for t in triangles {
-        for b in [[0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6], [0.34, 0.33, 0.33], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]] {
+        for b in [
+            [0.6, 0.2, 0.2],
+            [0.2, 0.6, 0.2],
+            [0.2, 0.2, 0.6],
+            [0.34, 0.33, 0.33],
+            [0.5, 0.5, 0.0],
+            [0.0, 0.5, 0.5],
+        ] {
             let x = p[t[0]] * b[0] + p[t[1]] * b[1] + p[t[2]] * b[2];
             // Parameters linear on the triangle start the search; the foot is what counts.
             let start = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];

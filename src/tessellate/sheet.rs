@@ -81,7 +81,8 @@ pub(super) fn local(patch: &BezierPatch, uv: Uv) -> Uv {
 /// Whether all control points lie on one affine image of their Greville points, with equal weights.
 fn is_affine(s: &Surface, size: f64) -> bool {
     let [nu, nv] = s.counts();
-    let greville = |d: usize, i: usize| s.knots[d][i + 1..=i + s.degree[d]].iter().sum::<f64>() / s.degree[d] as f64;
+    let greville =
+        |d: usize, i: usize| s.knots[d][i + 1..=i + s.degree[d]].iter().sum::<f64>() / s.degree[d] as f64;
     let (g0, g1) = ([greville(0, 0), greville(1, 0)], [greville(0, nu - 1), greville(1, nv - 1)]);
     let w = s.points[0].w;
     let at = |i: usize, j: usize| s.points[i * nv + j].project();

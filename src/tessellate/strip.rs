@@ -64,8 +64,21 @@ pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
 const ROUNDS: usize = 16;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
-pub(super) fn triangulate(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, outline: Outline, budget: usize) -> Option<Strip> {
-    let mut work = Work { sheet, nodes: outline.nodes, scale: outline.scale, next: outline.next, cdt: Cdt::new(), odd: FxHashMap::default(), handles: Vec::new() };
+pub(super) fn triangulate(
+    sheet: &Sheet<'_>,
+    prover: &mut Prover<'_, '_>,
+    outline: Outline,
+    budget: usize,
+) -> Option<Strip> {
+    let mut work = Work {
+        sheet,
+        nodes: outline.nodes,
+        scale: outline.scale,
+        next: outline.next,
+        cdt: Cdt::new(),
+        odd: FxHashMap::default(),
+        handles: Vec::new(),
+    };
     let mut conflicts = Vec::new();
     for n in 0..work.nodes.len() as u32 {
         let handle = work.insert(n)?;
@@ -85,12 +98,17 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, outlin
         let mut bad = Vec::new();
         for &t in &triangles {
             let name = sorted(t);
-            let (bound, xi) = *known.entry(name).or_insert_with(|| prove(sheet, prover, &work.nodes, t, &outline.trims));
+            let (bound, xi) =
+                *known.entry(name).or_insert_with(|| prove(sheet, prover, &work.nodes, t, &outline.trims));
             if bound > xi {
                 bad.push(t);
             }
         }
-        if bad.is_empty() || round == ROUNDS || work.nodes.len() >= most || !work.refine(&bad, &outline.trims, &known) {
+        if bad.is_empty()
+            || round == ROUNDS
+            || work.nodes.len() >= most
+            || !work.refine(&bad, &outline.trims, &known)
+        {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
             return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts });
         }
@@ -179,20 +197,26 @@ impl Work<'_, '_> {
 
     /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
     fn inside(&self, rings: Option<&Vec<[u32; 2]>>) -> Vec<[u32; 3]> {
-        let name = |f: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, (), spade::CdtEdge<()>, ()>| {
-            f.vertices().map(|v| v.data().node)
-        };
+        let name =
+            |f: spade::handles::FaceHandle<'_, spade::handles::InnerTag, Vertex, (), spade::CdtEdge<()>, ()>| {
+                f.vertices().map(|v| v.data().node)
+            };
         if let Some(segments) = rings {
             let uv = |n: u32| self.nodes[n as usize].uv;
-            return self.cdt.inner_faces().map(name).filter(|t| {
-                let p = (uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0;
-                segments.iter().fold(false, |odd, &[a, b]| {
-                    let (a, b) = (uv(a), uv(b));
-                    let crosses =
-                        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-                    odd != crosses
+            return self
+                .cdt
+                .inner_faces()
+                .map(name)
+                .filter(|t| {
+                    let p = (uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0;
+                    segments.iter().fold(false, |odd, &[a, b]| {
+                        let (a, b) = (uv(a), uv(b));
+                        let crosses =
+                            (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+                        odd != crosses
+                    })
                 })
-            }).collect();
+                .collect();
         }
         let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];
         let mut queue = std::collections::VecDeque::from([self.cdt.outer_face().fix()]);
@@ -222,7 +246,12 @@ impl Work<'_, '_> {
     }
 
     /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
-    fn refine(&mut self, bad: &[[u32; 3]], trims: &FxHashMap<[u32; 2], Trim>, known: &FxHashMap<[u32; 3], (f64, f64)>) -> bool {
+    fn refine(
+        &mut self,
+        bad: &[[u32; 3]],
+        trims: &FxHashMap<[u32; 2], Trim>,
+        known: &FxHashMap<[u32; 3], (f64, f64)>,
+    ) -> bool {
         let mut wanted: Vec<Uv> = Vec::new();
         let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
         for t in bad {

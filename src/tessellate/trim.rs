@@ -17,7 +17,14 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    pub(super) fn new(sheet: &Sheet<'_>, curve: &Curve, side: &EdgeUse, t: [f64; 2], uv: [Uv; 2], xyz: [Point; 2]) -> Self {
+    pub(super) fn new(
+        sheet: &Sheet<'_>,
+        curve: &Curve,
+        side: &EdgeUse,
+        t: [f64; 2],
+        uv: [Uv; 2],
+        xyz: [Point; 2],
+    ) -> Self {
         let (a, b) = (t[0].min(t[1]), t[0].max(t[1]));
         let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
         let offset = ends[0].max(ends[1]);
