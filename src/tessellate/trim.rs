@@ -28,7 +28,7 @@ impl Trim {
         let (a, b) = (t[0].min(t[1]), t[0].max(t[1]));
         let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
         let offset = ends[0].max(ends[1]);
-        if !(a < b) {
+        if a >= b || a.is_nan() || b.is_nan() {
             return Self { deviation: offset, between: Vec::new() };
         }
         let mut deviation = 0f64;
@@ -67,7 +67,7 @@ fn fan(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> V
     let extent = Uv::new(u1 - u0, v1 - v0);
     let [s0, s1] = side.uv.domain();
     let (a, b) = (a.clamp(s0, s1), b.clamp(s0, s1));
-    if !(a < b) {
+    if a >= b || a.is_nan() || b.is_nan() {
         return Vec::new();
     }
     let m = 0.5 * (a + b);
