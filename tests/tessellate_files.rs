@@ -5,9 +5,8 @@ use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use std::path::{Path, PathBuf};
 
 fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = std::fs::read_dir(folder)
-        .map(|d| d.filter_map(|e| e.ok().map(|e| e.path())).collect())
-        .unwrap_or_default();
+    let mut found: Vec<PathBuf> =
+        std::fs::read_dir(folder).map(|d| d.filter_map(|e| e.ok().map(|e| e.path())).collect()).unwrap_or_default();
     found.retain(|p| p.extension().is_some_and(|e| e == "stp"));
     found.sort();
     found
@@ -23,9 +22,23 @@ fn line(path: &Path, made: &Tessellation) -> String {
     format!(
         "{:44} faces {}/{} rep {} facets {} quads {:.3} cert {} over {:?} shells {}/{} open {} nonman {} sag {:.3} {:?} normal {:?} area {:.3} vol {:?} {:.3}s",
         path.file_name().unwrap().to_string_lossy(),
-        r.faces.meshed, r.faces.failed, r.faces.repaired, r.facets, r.quad_area_share,
-        r.facets - r.certified, r.over_tolerance, r.shells.closed, r.shells.open, r.open_edges, r.nonmanifold_edges,
-        r.sag_mm.bound_max, r.sag_mm.sampled_max, r.normal_error_deg, r.area_mm2, r.volume_mm3, r.seconds.tessellate,
+        r.faces.meshed,
+        r.faces.failed,
+        r.faces.repaired,
+        r.facets,
+        r.quad_area_share,
+        r.facets - r.certified,
+        r.over_tolerance,
+        r.shells.closed,
+        r.shells.open,
+        r.open_edges,
+        r.nonmanifold_edges,
+        r.sag_mm.bound_max,
+        r.sag_mm.sampled_max,
+        r.normal_error_deg,
+        r.area_mm2,
+        r.volume_mm3,
+        r.seconds.tessellate,
     )
 }
 
@@ -54,7 +67,8 @@ fn fixtures_are_closed_certified_and_mostly_quads() {
 #[test]
 #[ignore = "reads the whole open corpus, minutes"]
 fn corpus() {
-    let folder = std::env::var("LAMPYRIS_CORPUS").map(PathBuf::from).unwrap_or_else(|_| "../shared/step-corpus".into());
+    let folder =
+        std::env::var("LAMPYRIS_CORPUS").map(PathBuf::from).unwrap_or_else(|_| "../shared/step-corpus".into());
     let tolerance = std::env::var("TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
     let only = std::env::var("ONLY").unwrap_or_default();
     let measure = std::env::var("MEASURE").is_ok();
