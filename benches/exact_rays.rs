@@ -60,7 +60,17 @@ fn main() {
     }
     println!(
         "{:32} {:>7} {:>8} {:>6} {:>7} {:>7} {:>9} {:>8} {:>8} {:>6} {:>8}",
-        "model", "patches", "leaves", "hits %", "max M/s", "med M/s", "uncertain", "p99 µs", "max µs", "tests", "build s"
+        "model",
+        "patches",
+        "leaves",
+        "hits %",
+        "max M/s",
+        "med M/s",
+        "uncertain",
+        "p99 µs",
+        "max µs",
+        "tests",
+        "build s"
     );
     for case in &mut cases {
         case.seconds.sort_by(f64::total_cmp);

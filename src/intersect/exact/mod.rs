@@ -17,6 +17,7 @@
 // Comparisons are negated so that NaN falls on the careful side.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+pub mod audit;
 mod clip;
 mod edge;
 mod geometry;
@@ -26,6 +27,7 @@ mod newton;
 mod piece;
 mod query;
 mod trace;
+pub mod traditional;
 mod tree;
 mod trim;
 

@@ -1,0 +1,141 @@
+//! The way before: every ray against every spline surface, without a search structure over the patches and without proof.
+//!
+//! Each surface is rejected by its bounding box alone. On what is left Newton's method starts from sampled seeds: the local
+//! minima, over a grid of samples, of the distance to the ray. The points found are collected, trimmed and sorted by distance.
+//! With a single seed in the middle it is the plain iterative tracer.
+//!
+//! Guarantee: none; a hit is on the spline, but it may not be the first, and a hit may be missed. Evaluation runs on Bézier
+//! patches, as fast as the polishing of facet hits.
+
+use super::newton::SurfacePoint;
+use super::{Certainty, Cost, Exact, Footprint, Hit, Intersector};
+use crate::math::{Aabb, FaceId, Point, Ray, Uv};
+use crate::model::Model;
+use std::time::Instant;
+
+/// Where Newton's method starts on a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seeds {
+    /// At local minima of the distance to the ray over a grid with this many samples to a Bézier patch and direction.
+    Sampled(u32),
+    /// Once, in the middle of the domain.
+    Middle,
+}
+
+/// Every ray against every surface.
+#[derive(Debug)]
+pub struct Traditional<'a> {
+    exact: &'a Exact,
+    surfaces: Vec<Seeded>,
+    build_seconds: f64,
+}
+
+#[derive(Debug)]
+struct Seeded {
+    face: FaceId,
+    bounds: Aabb,
+    counts: [usize; 2],
+    samples: Vec<(Uv, Point)>,
+}
+
+impl<'a> Traditional<'a> {
+    /// Samples the surfaces of the model that `exact` was built from.
+    pub fn new(model: &Model, exact: &'a Exact, seeds: Seeds) -> Self {
+        let start = Instant::now();
+        let surfaces = model
+            .placed_faces()
+            .filter(|placed| exact.geometry.by_id.contains_key(&placed.id))
+            .filter_map(|placed| placed.face.map(|f| (placed.id, f, placed.placement)))
+            .map(|(face, f, placement)| {
+                let points = f.surface.points.iter().map(|p| placement.point(p.project()));
+                let bounds = Aabb::around(points);
+                let lines = [0, 1].map(|d| match seeds {
+                    Seeds::Middle => {
+                        let [a, b] = f.surface.domain()[d];
+                        vec![0.5 * (a + b)]
+                    }
+                    Seeds::Sampled(n) => {
+                        let record = exact.geometry.by_id[&face] as usize;
+                        let grid = &exact.geometry.grids[exact.geometry.faces[record].grid as usize];
+                        let within = |pair: &[f64]| {
+                            let (a, b) = (pair[0], pair[1]);
+                            (0..n)
+                                .map(move |k| a + (b - a) * (f64::from(k) + 0.5) / f64::from(n))
+                                .collect::<Vec<_>>()
+                        };
+                        grid.breaks[d].windows(2).flat_map(within).collect()
+                    }
+                });
+                let counts = [lines[0].len(), lines[1].len()];
+                let samples = lines[0]
+                    .iter()
+                    .flat_map(|&u| lines[1].iter().map(move |&v| Uv::new(u, v)))
+                    .map(|uv| (uv, placement.point(f.surface.evaluate(uv))))
+                    .collect();
+                Seeded { face, bounds: bounds.grown(1e-9 * (1.0 + bounds.diagonal())), counts, samples }
+            })
+            .collect();
+        Self { exact, surfaces, build_seconds: start.elapsed().as_secs_f64() }
+    }
+
+    fn candidates(&self, ray: &Ray, surface: &Seeded, found: &mut Vec<(FaceId, SurfacePoint)>) {
+        let distances: Vec<f64> =
+            surface.samples.iter().map(|(_, p)| (*p - ray.origin).cross(ray.direction).length_squared()).collect();
+        let [nu, nv] = surface.counts;
+        for i in 0..nu {
+            for j in 0..nv {
+                let here = distances[i * nv + j];
+                let (is, js) =
+                    (i.saturating_sub(1)..=(i + 1).min(nu - 1), j.saturating_sub(1)..=(j + 1).min(nv - 1));
+                if is.flat_map(|a| js.clone().map(move |b| a * nv + b)).any(|k| distances[k] < here) {
+                    continue;
+                }
+                let seed = surface.samples[i * nv + j].0;
+                if let Some(point) = self.exact.converge(ray, surface.face, seed, 20).filter(|p| p.inside) {
+                    found.push((surface.face, point));
+                }
+            }
+        }
+    }
+}
+
+impl Intersector for Traditional<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        cost.rays += 1;
+        let mut found = Vec::new();
+        for surface in &self.surfaces {
+            cost.nodes += 1;
+            if surface.bounds.clip(ray).is_some() {
+                cost.tests += 1;
+                self.candidates(ray, surface, &mut found);
+            }
+        }
+        found.sort_by(|a, b| a.1.t.total_cmp(&b.1.t));
+        let leaving = |face: FaceId, p: &SurfacePoint| {
+            ray.from.is_some_and(|f| {
+                f.face == face
+                    && p.t.abs() < 1e-6
+                    && self.exact.distance_at(face, f.uv, ray.at(p.t)).is_some_and(|d| d < 1e-6)
+            })
+        };
+        let first = found.into_iter().find(|(face, p)| p.t >= ray.t_min && p.t <= ray.t_max && !leaving(*face, p));
+        first.map(|(face, p)| Hit {
+            t: p.t,
+            normal: p.normal,
+            geometric_normal: p.normal,
+            face,
+            primitive: p.patch,
+            uv: p.uv,
+            certainty: Certainty::Uncertified,
+        })
+    }
+
+    fn footprint(&self) -> Footprint {
+        let samples: usize = self.surfaces.iter().map(|s| size_of_val(&*s.samples)).sum();
+        Footprint {
+            bytes: size_of_val(&*self.surfaces) + samples,
+            primitives: self.surfaces.len(),
+            build_seconds: self.build_seconds,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! The fast path against pure clipping, ray by ray, on surfaces of every degree.
+
+mod exact_common;
+use exact_common::*;
+use lampyris::intersect::exact::audit::Audit;
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::{Certainty, Cost};
+use lampyris::math::{Aabb, Point, Ray};
+use lampyris::model::Model;
+use lampyris::nurbs::Surface;
+
+/// How the two compared.
+#[derive(Debug, Default)]
+struct Tally {
+    rays: u32,
+    hits: u32,
+    flagged: u32,
+}
+
+/// Fails on the first unflagged difference.
+fn compare(name: &str, model: &Model, rays: impl Iterator<Item = Ray>) -> Tally {
+    let exact = Exact::build(model, &Settings::default());
+    let audit = Audit::new(model);
+    let mut tally = Tally::default();
+    for ray in rays {
+        tally.rays += 1;
+        let answer = exact.first(&ray, &mut Cost::default());
+        let all = audit.crossings(&ray);
+        tally.hits += u32::from(answer.hit.is_some());
+        if answer.certainty != Certainty::Certified || answer.near_trim {
+            tally.flagged += 1;
+            continue;
+        }
+        // Where clipping itself is in doubt it can neither confirm nor refute.
+        let first = all.first();
+        if first.is_some_and(|h| h.doubtful) {
+            continue;
+        }
+        match (answer.hit, first) {
+            (None, None) => {}
+            (Some(a), Some(b)) => {
+                assert!((a.t - b.t).abs() < 1e-7, "{name}: {} against {} for {ray:?}", a.t, b.t);
+            }
+            (a, b) => panic!("{name}: {a:?} against {b:?} for {ray:?}"),
+        }
+    }
+    tally
+}
+
+fn aimed(surface: &Surface, seed: u64, n: usize) -> Vec<Ray> {
+    let mut s = Stream(seed);
+    let b = Aabb::around(surface.points.iter().map(|p| p.project()));
+    (0..n).map(|_| s.ray(b.center(), 0.5 * b.size())).collect()
+}
+
+fn random_surface(s: &mut Stream, degree: [usize; 2], weights: f64) -> Surface {
+    let count = degree.map(|d| d + 1 + (s.next() * 4.0) as usize);
+    freeform(degree, count, |u, v| {
+        let wild = 12.0;
+        let p =
+            Point::new(100.0 * u + s.within(-wild, wild), 100.0 * v + s.within(-wild, wild), s.within(-20.0, 20.0));
+        (p, weights.powf(s.within(-1.0, 1.0)))
+    })
+}
+
+#[test]
+fn closed_forms_and_freeform() {
+    for (name, surface, n) in [
+        ("sphere", sphere(50.0), 1500),
+        ("torus", torus(50.0, 15.0), 1500),
+        ("bicubic", bicubic(), 3000),
+        ("reflector", reflector(20), 1500),
+    ] {
+        let rays = aimed(&surface, 21, n);
+        let tally = compare(name, &model([surface]), rays.into_iter());
+        assert_eq!(tally.flagged, 0, "{name}");
+        assert!(tally.hits > tally.rays / 3);
+    }
+}
+
+#[test]
+fn every_degree_and_mixed_ones() {
+    let mut s = Stream(31);
+    let (mut flagged, mut rays) = (0, 0);
+    for p in 1..=13usize {
+        for q in [1, 2, 3, 14 - p] {
+            for weights in [1.0, 5.0] {
+                let surface = random_surface(&mut s, [p, q], weights);
+                let aims = aimed(&surface, (p * 100 + q) as u64, 30);
+                let tally =
+                    compare(&format!("degree {p} {q}, weights {weights}"), &model([surface]), aims.into_iter());
+                flagged += tally.flagged;
+                rays += tally.rays;
+            }
+        }
+    }
+    assert!(flagged <= rays / 1000, "{flagged} of {rays} flagged");
+}
+
+#[test]
+#[ignore = "several minutes: 6,000 random surfaces, ten rays each"]
+fn fuzz_surfaces() {
+    let mut s = Stream(41);
+    let (mut flagged, mut rays) = (0, 0);
+    for k in 0..6_000 {
+        let degree = [1 + (s.next() * 6.0) as usize, 1 + (s.next() * 6.0) as usize];
+        let weights = 10f64.powf(s.within(0.0, 2.0));
+        let surface = random_surface(&mut s, degree, weights);
+        let aims = aimed(&surface, k, 10);
+        let tally = compare(&format!("fuzz {k} degree {degree:?}"), &model([surface]), aims.into_iter());
+        flagged += tally.flagged;
+        rays += tally.rays;
+    }
+    println!("{flagged} of {rays} flagged");
+    assert!(flagged <= rays / 5000 + 1, "{flagged} of {rays} flagged");
+}
