@@ -191,13 +191,15 @@ fn widen_border(leaf: &mut Leaf, untrimmed: bool, band: f64) {
     if untrimmed || leaf.whole {
         return;
     }
+    // Roots on grazed faces stray beyond the band by the inverse of the sine.
+    let reach = 32.0 * band;
     for (d, slope) in [&leaf.slopes.u, &leaf.slopes.v].into_iter().enumerate() {
-        leaf.beyond[d] = (2.0 * band / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
+        leaf.beyond[d] = (reach / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
     }
-    leaf.lo -= 2.0 * band;
-    leaf.hi += 2.0 * band;
-    leaf.olo -= 2.0 * band;
-    leaf.ohi += 2.0 * band;
+    leaf.lo -= reach;
+    leaf.hi += reach;
+    leaf.olo -= reach;
+    leaf.ohi += reach;
 }
 
 fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {

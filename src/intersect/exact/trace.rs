@@ -196,9 +196,11 @@ impl Exact {
         let uv = patch.uv(leaf.in_patch(local));
         let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
         let (_, du, dv) = super::geometry::project(&jet);
-        // From leaf parameters to the surface's.
+        // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the
+        // gap over the sine, and still the edge must decide for both of its faces.
         let scale = |d: usize| (leaf.rect[d][1] - leaf.rect[d][0]) * (patch.domain[d][1] - patch.domain[d][0]);
-        let (su, sv) = (du / scale(0), dv / scale(1));
+        let across = |a: Vector, d: usize| (a - q.d * a.dot(q.d)) / scale(d);
+        let (su, sv) = (across(du, 0), across(dv, 1));
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
         let place = trim.locate(uv, metric, face.band);
         let Some(near) = place.near else { return (place.inside, false) };

@@ -186,6 +186,6 @@ fn reach(face: &Face, extent: Uv, band: f64) -> Uv {
     };
     let along_u = longest(nv, nu, &|j, i| point(i, j));
     let along_v = longest(nu, nv, &|i, j| point(i, j));
-    let relative = |length: f64| (8.0 * band / length).clamp(1e-9, 1e-2);
+    let relative = |length: f64| (64.0 * band / length).clamp(1e-9, 1e-2);
     Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
 }

@@ -1,0 +1,125 @@
+//! The exact intersector on trimmed models from STEP files: against pure clipping, and through edges of closed shells.
+
+mod exact_common;
+use exact_common::*;
+use lampyris::intersect::exact::audit::Audit;
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::{Certainty, Cost};
+use lampyris::math::{Aabb, Point, Ray, Vector};
+use lampyris::model::Model;
+use std::path::{Path, PathBuf};
+
+fn fixtures() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step");
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .expect("fixtures")
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "stp"))
+        .collect();
+    files.sort();
+    files
+}
+
+fn read(path: &Path) -> Model {
+    lampyris::step::read(path, &lampyris::step::Settings::default()).expect("readable").model
+}
+
+fn bounds(model: &Model) -> Aabb {
+    model.placed_faces().filter_map(|p| p.face.map(|f| (f, p.placement))).fold(Aabb::EMPTY, |b, (f, place)| {
+        b.union(Aabb::around(f.surface.points.iter().map(|p| place.point(p.project()))))
+    })
+}
+
+/// Rays that certainty and trims leave undisputed must find the same first hit as clipping does.
+fn against_audit(name: &str, model: &Model, n: usize, seed: u64) -> (usize, usize) {
+    let exact = Exact::build(model, &Settings::default());
+    let audit = Audit::new(model);
+    let b = bounds(model);
+    let mut s = Stream(seed);
+    let (mut hits, mut flagged) = (0, 0);
+    for _ in 0..n {
+        let ray = s.ray(b.center(), 0.5 * b.size());
+        let answer = exact.first(&ray, &mut Cost::default());
+        if answer.certainty != Certainty::Certified || answer.near_trim {
+            flagged += 1;
+            continue;
+        }
+        hits += usize::from(answer.hit.is_some());
+        let first = audit.first(&ray);
+        match (answer.hit, first) {
+            (None, None) => {}
+            (Some(a), Some(b)) if (a.t - b.t).abs() < 1e-7 => {}
+            (_, Some(b)) if b.doubtful => {}
+            (a, b) => panic!("{name}: {a:?} against {b:?} for {ray:?}"),
+        }
+    }
+    (hits, flagged)
+}
+
+#[test]
+fn fixtures_against_clipping() {
+    for path in fixtures() {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let model = read(&path);
+        let n = if model.placed_face_count() > 60 { 150 } else { 400 };
+        let (hits, flagged) = against_audit(&name, &model, n, 5);
+        assert!(hits > n / 10, "{name}: {hits} hits");
+        assert!(flagged <= 1, "{name}: {flagged} flagged");
+    }
+}
+
+/// Rays through random points of edges of closed shells, and through their vertices.
+fn through_edges(name: &str, model: &Model, n: usize) -> (usize, usize, usize) {
+    let exact = Exact::build(model, &Settings::default());
+    let mut s = Stream(17);
+    let closed =
+        |part: usize| model.parts[part].shells.iter().all(|s| s.closed) && !model.parts[part].shells.is_empty();
+    let mut edges = Vec::new();
+    for instance in &model.instances {
+        let part = instance.part.0 as usize;
+        if closed(part) {
+            edges.extend(model.parts[part].edges.iter().map(|e| (e, &instance.placement)));
+        }
+    }
+    if edges.is_empty() {
+        return (0, 0, 0);
+    }
+    let reach = 4.0 * bounds(model).diagonal();
+    let (mut odd, mut flagged) = (0, 0);
+    for k in 0..n {
+        let (edge, placement) = edges[(s.next() * edges.len() as f64) as usize];
+        let [a, b] = edge.curve.domain();
+        let target: Point = placement.point(edge.curve.evaluate(s.within(a, b)));
+        // A third passes by at distances down to a micrometre's thousandth.
+        let off: Vector = if k % 3 == 0 { s.direction() * 10f64.powf(s.within(-12.0, -5.0)) } else { Vector::ZERO };
+        let d = s.direction();
+        let ray = Ray::new(target + off - d * reach, d);
+        let crossings = exact.crossings(&ray, &mut Cost::default());
+        if crossings.iter().any(|h| h.certainty != Certainty::Certified) {
+            flagged += 1;
+        } else if crossings.len() % 2 == 1 {
+            odd += 1;
+            if std::env::var("SHOW").is_ok() {
+                println!("{name}: target {target:?} off {off:?} d {d:?} edge #{:?}", edge.entity);
+                for c in &crossings {
+                    println!("   t {:.9} face {:?} uv {:?} n.d {:.4}", c.t - reach, c.face, c.uv, c.normal.dot(d));
+                }
+            }
+        }
+    }
+    (n, odd, flagged)
+}
+
+#[test]
+fn rays_through_edges_of_closed_shells_find_exactly_one_face() {
+    let mut worst = Vec::new();
+    for path in fixtures() {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let (n, odd, flagged) = through_edges(&name, &read(&path), 3000);
+        println!("{name}: {n} rays, {odd} odd, {flagged} flagged");
+        if odd > 0 || flagged * 20 > n {
+            worst.push(format!("{name}: {odd} of {n} odd, {flagged} flagged"));
+        }
+    }
+    assert!(worst.is_empty(), "{worst:?}");
+}
