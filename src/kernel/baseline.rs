@@ -1,0 +1,116 @@
+//! The mesher of truck-meshalgo as the baseline: triangles of one tolerance everywhere.
+
+use super::export::faces_to_truck;
+use super::geometry::{point, vector};
+use super::truck::Shell as TruckShell;
+use crate::math::{FaceId, Point, Uv};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::model::Model;
+use rustc_hash::FxHashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+use truck_meshalgo::prelude::{Invertible, MeshableShape, PolygonMesh, StandardVertex};
+
+/// Tolerance below which truck's mesher refuses to work, mm.
+const SMALLEST: f64 = 1e-6;
+
+/// What truck's mesher made of a model.
+#[derive(Clone, Debug)]
+pub struct Baseline {
+    /// Triangles with truck's normals; [`FacetMesh::sag`] is empty.
+    pub mesh: FacetMesh,
+    /// Seconds of meshing alone, conversion left out.
+    pub seconds: f64,
+    /// Placed faces without a triangle, and why.
+    pub failed: Vec<(FaceId, String)>,
+}
+
+/// Meshes the surfaces of a model by `truck_meshalgo` with one chordal tolerance in mm. Faces that are meshes already are left out.
+///
+/// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message still goes to stderr.
+pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
+    let mut out = Baseline { mesh: FacetMesh::default(), seconds: 0.0, failed: Vec::new() };
+    let mut positions = FxHashMap::default();
+    for (i, instance) in model.instances.iter().enumerate() {
+        let part = model.part(instance.part);
+        let first = model.first_face(i).0;
+        // Where the faces of each shell start among those of the part.
+        let starts: Vec<u32> = part
+            .shells
+            .iter()
+            .scan(first, |next, s| {
+                let start = *next;
+                *next += s.faces.len() as u32;
+                Some(start)
+            })
+            .collect();
+        let id = |shell: usize, face: usize| FaceId(starts[shell] + face as u32);
+        let (faces, refused) = faces_to_truck(part, &instance.placement);
+        out.failed.extend(refused.into_iter().map(|r| (id(r.shell, r.face), r.reason)));
+        // All at once, as truck is meant to be used: its faces then share the points of their edges.
+        let start = Instant::now();
+        let shell: TruckShell = faces.iter().map(|f| f.truck.clone()).collect();
+        let meshes: Vec<Option<PolygonMesh>> = match triangulated(&shell, tolerance) {
+            Some(meshes) if meshes.len() == faces.len() => meshes,
+            _ => faces
+                .iter()
+                .map(|f| triangulated(&[f.truck.clone()].into_iter().collect(), tolerance)?.pop()?)
+                .collect(),
+        };
+        out.seconds += start.elapsed().as_secs_f64();
+        for (f, mesh) in faces.iter().zip(meshes) {
+            let face = id(f.shell, f.face);
+            match mesh {
+                Some(m) if !m.tri_faces().is_empty() || !m.quad_faces().is_empty() => {
+                    append(&mut out.mesh, &mut positions, &m, face);
+                }
+                _ => out.failed.push((face, "truck's mesher gives no triangles".into())),
+            }
+        }
+    }
+    out
+}
+
+/// The mesh of each face with the face's orientation; `None` when truck panics.
+fn triangulated(shell: &TruckShell, tolerance: f64) -> Option<Vec<Option<PolygonMesh>>> {
+    let work = || {
+        let meshed = shell.triangulation(tolerance.max(SMALLEST));
+        let oriented = meshed.face_iter().map(|f| {
+            let mut mesh = f.surface()?;
+            if !f.orientation() {
+                mesh.invert();
+            }
+            Some(mesh)
+        });
+        oriented.collect()
+    };
+    catch_unwind(AssertUnwindSafe(work)).ok()
+}
+
+fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &PolygonMesh, face: FaceId) {
+    let mut corner = |v: &StandardVertex| {
+        let p = point(m.positions()[v.pos]);
+        let position = *known.entry(key(p)).or_insert_with(|| {
+            out.positions.push(p);
+            out.positions.len() as u32 - 1
+        });
+        let uv = v.uv.map_or(Uv::ZERO, |i| Uv::new(m.uv_coords()[i].x, m.uv_coords()[i].y));
+        let normal = v.nor.map(|i| vector(m.normals()[i])).unwrap_or_default();
+        out.vertices.push(MeshVertex { position, normal, uv });
+        out.vertices.len() as u32 - 1
+    };
+    let mut facets = Vec::new();
+    for t in m.tri_faces() {
+        let [a, b, c] = [0, 1, 2].map(|i| corner(&t[i]));
+        facets.push([a, b, c, c]);
+    }
+    for q in m.quad_faces() {
+        facets.push([0, 1, 2, 3].map(|i| corner(&q[i])));
+    }
+    out.facets.extend(facets.into_iter().map(|vertices| Facet { vertices, face }));
+}
+
+fn key(p: Point) -> [u64; 3] {
+    // Adding zero makes one zero of both.
+    p.to_array().map(|x| (x + 0.0).to_bits())
+}

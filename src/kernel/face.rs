@@ -1,0 +1,202 @@
+//! One truck face → one [`Face`]: its surface over the parameters it uses, its wires as closed uv loops.
+
+use super::geometry::{bspline_surface, nurbs_surface, point, vector};
+use super::revolve::{Revolved, Side};
+use super::trace::{ACCEPTED, Tracer};
+use super::truck::{Plane, Surface as TruckSurface};
+use crate::math::{Frame, Point, Uv};
+use crate::model::{Analytic, EdgeId, EdgeUse, Face, TrimLoop};
+use crate::nurbs::{ControlPoint, Curve, Surface, UvCurve, sweep};
+
+/// Gaps in the parameter plane below this share of the domain are closed by moving an end; above, a pole must explain them.
+const SNAP: f64 = 1e-6;
+
+/// An edge of a wire, in the wire's direction: counter-clockwise about truck's normal.
+#[derive(Clone, Copy)]
+pub(super) struct WireEdge<'a> {
+    pub(super) id: EdgeId,
+    pub(super) curve: &'a Curve,
+    pub(super) reversed: bool,
+}
+
+/// The face for a truck surface with its own (not the face's) orientation, and its wires.
+pub(super) fn convert<'a>(
+    surface: &TruckSurface,
+    oriented: bool,
+    wires: &[Vec<WireEdge<'a>>],
+) -> Result<Face, String> {
+    let (surface, analytic, flipped, loops, gap) = match surface {
+        TruckSurface::Plane(p) => plane(p, wires)?,
+        TruckSurface::BSplineSurface(s) => traced(bspline_surface(s)?, Analytic::Bspline, false, wires, None)?,
+        TruckSurface::NurbsSurface(s) => traced(nurbs_surface(s)?, Analytic::Rational, false, wires, None)?,
+        TruckSurface::RevolutedCurve(s) => {
+            let revolved = Revolved::new(s)?;
+            let flipped = revolved.flipped;
+            // The material has to be on the left of our own parameters.
+            let sides: Vec<Vec<Side>> = wires
+                .iter()
+                .map(|w| {
+                    let side = |e: &WireEdge<'a>| Side { curve: e.curve, reversed: e.reversed != flipped };
+                    if flipped { w.iter().rev().map(side).collect() } else { w.iter().map(side).collect() }
+                })
+                .collect();
+            let cut = revolved.cut(&sides)?;
+            let middles = cut
+                .middles
+                .into_iter()
+                .map(|m| if flipped { m.into_iter().rev().collect() } else { m })
+                .collect::<Vec<Vec<f64>>>();
+            traced(cut.surface, Analytic::Revolution, flipped, wires, Some(&middles))?
+        }
+    };
+    let reversed = flipped == oriented;
+    Ok(Face { name: String::new(), entity: None, colour: None, surface, analytic, reversed, loops, gap })
+}
+
+type Parts = (Surface, Analytic, bool, Vec<TrimLoop>, f64);
+
+fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
+    let (x, normal) = (vector(p.u_axis()), vector(p.normal()));
+    if !(x.is_finite() && normal.is_finite() && normal.length() > 0.5) {
+        return Err("a plane without a normal".into());
+    }
+    let frame = Frame::from_axis(point(p.origin()), normal, Some(x));
+    let mut gap = 0f64;
+    let mut loops = Vec::new();
+    for wire in wires {
+        let mut uses = Vec::new();
+        for e in wire {
+            gap = e.curve.points.iter().fold(gap, |g, q| g.max(frame.local_point(q.position()).z.abs()));
+            // An affine map of the control points maps the curve.
+            let flat = |q: Point| Uv::new(q.x, q.y);
+            let points = e.curve.points.iter();
+            let points =
+                points.map(|q| ControlPoint::weighted(flat(frame.local_point(q.position())), q.w)).collect();
+            let uv = UvCurve { degree: e.curve.degree, knots: e.curve.knots.clone(), points };
+            uses.push(EdgeUse { edge: Some(e.id), reversed: e.reversed, uv });
+        }
+        loops.push(TrimLoop { uses });
+    }
+    if gap > ACCEPTED {
+        return Err(format!("an edge lies {gap:.3e} mm off its plane; at most {ACCEPTED:e} mm is accepted"));
+    }
+    let corners =
+        loops.iter().flat_map(|l: &TrimLoop| &l.uses).flat_map(|u| u.uv.points.iter().map(|p| p.position()));
+    let (mut low, mut high) = (Uv::INFINITY, Uv::NEG_INFINITY);
+    for c in corners {
+        (low, high) = (low.min(c), high.max(c));
+    }
+    if !(low.x < high.x && low.y < high.y) {
+        return Err("a plane face without an extent".into());
+    }
+    let surface = sweep::plane(&frame, [[low.x, high.x], [low.y, high.y]]);
+    let loops = finished(&surface, loops)?;
+    Ok((surface, Analytic::Plane { frame }, false, loops, gap))
+}
+
+fn traced(
+    surface: Surface,
+    analytic: Analytic,
+    flipped: bool,
+    wires: &[Vec<WireEdge>],
+    middles: Option<&[Vec<f64>]>,
+) -> Result<Parts, String> {
+    let tracer = Tracer::new(&surface);
+    let mut gap = 0f64;
+    let mut loops = Vec::new();
+    for (i, wire) in wires.iter().enumerate() {
+        let mut uses = Vec::new();
+        for (k, e) in wire.iter().enumerate() {
+            if e.curve.bounds().diagonal() < ACCEPTED {
+                continue; // An edge without length is a pole; it is put in again below.
+            }
+            let traced = tracer.trace(e.curve, middles.map(|m| m[i][k]))?;
+            gap = gap.max(traced.gap);
+            let mut uv = traced.uv;
+            for p in &mut uv.points {
+                *p = ControlPoint::weighted(surface.clamp(p.position()), p.weight());
+            }
+            uses.push(EdgeUse { edge: Some(e.id), reversed: e.reversed, uv });
+        }
+        loops.push(TrimLoop { uses });
+    }
+    let loops = finished(&surface, loops)?;
+    Ok((surface, analytic, flipped, loops, gap))
+}
+
+/// Loops closed in the parameter plane, the outer one counter-clockwise and the others clockwise.
+fn finished(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, String> {
+    let mut closed = loops.into_iter().map(|l| close(surface, l)).collect::<Result<Vec<_>, _>>()?;
+    let areas: Vec<f64> = closed.iter().map(signed_area).collect();
+    let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
+    for (i, l) in closed.iter_mut().enumerate() {
+        if (areas[i] > 0.0) != (Some(i) == outer) {
+            l.uses.reverse();
+            l.uses.iter_mut().for_each(|u| u.reversed = !u.reversed);
+        }
+    }
+    if let Some(outer) = outer {
+        closed.swap(0, outer);
+    }
+    Ok(closed)
+}
+
+fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    let extent = Uv::new(u1 - u0, v1 - v0);
+    let mut uses: Vec<EdgeUse> = Vec::new();
+    let count = l.uses.len();
+    let first = l.uses.first().map(EdgeUse::start).ok_or("a wire without edges")?;
+    for (i, next) in l.uses.into_iter().enumerate() {
+        if i > 0 {
+            bridge(surface, extent, &mut uses, next.start())?;
+        }
+        let start = uses.last().map(EdgeUse::end);
+        uses.push(next);
+        if let (Some(start), Some(last)) = (start, uses.last_mut()) {
+            move_end(last, true, start);
+        }
+    }
+    debug_assert!(uses.len() >= count);
+    bridge(surface, extent, &mut uses, first)?;
+    if let Some(last) = uses.last_mut() {
+        move_end(last, false, first);
+    }
+    Ok(TrimLoop { uses })
+}
+
+/// Adds the line of a pole where the chain does not reach `to`.
+fn bridge(surface: &Surface, extent: Uv, uses: &mut Vec<EdgeUse>, to: Uv) -> Result<(), String> {
+    let Some(from) = uses.last().map(EdgeUse::end) else { return Ok(()) };
+    if ((to - from) / extent).abs().max_element() <= SNAP {
+        return Ok(());
+    }
+    let off = |s: f64| (surface.evaluate(from + (to - from) * s) - surface.evaluate(from)).length();
+    if [0.25, 0.5, 0.75, 1.0].map(off).into_iter().fold(0.0, f64::max) > ACCEPTED {
+        return Err("edges that do not meet in the parameters of their surface".into());
+    }
+    uses.push(EdgeUse { edge: None, reversed: false, uv: UvCurve::line(from, to, [0.0, 1.0]) });
+    Ok(())
+}
+
+/// Moves the start (or end) of a use, in the loop's direction, to a point that is the same but for rounding.
+fn move_end(u: &mut EdgeUse, start: bool, to: Uv) {
+    let last = u.uv.points.len() - 1;
+    let p = &mut u.uv.points[if start != u.reversed { 0 } else { last }];
+    *p = ControlPoint::weighted(to, p.weight());
+}
+
+fn signed_area(l: &TrimLoop) -> f64 {
+    let points: Vec<Uv> = l.uses.iter().flat_map(along).collect();
+    (0..points.len()).map(|i| points[i].perp_dot(points[(i + 1) % points.len()])).sum::<f64>() * 0.5
+}
+
+/// Points along a use in the loop's direction, its end left out.
+pub(super) fn along(u: &EdgeUse) -> impl Iterator<Item = Uv> + '_ {
+    const STEPS: usize = 16;
+    let [t0, t1] = u.uv.domain();
+    (0..STEPS).map(move |k| {
+        let s = k as f64 / STEPS as f64;
+        u.uv.evaluate(t0 + (t1 - t0) * if u.reversed { 1.0 - s } else { s })
+    })
+}

@@ -1,0 +1,134 @@
+//! Curves and surfaces in both directions: truck's homogeneous control points and ours are the same numbers.
+
+use super::truck::{
+    BSplineCurve, BSplineSurface, BoundedCurve, Curve as TruckCurve, KnotVec, NurbsCurve, NurbsSurface,
+    ParametricCurve, Point3, Vector3, Vector4,
+};
+use crate::math::{Homogeneous, Point, Vector};
+use crate::nurbs::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface};
+
+/// Largest distance between an intersection curve and the spline that stands for it, mm.
+const FIT: f64 = 1e-7;
+/// Most pieces of such a spline.
+const MAX_PIECES: usize = 1024;
+
+pub(super) fn point(p: Point3) -> Point {
+    Point::new(p.x, p.y, p.z)
+}
+
+pub(super) fn vector(v: Vector3) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+pub(super) fn to_truck(p: Point) -> Point3 {
+    Point3::new(p.x, p.y, p.z)
+}
+
+fn homogeneous(v: &Vector4) -> Homogeneous {
+    Homogeneous::new(v.x, v.y, v.z, v.w)
+}
+
+/// A truck curve as a clamped spline over the same parameters.
+pub(super) fn curve(c: &TruckCurve) -> Result<Curve, String> {
+    let spline = match c {
+        TruckCurve::Line(line) => Curve::line(point(line.0), point(line.1), [0.0, 1.0]),
+        TruckCurve::BSplineCurve(c) => Spline {
+            degree: c.degree(),
+            knots: c.knot_vec().iter().copied().collect(),
+            points: c.control_points().iter().map(|p| Homogeneous::weighted(point(*p), 1.0)).collect(),
+        },
+        TruckCurve::NurbsCurve(c) => Spline {
+            degree: c.degree(),
+            knots: c.knot_vec().iter().copied().collect(),
+            points: c.control_points().iter().map(homogeneous).collect(),
+        },
+        TruckCurve::IntersectionCurve(c) => fitted(c)?,
+    };
+    checked_curve(spline)
+}
+
+/// A cubic Hermite spline through a curve that is not a spline, refined until its middles are right.
+fn fitted(c: &(impl ParametricCurve<Point = Point3, Vector = Vector3> + BoundedCurve)) -> Result<Curve, String> {
+    let (t0, t1) = c.range_tuple();
+    let mut pieces = 8;
+    while pieces <= MAX_PIECES {
+        let at = |i: usize, n: usize| t0 + (t1 - t0) * i as f64 / n as f64;
+        let ts: Vec<f64> = (0..=pieces).map(|i| at(i, pieces)).collect();
+        let points: Vec<Point> = ts.iter().map(|&t| point(c.subs(t))).collect();
+        let slopes: Vec<Vector> = ts.iter().map(|&t| vector(c.der(t))).collect();
+        let spline = Curve::hermite(&ts, &points, &slopes);
+        let error = (0..pieces)
+            .map(|i| at(2 * i + 1, 2 * pieces))
+            .map(|t| (spline.evaluate(t) - point(c.subs(t))).length());
+        if error.fold(0.0, f64::max) <= FIT {
+            return Ok(spline);
+        }
+        pieces *= 2;
+    }
+    Err(format!("an intersection curve that {MAX_PIECES} cubic pieces do not follow within {FIT} mm"))
+}
+
+fn checked_curve(c: Curve) -> Result<Curve, String> {
+    if c.degree == 0 || c.degree > MAX_DEGREE {
+        return Err(format!("a curve of degree {}; 1 to {MAX_DEGREE} are supported", c.degree));
+    }
+    check_points(&c.points)?;
+    let [a, b] = c.domain();
+    if !(a < b && c.knots.iter().all(|k| k.is_finite())) {
+        return Err("a curve over an empty parameter interval".into());
+    }
+    Ok(c.restricted(a, b))
+}
+
+fn check_points(points: &[Homogeneous]) -> Result<(), String> {
+    if points.iter().any(|p| !p.is_finite()) {
+        return Err("a control point that is no finite number".into());
+    }
+    match points.iter().find(|p| p.w <= 0.0) {
+        Some(p) => Err(format!("a weight of {}; weights must be positive", p.w)),
+        None => Ok(()),
+    }
+}
+
+/// A surface from rows of control points, checked and clamped.
+pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) -> Result<Surface, String> {
+    let knots = [knots.0.iter().copied().collect::<Vec<f64>>(), knots.1.iter().copied().collect()];
+    let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
+    let degree = [0, 1].map(|k| knots[k].len().saturating_sub(counts[k] + 1));
+    if counts.contains(&0) || degree.iter().any(|d| *d == 0 || *d > MAX_DEGREE) {
+        return Err(format!("a surface of degrees {degree:?}; 1 to {MAX_DEGREE} are supported"));
+    }
+    let s = Surface { degree, knots, points: rows.into_iter().flatten().collect() };
+    check_points(&s.points)?;
+    let domain = s.domain();
+    if domain.iter().any(|[a, b]| a >= b) {
+        return Err("a surface over an empty parameter range".into());
+    }
+    Ok(s.restricted(domain))
+}
+
+pub(super) fn bspline_surface(s: &BSplineSurface<Point3>) -> Result<Surface, String> {
+    let rows = s.control_points().iter().map(|r| r.iter().map(|p| Homogeneous::weighted(point(*p), 1.0)).collect());
+    surface((s.uknot_vec(), s.vknot_vec()), rows.collect())
+}
+
+pub(super) fn nurbs_surface(s: &NurbsSurface<Vector4>) -> Result<Surface, String> {
+    let rows = s.control_points().iter().map(|r| r.iter().map(homogeneous).collect());
+    surface((s.uknot_vec(), s.vknot_vec()), rows.collect())
+}
+
+fn vector4(p: &Homogeneous) -> Vector4 {
+    Vector4::new(p.x, p.y, p.z, p.w)
+}
+
+/// Our curve as truck's.
+pub fn curve_to_truck(c: &Curve) -> NurbsCurve<Vector4> {
+    NurbsCurve::new(BSplineCurve::new(KnotVec::from(c.knots.clone()), c.points.iter().map(vector4).collect()))
+}
+
+/// Our surface as truck's, with the same parameters.
+pub fn surface_to_truck(s: &Surface) -> NurbsSurface<Vector4> {
+    let knots = (KnotVec::from(s.knots[0].clone()), KnotVec::from(s.knots[1].clone()));
+    let rows = s.points.chunks(s.counts()[1]).map(|r| r.iter().map(vector4).collect()).collect();
+    NurbsSurface::new(BSplineSurface::new(knots, rows))
+}

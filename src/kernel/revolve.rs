@@ -1,0 +1,198 @@
+//! Which angles a face on a surface of revolution covers: truck's surfaces always turn all the way round, ours only as far as the face.
+
+use super::geometry::{curve, point, vector};
+use super::truck::{Curve as TruckCurve, Matrix4, Processor, RevolutedCurve};
+use crate::math::{Frame, Homogeneous, Point};
+use crate::nurbs::{ControlPoint, Curve, Surface, conic, sweep};
+use std::f64::consts::PI;
+
+/// Points of an edge at which its angle is taken.
+const SAMPLES: usize = 24;
+
+/// A surface of revolution before the angles of a face are known.
+pub(super) struct Revolved {
+    meridian: Curve,
+    axis: Frame,
+    matrix: Matrix4,
+    inverse: Matrix4,
+    /// Angle of the meridian about the axis, from which u counts.
+    azimuth: f64,
+    /// Whether our normal points the other way than truck's.
+    pub(super) flipped: bool,
+    size: f64,
+}
+
+/// An edge of a loop in the direction of the loop, material on its left.
+#[derive(Clone, Copy)]
+pub(super) struct Side<'a> {
+    pub(super) curve: &'a Curve,
+    pub(super) reversed: bool,
+}
+
+/// A surface cut to a face, and for each loop the parameter u in the middle of each edge.
+pub(super) struct Cut {
+    pub(super) surface: Surface,
+    pub(super) middles: Vec<Vec<f64>>,
+}
+
+impl Revolved {
+    pub(super) fn new(s: &Processor<RevolutedCurve<TruckCurve>, Matrix4>) -> Result<Self, String> {
+        use super::truck::SquareMatrix;
+        let entity = s.entity();
+        let meridian = curve(entity.entity_curve())?;
+        let axis = Frame::from_axis(point(entity.origin()), vector(entity.axis()), None);
+        let inverse = s.transform().invert().ok_or("a surface of revolution scaled to nothing")?;
+        let size = meridian.bounds().diagonal();
+        let azimuth = azimuth(&meridian, &axis, size)?;
+        // Truck's u runs along the curve and v about the axis, ours the other way round.
+        Ok(Self { meridian, axis, matrix: *s.transform(), inverse, azimuth, flipped: s.orientation(), size })
+    }
+
+    /// The surface over the angles of a face.
+    pub(super) fn cut(&self, loops: &[Vec<Side>]) -> Result<Cut, String> {
+        let mut range: Option<[f64; 2]> = None;
+        let mut middles = Vec::new();
+        for sides in loops {
+            let (mut low, mut high, mut angles) = self.angles(sides)?;
+            if let Some([a, b]) = range {
+                let turn = 2.0 * PI * ((0.5 * (a + b) - 0.5 * (low + high)) / (2.0 * PI)).round();
+                (low, high) = (low + turn, high + turn);
+                angles.iter_mut().for_each(|x| *x += turn);
+            }
+            let [a, b] = range.unwrap_or([low, high]);
+            range = Some([a.min(low), b.max(high)]);
+            middles.push(angles);
+        }
+        let [a, mut b] = range.ok_or("a face without edges on an endless surface of revolution")?;
+        if b - a > 2.0 * PI + 1e-9 {
+            return Err("a face that winds around its axis more than once".into());
+        }
+        if b - a < 1e-9 {
+            return Err("a face without width on a surface of revolution".into());
+        }
+        b = b.min(a + 2.0 * PI);
+        let range = [a, b];
+        let local = sweep::revolution(&self.meridian, &self.axis, range);
+        for angle in middles.iter_mut().flatten() {
+            *angle = conic::parameter_of_angle(range, angle.clamp(a, b));
+        }
+        Ok(Cut { surface: local.transformed(|p| transform(&self.matrix, p)), middles })
+    }
+
+    /// Lowest and highest angle of a loop, unwrapped, and the angle in the middle of each edge.
+    fn angles(&self, sides: &[Side]) -> Result<(f64, f64, Vec<f64>), String> {
+        let ends_on_axis = |s: &Side| {
+            let [t0, t1] = s.curve.domain();
+            self.on_axis(s.curve.evaluate(if s.reversed { t0 } else { t1 }))
+        };
+        let n = sides.len();
+        // Begin after a pole, if there is one, so that each group between poles is walked through once.
+        let first = (0..n).find(|&i| ends_on_axis(&sides[i])).map_or(0, |i| i + 1);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut middles = vec![0.0; n];
+        let mut last: Option<f64> = None;
+        let mut jump: Option<f64> = None;
+        let mut start = None;
+        for i in (0..n).map(|k| (first + k) % n) {
+            let side = &sides[i];
+            let [t0, t1] = side.curve.domain();
+            for k in 0..=SAMPLES {
+                let s = k as f64 / SAMPLES as f64;
+                let s = if side.reversed { 1.0 - s } else { s };
+                let p = side.curve.evaluate(t0 + (t1 - t0) * s);
+                if self.on_axis(p) {
+                    continue;
+                }
+                let raw = self.angle(p);
+                let angle = match (last, jump.take()) {
+                    // Past a pole: towards lower angles at the end of the meridian, higher ones at its start.
+                    (Some(before), Some(sign)) => before + sign * turned(sign * (raw - before)),
+                    (Some(before), None) => before + wrapped(raw - before),
+                    (None, _) => raw,
+                };
+                start.get_or_insert(angle);
+                (low, high) = (low.min(angle), high.max(angle));
+                last = Some(angle);
+                if k == SAMPLES / 2 {
+                    middles[i] = angle;
+                }
+            }
+            if ends_on_axis(side) {
+                let [v0, v1] = self.meridian.domain();
+                let at_end = |v: f64| (self.meridian.evaluate(v) - self.local(side_end(side))).length();
+                jump = Some(if at_end(v1) < at_end(v0) { -1.0 } else { 1.0 });
+            }
+        }
+        let (Some(start), Some(last)) = (start, last) else {
+            return Err("a loop on the axis of its surface".into());
+        };
+        let has_pole = sides.iter().any(ends_on_axis);
+        if !has_pole && (last - start).abs() > 1.0 {
+            return Err(
+                "a face that closes around its axis; cut it into sectors, as truck's own builder does".into()
+            );
+        }
+        Ok((low, high, middles))
+    }
+
+    fn local(&self, p: Point) -> Point {
+        transform(&self.inverse, p)
+    }
+
+    fn on_axis(&self, p: Point) -> bool {
+        let q = self.axis.local_point(self.local(p));
+        q.x.hypot(q.y) < 1e-9 * (1.0 + self.size)
+    }
+
+    fn angle(&self, p: Point) -> f64 {
+        let q = self.axis.local_point(self.local(p));
+        q.y.atan2(q.x) - self.azimuth
+    }
+}
+
+/// The one angle about the axis that all points of a meridian have.
+fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
+    let [t0, t1] = meridian.domain();
+    let samples =
+        (0..=SAMPLES).map(|k| axis.local_point(meridian.evaluate(t0 + (t1 - t0) * k as f64 / SAMPLES as f64)));
+    let samples: Vec<Point> = samples.collect();
+    let radius = |p: &Point| p.x.hypot(p.y);
+    let farthest = samples.iter().copied().max_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default();
+    let reach = radius(&farthest);
+    if reach < 1e-9 * (1.0 + size) {
+        return Err("a curve on the axis it is turned about".into());
+    }
+    let (x, y) = (farthest.x / reach, farthest.y / reach);
+    let off =
+        |p: &Point| (p.y * x - p.x * y).abs() > 1e-7 * (1.0 + size) || p.x * x + p.y * y < -1e-7 * (1.0 + size);
+    if samples.iter().any(off) {
+        return Err("a surface of revolution whose curve does not lie in a half-plane of the axis".into());
+    }
+    Ok(y.atan2(x))
+}
+
+fn side_end(side: &Side) -> Point {
+    let [t0, t1] = side.curve.domain();
+    side.curve.evaluate(if side.reversed { t0 } else { t1 })
+}
+
+/// The angle brought to `(−π, π]`.
+fn wrapped(angle: f64) -> f64 {
+    angle - 2.0 * PI * (angle / (2.0 * PI)).round()
+}
+
+/// The angle brought to `(0, 2π]`.
+fn turned(angle: f64) -> f64 {
+    let a = angle.rem_euclid(2.0 * PI);
+    if a < 1e-9 { 2.0 * PI } else { a }
+}
+
+/// An affine placement; truck allows no other.
+pub(super) fn transform(m: &Matrix4, p: Point) -> Point {
+    let h = Homogeneous::weighted(p, 1.0);
+    Point::new(
+        m.x.x * h.x + m.y.x * h.y + m.z.x * h.z + m.w.x,
+        m.x.y * h.x + m.y.y * h.y + m.z.y * h.z + m.w.y,
+        m.x.z * h.x + m.y.z * h.y + m.z.z * h.z + m.w.z,
+    )
+}

