@@ -1,6 +1,6 @@
 //! Our surfaces evaluated by truck, our faces meshed by truck: an independent program on the same geometry.
 
-use lampyris::kernel::truck::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3};
+use lampyris::kernel::truck::{ParametricCurve, ParametricSurface3D, Point3, Vector3};
 use lampyris::kernel::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
 use lampyris::math::{Frame, Point, Uv, Vector};
 use lampyris::model::Model;
@@ -17,7 +17,7 @@ fn v(q: Vector3) -> Vector {
 
 /// Position, first and second derivatives and the normal against truck's, relative to their sizes.
 fn compare(s: &Surface, samples: usize) {
-    let t = surface_to_truck(s);
+    let (t, turned) = (surface_to_truck(s), surface_to_truck(&s.transposed()));
     let [[u0, u1], [v0, v1]] = s.domain();
     let size = s.bounds().diagonal();
     for i in 0..samples {
@@ -35,11 +35,14 @@ fn compare(s: &Surface, samples: usize) {
             };
             let (a, b) = (size / width(0), size / width(1));
             assert!(near(d.du, v(t.uder(x, y)), a) && near(d.dv, v(t.vder(x, y)), b));
-            assert!(near(d.duu, v(t.uuder(x, y)), a / width(0)), "{:?} {:?}", d.duu, t.uuder(x, y));
-            assert!(near(d.duv, v(t.uvder(x, y)), a / width(1)) && near(d.dvv, v(t.vvder(x, y)), b / width(1)));
+            assert!(near(d.duu, v(t.uuder(x, y)), a / width(0)));
+            assert!(near(d.duv, v(t.uvder(x, y)), a / width(1)));
+            // truck 0.5's vvder lacks the factor degree − 1 (its uuder has it), so the transposed surface is asked.
+            assert!(near(d.dvv, v(turned.uuder(y, x)), b / width(1)));
             if let Some(n) = s.normal(Uv::new(x, y)) {
-                if d.du.cross(d.dv).length() > 1e-6 * d.du.length() * d.dv.length() {
-                    assert!((n - v(t.normal(x, y))).length() < 1e-9);
+                // Away from poles and folds, where rounding leaves the normal its digits.
+                if d.du.cross(d.dv).length() > 1e-6 * a * b {
+                    assert!((n - v(t.normal(x, y))).length() < 1e-8, "{n} {:?}", t.normal(x, y));
                 }
             }
         }
@@ -80,8 +83,8 @@ fn truck_evaluates_surfaces_of_files_as_we_do() {
     assert!(surfaces > 20, "{surfaces}");
 }
 
-fn read(_path: &std::path::Path) -> Option<Model> {
-    None
+fn read(path: &std::path::Path) -> Option<Model> {
+    Some(lampyris::step::read(path, &Default::default()).ok()?.model)
 }
 
 fn facets_off(model: &Model, tolerance: f64) -> (f64, usize) {

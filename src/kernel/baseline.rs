@@ -1,15 +1,15 @@
 //! The mesher of truck-meshalgo as the baseline: triangles of one tolerance everywhere.
 
-use super::export::faces_to_truck;
+use super::export::{TruckFace, faces_to_truck};
 use super::geometry::{point, vector};
-use super::truck::Shell as TruckShell;
+use super::truck::{Shell as TruckShell, Surface};
 use crate::math::{FaceId, Point, Uv};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::Model;
 use rustc_hash::FxHashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
-use truck_meshalgo::prelude::{Invertible, MeshableShape, PolygonMesh, StandardVertex};
+use truck_meshalgo::prelude::{Invertible, MeshableShape, PolygonMesh, RobustMeshableShape, StandardVertex};
 
 /// Tolerance below which truck's mesher refuses to work, mm.
 const SMALLEST: f64 = 1e-6;
@@ -50,13 +50,10 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
         // All at once, as truck is meant to be used: its faces then share the points of their edges.
         let start = Instant::now();
         let shell: TruckShell = faces.iter().map(|f| f.truck.clone()).collect();
-        let meshes: Vec<Option<PolygonMesh>> = match triangulated(&shell, tolerance) {
-            Some(meshes) if meshes.len() == faces.len() => meshes,
-            _ => faces
-                .iter()
-                .map(|f| triangulated(&[f.truck.clone()].into_iter().collect(), tolerance)?.pop()?)
-                .collect(),
-        };
+        let meshes = triangulated(&shell, tolerance).unwrap_or_else(|| {
+            let alone = |f: &TruckFace| triangulated(&[f.truck.clone()].into_iter().collect(), tolerance)?.pop()?;
+            faces.iter().map(alone).collect()
+        });
         out.seconds += start.elapsed().as_secs_f64();
         for (f, mesh) in faces.iter().zip(meshes) {
             let face = id(f.shell, f.face);
@@ -72,19 +69,41 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
 }
 
 /// The mesh of each face with the face's orientation; `None` when truck panics.
+///
+/// Faces that truck's standard mesher gives up on (poles of rational B-splines, edges that lie a little off their surface) are
+/// tried with its robust one.
 fn triangulated(shell: &TruckShell, tolerance: f64) -> Option<Vec<Option<PolygonMesh>>> {
+    let tolerance = tolerance.max(SMALLEST);
     let work = || {
-        let meshed = shell.triangulation(tolerance.max(SMALLEST));
-        let oriented = meshed.face_iter().map(|f| {
-            let mut mesh = f.surface()?;
-            if !f.orientation() {
-                mesh.invert();
+        let mut meshes: Vec<Option<PolygonMesh>> =
+            shell.triangulation(tolerance).face_iter().map(|f| oriented(f.surface(), f.orientation())).collect();
+        if meshes.iter().any(Option::is_none) {
+            // Faces from `faces_to_truck` are rational B-splines, all of them.
+            let Some(plain) = shell.try_mapped(
+                |p| Some(*p),
+                |c| Some(c.clone()),
+                |s| if let Surface::NurbsSurface(s) = s { Some(s.clone()) } else { None },
+            ) else {
+                return meshes;
+            };
+            for (mesh, f) in meshes.iter_mut().zip(plain.robust_triangulation(tolerance).face_iter()) {
+                if mesh.is_none() {
+                    *mesh = oriented(f.surface(), f.orientation());
+                }
             }
-            Some(mesh)
-        });
-        oriented.collect()
+        }
+        meshes
     };
     catch_unwind(AssertUnwindSafe(work)).ok()
+}
+
+fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh> {
+    mesh.map(|mut m| {
+        if !orientation {
+            m.invert();
+        }
+        m
+    })
 }
 
 fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &PolygonMesh, face: FaceId) {

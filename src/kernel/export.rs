@@ -51,7 +51,6 @@ impl<'a> Exporter<'a> {
 
     fn face(&mut self, f: &Face) -> Result<truck::Face, String> {
         let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)));
-        // A mirrored placement turns Su × Sv, the edges of a loop and with them truck's idea of inside.
         let mut wires = Vec::new();
         for l in &f.loops {
             wires.extend(self.wires(l)?);
@@ -61,7 +60,8 @@ impl<'a> Exporter<'a> {
         }
         let surface = TruckSurface::NurbsSurface(surface);
         let face = truck::Face::try_new(wires, surface).map_err(|e| format!("truck refuses its wires: {e}"))?;
-        Ok(if f.reversed { face.inverse() } else { face })
+        // A mirrored placement turns Su × Sv against the placed normal; the loops follow Su × Sv.
+        Ok(if f.reversed != self.placement.is_mirrored() { face.inverse() } else { face })
     }
 
     /// The chains of edges between the seams of a loop, each closed by itself.
