@@ -48,7 +48,7 @@ pub(super) fn curve(c: &TruckCurve) -> Result<Curve, String> {
 }
 
 /// A cubic Hermite spline through a curve that is not a spline, refined until its middles are right.
-fn fitted(c: &(impl ParametricCurve<Point = Point3, Vector = Vector3> + BoundedCurve)) -> Result<Curve, String> {
+fn fitted(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Curve, String> {
     let (t0, t1) = c.range_tuple();
     let mut pieces = 8;
     while pieces <= MAX_PIECES {
