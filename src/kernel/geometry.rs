@@ -1,8 +1,8 @@
 //! Curves and surfaces in both directions: truck's homogeneous control points and ours are the same numbers.
 
 use super::truck::{
-    BSplineCurve, BSplineSurface, BoundedCurve, Curve as TruckCurve, KnotVec, NurbsCurve, NurbsSurface,
-    ParametricCurve, Point3, Vector3, Vector4,
+    BSplineCurve, BSplineSurface, BoundedCurve, Curve as TruckCurve, KnotVec, NurbsCurve, NurbsSurface, Point3,
+    Vector3, Vector4,
 };
 use crate::math::{Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface};
