@@ -2,7 +2,11 @@
 //!
 //! All intersectors answer through [`Intersector`]; all of them always count what they do in a [`Cost`].
 
+pub mod bvh;
 pub mod exact;
+mod facet;
+mod normals;
+pub mod octree;
 pub mod polish;
 
 use crate::math::{FaceId, Ray, Uv, Vector};

@@ -1,0 +1,122 @@
+//! Boxes around the part of a facet inside a cell: Sutherland–Hodgman on both triangles, rounded outward to f32.
+
+use crate::math::Point;
+
+/// A box in f32 about the middle of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Box32 {
+    pub(super) low: [f32; 3],
+    pub(super) high: [f32; 3],
+}
+
+impl Box32 {
+    pub(super) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    pub(super) fn union(&mut self, other: &Self) {
+        for a in 0..3 {
+            self.low[a] = self.low[a].min(other.low[a]);
+            self.high[a] = self.high[a].max(other.high[a]);
+        }
+    }
+
+    /// Half the surface, 0 when empty.
+    pub(super) fn half_area(&self) -> f32 {
+        let [x, y, z] = std::array::from_fn(|a| (self.high[a] - self.low[a]).max(0.0));
+        x * y + y * z + z * x
+    }
+
+    /// Around points, rounded outward.
+    pub(super) fn around(points: &[Point]) -> Self {
+        let mut low = Point::INFINITY;
+        let mut high = Point::NEG_INFINITY;
+        for &p in points {
+            low = low.min(p);
+            high = high.max(p);
+        }
+        Self { low: low.to_array().map(down), high: high.to_array().map(up) }
+    }
+}
+
+/// The nearest f32 that is not larger.
+pub(super) fn down(x: f64) -> f32 {
+    let y = x as f32;
+    if f64::from(y) > x { y.next_down() } else { y }
+}
+
+/// The nearest f32 that is not smaller.
+pub(super) fn up(x: f64) -> f32 {
+    let y = x as f32;
+    if f64::from(y) < x { y.next_up() } else { y }
+}
+
+/// A triangle cut by six planes has at most nine corners.
+#[derive(Clone, Copy)]
+struct Polygon {
+    points: [[f64; 3]; 10],
+    count: usize,
+}
+
+impl Polygon {
+    /// Keeps what lies on the side `sign` of the plane `axis = at`.
+    fn cut(&mut self, axis: usize, at: f64, sign: f64) {
+        let height = |p: &[f64; 3]| (p[axis] - at) * sign;
+        let points = &self.points[..self.count];
+        if points.iter().all(|p| height(p) >= 0.0) {
+            return;
+        }
+        let mut kept = Self { points: [[0.0; 3]; 10], count: 0 };
+        for (i, p) in points.iter().enumerate() {
+            let q = &points[if i + 1 == points.len() { 0 } else { i + 1 }];
+            let (hp, hq) = (height(p), height(q));
+            if hp >= 0.0 {
+                kept.push(*p);
+            }
+            if (hp > 0.0 && hq < 0.0) || (hp < 0.0 && hq > 0.0) {
+                let s = hp / (hp - hq);
+                let mut between: [f64; 3] = std::array::from_fn(|a| p[a] + (q[a] - p[a]) * s);
+                between[axis] = at;
+                kept.push(between);
+            }
+        }
+        *self = kept;
+    }
+
+    fn push(&mut self, p: [f64; 3]) {
+        // Rounding could in principle add a corner to a sliver; the hull of the first ten is kept then.
+        if self.count < self.points.len() {
+            self.points[self.count] = p;
+            self.count += 1;
+        }
+    }
+}
+
+/// The box around the part of a facet inside `cell`, `None` when they do not meet.
+///
+/// Corners are relative to the middle of the mesh. Cuts are computed in f64; their rounding is covered by `pad`.
+pub(super) fn clip(corners: &[Point; 4], cell: &Box32, pad: f64) -> Option<Box32> {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    let [a, b, c, d] = corners.map(|p| p.to_array());
+    let triangles = [[a, b, c], [a, c, d]];
+    for triangle in &triangles[..if c == d { 1 } else { 2 }] {
+        let mut polygon = Polygon { points: [[0.0; 3]; 10], count: 3 };
+        polygon.points[..3].copy_from_slice(triangle);
+        for axis in 0..3 {
+            polygon.cut(axis, f64::from(cell.low[axis]), 1.0);
+            polygon.cut(axis, f64::from(cell.high[axis]), -1.0);
+        }
+        for p in &polygon.points[..polygon.count] {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(p[axis]);
+                high[axis] = high[axis].max(p[axis]);
+            }
+        }
+    }
+    if low[0] > high[0] {
+        return None;
+    }
+    Some(Box32 {
+        low: std::array::from_fn(|a| down(low[a] - pad).max(cell.low[a])),
+        high: std::array::from_fn(|a| up(high[a] + pad).min(cell.high[a])),
+    })
+}

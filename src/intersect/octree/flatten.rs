@@ -1,0 +1,152 @@
+//! From cells to nodes and blocks: sparse octants merged into full nodes, children next to each other.
+
+use super::build::{Cell, Content};
+use super::node::{Block, Link, Node};
+use super::{Settings, Statistics};
+use crate::math::Point;
+use crate::mesh::FacetMesh;
+use rayon::prelude::*;
+
+/// The tree as it is walked.
+pub(super) struct Flat {
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<Block>,
+    pub(super) root: Link,
+}
+
+/// Nodes and the facets of blocks, with links into both.
+#[derive(Default)]
+struct Draft {
+    nodes: Vec<Node>,
+    blocks: Vec<(u8, [u32; 4])>,
+    stats: Statistics,
+}
+
+/// Levels from the top whose children are drafted in parallel.
+const PARALLEL_LEVELS: u32 = 2;
+
+pub(super) fn flatten(
+    mesh: &FacetMesh,
+    center: Point,
+    cell: Cell,
+    settings: &Settings,
+    stats: &mut Statistics,
+) -> Flat {
+    let mut draft = Draft::default();
+    let root = draft.add(cell, settings.collapse, 0, None);
+    assert!(draft.blocks.len() <= Link::MOST_BLOCKS, "more blocks than links can name");
+    let blocks = draft
+        .blocks
+        .par_iter()
+        .map(|(count, facets)| {
+            let corners = facets.map(|f| {
+                let f = f.min(mesh.facets.len() as u32 - 1) as usize;
+                (f as u32, mesh.corner_positions(f), mesh.corners(f).map(|p| p - center))
+            });
+            Block::new(&corners[..usize::from(*count)])
+        })
+        .collect();
+    let left_out = stats.left_out;
+    *stats = draft.stats;
+    stats.left_out = left_out;
+    Flat { nodes: draft.nodes, blocks, root }
+}
+
+impl Draft {
+    /// Adds a cell, a node at the place reserved for it, and gives its link.
+    fn add(&mut self, cell: Cell, collapse: bool, depth: u32, reserved: Option<usize>) -> Link {
+        match cell.content {
+            Content::Block(count, facets) => {
+                self.stats.count_block(depth, count);
+                self.blocks.push((count, facets));
+                Link::block(self.blocks.len() - 1, count)
+            }
+            Content::Cells(cells) => {
+                let me = reserved.unwrap_or_else(|| self.reserve(1));
+                self.stats.nodes += 1;
+                let children = if collapse { merge(cells) } else { cells };
+                let mut node = Node::around(&cell.bounds);
+                let boxes: Vec<_> = children.iter().map(|c| c.bounds).collect();
+                let links = if depth < PARALLEL_LEVELS {
+                    self.add_parallel(children, collapse, depth)
+                } else {
+                    self.add_in_turn(children, collapse, depth)
+                };
+                for (slot, (bounds, link)) in boxes.iter().zip(links).enumerate() {
+                    node.set(slot, bounds, link);
+                }
+                self.nodes[me] = node;
+                Link::node(me)
+            }
+        }
+    }
+
+    fn reserve(&mut self, count: usize) -> usize {
+        self.nodes.resize(self.nodes.len() + count, Node::EMPTY);
+        self.nodes.len() - count
+    }
+
+    /// Sibling nodes and sibling blocks lie next to each other.
+    fn add_in_turn(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
+        let inner = children.iter().filter(|c| matches!(c.content, Content::Cells(_))).count();
+        let mut place = self.reserve(inner);
+        let mut links = vec![Link::node(0); children.len()];
+        let mut waiting = Vec::with_capacity(inner);
+        for (slot, child) in children.into_iter().enumerate() {
+            if matches!(child.content, Content::Cells(_)) {
+                waiting.push((slot, child));
+            } else {
+                links[slot] = self.add(child, collapse, depth + 1, None);
+            }
+        }
+        for (slot, child) in waiting {
+            links[slot] = self.add(child, collapse, depth + 1, Some(place));
+            place += 1;
+        }
+        links
+    }
+
+    fn add_parallel(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
+        let drafts: Vec<(Draft, Link)> = children
+            .into_par_iter()
+            .map(|child| {
+                let mut draft = Draft::default();
+                let link = draft.add(child, collapse, depth + 1, None);
+                (draft, link)
+            })
+            .collect();
+        drafts.into_iter().map(|(draft, link)| self.append(draft, link)).collect()
+    }
+
+    fn append(&mut self, draft: Draft, link: Link) -> Link {
+        let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
+        self.blocks.extend(draft.blocks);
+        self.nodes.extend(draft.nodes.into_iter().map(|mut node| {
+            node.children = node.children.map(|c| Link(c).moved(nodes, blocks).0);
+            node
+        }));
+        self.stats.add(&draft.stats);
+        link.moved(nodes, blocks)
+    }
+}
+
+/// Opens the largest child that fits until eight places are full.
+fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
+    loop {
+        let mut best: Option<(f32, usize)> = None;
+        for (i, child) in children.iter().enumerate() {
+            if let Content::Cells(inner) = &child.content
+                && children.len() - 1 + inner.len() <= 8
+            {
+                let area = child.bounds.half_area();
+                if best.is_none_or(|(a, _)| area >= a) {
+                    best = Some((area, i));
+                }
+            }
+        }
+        let Some((_, i)) = best else { return children };
+        if let Content::Cells(inner) = children.swap_remove(i).content {
+            children.extend(inner);
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What is walked: 128-byte nodes of up to eight children, 192-byte blocks of up to four facets.
+
+use super::clip::{Box32, down};
+use crate::math::Point;
+
+/// Where a child is: a node, or a block with its number of facets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Link(pub(super) u32);
+
+/// What a [`Link`] points at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    Node(usize),
+    /// Index and number of facets.
+    Block(usize, usize),
+}
+
+impl Link {
+    const BLOCK: u32 = 1 << 31;
+    /// Blocks that a link can tell apart.
+    pub(super) const MOST_BLOCKS: usize = 1 << 29;
+
+    pub(super) fn node(index: usize) -> Self {
+        Self(index as u32)
+    }
+
+    pub(super) fn block(index: usize, count: u8) -> Self {
+        Self(Self::BLOCK | (index as u32) << 2 | u32::from(count - 1))
+    }
+
+    #[inline(always)]
+    pub(super) fn target(self) -> Target {
+        if self.0 & Self::BLOCK == 0 {
+            Target::Node(self.0 as usize)
+        } else {
+            Target::Block(((self.0 & !Self::BLOCK) >> 2) as usize, (self.0 & 3) as usize + 1)
+        }
+    }
+
+    /// The same link after its target moved up.
+    pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
+        if self.0 & Self::BLOCK == 0 { Self(self.0 + nodes as u32) } else { Self(self.0 + ((blocks as u32) << 2)) }
+    }
+}
+
+/// Up to eight children with boxes in eight bits a bound, `origin + bound · step`; an unused child has an empty box.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(128))]
+pub(super) struct Node {
+    /// Lower and upper bounds along x, y, z.
+    pub(super) bounds: [[u8; 8]; 6],
+    pub(super) origin: [f32; 4],
+    pub(super) step: [f32; 4],
+    pub(super) children: [u32; 8],
+    /// One bit for each child in use: a box slack can be wider than the whole node, then even an empty box is met.
+    pub(super) used: u32,
+    pub(super) padding: [u32; 3],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        bounds: [[255; 8], [0; 8], [255; 8], [0; 8], [255; 8], [0; 8]],
+        origin: [0.0; 4],
+        step: [0.0; 4],
+        children: [0; 8],
+        used: 0,
+        padding: [0; 3],
+    };
+
+    /// A node around `all` without children.
+    pub(super) fn around(all: &Box32) -> Self {
+        let mut node = Self::EMPTY;
+        for a in 0..3 {
+            let origin = all.low[a].next_down();
+            // A step below the spacing of f32 at the origin would be lost in `origin + bound · step`.
+            let step = ((f64::from(all.high[a]) - f64::from(origin)) / 254.0 * (1.0 + 1e-6)) as f32;
+            node.origin[a] = origin;
+            node.step[a] = step.max(origin.abs() * 1e-7).max(1e-20);
+        }
+        node
+    }
+
+    /// Sets a child's box, rounded outward.
+    pub(super) fn set(&mut self, slot: usize, bounds: &Box32, link: Link) {
+        for a in 0..3 {
+            let (origin, step) = (f64::from(self.origin[a]), f64::from(self.step[a]));
+            let low = ((f64::from(bounds.low[a]) - origin) / step).floor();
+            let high = ((f64::from(bounds.high[a]) - origin) / step).ceil();
+            // Casts saturate.
+            self.bounds[2 * a][slot] = low as u8;
+            self.bounds[2 * a + 1][slot] = high as u8;
+        }
+        self.children[slot] = link.0;
+        self.used |= 1 << slot;
+    }
+}
+
+/// Up to four facets; corners in 16 bits, `origin + corner · step`, to sort out what a ray cannot hit.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    /// x, y, z of corners 0 (lanes 0–3) and 2 (lanes 4–7) of the four facets, then of corners 1 and 3.
+    pub(super) corners: [[u16; 8]; 6],
+    pub(super) origin: [f32; 3],
+    pub(super) step: f32,
+    pub(super) facets: [u32; 4],
+    /// Indices of the exact corners in the mesh.
+    pub(super) positions: [[u32; 4]; 4],
+}
+
+impl Block {
+    /// Corners are relative to the middle of the mesh.
+    pub(super) fn new(facets: &[(u32, [u32; 4], [Point; 4])]) -> Self {
+        let points = facets.iter().flat_map(|f| f.2);
+        let low = points.clone().fold(Point::INFINITY, Point::min);
+        let high = points.fold(Point::NEG_INFINITY, Point::max);
+        let origin = low.to_array().map(down);
+        let largest = (0..3).map(|a| high[a] - f64::from(origin[a])).fold(0.0, f64::max);
+        let step = ((largest / 65535.0 * (1.0 + 1e-6)) as f32).max(1e-30);
+        let mut block =
+            Self { corners: [[0; 8]; 6], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
+        for (lane, (facet, positions, corners)) in facets.iter().enumerate() {
+            block.facets[lane] = *facet;
+            block.positions[lane] = *positions;
+            for a in 0..3 {
+                let coarse = |k: usize| ((corners[k][a] - f64::from(origin[a])) / f64::from(step)).round() as u16;
+                block.corners[a][lane] = coarse(0);
+                block.corners[a][4 + lane] = coarse(2);
+                block.corners[3 + a][lane] = coarse(1);
+                block.corners[3 + a][4 + lane] = coarse(3);
+            }
+        }
+        block
+    }
+}
