@@ -8,19 +8,22 @@
 //! 2. boxes are taken about the middle of the mesh, rounded outward and padded for the rounding of node tests;
 //! 3. +0.0 is added to directions, for CwBvh orders children wrongly for −0.0;
 //! 4. inverse directions near zero are ±1e30 instead of ±1/f32::EPSILON;
-//! 5. rays start where they enter the mesh, so that f32 origins are good from any distance, and a little earlier,
+//! 5. a tree too deep for the fixed stack of CwBvh is walked as the binary tree;
+//! 6. rays start where they enter the mesh, so that f32 origins are good from any distance, and a little earlier,
 //!    for the node test of CwBvh discards what ends before t = 1e-4.
 //!
 //! Guarantee when cured: bit for bit the hits of the octree. Weakness: slower by what f64 leaves cost.
 
-use super::facet::{FacetHit, FacetRay, Nearest, Surroundings};
+use super::facet::{FacetHit, FacetRay, Nearest, Surroundings, usable};
 use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use glam::{UVec2, Vec3A};
 use obvhs::aabb::Aabb as Box32;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2, builder::build_bvh2_from_tris};
-use obvhs::cwbvh::{CwBvh, builder::build_cwbvh, builder::build_cwbvh_from_tris};
+use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, builder::build_cwbvh_from_tris};
+use obvhs::ploc::PlocBuilder;
 use obvhs::ray::{Ray as Ray32, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
@@ -104,11 +107,12 @@ impl<'m> Bvh<'m> {
     /// Builds the hierarchy; facets with corners that are no finite numbers are left out.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
-        let bounds = mesh.bounds();
+        let around = Surroundings::new(mesh);
+        let bounds = around.bounds;
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
         let half = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
         let codes: Vec<u32> = (0..mesh.facets.len())
-            .filter(|&f| mesh.corners(f).iter().all(|p| p.is_finite()))
+            .filter(|&f| mesh.corners(f).iter().all(|&p| usable(p)))
             .flat_map(|f| {
                 let one = (f as u32) << 1;
                 std::iter::once(one).chain((!mesh.facets[f].is_triangle()).then_some(one | 1))
@@ -126,7 +130,7 @@ impl<'m> Bvh<'m> {
             let boxes: Vec<Bounded> = codes.iter().map(|&c| outer_box(mesh, c, center, pad)).collect();
             match settings.kind {
                 Kind::Bvh2 => Tree::Binary(build_bvh2(&boxes, params, &mut core)),
-                Kind::CwBvh => Tree::Wide(build_cwbvh(&boxes, params, &mut core)),
+                Kind::CwBvh => wide_or_binary(&boxes, &params),
             }
         } else {
             let triangles: Vec<Triangle> = codes.iter().map(|&c| triangle32(mesh, c)).collect();
@@ -146,7 +150,6 @@ impl<'m> Bvh<'m> {
         } else {
             Leaves::Shipped(codes.iter().map(|&c| RtTriangle::from(&triangle32(mesh, c))).collect())
         };
-        let around = Surroundings::new(mesh);
         let bounds = bounds.grown(half * 2f64.powi(-20));
         let pull = 2e-3 + half * 2f64.powi(-18);
         let build_seconds = started.elapsed().as_secs_f64();
@@ -264,6 +267,29 @@ impl Intersector for Bvh<'_> {
         let bytes = tree + leaves + size_of_val(&*self.codes);
         Footprint { bytes, primitives: self.around.mesh.facets.len(), build_seconds: self.build_seconds }
     }
+}
+
+/// The steps of `obvhs::cwbvh::builder::build_cwbvh`, but where the tree is too deep for the 32 places of its stack, as over
+/// many coincident facets, the binary tree it comes from.
+fn wide_or_binary(boxes: &[Bounded], params: &BvhBuildParams) -> Tree {
+    let all = (0..boxes.len() as u32).collect();
+    let (distance, threshold) = (params.ploc_search_distance, params.search_depth_threshold);
+    let mut binary =
+        PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, all, params.sort_precision, threshold);
+    ReinsertionOptimizer::default().run(&mut binary, params.reinsertion_batch_ratio, None);
+    let wide = bvh2_to_cwbvh(&binary, params.max_prims_per_leaf.clamp(1, 3), true, false);
+    if depth(&wide) < 32 { Tree::Wide(wide) } else { Tree::Binary(binary) }
+}
+
+fn depth(tree: &CwBvh) -> u32 {
+    let mut deepest = 0;
+    let mut open = vec![(0, 1)];
+    while let Some((index, depth)) = open.pop() {
+        deepest = deepest.max(depth);
+        let Some(node) = tree.nodes.get(index as usize) else { continue };
+        open.extend((0..node.imask.count_ones()).map(|k| (node.child_base_idx + k, depth + 1)));
+    }
+    deepest
 }
 
 /// Corners of the triangle with this code.

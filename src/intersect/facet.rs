@@ -11,7 +11,7 @@
 //! Weakness: two coincident sheets of different parts are two facets at the same place, and which of them a ray that
 //! leaves one meets at t = 0 is a matter of rounding.
 
-use crate::math::{Point, Ray, Vector};
+use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
 
@@ -66,15 +66,22 @@ pub(crate) struct Surroundings<'m> {
     pub(crate) mesh: &'m FacetMesh,
     /// A start is taken to lie on a border when it is nearer than this, mm.
     pub(crate) reach: f64,
+    /// Around all positions that count.
+    pub(crate) bounds: Aabb,
+}
+
+/// Whether a corner can be traced: a number of at most 1e12 mm, so that nothing overflows in f32 boxes.
+pub(crate) fn usable(p: Point) -> bool {
+    p.abs().cmple(Point::splat(1e12)).all()
 }
 
 impl<'m> Surroundings<'m> {
     /// A start is a rounded `origin + t·direction`; 2⁻⁴⁰ of the largest coordinate covers rays a thousand times
     /// longer than the scene and is a picometre for a lamp.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
-        let bounds = mesh.bounds();
+        let bounds = Aabb::around(mesh.positions.iter().copied().filter(|&p| usable(p)));
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
-        Self { mesh, reach: largest * 2f64.powi(-40) }
+        Self { mesh, reach: largest * 2f64.powi(-40), bounds }
     }
 
     /// Room that a box test must leave around a start so that a moved start stays inside, mm.

@@ -3,6 +3,7 @@
 use super::clip::{Box32, clip};
 use super::pack::pack;
 use super::{Settings, Statistics};
+use crate::intersect::facet::usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -48,11 +49,9 @@ pub(super) fn grow(mesh: &FacetMesh, center: Point, settings: &Settings, stats: 
     let parts: Vec<Part> = (0..mesh.facets.len())
         .into_par_iter()
         .filter_map(|f| {
-            let corners = mesh.corners(f).map(|p| p - center);
-            let bounds = Box32::around(&corners);
-            let usable = corners.iter().all(|p| p.is_finite())
-                && bounds.low.iter().chain(&bounds.high).all(|x| x.is_finite() && x.abs() < 1e15);
-            usable.then_some(Part { facet: f as u32, bounds })
+            let corners = mesh.corners(f);
+            let part = || Part { facet: f as u32, bounds: Box32::around(&corners.map(|p| p - center)) };
+            corners.iter().all(|&p| usable(p)).then(part)
         })
         .collect();
     stats.left_out = mesh.facets.len() - parts.len();

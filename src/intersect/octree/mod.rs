@@ -117,7 +117,8 @@ impl<'m> Octree<'m> {
     /// Builds the tree with the threads of the current rayon pool; the tree does not depend on their number.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
-        let finite = Aabb::around(mesh.positions.iter().copied().filter(|p| p.is_finite()));
+        let around = Surroundings::new(mesh);
+        let finite = around.bounds;
         let center = if finite.is_empty() { Point::ZERO } else { finite.center() };
         let mut statistics = Statistics::default();
         let cell = build::grow(mesh, center, settings, &mut statistics);
@@ -128,7 +129,6 @@ impl<'m> Octree<'m> {
         };
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * 1e-6) };
         let build_seconds = started.elapsed().as_secs_f64();
-        let around = Surroundings::new(mesh);
         Self { around, settings: *settings, center, bounds, nodes, blocks, root, statistics, build_seconds }
     }
 
