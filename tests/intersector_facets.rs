@@ -137,7 +137,10 @@ fn a_ray_reflected_inside_a_closed_mesh_stays_inside() {
                     let hit = structure.intersect(&ray, &mut Cost::default());
                     let Some(hit) = hit else { panic!("{name}: left through {ray:?}") };
                     bounces += 1;
-                    assert!(ray.direction.dot(hit.geometric_normal) > 0.0, "{name}: met from outside, {ray:?} {hit:?}");
+                    assert!(
+                        ray.direction.dot(hit.geometric_normal) > 0.0,
+                        "{name}: met from outside, {ray:?} {hit:?}"
+                    );
                     let n = hit.geometric_normal;
                     let direction = if bounces % 3 == 0 {
                         // Anywhere inward, often at grazing angles.
@@ -196,7 +199,8 @@ fn a_gap_of_a_micrometre_is_seen() {
         } else {
             Point::new(r.within(1.0, 99.0), r.within(1.0, 99.0), 0.0)
         };
-        let start = start.clamp(Point::splat(0.0), Point::new(95.0, 95.0, 0.0)) + Point::new(1.0, 1.0, 0.0) * f64::from(k % 3);
+        let start = start.clamp(Point::splat(0.0), Point::new(95.0, 95.0, 0.0))
+            + Point::new(1.0, 1.0, 0.0) * f64::from(k % 3);
         let above = Ray::new(start + Vector::Z * 1e-4, -Vector::Z);
         rays.push(above);
     }
@@ -258,7 +262,8 @@ fn odd_meshes_do_no_harm() {
     assert_eq!(ask(&FacetMesh::default(), &[ray]), [None]);
     // One facet; a point; a line; corners at infinity; a fan of thousands at one vertex.
     let mut mesh = FacetMesh::default();
-    mesh.positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y, Point::splat(f64::NAN), Point::X * 1e300];
+    mesh.positions =
+        vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y, Point::splat(f64::NAN), Point::X * 1e300];
     add_facet(&mut mesh, [0, 1, 2, 3], 0);
     assert!(ask(&mesh, &[ray])[0].is_some());
     for odd in [[0, 0, 0, 0], [0, 1, 1, 0], [0, 1, 4, 3], [4, 4, 4, 4], [0, 1, 5, 3]] {

@@ -22,7 +22,7 @@ use glam::{UVec2, Vec3A};
 use obvhs::aabb::Aabb as Box32;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2, builder::build_bvh2_from_tris};
-use obvhs::cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh, builder::build_cwbvh_from_tris};
+use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris, bvh2_to_cwbvh::bvh2_to_cwbvh};
 use obvhs::ploc::PlocBuilder;
 use obvhs::ray::{Ray as Ray32, RayHit};
 use obvhs::rt_triangle::RtTriangle;
@@ -199,8 +199,9 @@ impl<'m> Bvh<'m> {
             if t.is_finite() { t } else { f32::MAX }
         };
         let mut ray32 = Ray32::new(origin, direction, 0.0, far(leave + self.pull));
-        ray32.inv_direction =
-            Vec3A::from_array(direction.to_array().map(|d| if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { 1.0 / d }));
+        ray32.inv_direction = Vec3A::from_array(
+            direction.to_array().map(|d| if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { 1.0 / d }),
+        );
         self.walk(ray32, cost, |_, id| {
             let before = best.t;
             facet_ray.test(self.codes[id] >> 1, &corners[id], &self.around, &mut best);
@@ -210,7 +211,12 @@ impl<'m> Bvh<'m> {
     }
 
     /// Walks the tree; the closure gives the f32 distance at which a leaf primitive is hit.
-    fn walk(&self, ray: Ray32, cost: &mut Cost, mut leaf: impl FnMut(&Ray32, usize) -> f32) -> (Option<usize>, f32) {
+    fn walk(
+        &self,
+        ray: Ray32,
+        cost: &mut Cost,
+        mut leaf: impl FnMut(&Ray32, usize) -> f32,
+    ) -> (Option<usize>, f32) {
         match &self.tree {
             Tree::Empty => (None, f32::INFINITY),
             Tree::Binary(tree) => {

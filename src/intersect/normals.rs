@@ -19,7 +19,8 @@ pub(crate) fn describe(mesh: &FacetMesh, hit: &FacetHit, mode: NormalMode) -> Hi
     let [a, b, c] = if hit.second { [0, 2, 3] } else { [0, 1, 2] };
     let flat = (corners[b] - corners[a]).cross(corners[c] - corners[a]).normalize_or_zero();
     let parameters = parameters(hit);
-    let weights = if facet.is_triangle() { [hit.b[0], hit.b[1], hit.b[2], 0.0] } else { bilinear_weights(parameters) };
+    let weights =
+        if facet.is_triangle() { [hit.b[0], hit.b[1], hit.b[2], 0.0] } else { bilinear_weights(parameters) };
     let smooth = || {
         let sum: Vector = vertices.iter().zip(weights).map(|(v, w)| v.normal * w).sum();
         sum.try_normalize().unwrap_or(flat)
@@ -116,17 +117,11 @@ fn triangle_patch(corners: &[Point; 4], vertices: &[MeshVertex; 4], b: [f64; 3])
     let p111 = edges + (edges - (p300 + p030 + p003) / 3.0) * 0.5;
     let [u, v, w] = b;
     // Partial derivatives of the homogeneous form, up to the common factor 3.
-    let d_u = p300 * (u * u)
-        + p120 * (v * v)
-        + p102 * (w * w)
-        + (p210 * (u * v) + p201 * (u * w) + p111 * (v * w)) * 2.0;
-    let d_v = p210 * (u * u)
-        + p030 * (v * v)
-        + p012 * (w * w)
-        + (p120 * (u * v) + p111 * (u * w) + p021 * (v * w)) * 2.0;
-    let d_w = p201 * (u * u)
-        + p021 * (v * v)
-        + p003 * (w * w)
-        + (p111 * (u * v) + p102 * (u * w) + p012 * (v * w)) * 2.0;
+    let d_u =
+        p300 * (u * u) + p120 * (v * v) + p102 * (w * w) + (p210 * (u * v) + p201 * (u * w) + p111 * (v * w)) * 2.0;
+    let d_v =
+        p210 * (u * u) + p030 * (v * v) + p012 * (w * w) + (p120 * (u * v) + p111 * (u * w) + p021 * (v * w)) * 2.0;
+    let d_w =
+        p201 * (u * u) + p021 * (v * v) + p003 * (w * w) + (p111 * (u * v) + p102 * (u * w) + p012 * (v * w)) * 2.0;
     (d_v - d_u).cross(d_w - d_u)
 }

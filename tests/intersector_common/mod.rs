@@ -143,7 +143,9 @@ pub fn joined(a: &FacetMesh, b: &FacetMesh) -> FacetMesh {
     let (p, v) = (a.positions.len() as u32, a.vertices.len() as u32);
     mesh.positions.extend(&b.positions);
     mesh.vertices.extend(b.vertices.iter().map(|x| MeshVertex { position: x.position + p, ..*x }));
-    mesh.facets.extend(b.facets.iter().map(|f| Facet { vertices: f.vertices.map(|k| k + v), face: FaceId(f.face.0 + 1000) }));
+    mesh.facets.extend(
+        b.facets.iter().map(|f| Facet { vertices: f.vertices.map(|k| k + v), face: FaceId(f.face.0 + 1000) }),
+    );
     mesh
 }
 

@@ -67,14 +67,10 @@ impl Lanes for Avx2 {
             let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, spread::<0x00>(late));
             let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, spread::<0x55>(late));
             let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, spread::<0xAA>(late));
-            let enter = _mm256_max_ps(
-                _mm256_max_ps(enter_x, enter_y),
-                _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)),
-            );
-            let leave = _mm256_min_ps(
-                _mm256_min_ps(leave_x, leave_y),
-                _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)),
-            );
+            let enter =
+                _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
+            let leave =
+                _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
             let leave = _mm256_mul_ps(leave, _mm256_set1_ps(1.0 + 5e-7));
             let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32;
             let mut out = [0f32; 8];

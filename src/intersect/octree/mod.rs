@@ -14,6 +14,8 @@
 //! single ray and a batch, for any number of threads at build or query, with and without AVX2.
 //! Weakness: facets with corners that are no finite numbers are left out; building takes longer than Embree's.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod build;
 mod clip;
 mod engine;
@@ -21,8 +23,6 @@ mod flatten;
 mod node;
 mod pack;
 mod portable;
-#[cfg(target_arch = "x86_64")]
-mod avx2;
 mod state;
 mod statistics;
 

@@ -117,8 +117,7 @@ impl Block {
         let origin = low.to_array().map(down);
         let largest = (0..3).map(|a| high[a] - f64::from(origin[a])).fold(0.0, f64::max);
         let step = ((largest / 65535.0 * (1.0 + 1e-6)) as f32).max(1e-30);
-        let mut block =
-            Self { corners: [[0; 8]; 6], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
+        let mut block = Self { corners: [[0; 8]; 6], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
         for (lane, (facet, positions, corners)) in facets.iter().enumerate() {
             block.facets[lane] = *facet;
             block.positions[lane] = *positions;
