@@ -261,9 +261,9 @@ fn odd_meshes_do_no_harm() {
     let ray = Ray::new(Point::new(0.2, 0.1, 5.0), -Vector::Z);
     assert_eq!(ask(&FacetMesh::default(), &[ray]), [None]);
     // One facet; a point; a line; corners at infinity; a fan of thousands at one vertex.
-    let mut mesh = FacetMesh::default();
-    mesh.positions =
-        vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y, Point::splat(f64::NAN), Point::X * 1e300];
+    let far = Point::X * 1e300;
+    let positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y, Point::splat(f64::NAN), far];
+    let mut mesh = FacetMesh { positions, ..FacetMesh::default() };
     add_facet(&mut mesh, [0, 1, 2, 3], 0);
     assert!(ask(&mesh, &[ray])[0].is_some());
     for odd in [[0, 0, 0, 0], [0, 1, 1, 0], [0, 1, 4, 3], [4, 4, 4, 4], [0, 1, 5, 3]] {
