@@ -30,8 +30,18 @@ fn main() {
                 "{{\"scene\":\"{name}\",\"intersector\":\"{label}\",\"threads\":{threads},\"rays\":{},\"mrays_per_s\":{:.3},\
                  \"msegments_per_s\":{:.3},\"segments_per_ray\":{:.4},\"power\":{:.6},\"power_error\":{:.6},\"rms\":{:?},\
                  \"centroid\":{:?},\"centre_cell\":{:.5e},\"corrected\":{},\"lost\":{},\"digest\":\"{}\"}}",
-                r.rays, r.mrays_per_s, r.msegments_per_s, r.segments as f64 / r.rays as f64, w.power, w.power_error, w.rms,
-                w.centroid, w.cell(99, 99).max(w.cell(100, 100)) * w.half[0] * w.half[1] * 1e-10 , r.corrected_normals, r.lost_rays, r.digest
+                r.rays,
+                r.mrays_per_s,
+                r.msegments_per_s,
+                r.segments as f64 / r.rays as f64,
+                w.power,
+                w.power_error,
+                w.rms,
+                w.centroid,
+                w.cell(99, 99).max(w.cell(100, 100)) * w.half[0] * w.half[1] * 1e-10,
+                r.corrected_normals,
+                r.lost_rays,
+                r.digest
             );
         }
     }

@@ -57,7 +57,7 @@ fn s1_lens() {
     near("RMS radius", two.rms[0].hypot(two.rms[1]), 0.800607, 1e-5);
     near("largest radius", two.farthest, 1.642676, 2e-3);
     // The marginal ray in closed form: 15 - (107.026853 - z)·tan(asin(n·15/R) - asin(15/R)).
-    assert!(two.farthest < 1.642677 + 1e-6 && focus.power > two.power);
+    assert!(two.farthest < 1.6426797 && focus.power > two.power);
 }
 
 /// S2: power 0.75595 ± 0.0001, RMS 465.2 and 510.7 mm, centroid (1.0, 17.4), 3.694 segments a ray.
@@ -81,7 +81,8 @@ fn s2_lamp_to_more_digits() {
     let r = lampyris::simulate::simulate(&case.bound, &case.exact, &settings, &|_| true);
     let wall = &r.receivers[0];
     let cell = 1e-6 * 100.0 * 100.0;
-    let centre: Vec<f64> = [(99, 99), (100, 99), (99, 100), (100, 100)].iter().map(|&(i, j)| wall.cell(i, j) * cell).collect();
+    let centre: Vec<f64> =
+        [(99, 99), (100, 99), (99, 100), (100, 100)].iter().map(|&(i, j)| wall.cell(i, j) * cell).collect();
     near("centre cell", centre.iter().sum::<f64>() / 4.0, 1.097e-2, 2e-4);
     near("power", wall.power, 0.75595, 1e-4 + 3.0 * wall.power_error);
     // Eight seeds of half a million rays scatter by 2.4 and 5 mm.
@@ -93,7 +94,9 @@ fn s2_lamp_to_more_digits() {
 #[test]
 fn s3_reflector() {
     let counted = |n: u32| {
-        format!("[[receiver]]\nname = 'after {n}'\nat = [0, 0, 1000]\nsize = [2000, 2000]\nabsorbs = false\ninteractions = {n}\n")
+        format!(
+            "[[receiver]]\nname = 'after {n}'\nat = [0, 0, 1000]\nsize = [2000, 2000]\nabsorbs = false\ninteractions = {n}\n"
+        )
     };
     let case = case("s3_reflector.toml", &(counted(0) + &counted(1)));
     let r = case.run(|s| s.rays = 100_000);

@@ -15,7 +15,9 @@ const ALL: &str = "[[receiver]]\nname = 'all'\nkind = 'far_field'\nh_deg = [-180
 fn a_shining_sphere_shines_evenly() {
     let mut world = World::default();
     world.sphere("bulb", Point::new(3.0, 0.0, 0.0), 5.0);
-    let text = format!("[run]\nrays = 100_000\n[[source]]\nkind = 'lambertian'\npower = 12\non = {{ part = 'bulb' }}\n{ALL}");
+    let text = format!(
+        "[run]\nrays = 100_000\n[[source]]\nkind = 'lambertian'\npower = 12\non = {{ part = 'bulb' }}\n{ALL}"
+    );
     let r = &world.run(&text, |_| ());
     assert_eq!(r.segments, r.rays, "no ray hits the sphere it leaves");
     for (cell, error) in r.receivers[0].cells.iter().zip(&r.receivers[0].errors) {
@@ -29,7 +31,9 @@ fn a_shining_face_of_a_box() {
     let mut world = World::default();
     world.cuboid("led", Point::new(-2.0, -1.0, 0.0), Point::new(2.0, 1.0, 0.3));
     let screen = "[[receiver]]\nname = 'near'\nat = [0, 0, 0.31]\nsize = [10, 10]\ncells = [10, 10]\n";
-    let text = format!("[run]\nrays = 50_000\n[[source]]\nkind = 'cosine'\nexponent = 1\non = {{ part = 'led', face = 'z1' }}\n{screen}{ALL}");
+    let text = format!(
+        "[run]\nrays = 50_000\n[[source]]\nkind = 'cosine'\nexponent = 1\non = {{ part = 'led', face = 'z1' }}\n{screen}{ALL}"
+    );
     let r = world.run(&text, |_| ());
     assert_eq!(r.power.absorbed, 0.0);
     // 0.01 mm above the face the light is still where it left: RMS of an even 4 × 2 rectangle is 2/√3 and 1/√3.
@@ -50,7 +54,8 @@ fn ray_lists_are_drawn_by_power() {
     let (csv, data) = (folder.path().join("rays.csv"), folder.path().join("rays.txt"));
     write_rays(&csv, &rays).unwrap();
     write_data1(&data, &rays).unwrap();
-    let screen = "[[receiver]]\nname = 'x'\nat = [0, 0, 20]\nsize = [10, 10]\ncells = [1, 1]\nbins_nm = [400, 600, 700]\n";
+    let screen =
+        "[[receiver]]\nname = 'x'\nat = [0, 0, 20]\nsize = [10, 10]\ncells = [1, 1]\nbins_nm = [400, 600, 700]\n";
     for (file, kind) in [(&csv, "rays"), (&data, "data_1")] {
         let source = format!("[[source]]\nkind = '{kind}'\nfile = '{}'\nat = [0, 0, 5]\n", file.display());
         let r = World::default().run(&format!("[run]\nrays = 4000\n{source}{screen}"), |_| ());
@@ -105,7 +110,8 @@ fn stated_errors_are_honest() {
     // Power on a rectangle from a Lambertian point: (1/2π) Σ edges γ (e·n), the exact form factor of a polygon.
     let truth = {
         let p = Vector::new(0.3, 0.1, -20.0);
-        let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]].map(|[x, y]| (Vector::new(x, y, -10.0) - p).normalize());
+        let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]
+            .map(|[x, y]| (Vector::new(x, y, -10.0) - p).normalize());
         let edge = |i: usize| {
             let (a, b) = (corners[i], corners[(i + 1) % 4]);
             a.cross(b).normalize().z * a.dot(b).acos()

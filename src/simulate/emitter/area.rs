@@ -67,7 +67,8 @@ impl Area {
         let mut last = None;
         // A face of which less than 1/1000 lies inside its trims would be a sliver.
         for attempt in 0..10_000 {
-            let [u, v] = if attempt == 0 { stream.pair(ticket, 0) } else { stream.random(ticket, 2 * attempt + 10) };
+            let [u, v] =
+                if attempt == 0 { stream.pair(ticket, 0) } else { stream.random(ticket, 2 * attempt + 10) };
             let at = u * whole;
             let cell = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);
             let low = if cell == 0 { 0.0 } else { self.sums[cell - 1] };

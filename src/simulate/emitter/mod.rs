@@ -7,14 +7,14 @@ mod stream;
 use super::bind::{Body, Light};
 use super::scene::{self, Scene, SourceKind};
 use super::{Error, ErrorKind};
-pub(crate) use area::Area;
-pub(crate) use file::{Loaded, load};
-pub(crate) use stream::{Stream, Ticket};
 use crate::formats::PhotometricType;
 use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::{IntensitySampler, Spectrum, Wavelengths};
+pub(crate) use area::Area;
+pub(crate) use file::{Loaded, load};
 use smallvec::SmallVec;
 use std::f64::consts::TAU;
+pub(crate) use stream::{Stream, Ticket};
 
 /// A source ready to emit.
 #[derive(Clone, Debug)]

@@ -22,7 +22,13 @@ pub(crate) struct Ticket {
 }
 
 impl Stream {
-    pub(crate) fn new(seed: u64, sampling: Sampling, [replicate, replicates]: [u32; 2], source: u32, rays: u64) -> Self {
+    pub(crate) fn new(
+        seed: u64,
+        sampling: Sampling,
+        [replicate, replicates]: [u32; 2],
+        source: u32,
+        rays: u64,
+    ) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
@@ -36,7 +42,8 @@ impl Stream {
             Sampling::Random => self.random(ticket, pair),
             Sampling::Sobol => {
                 let number = |d: usize| {
-                    (f64::from(random::scrambled(ticket.index, d, self.scrambles[d])) + 0.5) * (1.0 / 4_294_967_296.0)
+                    (f64::from(random::scrambled(ticket.index, d, self.scrambles[d])) + 0.5)
+                        * (1.0 / 4_294_967_296.0)
                 };
                 let d = 2 * pair as usize;
                 [number(d), number(d + 1)]

@@ -110,7 +110,8 @@ impl Source {
         let from_file =
             matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat | SourceKind::Rays | SourceKind::Data1);
         if from_file != self.file.is_some() {
-            let message = if from_file { "this kind of source needs `file`" } else { "`file` belongs to another kind" };
+            let message =
+                if from_file { "this kind of source needs `file`" } else { "`file` belongs to another kind" };
             return fail("file", message.into());
         }
         if self.on.is_some() && from_file {
