@@ -68,29 +68,8 @@ pub(crate) enum Command {
         meshing: Meshing,
         #[command(flatten)]
         tracing: Tracing,
-        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
-        accuracy: Option<String>,
-        /// Trace only part I of N (I from 1)
-        #[arg(long, value_name = "I/N")]
-        shard: Option<String>,
-        /// Go on where an interrupted run stopped
-        #[arg(long)]
-        resume: bool,
-        /// Trace until the statistical error of a receiver is below P percent
-        #[arg(long, value_name = "P%@RECEIVER")]
-        until_error: Option<String>,
-        /// Run the full kernel too and compare every tally bit by bit
-        #[arg(long)]
-        verify_pruning: bool,
-        /// Read, check and tessellate, say what would be done, trace nothing
-        #[arg(long)]
-        dry_run: bool,
-        /// Largest share of energy that may be lost before the exit code becomes 4
-        #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
-        max_lost: f64,
         #[command(flatten)]
-        limits: Refusals,
+        extra: Box<TraceOptions>,
     },
     /// Compare octree, BVH and exact spline ray by ray
     Check {
@@ -150,6 +129,34 @@ pub(crate) enum Command {
     },
 }
 
+/// Options of `trace` alone.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct TraceOptions {
+    /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+    #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+    pub(crate) accuracy: Option<String>,
+    /// Trace only part I of N (I from 1)
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<String>,
+    /// Go on where an interrupted run stopped
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Trace until the statistical error of a receiver is below P percent
+    #[arg(long, value_name = "P%@RECEIVER")]
+    pub(crate) until_error: Option<String>,
+    /// Run the full kernel too and compare every tally bit by bit
+    #[arg(long)]
+    pub(crate) verify_pruning: bool,
+    /// Read, check and tessellate, say what would be done, trace nothing
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// Largest share of energy that may be lost before the exit code becomes 4
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
+    pub(crate) max_lost: f64,
+    #[command(flatten)]
+    pub(crate) limits: Refusals,
+}
+
 /// What of a model may be missing.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct Refusals {
@@ -184,23 +191,6 @@ impl StudyKind {
             Self::Stability => "stability",
             Self::Bvh => "bvh",
             Self::Effects => "effects",
-        }
-    }
-}
-
-impl Command {
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Demo { .. } => "demo",
-            Self::Info { .. } => "info",
-            Self::Facet { .. } => "facet",
-            Self::Trace { .. } => "trace",
-            Self::Check { .. } => "check",
-            Self::Study { .. } => "study",
-            Self::Merge { .. } => "merge",
-            Self::Schema => "schema",
-            Self::Completions { .. } => "completions",
-            Self::Man { .. } => "man",
         }
     }
 }

@@ -41,13 +41,6 @@ impl Context {
         }
     }
 
-    /// A message that only `-v` shows.
-    pub(crate) fn detail(&self, message: impl std::fmt::Display) {
-        if self.verbose > 0 {
-            self.say(message);
-        }
-    }
-
     /// Emphasis, where the terminal has it.
     pub(crate) fn strong(&self, text: &str) -> String {
         if self.colour { format!("\x1b[1m{text}\x1b[0m") } else { text.to_owned() }

@@ -2,10 +2,11 @@
 
 use super::context::{Context, print};
 use super::job::{self, Job};
+use super::load::Loaded;
 use super::options::{Meshing, Tracing};
 use super::{Failure, Outcome, load, trace};
 use crate::report::{figures, grouped, seconds};
-use crate::simulate::{KernelChoice, Scene};
+use crate::simulate::Scene;
 use crate::step;
 use std::path::Path;
 
@@ -18,25 +19,27 @@ const SCENE: &str = include_str!("../../fixtures/scenes/demo.toml");
 /// (Mitsuba 3.9, 2e7 rays).
 const ELSEWHERE: [f64; 2] = [0.75595, 3.694];
 
-pub(super) fn run(folder: &Path, meshing: &Meshing, tracing: &Tracing, context: &Context) -> Result<Outcome, Failure> {
+pub(super) fn run(
+    folder: &Path,
+    meshing: &Meshing,
+    tracing: &Tracing,
+    context: &Context,
+) -> Result<Outcome, Failure> {
     context.say(context.strong("lampyris demo: a three-cavity lamp, from its STEP file to its light"));
-    let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
-    let loaded = load::scene_models(&scene, |_| {
-        Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?)
-    })?;
+    let (scene, loaded) = lamp()?;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let step_of = |name: &str, what: String, time: f64| {
         context.say(format_args!("  {name:<12} {what:<58} {:>9}", seconds(time)));
     };
     step_of("read", format!("{faces} faces of {} parts", loaded.model.parts.len()), loaded.seconds);
-    let job = Job { scene: &scene, loaded: &loaded, meshing, tracing, photometric: true, recheck: 10_000 };
+    let job = Job { scene: &scene, loaded: &loaded, meshing, tracing, recheck: 10_000 };
     let prepared = job::prepare(job, context)?;
     let mesh = &prepared.tessellation.mesh;
     let [low, high] = prepared.mesh_settings.tolerance;
     let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
     step_of("tessellate", what, prepared.seconds);
     let start = std::time::Instant::now();
-    let mut outcome = prepared.trace(KernelChoice::Pruned, context);
+    let mut outcome = prepared.trace(false, context);
     let both = start.elapsed().as_secs_f64();
     let (s, r) = (outcome.results.seconds, &outcome.results);
     step_of("build", format!("the {}", prepared.choice.intersector), s.build);
@@ -56,6 +59,15 @@ pub(super) fn run(folder: &Path, meshing: &Meshing, tracing: &Tracing, context: 
         trace::closing(&report.answer, folder, &outcome.results, context);
     }
     Ok(Outcome::Done)
+}
+
+/// The built-in lamp with its scene.
+pub(super) fn lamp() -> Result<(Scene, Loaded), Failure> {
+    let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
+    let loaded = load::scene_models(&scene, |_| {
+        Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?)
+    })?;
+    Ok((scene, loaded))
 }
 
 /// How the run compares with what other programs found.

@@ -1,8 +1,8 @@
 //! From options to facets and intersectors.
 
+use super::Failure;
 use super::context::Context;
 use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
-use super::Failure;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
@@ -25,7 +25,11 @@ impl Choice {
     /// The options, else the scene, else octree and bilinear.
     pub(super) fn new(tracing: &Tracing, scene: Option<&Scene>) -> Result<Self, Failure> {
         use clap::ValueEnum;
-        fn named<T: ValueEnum + Default>(asked: Option<T>, scene: Option<&String>, key: &str) -> Result<T, Failure> {
+        fn named<T: ValueEnum + Default>(
+            asked: Option<T>,
+            scene: Option<&String>,
+            key: &str,
+        ) -> Result<T, Failure> {
             match (asked, scene) {
                 (Some(x), _) => Ok(x),
                 (None, Some(name)) => T::from_str(name, true).map_err(|_| {
@@ -40,11 +44,7 @@ impl Choice {
         }
         let accuracy = scene.map(|s| &s.accuracy);
         Ok(Self {
-            intersector: named(
-                tracing.intersector,
-                accuracy.and_then(|a| a.intersector.as_ref()),
-                "intersector",
-            )?,
+            intersector: named(tracing.intersector, accuracy.and_then(|a| a.intersector.as_ref()), "intersector")?,
             normals: named(tracing.normals, accuracy.and_then(|a| a.normals.as_ref()), "normals")?,
         })
     }

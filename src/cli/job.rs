@@ -6,11 +6,13 @@ use super::load::Loaded;
 use super::options::{Meshing, Tracing};
 use super::witness::Witness;
 use super::{Failure, look};
-use crate::formats::{Polylines, write_facets, write_grid_csv, write_grid_npz, write_grid_png, write_vti, write_vtp};
+use crate::formats::{
+    Polylines, write_facets, write_grid_csv, write_grid_npz, write_grid_png, write_vti, write_vtp,
+};
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::Exact;
 use crate::report::{Cell, Light, Report, Table, file_stem, path_lines, receiver_grid};
-use crate::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};
+use crate::simulate::{BoundScene, Results, RunSettings, Scene, Verification, simulate, verify_pruning};
 use crate::study::check::{self, Check, Court, check};
 use crate::tessellate::{self, Tessellation};
 use std::path::{Path, PathBuf};
@@ -21,8 +23,6 @@ pub(super) struct Job<'a> {
     pub(super) loaded: &'a Loaded,
     pub(super) meshing: &'a Meshing,
     pub(super) tracing: &'a Tracing,
-    /// Whether the powers of the sources are lumens.
-    pub(super) photometric: bool,
     /// Rays of the run to ask again of BVH and spline; 0 for none.
     pub(super) recheck: usize,
 }
@@ -42,6 +42,8 @@ pub(super) struct Prepared<'a> {
 pub(super) struct Outcome {
     pub(super) results: Results,
     pub(super) check: Option<Check>,
+    /// The pruned kernel against the full one, when asked for.
+    pub(super) verification: Option<Verification>,
 }
 
 /// Binds the scene (so that its mistakes come before any work) and makes the facets.
@@ -65,10 +67,10 @@ impl Prepared<'_> {
         settings
     }
 
-    /// Traces the scene, and asks a sample of its rays again.
-    pub(super) fn trace(&self, kernel: KernelChoice, context: &Context) -> Outcome {
+    /// Traces the scene (with the full kernel too, when `verify`), and asks a sample of its rays again.
+    pub(super) fn trace(&self, verify: bool, context: &Context) -> Outcome {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
-        let settings = RunSettings { kernel, ..self.run_settings() };
+        let settings = self.run_settings();
         engine::with_intersector(self.choice, model, mesh, context, |intersector, footprint| {
             // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
             let witness = Witness::new(intersector, self.job.recheck as u64, 4 * settings.rays);
@@ -80,18 +82,33 @@ impl Prepared<'_> {
             };
             let asked: &dyn crate::intersect::Intersector =
                 if self.job.recheck > 0 { &witness } else { intersector };
-            let mut results = simulate(&self.bound, asked, &settings, &progress);
+            let (mut results, verification) = if verify {
+                let (results, verification) = verify_pruning(&self.bound, asked, &settings, &progress);
+                (results, Some(verification))
+            } else {
+                (simulate(&self.bound, asked, &settings, &progress), None)
+            };
             bar.finish_and_clear();
+            for absorbed in &mut results.absorbed {
+                if let Some(k) = model.instances.iter().position(|i| i.name == absorbed.name) {
+                    absorbed.name = look::shown_name(model, k);
+                }
+            }
             results.seconds.read = self.job.loaded.seconds;
             results.seconds.tessellate = self.seconds;
             results.seconds.build = footprint.build_seconds;
             let rays = witness.rays(self.job.recheck, mesh, 4.0 * self.mesh_settings.tolerance[1]);
             let check = (!rays.is_empty()).then(|| self.court(intersector, &rays, context));
-            Outcome { results, check }
+            Outcome { results, check, verification }
         })
     }
 
-    fn court(&self, octree: &dyn crate::intersect::Intersector, rays: &Vec<crate::math::Ray>, context: &Context) -> Check {
+    fn court(
+        &self,
+        octree: &dyn crate::intersect::Intersector,
+        rays: &Vec<crate::math::Ray>,
+        context: &Context,
+    ) -> Check {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let spinner = context.spinner("building BVH and spline for the cross-check");
         let bvh = Bvh::build(mesh, &Default::default());
@@ -119,17 +136,12 @@ impl Prepared<'_> {
         let spinner = context.spinner("writing");
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
-        let photometric = self.job.photometric;
         for receiver in &mut outcome.results.receivers {
-            let Some(grid) = receiver_grid(receiver, photometric) else { continue };
+            let Some(grid) = receiver_grid(receiver) else { continue };
             let stem = file_stem(&receiver.name);
             type Writer = fn(&Path, &crate::formats::Grid) -> Result<(), crate::formats::Error>;
-            let writers: [(&str, Writer); 4] = [
-                ("csv", write_grid_csv),
-                ("npz", write_grid_npz),
-                ("png", write_grid_png),
-                ("vti", write_vti),
-            ];
+            let writers: [(&str, Writer); 4] =
+                [("csv", write_grid_csv), ("npz", write_grid_npz), ("png", write_grid_png), ("vti", write_vti)];
             for (extension, write) in writers {
                 let name = format!("{stem}.{extension}");
                 write(&folder.join(&name), &grid)?;
@@ -146,6 +158,9 @@ impl Prepared<'_> {
         write_facets(&folder.join("facets.glb"), &facets)?;
         facets.paths = None;
         let mut document = serde_json::to_value(&outcome.results).map_err(|e| Failure::running(e.to_string()))?;
+        if let Some(v) = &outcome.verification {
+            document["pruning"] = serde_json::to_value(v).map_err(|e| Failure::running(e.to_string()))?;
+        }
         if let Some(check) = &outcome.check {
             document["check"] = serde_json::to_value(check).map_err(|e| Failure::running(e.to_string()))?;
         }
@@ -161,7 +176,10 @@ impl Prepared<'_> {
             title,
             results: &outcome.results,
             facets: &facets,
-            photometric,
+            unit: match self.job.scene.run.unit {
+                crate::simulate::scene::PowerUnit::Lumen => "lm",
+                _ => "W",
+            },
             check: outcome.check.as_ref(),
             tables: self.tables(),
             comparison,

@@ -3,16 +3,27 @@
 //! Data goes to stdout, messages and progress to stderr. Progress appears on a terminal alone, `NO_COLOR` is respected, and
 //! `--json` prints exactly one document. Known weakness: a broken pipe on stdout ends the command with code 1.
 
-#![allow(dead_code)]
-
+mod aim;
 mod args;
+mod check;
 mod context;
+mod demo;
+mod engine;
+mod facet;
 mod failure;
 mod info;
+mod job;
 mod load;
+mod look;
 mod machine;
 mod meta;
 mod options;
+mod race;
+mod study;
+mod suggest;
+mod trace;
+mod witness;
+mod workshop;
 
 use args::{Arguments, Command};
 use clap::Parser;
@@ -55,10 +66,41 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
     match command {
+        Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, context),
         Command::Info { file, limits } => info::run(&file, limits, context),
+        Command::Facet { file, output, meshing, accuracy, threads, limits } => {
+            let accuracy = accuracy.as_deref();
+            let asked = facet::Asked { file: &file, output: &output, meshing: &meshing, accuracy, threads, limits };
+            facet::run(&asked, context)
+        }
+        Command::Trace { scene, output, meshing, tracing, extra } => {
+            trace::run(&scene, &output, &meshing, &tracing, &extra, context)
+        }
+        Command::Check { file, meshing, tracing, accuracy, rays_out, rays_in, limits } => {
+            let asked = check::Asked {
+                file: &file,
+                meshing: &meshing,
+                tracing: &tracing,
+                accuracy: accuracy.as_deref(),
+                rays_out: rays_out.as_ref(),
+                rays_in: rays_in.as_ref(),
+                limits,
+            };
+            check::run(&asked, context)
+        }
+        Command::Study { kind, file, output, meshing, tracing } => {
+            let (file, output) = (file.as_deref(), output.as_ref());
+            study::run(&study::Asked { kind, file, output, meshing: &meshing, tracing: &tracing }, context)
+        }
+        Command::Merge { .. } => Err(reserved("merge")),
         Command::Schema => meta::schema(),
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), context),
-        other => Err(Failure::running(format!("'{}' is not built yet", other.name()))),
     }
+}
+
+/// A name of the contract that waits for its work.
+fn reserved(name: &str) -> Failure {
+    Failure::arguments(format!("'{name}' is a reserved name: it does nothing in this version"))
+        .help("leave it out; see `lampyris --help` for what works today")
 }

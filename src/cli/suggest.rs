@@ -8,7 +8,8 @@ pub(super) fn names(intro: &str, given: &str, known: &[&str]) -> String {
             unique.push(name);
         }
     }
-    let close = unique.iter().map(|n| (distance(given, n), *n)).min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
+    let close =
+        unique.iter().map(|n| (distance(given, n), *n)).min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
     let shown = unique.iter().take(20).copied().collect::<Vec<_>>().join(", ");
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
     match close {
@@ -42,7 +43,10 @@ mod tests {
     #[test]
     fn the_nearest_name_comes_first() {
         assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(names("parts:", "huosing", &["cover", "housing", "cover"]), "did you mean \"housing\"? parts: cover, housing");
+        assert_eq!(
+            names("parts:", "huosing", &["cover", "housing", "cover"]),
+            "did you mean \"housing\"? parts: cover, housing"
+        );
         assert_eq!(names("parts:", "xyz", &["cover"]), "parts: cover");
     }
 }

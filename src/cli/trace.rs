@@ -1,26 +1,13 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::args::Refusals;
+use super::args::TraceOptions;
 use super::context::{Context, print};
 use super::job::{self, Job, Prepared};
 use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, load};
+use super::{Failure, Outcome, aim, load};
 use crate::report::{bytes, figures, grouped, seconds};
-use crate::simulate::KernelChoice;
 use serde_json::json;
 use std::path::Path;
-
-/// Options of `trace` beside those that others share.
-pub(super) struct Extra {
-    pub(super) accuracy: Option<String>,
-    pub(super) shard: Option<String>,
-    pub(super) resume: bool,
-    pub(super) until_error: Option<String>,
-    pub(super) verify_pruning: bool,
-    pub(super) dry_run: bool,
-    pub(super) max_lost: f64,
-    pub(super) limits: Refusals,
-}
 
 /// Rays of a run that are asked again of BVH and spline.
 const RECHECKED: usize = 10_000;
@@ -30,7 +17,7 @@ pub(super) fn run(
     folder: &Path,
     meshing: &Meshing,
     tracing: &Tracing,
-    extra: &Extra,
+    extra: &TraceOptions,
     context: &Context,
 ) -> Result<Outcome, Failure> {
     for (given, name) in [
@@ -43,23 +30,30 @@ pub(super) fn run(
         }
     }
     let (scene, loaded) = load::scene_file(path, context)?;
-    let meshing = super::aim::meshing(extra.accuracy.as_deref(), meshing, tracing, &loaded.model, context)?;
-    let (meshing, tracing) = (&meshing.0, &meshing.1);
-    let job =
-        Job { scene: &scene, loaded: &loaded, meshing, tracing, photometric: false, recheck: RECHECKED };
+    let (meshing, tracing) = aim::meshing(extra.accuracy.as_deref(), meshing, tracing, &loaded.model, context)?;
+    let job = Job { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, recheck: RECHECKED };
     let prepared = job::prepare(job, context)?;
     if extra.dry_run {
         return dry_run(&prepared, folder, context);
     }
     let refused = load::account(&loaded.reports, extra.limits.max_refused, context);
-    let mut outcome = prepared.trace(KernelChoice::Pruned, context);
-    if extra.verify_pruning {
-        let full = prepared.trace(KernelChoice::Full, context);
-        if full.results.digest != outcome.results.digest {
-            let failure = Failure::running("the full kernel gives other tallies than the pruned one: a defect of lampyris");
-            return Err(failure.help("please report the scene; results were not written"));
+    let mut outcome = prepared.trace(extra.verify_pruning, context);
+    if let Some(v) = &outcome.verification {
+        if !v.identical {
+            let message = format!(
+                "the {} kernel gives other tallies than the {} one: a defect of lampyris",
+                v.full, v.pruned
+            );
+            return Err(Failure::running(message)
+                .help(format!("nothing was written; what differs: {}", v.differing.join(", "))));
         }
-        context.say("the full kernel gives the same tallies, bit by bit");
+        context.say(format_args!(
+            "the {} kernel ({}) gives the same tallies as the {} one ({}), bit by bit",
+            v.full,
+            seconds(v.seconds_full),
+            v.pruned,
+            seconds(v.seconds_pruned)
+        ));
     }
     let (document, report) = prepared.write(folder, &mut outcome, Vec::new(), context)?;
     if context.json {
@@ -99,7 +93,7 @@ fn dry_run(prepared: &Prepared, folder: &Path, context: &Context) -> Result<Outc
     let settings = prepared.run_settings();
     let mesh = &prepared.tessellation.mesh;
     let faces: usize = prepared.job.loaded.reports.iter().map(|r| r.faces.converted).sum();
-    let effects = crate::simulate::required(&prepared.bound);
+    let effects = crate::simulate::Required::by(&prepared.bound);
     if context.json {
         let document = json!({"dry_run": true, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),

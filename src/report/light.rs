@@ -1,6 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
-use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View, figures, grouped, seconds};
+use super::{AxisStyle, Block, Cell, Chart, Provenance, Report, Section, Series, SeriesStyle, Table, View};
+use super::{figures, grouped, seconds};
 use crate::formats::{Axis, Facets, Grid, Polylines};
 use crate::math::Vector;
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
@@ -14,8 +15,8 @@ pub struct Light<'a> {
     pub results: &'a Results,
     /// The traced facets in their groups.
     pub facets: &'a Facets<'a>,
-    /// Whether the powers of the sources are lumens.
-    pub photometric: bool,
+    /// Unit of powers: `W` or `lm`.
+    pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
     pub check: Option<&'a Check>,
     /// More tables: of the model, of the facets.
@@ -27,7 +28,7 @@ pub struct Light<'a> {
 }
 
 /// The cells of a receiver with their axes; `None` for a receiver that has one number only.
-pub fn receiver_grid(r: &ReceiverResult, photometric: bool) -> Option<Grid> {
+pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
     if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
         return None;
     }
@@ -42,16 +43,16 @@ pub fn receiver_grid(r: &ReceiverResult, photometric: bool) -> Option<Grid> {
         range: [r.middle[k] - r.half[k], r.middle[k] + r.half[k]],
         cells: r.grid[k],
     };
-    let (quantity, unit) = match (r.kind, photometric) {
-        ("far_field", true) => ("luminous intensity", "cd"),
-        ("far_field", false) => ("radiant intensity", r.unit),
-        (_, true) => ("illuminance", "lx"),
-        (_, false) => ("irradiance", r.unit),
+    let quantity = match r.unit {
+        "cd" => "luminous intensity",
+        "W/sr" => "radiant intensity",
+        "lx" => "illuminance",
+        _ => "irradiance",
     };
     Some(Grid {
         name: r.name.clone(),
         quantity: quantity.into(),
-        unit: unit.into(),
+        unit: r.unit.into(),
         axes: [axis(0), axis(1)],
         values: r.cells.clone(),
         error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
@@ -82,10 +83,6 @@ fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, mos
 }
 
 impl Light<'_> {
-    fn unit(&self) -> &'static str {
-        if self.photometric { "lm" } else { "W" }
-    }
-
     fn share(&self, power: f64) -> String {
         format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
     }
@@ -93,15 +90,13 @@ impl Light<'_> {
     /// The answer in a paragraph.
     pub fn answer(&self) -> String {
         let r = self.results;
-        let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit());
+        let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
         let parts: Vec<String> = (r.receivers.iter())
             .map(|x| format!("**{}** ({}) meet {}", self.share(x.power), figures(x.power, 4), spoken(&x.name)))
             .collect();
         text += &if parts.is_empty() { "no receiver counts any".into() } else { parts.join(", ") };
         text += ". ";
-        for grid in
-            r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(|x| receiver_grid(x, self.photometric))
-        {
+        for grid in r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(receiver_grid) {
             if let Some(([h, v], peak)) = grid.peak() {
                 text += &format!(
                     "The brightest direction is {} = {}°, {} = {}° with **{} {}**. ",
@@ -141,9 +136,8 @@ impl Light<'_> {
 
     fn light(&self) -> Section {
         let mut section = Section::new("Light");
-        let mut maps: Vec<(&ReceiverResult, Grid)> = (self.results.receivers.iter())
-            .filter_map(|r| Some((r, receiver_grid(r, self.photometric)?)))
-            .collect();
+        let mut maps: Vec<(&ReceiverResult, Grid)> =
+            (self.results.receivers.iter()).filter_map(|r| Some((r, receiver_grid(r)?))).collect();
         // Directions first: what a lamp is judged by.
         maps.sort_by_key(|(r, _)| r.kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
@@ -160,11 +154,13 @@ impl Light<'_> {
         );
         for (r, grid) in maps {
             let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
-            let chart = Chart::map(&file_stem(&r.name), &title, &reading(r, &grid), grid);
-            section = section.with(chart);
-            if let Some(view) = view.take() {
-                section = section.with(view);
-            }
+            let cuts = cuts(r, &grid);
+            section = section.with(Chart::map(&file_stem(&r.name), &title, &reading(r, &grid), grid));
+            // The first map stands beside the facets, others beside their cuts.
+            section = match view.take() {
+                Some(view) => section.with(view).with(cuts),
+                None => section.with(cuts),
+            };
         }
         if let Some(view) = view {
             section = section.with(view);
@@ -177,7 +173,7 @@ impl Light<'_> {
 
     fn energy(&self) -> Section {
         let p = &self.results.power;
-        let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit()), ("share", "%")])
+        let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit), ("share", "%")])
             .caption(format!(
                 "Emitted is the sum of the others to {} of it. Received counts receivers that end light; one that lets it pass \
                  counts it again.",
@@ -196,8 +192,8 @@ impl Light<'_> {
         row("lost", p.lost);
         let columns = [
             ("receiver", ""),
-            ("power", self.unit()),
-            ("± (1σ)", self.unit()),
+            ("power", self.unit),
+            ("± (1σ)", self.unit),
             ("largest", ""),
             ("unit", ""),
             ("mean position 1", "mm or °"),
@@ -207,13 +203,12 @@ impl Light<'_> {
         ];
         let mut receivers = Table::new("receivers", "Receivers", &columns);
         for r in &self.results.receivers {
-            let unit = receiver_grid(r, self.photometric).map_or(r.unit.to_owned(), |g| g.unit);
             receivers.row([
                 r.name.as_str().into(),
                 Cell::Number(r.power, 6),
                 Cell::Number(r.power_error, 2),
                 r.max.into(),
-                unit.into(),
+                r.unit.into(),
                 r.centroid[0].into(),
                 r.centroid[1].into(),
                 r.rms[0].into(),
@@ -328,6 +323,27 @@ pub fn verdict(check: &Check) -> String {
         n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
     };
     format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
+}
+
+/// The values along both axes through the peak, with their statistical errors.
+fn cuts(r: &ReceiverResult, grid: &Grid) -> Chart {
+    let [a, b] = &grid.axes;
+    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y])).unwrap_or(0);
+    let (column, row) = (peak % a.cells, peak / a.cells);
+    let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
+        name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
+        points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
+        errors: grid.error.as_ref().map(|e| (0..axis.cells).map(|k| e[cell(k)]).collect()).unwrap_or_default(),
+        style: SeriesStyle::Line,
+        ..Series::default()
+    };
+    let series = vec![along(a, b, row, &|k| row * a.cells + k), along(b, a, column, &|k| k * a.cells + column)];
+    let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
+    let axes =
+        [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
+    let name = format!("{}-cuts", file_stem(&r.name));
+    let caption = "One row and one column of cells; bars are one standard error.";
+    Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series)
 }
 
 fn reading(r: &ReceiverResult, grid: &Grid) -> String {

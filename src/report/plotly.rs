@@ -44,7 +44,7 @@ fn css([r, g, b]: [f64; 3]) -> String {
 
 fn axis(style: &AxisStyle) -> Value {
     json!({"title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
-        "automargin": true, "exponentformat": "power"})
+        "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
 /// Data and layout of a chart.

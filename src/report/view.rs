@@ -80,7 +80,7 @@ impl View {
             if triangles.is_empty() {
                 continue;
             }
-            let limit = (SHOWN * triangles.len()).div_ceil(total.max(1)).max(200);
+            let limit = (SHOWN * triangles.len()).div_ceil(total.max(1)).max(2000);
             let (points, triangles, cell) = simplified(points, triangles, limit);
             merged = merged.max(cell);
             view.shapes.push(Shape::Surface {

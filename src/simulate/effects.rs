@@ -70,6 +70,13 @@ impl Effects {
     }
 }
 
+impl Required {
+    /// What a scene calls for, with every reason, without running it.
+    pub fn by(scene: &BoundScene) -> Self {
+        required(scene)
+    }
+}
+
 pub(crate) fn required(bound: &BoundScene) -> Required {
     let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()

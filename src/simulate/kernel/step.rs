@@ -183,8 +183,7 @@ pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
 /// Counts the light on receivers that let it pass.
 fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &mut Local) {
     for &r in &context.passing {
-        // A receiver that lies in a face, or in another receiver, is reached.
-        let (mut after, end) = (ray.t_min, end.next_up());
+        let mut after = ray.t_min;
         // A sphere may be crossed twice.
         while let Some(t) = context.bound.receivers[r as usize].crossing(ray, after, end) {
             count(context, path, r, ray.at(t), local);

@@ -1,0 +1,253 @@
+//! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
+
+use super::args::Refusals;
+use super::context::{Context, print};
+use super::engine::Choice;
+use super::load::Input;
+use super::options::{Meshing, NormalKind, Tracing};
+use super::witness::Witness;
+use super::{Failure, Outcome, aim, engine, load};
+use crate::formats::write_atomic;
+use crate::intersect::bvh::{self, Bvh};
+use crate::intersect::exact::Exact;
+use crate::intersect::octree::{self, Octree};
+use crate::intersect::polish::Polished;
+use crate::intersect::{Cost, Intersector, NormalMode};
+use crate::math::Ray;
+use crate::mesh::FacetMesh;
+use crate::report::{figures, grouped, verdict};
+use crate::simulate::{RunSettings, Scene, simulate};
+use crate::study::check::{self, Check, Competitor, Court, measure};
+use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
+use crate::study::records;
+use comfy_table::{Table, presets};
+use std::path::{Path, PathBuf};
+
+/// What `check` was asked for.
+pub(super) struct Asked<'a> {
+    pub(super) file: &'a Path,
+    pub(super) meshing: &'a Meshing,
+    pub(super) tracing: &'a Tracing,
+    pub(super) accuracy: Option<&'a str>,
+    pub(super) rays_out: Option<&'a PathBuf>,
+    pub(super) rays_in: Option<&'a PathBuf>,
+    pub(super) limits: Refusals,
+}
+
+/// Rays when nothing else is asked: a second or two on a lamp.
+const RAYS: u64 = 100_000;
+/// Rays of a timed round, and rounds.
+const TIMED: (usize, usize) = (20_000, 3);
+
+pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+    engine::threads(asked.tracing.threads)?;
+    let given = asked.rays_in.map(|p| read_rays(p)).transpose()?;
+    let input = load::either(asked.file, context)?;
+    let (scene, loaded) = match &input {
+        Input::Step(loaded) => (None, loaded),
+        Input::Scene(scene, loaded) => (Some(&**scene), loaded),
+    };
+    let model = &loaded.model;
+    let (meshing, tracing) = aim::meshing(asked.accuracy, asked.meshing, asked.tracing, model, context)?;
+    let settings = engine::mesh_settings(&meshing, scene, model)?;
+    let (made, _) = engine::facets(model, &settings, context);
+    let mesh = &made.mesh;
+    let normals = match Choice::new(&tracing, scene)?.normals {
+        NormalKind::Flat => NormalMode::Flat,
+        NormalKind::Nearest => NormalMode::Nearest,
+        NormalKind::Cubic => NormalMode::Cubic,
+        NormalKind::Bilinear | NormalKind::Exact => NormalMode::Bilinear,
+    };
+    let spinner = context.spinner("building octree, BVHs and spline");
+    let octree = Octree::build(mesh, &octree::Settings { normals, ..Default::default() });
+    let wide = bvh::Settings { normals, ..Default::default() };
+    let cwbvh = Bvh::build(mesh, &wide);
+    let bvh2 = Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..wide });
+    let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..wide });
+    let exact = Exact::build(model, &Default::default());
+    let polish = Polished::new(&octree, mesh, &exact);
+    spinner.finish_and_clear();
+    let lift = 4.0 * settings.tolerance[1];
+    let rays = match given {
+        Some(rays) => rays,
+        None => own_rays(scene, model, mesh, &octree, &tracing, lift)?,
+    };
+    let bar = context.bar("judging", "rays", rays.len() as u64);
+    let court = Court { model, mesh, octree: &octree, bvh: &cwbvh, exact: &exact };
+    let band = check::Settings { fallback_band_mm: settings.tolerance[1], ..Default::default() };
+    let total = rays.len() as f64;
+    let mut found = check::check(&court, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
+    bar.finish_and_clear();
+    let spinner = context.spinner("timing");
+    let race = |name: &'static str, who: &dyn Intersector| -> (&'static str, f64, f64) {
+        let f = who.footprint();
+        (name, f.build_seconds, f.bytes as f64 / f.primitives.max(1) as f64)
+    };
+    for (name, build, bytes) in [
+        race("octree", &octree),
+        race("octree_single", &octree),
+        race("bvh2", &bvh2),
+        race("cwbvh", &cwbvh),
+        race("cwbvh_as_shipped", &shipped),
+        race("polish", &polish),
+        race("exact", &exact),
+    ] {
+        found.build_seconds.set(name, build);
+        found.bytes_per_facet.set(name, bytes);
+    }
+    let entrant = |name, who, batch| Competitor { name, who, batch };
+    let competitors = [
+        entrant("octree", &octree as &dyn Intersector, true),
+        entrant("octree_single", &octree, false),
+        entrant("bvh2", &bvh2, true),
+        entrant("cwbvh", &cwbvh, true),
+        entrant("cwbvh_as_shipped", &shipped, true),
+        entrant("polish", &polish, true),
+        entrant("exact", &exact, true),
+    ];
+    // Evenly over the rays, so that every kind of them is among the timed.
+    let timed: Vec<Ray> = rays.iter().copied().step_by(rays.len().div_ceil(TIMED.0).max(1)).collect();
+    for (name, timing) in measure(&competitors, &timed, TIMED.1) {
+        found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(1e-12) / 1e6);
+    }
+    spinner.finish_and_clear();
+    if let Some(path) = asked.rays_out {
+        let mut hits = vec![None; rays.len()];
+        octree.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        write_atomic(path, |mut w| {
+            records::write(&mut w, rays.iter().copied().zip(hits.iter().map(|h| h.map(|h| h.t))))
+        })?;
+        context.say(format_args!("wrote {}", path.display()));
+    }
+    if context.json {
+        let text = serde_json::to_string_pretty(&found).map_err(|e| Failure::running(e.to_string()))?;
+        print(&(text + "\n"))?;
+    } else {
+        print(&described(&found))?;
+    }
+    Ok(load::account(&loaded.reports, asked.limits.max_refused, context))
+}
+
+fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
+    let open = std::fs::File::open(path);
+    let read = open.and_then(|f| records::read(&mut std::io::BufReader::new(f)));
+    match read {
+        Ok(list) if list.is_empty() => Err(Failure::input(format!("{}: no rays in it", path.display()))),
+        Ok(list) => Ok(list.into_iter().map(|(ray, _)| ray).collect()),
+        Err(e) => Err(Failure::input(format!("{}: {e}", path.display()))),
+    }
+}
+
+/// The rays of a scene's own run, or a camera's, random and bouncing ones for a bare model.
+fn own_rays(
+    scene: Option<&Scene>,
+    model: &crate::model::Model,
+    mesh: &FacetMesh,
+    octree: &dyn Intersector,
+    tracing: &Tracing,
+    lift: f64,
+) -> Result<Vec<Ray>, Failure> {
+    let count = tracing.rays.unwrap_or(RAYS);
+    let Some(scene) = scene else {
+        let seed = tracing.seed.unwrap_or(1);
+        let (bounds, third) = (mesh.bounds(), (count / 3).max(1));
+        let camera = Camera::new(&bounds, third.min(count));
+        let uniform = Uniform::new(&bounds, seed, third.min(count - camera.len()));
+        let bounces = Bounces::new(&bounds, octree, lift, seed, count - camera.len() - uniform.len());
+        let chain = Chain(vec![&camera, &uniform, &bounces]);
+        return Ok(chain.rays(0..chain.len()));
+    };
+    let bound = scene.bind(model)?;
+    // About four segments a ray; a few more rays, so that there are enough.
+    let settings = RunSettings {
+        rays: count.div_ceil(2).max(64),
+        seed: tracing.seed.unwrap_or(scene.run.seed),
+        ..RunSettings::from(&scene.run)
+    };
+    let witness = Witness::new(octree, count, count);
+    simulate(&bound, &witness, &settings, &|_| true);
+    Ok(witness.rays(count as usize, mesh, lift))
+}
+
+fn described(c: &Check) -> String {
+    let f = &c.facets_vs_exact;
+    let e = &f.explained;
+    let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));
+    let mut line = |name: &str, what: String| text += &format!("  {name:<12} {what}\n");
+    line(
+        "rays",
+        format!(
+            "{} asked, {} hit; {} facets, {} patches",
+            grouped(c.rays),
+            grouped(c.hits),
+            grouped(c.scene.facets as u64),
+            grouped(c.scene.patches as u64)
+        ),
+    );
+    line(
+        "differences",
+        format!("{} hit or miss, {} another face, {} unexplained", f.hit_miss, f.other_face, f.unexplained),
+    );
+    line(
+        "explained",
+        format!(
+            "{} within sag, {} silhouette, {} trim edge, {} coincident, {} tangent, {} without facets or surface",
+            e.within_sag,
+            e.silhouette,
+            e.trim_edge,
+            e.coincident,
+            e.tangent,
+            e.unmeshed + e.no_surface
+        ),
+    );
+    line(
+        "distance",
+        format!(
+            "off by {} mm (median), {} mm (99 %), {} mm (largest)",
+            figures(f.t_error_mm.p50, 2),
+            figures(f.t_error_mm.p99, 2),
+            figures(f.t_error_mm.max, 2)
+        ),
+    );
+    line(
+        "normals",
+        format!(
+            "off by {}° (median), {}° (99 %), {}° (largest)",
+            figures(f.normal_error_deg.p50, 2),
+            figures(f.normal_error_deg.p99, 2),
+            figures(f.normal_error_deg.max, 2)
+        ),
+    );
+    line(
+        "spline",
+        format!(
+            "{} hits certified, {} tangent, {} uncertified",
+            grouped(c.exact.certified),
+            c.exact.tangent,
+            c.exact.uncertified
+        ),
+    );
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header([
+        "",
+        "Mrays/s, 1 thread",
+        "build",
+        "bytes per facet",
+    ]);
+    let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);
+    for (name, rate, build, size) in [
+        ("octree, batch", m.octree, b.octree, s.octree),
+        ("octree, ray by ray", m.octree_single, b.octree_single, s.octree_single),
+        ("obvhs Bvh2", m.bvh2, b.bvh2, s.bvh2),
+        ("obvhs CwBvh", m.cwbvh, b.cwbvh, s.cwbvh),
+        ("obvhs CwBvh, as shipped", m.cwbvh_as_shipped, b.cwbvh_as_shipped, s.cwbvh_as_shipped),
+        ("octree, polished", m.polish, b.polish, s.polish),
+        ("exact spline (per patch)", m.exact, b.exact, s.exact),
+    ] {
+        let shown = |x: Option<f64>| x.map_or("–".into(), |x| figures(x, 3));
+        let time = build.map_or("–".into(), crate::report::seconds);
+        table.add_row([name.to_owned(), shown(rate), time, shown(size)]);
+    }
+    text += &format!("{table}\n");
+    text
+}

@@ -1,0 +1,158 @@
+//! `lampyris facet`: quad facets within a proved tolerance, written in as many formats as asked for.
+
+use super::args::Refusals;
+use super::context::{Context, print};
+use super::options::{Meshing, Tracing};
+use super::{Failure, Outcome, aim, engine, load, look, machine};
+use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
+use crate::mesh::FacetMesh;
+use crate::model::{Model, PlacedFace};
+use crate::report::{bytes, figures, grouped, seconds};
+use crate::tessellate::Report;
+use std::path::{Path, PathBuf};
+
+/// What `facet` was asked for.
+pub(super) struct Asked<'a> {
+    pub(super) file: &'a Path,
+    pub(super) output: &'a [PathBuf],
+    pub(super) meshing: &'a Meshing,
+    pub(super) accuracy: Option<&'a str>,
+    pub(super) threads: Option<usize>,
+    pub(super) limits: Refusals,
+}
+
+pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+    // A wrong extension is said before any work is done.
+    if let Some(path) = asked.output.iter().find(|p| !is_facet_file(p)) {
+        let given = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+        return Err(
+            crate::formats::Error::new(path, ErrorKind::Extension { given, known: FACET_EXTENSIONS }).into()
+        );
+    }
+    engine::threads(asked.threads)?;
+    let loaded = load::model_file(asked.file, context)?;
+    let (meshing, _) = aim::meshing(asked.accuracy, asked.meshing, &Tracing::default(), &loaded.model, context)?;
+    let mut settings = engine::mesh_settings(&meshing, None, &loaded.model)?;
+    settings.measure = true;
+    let (mut made, _) = engine::facets(&loaded.model, &settings, context);
+    made.report.seconds.read = loaded.seconds;
+    made.report.peak_bytes = machine::peak_bytes();
+    let mut facets = look::facets(&loaded.model, &made.mesh, None);
+    if asked.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
+        (facets.normal_error_deg, facets.curvature_per_mm) = per_facet(&loaded.model, &made.mesh);
+    }
+    for path in asked.output {
+        let spinner = context.spinner(&format!("writing {}", path.display()));
+        write_facets(path, &facets)?;
+        spinner.finish_and_clear();
+        context.say(format_args!("wrote {}", path.display()));
+    }
+    if context.json {
+        let text = serde_json::to_string_pretty(&made.report).map_err(|e| Failure::running(e.to_string()))?;
+        print(&(text + "\n"))?;
+    } else {
+        print(&described(&made.report))?;
+    }
+    let refused = load::account(&loaded.reports, asked.limits.max_refused, context);
+    let placed = made.report.faces.meshed + made.report.faces.failed;
+    if made.report.faces.failed > 0 {
+        context.say(format_args!("{} of {placed} faces got no facets", made.report.faces.failed));
+    }
+    let over = made.report.faces.failed as f64 > asked.limits.max_refused * placed as f64;
+    Ok(if over { Outcome::Incomplete } else { refused })
+}
+
+fn described(r: &Report) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
+    let n = |x: usize| grouped(x as u64);
+    line(
+        "facets",
+        format!("{}: {} quads, {} triangles; {} vertices", n(r.facets), n(r.quads), n(r.triangles), n(r.vertices)),
+    );
+    line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
+    line("tolerance", format!("{}..{} mm", r.tolerance_mm.min, r.tolerance_mm.max));
+    line(
+        "certified",
+        format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),
+    );
+    let mut sag = format!("proved at most {} mm", figures(r.sag_mm.bound_max, 4));
+    if let (Some(max), Some(mean)) = (r.sag_mm.sampled_max, r.sag_mm.sampled_mean) {
+        sag += &format!("; sampled: at most {} mm, mean {} mm", figures(max, 4), figures(mean, 3));
+    }
+    if let Some(over) = r.over_tolerance {
+        sag += &format!("; {over} facets over their tolerance");
+    }
+    line("distance", sag);
+    if let Some(e) = r.normal_error_deg {
+        line(
+            "normals",
+            format!(
+                "off by {}° (median), {}° (99 %), {}° (largest)",
+                figures(e.p50, 2),
+                figures(e.p99, 2),
+                figures(e.max, 2)
+            ),
+        );
+    }
+    let volume = r.volume_mm3.map_or("open".to_owned(), |v| format!("{} mm³", figures(v, 6)));
+    line("size", format!("area {} mm², volume {volume}", figures(r.area_mm2, 6)));
+    line(
+        "shells",
+        format!(
+            "{} closed, {} not; {} open and {} ambiguous edges",
+            r.shells.closed, r.shells.open, r.open_edges, r.nonmanifold_edges
+        ),
+    );
+    line("faces", format!("{} with facets, {} without", n(r.faces.meshed), r.faces.failed));
+    let peak = r.peak_bytes.map_or(String::new(), |b| format!("; {} at most", bytes(b)));
+    line("time", format!("read {}, tessellate {}{peak}", seconds(r.seconds.read), seconds(r.seconds.tessellate)));
+    text
+}
+
+/// For each facet the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
+/// the largest curvature there, 1/mm.
+fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
+    use rayon::prelude::*;
+    let faces: Vec<PlacedFace> = model.placed_faces().collect();
+    (0..mesh.facets.len())
+        .into_par_iter()
+        .map(|i| {
+            let facet = &mesh.facets[i];
+            let Some((placed, face)) = faces.get(facet.face.index()).and_then(|p| p.face.map(|face| (p, face)))
+            else {
+                return (f64::NAN, f64::NAN);
+            };
+            let corners = facet.vertices.map(|v| mesh.vertices[v as usize]);
+            let sides = if facet.is_triangle() { 3 } else { 4 };
+            let mut places: Vec<Vec<usize>> = (0..sides).map(|k| vec![k, (k + 1) % sides]).collect();
+            places.push((0..sides).collect());
+            let (mut worst, mut curved) = (0f64, 0f64);
+            for place in places {
+                let share = 1.0 / place.len() as f64;
+                let uv = place.iter().map(|&k| corners[k].uv * share).sum();
+                let mixed: crate::math::Vector = place.iter().map(|&k| corners[k].normal).sum();
+                let d = face.surface.second_derivatives(face.surface.clamp(uv));
+                let Some(n) = d.du.cross(d.dv).try_normalize() else { continue };
+                let true_normal = placed.placement.normal(if face.reversed { -n } else { n });
+                let angle = mixed.cross(true_normal).length().atan2(mixed.dot(true_normal)).to_degrees();
+                worst = worst.max(angle);
+                curved = curved.max(curvature(&d, n) / placed.placement.scale);
+            }
+            (worst, curved)
+        })
+        .unzip()
+}
+
+/// Largest absolute principal curvature from the two fundamental forms.
+fn curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64 {
+    let (e, f, g) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
+    let (l, m, k) = (d.duu.dot(n), d.duv.dot(n), d.dvv.dot(n));
+    let det = e * g - f * f;
+    if det <= 0.0 {
+        return f64::NAN;
+    }
+    let mean = (e * k - 2.0 * f * m + g * l) / (2.0 * det);
+    let gauss = (l * k - m * m) / det;
+    mean.abs() + (mean * mean - gauss).max(0.0).sqrt()
+}

@@ -1,0 +1,219 @@
+//! `lampyris study`: rows to study.json, a page, pictures and tables; one sentence on the terminal.
+
+use super::args::StudyKind;
+use super::context::{Context, print};
+use super::engine::{self, Choice};
+use super::load::{self, Input, Loaded};
+use super::options::{Meshing, Tracing};
+use super::workshop::Product;
+use super::{Failure, Outcome, demo};
+use crate::formats::write_atomic;
+use crate::intersect::bvh::{self, Bvh};
+use crate::intersect::exact::{
+    Exact,
+    traditional::{Seeds, Traditional},
+};
+use crate::intersect::octree::{self, Octree};
+use crate::model::Model;
+use crate::report::study_report;
+use crate::simulate::{RunSettings, Scene};
+use crate::study::complexity::Method;
+use crate::study::{self, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
+use crate::tessellate::tessellate;
+use indicatif::ProgressBar;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// What `study` was asked for.
+pub(super) struct Asked<'a> {
+    pub(super) kind: StudyKind,
+    pub(super) file: Option<&'a Path>,
+    pub(super) output: Option<&'a PathBuf>,
+    pub(super) meshing: &'a Meshing,
+    pub(super) tracing: &'a Tracing,
+}
+
+/// Rows with the sentence that the study made of them.
+struct Found {
+    rows: Value,
+    answer: String,
+}
+
+impl Found {
+    fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
+        let rows = serde_json::to_value(rows).map_err(|e| Failure::running(e.to_string()))?;
+        Ok(Self { rows, answer: answer.into() })
+    }
+}
+
+pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+    let threads = engine::threads(asked.tracing.threads)?;
+    let seed = asked.tracing.seed.unwrap_or(1);
+    let bar = context.bar(asked.kind.name(), "‰", 1000);
+    let progress = |p: Progress| show(&bar, &p);
+    let found = match asked.kind {
+        StudyKind::Accuracy => accuracy_of(asked, seed, context, &progress)?,
+        StudyKind::Interpolation => interpolation_of(asked, seed, context, &progress)?,
+        StudyKind::Complexity => complexity_of(asked, seed, threads, &progress)?,
+        StudyKind::Stability => stability_of(&progress)?,
+        StudyKind::Bvh => super::race::run(asked.file, asked.tracing, context, &progress)
+            .and_then(|(rows, answer)| Found::new(&rows, answer))?,
+        StudyKind::Effects => effects_of(asked, threads, context)?,
+    };
+    bar.finish_and_clear();
+    let provenance = context.provenance(Some(seed), threads);
+    let document = json!({
+        "study": asked.kind.name(),
+        "command": provenance.command,
+        "version": provenance.version,
+        "commit": provenance.commit,
+        "hardware": provenance.hardware,
+        "seed": seed,
+        "answer": found.answer,
+        "rows": found.rows,
+    });
+    let folder = asked.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", asked.kind.name()).into());
+    std::fs::create_dir_all(&folder)
+        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+    let text = format!("{document:#}\n");
+    write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
+    let report = study_report(&document, provenance);
+    report.write(&folder)?;
+    if context.json {
+        print(&text)?;
+    } else {
+        context.say(format_args!("  {}\n", report.answer.replace("**", "")));
+        context.say(format_args!("  {}", context.strong(&folder.join("report.html").display().to_string())));
+        context.say(format_args!("  {}", folder.join("study.json").display()));
+    }
+    Ok(Outcome::Done)
+}
+
+/// The bar follows the study's own clock, remaining time included.
+fn show(bar: &ProgressBar, p: &Progress) {
+    let left = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
+    bar.set_message(format!("{}{left}", p.stage));
+    bar.set_position((1000.0 * p.done.clamp(0.0, 1.0)) as u64);
+}
+
+/// The model of the file, or the built-in lamp.
+fn model_of(file: Option<&Path>, context: &Context) -> Result<(Option<Scene>, Loaded, String), Failure> {
+    let Some(path) = file else {
+        let (scene, loaded) = demo::lamp()?;
+        return Ok((Some(scene), loaded, "three-cavity lamp".into()));
+    };
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    Ok(match load::either(path, context)? {
+        Input::Step(loaded) => (None, loaded, name),
+        Input::Scene(scene, loaded) => (Some(*scene), loaded, name),
+    })
+}
+
+type Report<'a> = &'a (dyn Fn(Progress) + Sync);
+
+fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
+    let (_, loaded, name) = model_of(asked.file, context)?;
+    let product = Product::new(&loaded.model);
+    let mut settings = accuracy::Settings { seed, ..Default::default() };
+    if let Some(range) = asked.meshing.tolerance {
+        settings.tolerances = vec![range];
+    }
+    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    let study = accuracy::accuracy(&name, &product, &settings, progress);
+    Found::new(&study.rows, study.answer)
+}
+
+fn interpolation_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
+    let (_, loaded, name) = model_of(asked.file, context)?;
+    let mut models: Vec<(String, Model)> = vec![(name, loaded.model)];
+    if asked.file.is_none() {
+        models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
+    }
+    let products: Vec<Product> = models.iter().map(|(_, m)| Product::new(m)).collect();
+    let named: Vec<(&str, &dyn Workshop)> =
+        models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn Workshop)).collect();
+    let mut settings = interpolation::Settings { seed, ..Default::default() };
+    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    let study = interpolation::interpolation(&named, &settings, progress);
+    Found::new(&study.rows, study.answer)
+}
+
+fn complexity_of(asked: &Asked, seed: u64, threads: usize, progress: Report) -> Result<Found, Failure> {
+    let mesh_settings = crate::tessellate::Settings {
+        tolerance: asked.meshing.tolerance.unwrap_or([0.05, 0.2]),
+        ..Default::default()
+    };
+    let methods = [
+        Method {
+            name: "traditional",
+            with: Box::new(|model, then| {
+                let exact = Exact::build(model, &Default::default());
+                then(&Traditional::new(model, &exact, Seeds::Sampled(4)), None);
+            }),
+        },
+        Method {
+            name: "octree",
+            with: Box::new(|model, then| {
+                let made = tessellate(model, &mesh_settings);
+                then(&Octree::build(&made.mesh, &octree::Settings::default()), Some(made.mesh.facets.len()));
+            }),
+        },
+        Method {
+            name: "bvh",
+            with: Box::new(|model, then| {
+                let made = tessellate(model, &mesh_settings);
+                then(&Bvh::build(&made.mesh, &bvh::Settings::default()), Some(made.mesh.facets.len()));
+            }),
+        },
+        Method {
+            name: "exact",
+            with: Box::new(|model, then| then(&Exact::build(model, &Default::default()), None)),
+        },
+    ];
+    let mut settings = complexity::Settings { seed, threads, ..Default::default() };
+    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    let study = complexity::complexity(&methods, &settings, progress)?;
+    Found::new(&study.rows, study.answer)
+}
+
+fn stability_of(progress: Report) -> Result<Found, Failure> {
+    use stability::{Ground, Variant, cases};
+    let all = cases();
+    let mut rows = Vec::new();
+    for (k, case) in all.iter().enumerate() {
+        for variant in Variant::ALL {
+            let scene = case.scene(variant);
+            let octree = Octree::build(&scene.mesh, &octree::Settings::default());
+            let cured = Bvh::build(&scene.mesh, &bvh::Settings::default());
+            let shipped = Bvh::build(&scene.mesh, &bvh::Settings { cured: false, ..Default::default() });
+            let exact = Exact::build(&scene.model, &Default::default());
+            rows.push(scene.ask("octree", &octree, Ground::Facets));
+            rows.push(scene.ask("cwbvh", &cured, Ground::Facets));
+            rows.push(scene.ask("cwbvh as shipped", &shipped, Ground::Facets));
+            rows.push(scene.ask("exact", &exact, Ground::Spline));
+        }
+        let done = (k + 1) as f64 / all.len() as f64;
+        progress(Progress { stage: case.name.into(), done, remaining_seconds: None });
+    }
+    Found::new(&rows, "")
+}
+
+fn effects_of(asked: &Asked, threads: usize, context: &Context) -> Result<Found, Failure> {
+    let (scene, loaded, name) = model_of(asked.file, context)?;
+    let Some(scene) = scene else {
+        let failure = Failure::arguments("study effects needs a scene: a STEP file alone has no light");
+        return Err(failure.help("give a scene file (.toml), or nothing for the built-in lamp"));
+    };
+    let bound = scene.bind(&loaded.model)?;
+    let settings = engine::mesh_settings(asked.meshing, Some(&scene), &loaded.model)?;
+    let (made, _) = engine::facets(&loaded.model, &settings, context);
+    let choice = Choice::new(asked.tracing, Some(&scene))?;
+    let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
+    run.rays = asked.tracing.rays.unwrap_or(run.rays.min(1_000_000));
+    run.seed = asked.tracing.seed.unwrap_or(run.seed);
+    let rows = engine::with_intersector(choice, &loaded.model, &made.mesh, context, |who, _| {
+        effects::effects(&name, &bound, who, &run, 5)
+    });
+    Found::new(&rows, "")
+}
