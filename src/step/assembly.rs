@@ -26,6 +26,8 @@ pub(super) struct Placed {
     pub(super) product: String,
     /// Entities that may carry a style for this occurrence.
     pub(super) owners: Vec<u64>,
+    /// Whether no product leads here: shapes that stand elsewhere already are not meant again.
+    pub(super) orphan: bool,
 }
 
 /// A directed relationship: what it leads to, and how that is placed.
@@ -59,6 +61,9 @@ pub(super) struct Assembly<'f, 'a> {
     pub(super) problems: Vec<String>,
     placed: Vec<Placed>,
     reached: FxHashSet<u64>,
+    in_orphans: bool,
+    /// What products reach; orphans do not place it again.
+    by_products: FxHashSet<u64>,
 }
 
 impl<'f, 'a> Assembly<'f, 'a> {
@@ -76,6 +81,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             problems: Vec::new(),
             placed: Vec::new(),
             reached: FxHashSet::default(),
+            in_orphans: false,
+            by_products: FxHashSet::default(),
         };
         let mut contextual = Vec::new();
         let mut relations = Vec::new();
@@ -220,10 +227,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Representations with shapes that no product reaches.
     fn orphans(&mut self) {
+        self.in_orphans = true;
+        self.by_products = self.reached.clone();
         let candidates: Vec<u64> = self
             .file
             .entities()
-            .filter(|e| e.keywords().any(|k| k.ends_with("SHAPE_REPRESENTATION") || k == "REPRESENTATION"))
+            .filter(|e| e.keywords().any(|k| k.ends_with("SHAPE_REPRESENTATION")))
+            .filter(|e| !e.keywords().any(|k| k.contains("DRAUGHTING") || k.contains("PRESENTATION_")))
             .map(|e| e.id)
             .collect();
         let mapped: FxHashSet<u64> =
@@ -277,7 +287,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path: &mut Vec<u64>,
         owners: &[u64],
     ) {
-        if path.len() >= MAX_DEPTH || path.contains(&id) || self.placed.len() >= MAX_PLACED {
+        let bounded = path.len() < MAX_DEPTH && !path.contains(&id) && self.placed.len() < MAX_PLACED;
+        if !bounded || self.by_products.contains(&id) {
             return;
         }
         path.push(id);
@@ -288,6 +299,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             name: name.to_string(),
             product: product.to_string(),
             owners: owners.to_vec(),
+            orphan: self.in_orphans,
         });
         let geometry = self.geometry(id);
         for item in self.items(id) {

@@ -7,7 +7,7 @@ use super::topology::Items;
 use super::units::{Units, contexts};
 use super::{Error, ErrorKind, Settings, bounds};
 use crate::model::{Analytic, Instance, Model, PartId};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
 use std::time::Instant;
 
@@ -90,10 +90,17 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
     report.problems.extend(assembly.problems.iter().cloned());
     let mut model = Model { name: name.to_string(), ..Model::default() };
     let mut parts: FxHashMap<u64, Option<(PartId, usize)>> = FxHashMap::default();
+    let mut items_placed = FxHashSet::default();
     for p in placed {
         let known = parts.get(&p.representation).copied();
         let entry = known.unwrap_or_else(|| {
-            let made = make_part(file, &assembly, &p, &styles, settings, &mut model, report);
+            let mut items = assembly.items(p.representation);
+            if p.orphan {
+                items.retain(|item| !items_placed.contains(item));
+            }
+            items_placed.extend(items.iter().copied());
+            let units = assembly.units_of(p.representation);
+            let made = make_part(file, units, &p, &items, &styles, settings, &mut model, report);
             parts.insert(p.representation, made);
             made
         });
@@ -121,22 +128,22 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
 /// Converts a representation that holds shapes; `None` when it holds none.
 fn make_part(
     file: &File<'_>,
-    assembly: &Assembly<'_, '_>,
+    units: Units,
     placed: &Placed,
+    ids: &[u64],
     styles: &Styles,
     settings: &Settings,
     model: &mut Model,
     report: &mut ImportReport,
 ) -> Option<(PartId, usize)> {
     let mut items = Items::default();
-    for id in assembly.items(placed.representation) {
+    for &id in ids {
         items.add(file, id);
     }
     if items.is_empty() {
         return None;
     }
-    let Converted { mut part, found, refused, repaired } =
-        convert(file, assembly.units_of(placed.representation), &items, styles, settings);
+    let Converted { mut part, found, refused, repaired } = convert(file, units, &items, styles, settings);
     part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
     part.colour = styles.colour(placed.representation);
     report.faces.found += found;
@@ -146,7 +153,7 @@ fn make_part(
     let note = |r: super::geometry::Refusal| Note { id: r.id, entity: r.entity, reason: r.reason };
     report.refusals.extend(refused.into_iter().map(note));
     report.repairs.extend(repaired.into_iter().map(note));
-    let mut counted = rustc_hash::FxHashSet::default();
+    let mut counted = FxHashSet::default();
     for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e))) {
         count(&mut report.by_surface, &face.analytic);
         report.gap_max_mm = report.gap_max_mm.max(face.gap);
