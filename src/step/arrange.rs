@@ -17,7 +17,11 @@ pub(super) struct Arranged {
 }
 
 /// Arranges the chains of a face, given with the material on their left.
-pub(super) fn arrange(mut chains: Vec<Chain>, chart: &Chart) -> Result<Arranged, &'static str> {
+pub(super) fn arrange(
+    mut chains: Vec<Chain>,
+    chart: &Chart,
+    implicit_outer: bool,
+) -> Result<Arranged, &'static str> {
     chains.retain(|c| !c.pieces.is_empty());
     let mut out = Arranged { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
@@ -29,7 +33,7 @@ pub(super) fn arrange(mut chains: Vec<Chain>, chart: &Chart) -> Result<Arranged,
             out.loops.push(whole(chart, &[], &mut out.seams)?);
             return Ok(out);
         }
-        orient(&mut plain, chart, &mut out)?;
+        orient(&mut plain, chart, &mut out, implicit_outer)?;
         return Ok(out);
     }
     let obstacles: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
@@ -94,10 +98,15 @@ fn inside(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'sta
 
 /// Loops that wind around nothing: the largest is the outer one, except on a closed surface, where loops that all run
 /// clockwise leave the rest of the surface as the face.
-fn orient(plain: &mut Vec<Chain>, chart: &Chart, out: &mut Arranged) -> Result<(), &'static str> {
+fn orient(
+    plain: &mut Vec<Chain>,
+    chart: &Chart,
+    out: &mut Arranged,
+    implicit_outer: bool,
+) -> Result<(), &'static str> {
     let areas: Vec<f64> = plain.iter().map(|c| signed_area(&c.polygon())).collect();
     let all_holes = areas.iter().all(|&a| a < 0.0);
-    if all_holes && is_closed(chart) {
+    if implicit_outer || all_holes && is_closed(chart) {
         let polygons: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
         let outer = whole(chart, &polygons, &mut out.seams)?;
         let border = outer.polygon();

@@ -26,7 +26,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return self.bounded(basis.id, depth + 1);
         }
         if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {
-            return Err(Refusal::of(e, "a curve given only in the parameter plane is not supported"));
+            return self.pcurve(e, depth);
         }
         let Directed { shape, reversed } = self.curve(id, depth)?;
         let whole = match &shape {

@@ -5,7 +5,7 @@ use super::chart::{Chart, Kind, Pole};
 use super::fit::{Budget, Fit, Overrun, Target, project};
 use super::loops::{Chain, Piece, Source, chain};
 use super::seams::{Seam, Seams};
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Uv, Vector};
 use crate::model::{Analytic, EdgeUse, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve, Surface};
 use rustc_hash::FxHashMap;
@@ -13,7 +13,6 @@ use rustc_hash::FxHashMap;
 /// What a face needs to know of an edge.
 pub(super) struct EdgeShape<'e> {
     pub(super) curve: &'e Curve,
-    pub(super) ends: [Point; 2],
 }
 
 /// A face to be built.
@@ -30,6 +29,8 @@ pub(super) struct Task<'e> {
     pub(super) accuracy: f64,
     /// Evaluations that the face may take.
     pub(super) budget: u64,
+    /// Whether the natural border of the surface is the outer loop.
+    pub(super) implicit_outer: bool,
 }
 
 /// A built face; seams are numbered from 0, edges as in the task.
@@ -104,7 +105,7 @@ pub(super) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
     if bridged > 0.0 {
         repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
     }
-    let Arranged { mut loops, seams, repairs: turned } = arrange(chains, chart)?;
+    let Arranged { mut loops, seams, repairs: turned } = arrange(chains, chart, task.implicit_outer)?;
     repairs.extend(turned.into_iter().map(String::from));
     let (domain, shift) = domain_of(&loops, chart).ok_or("its loops enclose nothing")?;
     loops.iter_mut().for_each(|l| l.shift(shift));
@@ -136,8 +137,6 @@ pub(super) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
         snap(&mut uses);
         built.push(uses);
     }
-    let ends: Vec<Point> = task.edges.values().flat_map(|e| e.ends).collect();
-    let _ = ends;
     Ok(Built {
         analytic: chart.analytic,
         reversed: !same_sense,

@@ -1,25 +1,158 @@
-//! Surfaces without a face, and ready meshes.
+//! Surfaces without a face (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
 
-use super::geometry::{Geometry, Refusal};
-use super::part::Converted;
+use super::chart::{Chart, Kind};
+use super::face::{Built, EdgeShape, Task, build};
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part::{Converted, place};
+use super::part21::Entity;
 use super::settings::Settings;
 use super::styles::Styles;
+use super::tessellated::Leaves;
 use super::topology::Items;
-use crate::model::Part;
+use crate::math::{Aabb, Point};
+use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
+use crate::nurbs::Curve;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
-/// Converts what is not a face of a shell.
+/// Converts what is not a face of a shell: each surface becomes a shell of one face.
 pub(super) fn convert(
     geometry: &Geometry<'_, '_>,
     items: &Items,
-    _styles: &Styles,
-    _settings: &Settings,
-    _part: &mut Part,
+    styles: &Styles,
+    settings: &Settings,
+    part: &mut Part,
     out: &mut Converted,
 ) {
-    for &id in items.surfaces.iter().chain(&items.tessellated) {
-        out.found += 1;
-        if let Ok(e) = geometry.entity(id) {
-            out.refused.push(Refusal::of(e, "surfaces without a face are not converted yet"));
+    out.found += items.surfaces.len();
+    let built: Vec<(u64, Outcome<(Built, Vec<Vec<Curve>>)>)> =
+        items.surfaces.par_iter().map(|&id| (id, surface(geometry, id, settings))).collect();
+    for (id, outcome) in built {
+        match outcome {
+            Ok((built, boundaries)) => {
+                let numbers = number(boundaries, part);
+                let name = geometry.file.entity(id).and_then(|e| e.args().text(0)).unwrap_or_default();
+                let face = place(built, id, name, part, &numbers, styles);
+                part.shells.push(Shell { faces: vec![face], ..Shell::default() });
+            }
+            Err(refusal) => out.refused.push(refusal),
         }
     }
+    let mut leaves = Leaves::default();
+    for &id in &items.tessellated {
+        geometry.tessellated(id, 0, &mut leaves);
+    }
+    out.found += leaves.faces.len() + leaves.refused.len();
+    out.refused.extend(leaves.refused);
+    part.tessellated.extend(leaves.faces.into_iter().map(|mut face| {
+        face.colour = face.entity.and_then(|e| styles.colour(e));
+        face
+    }));
+}
+
+/// Adds boundary curves as edges; ends that follow on each other share a vertex.
+fn number(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
+    let mut numbers = Vec::new();
+    for boundary in boundaries {
+        let first = part.vertices.len() as u32;
+        let n = boundary.len() as u32;
+        part.vertices.extend(boundary.iter().map(|c| c.evaluate(c.domain()[0])));
+        for (k, curve) in boundary.into_iter().enumerate() {
+            let k = k as u32;
+            numbers.push(Some(EdgeId(part.edges.len() as u32)));
+            let vertices = [VertexId(first + k), VertexId(first + (k + 1) % n)];
+            part.edges.push(Edge { curve, vertices, entity: None });
+        }
+    }
+    numbers
+}
+
+/// One surface with its boundaries, if it has any.
+fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<(Built, Vec<Vec<Curve>>)> {
+    let e = geometry.entity(id)?;
+    let (mut boundaries, mut implicit) = (Vec::new(), false);
+    let mut task = if let Some(a) = e.own("CURVE_BOUNDED_SURFACE", 1) {
+        for boundary in a.list(1).ids() {
+            boundaries.push(geometry.segments(geometry.entity(boundary)?, 0)?);
+        }
+        implicit = a.flag(2) == Some(true);
+        let basis = geometry.follow(e, a.id(0), "basis surface")?;
+        let hull = boundaries.iter().flatten().fold(Aabb::EMPTY, |b, c: &Curve| b.union(c.bounds()));
+        let reach = if hull.is_empty() { (Point::ZERO, 0.0) } else { (hull.center(), 0.5 * hull.diagonal()) };
+        task(geometry.chart(basis.id, reach, 0)?, &boundaries, settings)
+    } else {
+        let mut chart = geometry.chart(id, (Point::ZERO, 0.0), 0)?;
+        if let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1) {
+            let range = rectangle(geometry, e, &chart)?;
+            for d in 0..2 {
+                let [a, b] = range[d];
+                if chart.period[d].is_none_or(|p| b - a < p * (1.0 - 1e-9)) {
+                    chart.period[d] = None;
+                    chart.poles.retain(|pole| pole.fixed != d || pole.at == a || pole.at == b);
+                    chart.range[d] = range[d];
+                }
+            }
+            if a.flag(5) == Some(false) && a.flag(6) == Some(false) {
+                return Err(Refusal::of(e, "a rectangle trimmed against both parameters is not supported"));
+            }
+        }
+        task(chart, &boundaries, settings)
+    };
+    task.implicit_outer = implicit;
+    let built = build(task).map_err(|reason| Refusal::of(e, reason))?;
+    Ok((built, boundaries))
+}
+
+fn task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> Task<'e> {
+    let mut edges = FxHashMap::default();
+    let mut loops = Vec::new();
+    for boundary in boundaries {
+        let mut uses = Vec::with_capacity(boundary.len());
+        for curve in boundary {
+            let k = edges.len();
+            edges.insert(k, EdgeShape { curve });
+            uses.push((k, false));
+        }
+        loops.push(uses);
+    }
+    Task {
+        chart,
+        same_sense: true,
+        loops,
+        edges,
+        tolerance: settings.uv_tolerance,
+        // Boundaries of geometric sets meet loosely: real files leave 1e-3 mm.
+        accuracy: 1e-3,
+        budget: settings.face_budget,
+        implicit_outer: false,
+    }
+}
+
+/// The parameter rectangle of a RECTANGULAR_TRIMMED_SURFACE in the chart's parameters.
+fn rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
+    let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1) else { return Err(Refusal::of(e, "is not trimmed")) };
+    let scale = chart.parameter_scale(geometry.units.length, geometry.units.angle);
+    let Some(scale) = scale else {
+        return Err(Refusal::of(e, "its parameters cannot be taken over to the swept conic"));
+    };
+    let mut range = [[0.0; 2]; 2];
+    for d in 0..2 {
+        let (Some(lo), Some(hi)) = (a.real(1 + 2 * d), a.real(2 + 2 * d)) else {
+            return Err(Refusal::of(e, "a trimming parameter is missing"));
+        };
+        let (mut lo, mut hi) = (lo * scale[d], hi * scale[d]);
+        if a.flag(5 + d) == Some(false) {
+            (lo, hi) = (hi, lo);
+        }
+        match chart.period[d] {
+            Some(p) if hi <= lo => hi = lo + (hi - lo).rem_euclid(p),
+            None if hi < lo => (lo, hi) = (hi, lo),
+            _ => {}
+        }
+        range[d] = [lo, hi];
+    }
+    if matches!(chart.kind, Kind::Spline(_)) && range.iter().flatten().any(|x| !x.is_finite()) {
+        return Err(Refusal::of(e, "a trimming parameter is no number"));
+    }
+    Ok(range)
 }

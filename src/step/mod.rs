@@ -35,13 +35,16 @@ mod geometry;
 mod import;
 mod loops;
 mod loose;
+mod offset;
 mod part;
 mod part21;
+mod pcurves;
 mod report;
 mod seams;
 mod settings;
 mod styles;
 mod surfaces;
+mod tessellated;
 mod topology;
 mod units;
 

@@ -158,10 +158,8 @@ fn build_face(
             })?;
             edge_gap = edge_gap.max(edge.gap);
             let Some(curve) = &edge.curve else { continue };
-            let [a, b] = curve.domain();
-            let ends = [curve.evaluate(a), curve.evaluate(b)];
             bounds = bounds.union(curve.bounds());
-            shapes.entry(k).or_insert(EdgeShape { curve, ends });
+            shapes.entry(k).or_insert(EdgeShape { curve });
             kept.push((k, *reversed));
         }
         if !kept.is_empty() {
@@ -183,6 +181,7 @@ fn build_face(
         tolerance: settings.uv_tolerance,
         accuracy: stated.min(1e-3 * bounds.diagonal().max(1e-3)).max(1e-6).max(2.0 * edge_gap.min(0.05)),
         budget: settings.face_budget,
+        implicit_outer: false,
     };
     build(task).map_err(|reason| {
         let surface = geometry.file.entity(plan.surface).map(|s| s.name()).unwrap_or_default();

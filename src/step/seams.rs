@@ -4,6 +4,7 @@ use super::chart::Chart;
 use super::face::{Task, refit};
 use super::fit::{Budget, Overrun};
 use super::loops::{Piece, Source};
+use super::pcurves::cubic;
 use crate::math::{Point, Uv};
 use crate::nurbs::{Curve, Surface, UvCurve};
 
@@ -92,22 +93,11 @@ fn make(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]
             return Made { curve: line.restricted(lo, hi), varies: Some(varies), turned: p[varies] > q[varies] };
         }
     }
-    // Oblique: cubic pieces, doubled until they follow the surface to 1e-7 mm.
-    let at = |t: f64| chart.derivatives(a + (b - a) * t);
+    // Oblique: a cubic that follows the surface to 1e-7 mm.
     let step = b - a;
-    let mut n = 8;
-    loop {
-        let ts: Vec<f64> = (0..=n).map(|i| f64::from(i) / f64::from(n)).collect();
-        let d: Vec<_> = ts.iter().map(|&t| at(t)).collect();
-        let points: Vec<Point> = d.iter().map(|d| d.point).collect();
-        let slopes: Vec<_> = d.iter().map(|d| d.du * step.x + d.dv * step.y).collect();
-        let curve = Curve::hermite(&ts, &points, &slopes);
-        let error = (0..n)
-            .map(|i| (f64::from(i) + 0.5) / f64::from(n))
-            .fold(0f64, |e, t| e.max((curve.evaluate(t) - at(t).point).length()));
-        if error < 1e-7 || n >= 4096 {
-            return Made { curve, varies: None, turned: false };
-        }
-        n *= 2;
-    }
+    let at = |t: f64| {
+        let d = chart.derivatives(a + step * t);
+        (d.point, d.du * step.x + d.dv * step.y)
+    };
+    Made { curve: cubic([0.0, 1.0], at, 1e-7).0, varies: None, turned: false }
 }

@@ -74,8 +74,13 @@ impl<'f, 'a> Geometry<'f, 'a> {
             if let Some(found) = position(name) {
                 let (frame, a) = found?;
                 let (major, minor) =
-                    (positive(a.real(skip), "major radius")?, positive(a.real(skip + 1), "minor radius")?);
-                let inner = name.starts_with("DEG") && a.flag(skip + 2) == Some(false) && major < minor;
+                    (length(a.real(skip)).unwrap_or(f64::NAN), positive(a.real(skip + 1), "minor radius")?);
+                // A negative major radius, which real files hold, is the inner part of a self-touching torus.
+                if !(major.abs() > 0.0 && major > -minor) {
+                    return Err(Refusal::of(e, "major radius leaves no surface"));
+                }
+                let inner =
+                    name.starts_with("DEG") && a.flag(skip + 2) == Some(false) && major > 0.0 && major < minor;
                 let signed = if inner { -major } else { major };
                 let mut chart = Chart::new(
                     Kind::Torus { frame, major: signed, minor },
@@ -94,6 +99,15 @@ impl<'f, 'a> Geometry<'f, 'a> {
         if let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1).or_else(|| e.own("CURVE_BOUNDED_SURFACE", 1)) {
             let basis = self.follow(e, a.id(0), "basis surface")?;
             return self.chart(basis.id, reach, depth + 1);
+        }
+        if let Some(a) = e.own("OFFSET_SURFACE", 1) {
+            let basis = self.follow(e, a.id(0), "basis surface")?;
+            let distance = length(a.real(1)).ok_or_else(|| Refusal::of(e, "its distance is missing"))?;
+            let basis = self.chart(basis.id, (reach.0, reach.1 + distance.abs()), depth + 1)?;
+            // Along the normal of the file's surface, which the chart's may oppose.
+            let signed = if basis.flipped { -distance } else { distance };
+            return super::offset::offset(&basis, signed)
+                .ok_or_else(|| Refusal::of(e, "the offset leaves nothing of its basis"));
         }
         const SPLINES: [&str; 5] = [
             "B_SPLINE_SURFACE",

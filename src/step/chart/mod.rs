@@ -258,6 +258,19 @@ impl Chart {
         Uv::new(one(0, u), one(1, v))
     }
 
+    /// Factors from the file's parameters to the chart's; `None` where they are not proportional.
+    pub(super) fn parameter_scale(&self, length: f64, angle: f64) -> Option<[f64; 2]> {
+        let direct = |c: &Curve| c.points.iter().all(|p| p.w == c.points[0].w);
+        match &self.kind {
+            Kind::Plane { .. } => Some([length; 2]),
+            Kind::Cone { .. } => Some([angle, length]),
+            Kind::Torus { .. } => Some([angle; 2]),
+            Kind::Revolution { meridian, .. } => direct(meridian).then_some([angle, 1.0]),
+            Kind::Extrusion { base, .. } => direct(base).then_some([1.0; 2]),
+            Kind::Spline(_) => Some([1.0; 2]),
+        }
+    }
+
     /// The same sphere with its poles along another axis.
     pub(super) fn with_axis(&self, axis: Vector, x_hint: Vector) -> Option<Self> {
         let Kind::Torus { frame, major: 0.0, minor } = self.kind else { return None };

@@ -77,7 +77,8 @@ impl SplineChart {
         }
         let (uv, distance) = self.search(p, best);
         // Edges that stay off the surface by this much need no search at every point.
-        if distance > self.expected.get() && distance < 1e-2 * self.size {
+        let in_vain = best.is_some_and(|b| distance > 0.9 * b.1);
+        if distance > self.expected.get() && (in_vain || distance < 1e-2 * self.size) {
             self.expected.set(1.5 * distance);
         }
         uv

@@ -1,0 +1,74 @@
+//! Curves given only in the parameter plane of a surface, and cubic curves through what can be evaluated.
+
+use super::chart::Chart;
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part21::Entity;
+use super::units::Units;
+use crate::math::{Point, Uv, Vector};
+use crate::nurbs::Curve;
+
+/// Most pieces of a fitted curve.
+const MAX_PIECES: u32 = 4096;
+
+/// The C¹ cubic through a curve given by position and derivative, its pieces doubled until the middles agree to
+/// `tolerance` mm; the error left.
+pub(super) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
+    let mut n = 8u32;
+    loop {
+        let t = |i: f64| a + (b - a) * i / f64::from(n);
+        let ts: Vec<f64> = (0..=n).map(|i| t(f64::from(i))).collect();
+        let (points, slopes): (Vec<Point>, Vec<Vector>) = ts.iter().map(|&t| at(t)).unzip();
+        let curve = Curve::hermite(&ts, &points, &slopes);
+        let middles = (0..n).map(|i| t(f64::from(i) + 0.5));
+        let error = middles.fold(0f64, |e, t| e.max((curve.evaluate(t) - at(t).0).length()));
+        if error < tolerance || n >= MAX_PIECES {
+            return (curve, error);
+        }
+        n *= 2;
+    }
+}
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// A PCURVE as a curve in space.
+    pub(super) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        let own = e.own("PCURVE", 1).unwrap_or_else(|| e.args());
+        let basis = self.follow(e, own.id(0), "basis surface")?;
+        let definition = self.follow(e, own.id(1), "curve in the parameter plane")?;
+        let representation = definition.own("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
+        let item = representation.list(1).ids().first().copied();
+        let item = self.follow(definition, item, "curve in the parameter plane")?;
+        let chart = self.chart(basis.id, (Point::ZERO, 0.0), depth + 1)?;
+        let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
+            return Err(Refusal::of(e, "its parameters cannot be taken over to the swept conic"));
+        };
+        // Parameters are pure numbers; only angles of conics keep their unit.
+        let plane = Geometry { file: self.file, units: Units { length: 1.0, ..self.units } };
+        let curve = plane.bounded(item.id, depth + 1)?;
+        Ok(lifted(&chart, &curve, scale))
+    }
+}
+
+/// A curve of the parameter plane, in space.
+fn lifted(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
+    let at = |t: f64| {
+        let c = curve.derivatives(t);
+        let d = chart.derivatives(Uv::new(c.point.x * scale[0], c.point.y * scale[1]));
+        (d.point, d.du * (c.first.x * scale[0]) + d.dv * (c.first.y * scale[1]))
+    };
+    // Corners stay corners: one cubic between each pair of knots of full multiplicity would do, all knots are simpler.
+    let breaks = curve.breakpoints();
+    if curve.degree > 1 || breaks.len() == 2 {
+        return cubic(curve.domain(), at, 1e-6).0;
+    }
+    let parts = breaks.windows(2).map(|w| {
+        let middle = 0.5 * (w[0] + w[1]);
+        let slope = curve.derivatives(middle).first;
+        let line = |t: f64| {
+            let p = curve.evaluate(t);
+            let d = chart.derivatives(Uv::new(p.x * scale[0], p.y * scale[1]));
+            (d.point, d.du * (slope.x * scale[0]) + d.dv * (slope.y * scale[1]))
+        };
+        cubic([w[0], w[1]], line, 1e-6).0
+    });
+    parts.reduce(|a, b| super::curves::joined(&a, &b)).unwrap_or_else(|| curve.clone())
+}

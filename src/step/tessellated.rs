@@ -1,0 +1,138 @@
+//! AP242 tessellated shapes: ready meshes, taken as they are.
+
+use super::geometry::{Geometry, Outcome, Refusal};
+use super::part21::{Args, Entity};
+use crate::math::{FaceId, Point, Uv, Vector};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::model::TessellatedFace;
+
+/// Deepest nesting of tessellated items.
+const MAX_DEPTH: usize = 8;
+
+/// What the leaves of a tessellated item gave.
+#[derive(Default)]
+pub(super) struct Leaves {
+    pub(super) faces: Vec<TessellatedFace>,
+    pub(super) refused: Vec<Refusal>,
+}
+
+/// Where a kind of leaf keeps its indices, and how triangles are listed.
+struct Layout {
+    pnindex: usize,
+    strips: bool,
+}
+
+fn layout(keyword: &str) -> Option<Layout> {
+    Some(match keyword {
+        "TRIANGULATED_FACE" => Layout { pnindex: 5, strips: false },
+        "COMPLEX_TRIANGULATED_FACE" => Layout { pnindex: 5, strips: true },
+        "TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, strips: false },
+        "COMPLEX_TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, strips: true },
+        _ => return None,
+    })
+}
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// Collects the triangulated faces of a tessellated item. A solid or shell that is linked to an exact shape is only
+    /// its picture and gives nothing.
+    pub(super) fn tessellated(&self, id: u64, depth: usize, into: &mut Leaves) {
+        let Ok(e) = self.entity(id) else { return };
+        if let Some(layout) = layout(e.keyword()) {
+            match self.triangles(e, &layout) {
+                Ok(mesh) => {
+                    let name = e.args().text(0).unwrap_or_default();
+                    into.faces.push(TessellatedFace { name, entity: Some(id), colour: None, mesh });
+                }
+                Err(refusal) => into.refused.push(refusal),
+            }
+        } else if depth < MAX_DEPTH
+            && e.is_any(&["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_GEOMETRIC_SET"])
+        {
+            let linked = e.args().id(2).is_some_and(|link| self.file.entity(link).is_some());
+            if !linked {
+                for item in e.args().list(1).ids() {
+                    self.tessellated(item, depth + 1, into);
+                }
+            }
+        }
+    }
+
+    fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
+        let args = e.args();
+        let list = self.follow(e, args.id(1), "list of coordinates")?;
+        let rows = list.own("COORDINATES_LIST", 1).map(|a| a.list(1));
+        let Some(rows) = rows else { return Err(Refusal::of(list, "is no list of coordinates")) };
+        let triple = |rows: Args<'f, 'a>, i: usize| -> Option<Vector> {
+            let row = rows.list(i);
+            Some(Vector::new(row.real(0)?, row.real(1)?, row.real(2)?)).filter(|v| v.is_finite())
+        };
+        let index = args.list(layout.pnindex);
+        // The local number of a point, from 1, to the row of its coordinates, from 0.
+        let row_of = |local: usize| -> Option<usize> {
+            let row = if index.len() == 0 { local } else { index.count(local.checked_sub(1)?)? };
+            row.checked_sub(1).filter(|r| *r < rows.len())
+        };
+        let corners = corner_numbers(args, layout);
+        let normals = args.list(3);
+        let normal_of = |local: usize| -> Option<Vector> {
+            let at = if normals.len() == 1 { 0 } else { local.checked_sub(1)? };
+            triple(normals, at)?.try_normalize()
+        };
+        let mut mesh = FacetMesh::default();
+        let mut position_of = rustc_hash::FxHashMap::<usize, u32>::default();
+        for triangle in corners {
+            let mut found = [None; 3];
+            for (slot, local) in found.iter_mut().zip(triangle) {
+                *slot = row_of(local).and_then(|row| Some((row, triple(rows, row)? * self.units.length)));
+            }
+            let [Some(a), Some(b), Some(c)] = found else {
+                return Err(Refusal::of(e, "a triangle refers to a point that is not in the list"));
+            };
+            let Some(flat) = (b.1 - a.1).cross(c.1 - a.1).try_normalize() else { continue };
+            let first = mesh.vertices.len() as u32;
+            for ((row, p), local) in [a, b, c].into_iter().zip(triangle) {
+                let position = *position_of.entry(row).or_insert_with(|| {
+                    mesh.positions.push(p as Point);
+                    mesh.positions.len() as u32 - 1
+                });
+                let normal = normal_of(local).unwrap_or(flat);
+                mesh.vertices.push(MeshVertex { position, normal, uv: Uv::ZERO });
+            }
+            mesh.facets.push(Facet { vertices: [first, first + 1, first + 2, first + 2], face: FaceId(0) });
+        }
+        if mesh.facets.is_empty() {
+            return Err(Refusal::of(e, "holds no triangle with an area"));
+        }
+        Ok(mesh)
+    }
+}
+
+/// Local point numbers of all triangles: listed, or unrolled from strips and fans.
+fn corner_numbers(args: Args<'_, '_>, layout: &Layout) -> Vec<[usize; 3]> {
+    let numbers = |list: Args<'_, '_>| -> Vec<usize> { (0..list.len()).filter_map(|i| list.count(i)).collect() };
+    let mut triangles = Vec::new();
+    if !layout.strips {
+        let list = args.list(layout.pnindex + 1);
+        for i in 0..list.len() {
+            if let [a, b, c] = numbers(list.list(i))[..] {
+                triangles.push([a, b, c]);
+            }
+        }
+        return triangles;
+    }
+    let strips = args.list(layout.pnindex + 1);
+    for i in 0..strips.len() {
+        for (k, w) in numbers(strips.list(i)).windows(3).enumerate() {
+            // Every other triangle of a strip turns the other way.
+            triangles.push(if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
+        }
+    }
+    let fans = args.list(layout.pnindex + 2);
+    for i in 0..fans.len() {
+        let fan = numbers(fans.list(i));
+        for w in fan.get(1..).unwrap_or(&[]).windows(2) {
+            triangles.push([fan[0], w[0], w[1]]);
+        }
+    }
+    triangles
+}
