@@ -95,6 +95,14 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let [a, b] = c.domain();
             (c.evaluate(a), c.evaluate(b))
         };
+        if let [first, second, ..] = &curves[..] {
+            let (a, b) = ends(second);
+            let to = |p: Point| (p - a).length().min((p - b).length());
+            let (start, end) = ends(first);
+            if to(start) < 0.5 * to(end) && curves.len() > 2 {
+                curves[0] = curves[0].reversed();
+            }
+        }
         for i in 1..curves.len() {
             let end = ends(&curves[i - 1]).1;
             let (a, b) = ends(&curves[i]);

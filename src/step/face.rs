@@ -134,7 +134,7 @@ pub(super) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
                 uv,
             });
         }
-        snap(&mut uses);
+        gap = gap.max(snap(&mut uses, &surface));
         built.push(uses);
     }
     Ok(Built {
@@ -213,7 +213,16 @@ fn fit_edge(chart: &Chart, curve: &Curve, task: &Task<'_>, budget: &Budget) -> R
         tolerance: task.tolerance,
         budget,
     };
-    target.fit(curve)
+    let mut fit = target.fit(curve)?;
+    // Cubics between points of the border may swing over it.
+    for p in &mut fit.curve.points {
+        for d in 0..2 {
+            if chart.period[d].is_none() {
+                p[d] = p[d].clamp(chart.range[d][0], chart.range[d][1]);
+            }
+        }
+    }
+    Ok(fit)
 }
 
 /// The edge in the spline's parameters, following the piece in the chart's.
@@ -293,8 +302,9 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
     Some((domain, shift))
 }
 
-/// Lets each use begin exactly where the one before ends.
-fn snap(uses: &mut [BuiltUse]) {
+/// Lets each use begin exactly where the one before ends; the largest move of an end, mm.
+fn snap(uses: &mut [BuiltUse], surface: &Surface) -> f64 {
+    let mut moved = 0f64;
     let n = uses.len();
     let end_index = |u: &BuiltUse, end: bool| if end != u.reversed { u.uv.points.len() - 1 } else { 0 };
     for i in 0..n {
@@ -309,10 +319,15 @@ fn snap(uses: &mut [BuiltUse]) {
             _ => 0.5 * (p + q),
         };
         for (k, at) in [(i, a), (j, b)] {
+            let from = uses[k].uv.points[at].position();
+            if from != to {
+                moved = moved.max((surface.evaluate(from) - surface.evaluate(to)).length());
+            }
             let w = uses[k].uv.points[at].z;
             uses[k].uv.points[at] = (to * w).extend(w);
         }
     }
+    moved
 }
 
 /// Loops of numbered uses.

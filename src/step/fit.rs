@@ -123,7 +123,8 @@ impl Target<'_> {
     pub(super) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
         let breaks = curve.breakpoints();
         let spans = breaks.len() - 1;
-        let pieces = if curve.degree == 1 { 1 } else { 4usize.div_ceil(spans) };
+        // One Bézier span of high degree may hold a whole turn of a thread.
+        let pieces = if curve.degree == 1 { 1 } else { 4usize.div_ceil(spans).max(curve.degree.div_ceil(2)) };
         let mut nodes: Vec<(Node, Node)> = Vec::new();
         let mut hint = None;
         let mut gap = 0f64;
@@ -135,8 +136,6 @@ impl Target<'_> {
             for k in 1..=pieces {
                 let t =
                     if k == pieces { pair[1] } else { pair[0] + (pair[1] - pair[0]) * k as f64 / pieces as f64 };
-                let expected = a.uv + a.slope * (t - a.t);
-                let _ = expected;
                 let b = self.node(&piece, t, -1.0, Some(a.uv))?;
                 self.halve(&piece, a, b, 0, &mut nodes, &mut gap)?;
                 a = b;

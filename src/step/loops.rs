@@ -144,21 +144,35 @@ pub(super) fn contains(polygon: &[Uv], p: Uv) -> bool {
 }
 
 /// Chains edge uses; each is shifted by whole periods to begin where the one before ends.
+///
+/// Loops whose sides at a pole do not fit the sense in which they wind are tried with the sides run the other way: such
+/// loops run against their face's orientation.
 pub(super) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
+    let first = chained(uses.clone(), chart, tolerance, false);
+    if first.winding.iter().all(|w| w.abs() < 2) {
+        return first;
+    }
+    let mut second = chained(uses, chart, tolerance, true);
+    if second.is_winding() {
+        return first;
+    }
+    second.reverse();
+    second
+}
+
+fn chained(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
     let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
-    let count = uses.len();
     for (i, next) in uses.into_iter().enumerate() {
         if i == 0 {
             chain.pieces.push(next);
             continue;
         }
-        let shift = connect(&mut chain, &next, chart, tolerance);
+        let shift = connect(&mut chain, &next, chart, tolerance, turned);
         chain.pieces.push(next.shifted(shift));
     }
     let Some(first) = chain.pieces.first().cloned() else { return chain };
-    let _ = count;
     // Back to the start: what the shift says is the winding.
-    let shift = connect(&mut chain, &first, chart, tolerance);
+    let shift = connect(&mut chain, &first, chart, tolerance, turned);
     for d in 0..2 {
         chain.winding[d] = chart.period[d].map_or(0, |p| (shift[d] / p).round() as i32);
     }
@@ -166,7 +180,7 @@ pub(super) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
 }
 
 /// Steps from the end of the chain to the start of `next`, adding pole sides; the shift that `next` needs.
-fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64) -> Uv {
+fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turned: bool) -> Uv {
     let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
     let (from, start) = (last.end(), next.start());
     let near = chart.near(start, from);
@@ -185,7 +199,8 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64) -> Uv
     };
     let free = 1 - pole.fixed;
     let same_edge = last.source == next.source;
-    let amount = around_pole(pole, chart, &last, start[free] - from[free], same_edge);
+    let low = (last.middle()[pole.fixed] > pole.at) != turned;
+    let amount = around_pole(pole, chart, low, start[free] - from[free], same_edge);
     let target = from[free] + amount;
     // Down to the pole, along it, and back: the first and last step are usually empty.
     let mut corner = from;
@@ -203,10 +218,9 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64) -> Uv
 }
 
 /// How far the loop runs along a pole, with the material on its left.
-fn around_pole(pole: &Pole, chart: &Chart, last: &Piece, difference: f64, same_edge: bool) -> f64 {
+fn around_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_edge: bool) -> f64 {
     let free = 1 - pole.fixed;
     let Some(period) = chart.period[free] else { return difference };
-    let low = last.middle()[pole.fixed] > pole.at;
     // Along v = low run to +u, along v = high to -u; along u = high to +v, along u = low to -v.
     let forward = if pole.fixed == 1 { low } else { !low };
     let amount = if forward { difference.rem_euclid(period) } else { (-difference).rem_euclid(period) };

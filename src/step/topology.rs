@@ -106,13 +106,13 @@ impl Items {
             self.tessellated.push(id);
         } else if e.is_any(&RECIPES) {
             self.refused.push(Refusal::of(e, "solids given as a recipe (CSG, sweeps of areas) are not converted; export them as a boundary representation"));
-        } else if is_surface(e) {
+        } else if is_surface(e) && !self.surfaces.contains(&id) {
             self.surfaces.push(id);
         }
     }
 
     fn element(&mut self, file: &File<'_>, id: u64) {
-        if file.entity(id).is_some_and(is_surface) {
+        if !self.surfaces.contains(&id) && file.entity(id).is_some_and(is_surface) {
             self.surfaces.push(id);
         }
     }

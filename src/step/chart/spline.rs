@@ -6,7 +6,8 @@ use crate::nurbs::{BezierPatch, ControlPoint, Curve, Surface};
 use std::cell::Cell;
 use std::sync::OnceLock;
 
-/// Samples per direction in a patch that seed the search.
+/// Samples per direction in a patch that seed the search, at degrees up to 3. Threads have degree 13 and a whole turn in
+/// one patch: higher degrees take twice their number.
 const SEEDS: usize = 4;
 
 /// A spline surface that knows where it closes and contracts.
@@ -188,10 +189,11 @@ impl SplineChart {
                 break;
             }
             let patch = &patches[i].0;
-            let mut seeds: Vec<(f64, Uv)> = Vec::with_capacity(SEEDS * SEEDS);
-            for a in 0..SEEDS {
-                for b in 0..SEEDS {
-                    let local = Uv::new((a as f64 + 0.5) / SEEDS as f64, (b as f64 + 0.5) / SEEDS as f64);
+            let counts = patch.degree.map(|p| if p <= 3 { SEEDS } else { 2 * p });
+            let mut seeds: Vec<(f64, Uv)> = Vec::with_capacity(counts[0] * counts[1]);
+            for a in 0..counts[0] {
+                for b in 0..counts[1] {
+                    let local = Uv::new((a as f64 + 0.5) / counts[0] as f64, (b as f64 + 0.5) / counts[1] as f64);
                     let q = patch.homogeneous(local)[0].position();
                     seeds.push(((q - p).length(), patch.surface_uv(local)));
                 }
