@@ -32,7 +32,6 @@ struct Row {
     bbox: Option<f64>,
     /// Relative difference of the area.
     area: Option<f64>,
-    area_reference: Option<f64>,
     violations: usize,
     first: String,
 }
@@ -55,8 +54,8 @@ fn row(folder: &Path, name: &str, reference: &Value, with_area: bool) -> Row {
         p.shells.iter().flat_map(|s| &s.faces).filter(|f| !step_support::violations(p, f).is_empty()).count()
     });
     let violations = violations.sum();
-    let area_reference = reference["area_mm2"].as_f64();
-    let area = area_reference
+    let area = reference["area_mm2"]
+        .as_f64()
         .filter(|a| with_area && *a > 0.0)
         .map(|a| step_support::measure_model(&import.model).area / a - 1.0);
     let first = r.refusals.first().map(|n| format!("#{} {}: {}", n.id, n.entity, n.reason)).unwrap_or_default();
@@ -72,7 +71,6 @@ fn row(folder: &Path, name: &str, reference: &Value, with_area: bool) -> Row {
         distinct_reference: count("counts_distinct", "faces"),
         bbox,
         area,
-        area_reference,
         violations,
         first,
     }

@@ -6,6 +6,7 @@ use super::styles::Styles;
 use super::topology::Items;
 use super::units::{Units, contexts};
 use super::{Error, ErrorKind, Settings, bounds};
+use crate::math::Frame;
 use crate::model::{Analytic, Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
@@ -84,23 +85,25 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
             }
         }
     }
-    let styles = Styles::read(file);
+    let common = Common { file, styles: Styles::read(file), settings };
     let assembly = Assembly::read(file, units, fallback.unwrap_or(Units::DEFAULT));
     let (placed, assembly) = assembly.walk();
     report.problems.extend(assembly.problems.iter().cloned());
     let mut model = Model { name: name.to_string(), ..Model::default() };
     let mut parts: FxHashMap<u64, Option<(PartId, usize)>> = FxHashMap::default();
-    let mut items_placed = FxHashSet::default();
+    let mut items_placed: FxHashMap<u64, Frame> = FxHashMap::default();
     for p in placed {
         let known = parts.get(&p.representation).copied();
         let entry = known.unwrap_or_else(|| {
             let mut items = assembly.items(p.representation);
-            if p.orphan {
-                items.retain(|item| !items_placed.contains(item));
+            // Linked representations often name the same shapes; each is meant once in a place.
+            let again = |item: &u64| items_placed.get(item).is_some_and(|at| p.orphan || *at == p.placement);
+            items.retain(|item| !again(item));
+            for item in &items {
+                items_placed.entry(*item).or_insert(p.placement);
             }
-            items_placed.extend(items.iter().copied());
             let units = assembly.units_of(p.representation);
-            let made = make_part(file, units, &p, &items, &styles, settings, &mut model, report);
+            let made = make_part(&common, units, &p, &items, &mut model, report);
             parts.insert(p.representation, made);
             made
         });
@@ -110,7 +113,7 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
             continue;
         }
         let named = if p.name.is_empty() { model.part(part).name.clone() } else { p.name.clone() };
-        let colour = p.owners.iter().rev().find_map(|o| styles.colour(*o));
+        let colour = p.owners.iter().rev().find_map(|o| common.styles.colour(*o));
         model.instances.push(Instance { name: named, part, placement: p.placement, colour });
     }
     report.parts = model.parts.iter().filter(|p| p.face_count() > 0).count();
@@ -125,17 +128,23 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
     model
 }
 
+/// What all parts of a file share.
+struct Common<'f, 'a> {
+    file: &'f File<'a>,
+    styles: Styles,
+    settings: &'f Settings,
+}
+
 /// Converts a representation that holds shapes; `None` when it holds none.
 fn make_part(
-    file: &File<'_>,
+    common: &Common<'_, '_>,
     units: Units,
     placed: &Placed,
     ids: &[u64],
-    styles: &Styles,
-    settings: &Settings,
     model: &mut Model,
     report: &mut ImportReport,
 ) -> Option<(PartId, usize)> {
+    let Common { file, styles, settings } = common;
     let mut items = Items::default();
     for &id in ids {
         items.add(file, id);

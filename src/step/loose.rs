@@ -15,6 +15,9 @@ use crate::nurbs::Curve;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+/// A built face with its boundary curves.
+type Bounded = (Built, Vec<Vec<Curve>>);
+
 /// Converts what is not a face of a shell: each surface becomes a shell of one face.
 pub(super) fn convert(
     geometry: &Geometry<'_, '_>,
@@ -25,7 +28,7 @@ pub(super) fn convert(
     out: &mut Converted,
 ) {
     out.found += items.surfaces.len();
-    let built: Vec<(u64, Outcome<(Built, Vec<Vec<Curve>>)>)> =
+    let built: Vec<(u64, Outcome<Bounded>)> =
         items.surfaces.par_iter().map(|&id| (id, surface(geometry, id, settings))).collect();
     for (id, outcome) in built {
         match outcome {
@@ -68,7 +71,7 @@ fn number(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
 }
 
 /// One surface with its boundaries, if it has any.
-fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<(Built, Vec<Vec<Curve>>)> {
+fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
     let e = geometry.entity(id)?;
     let (mut boundaries, mut implicit) = (Vec::new(), false);
     let mut task = if let Some(a) = e.own("CURVE_BOUNDED_SURFACE", 1) {
