@@ -1,7 +1,7 @@
 //! The walk with AVX2 and FMA.
 //!
 //! Sound because [`walk`] is entered only after [`available`] found both at run time, because loads stay inside the
-//! fixed-size arrays of [`Node`], [`Block`] and [`BoxRay`], and because prefetching never faults.
+//! fixed-size arrays of [`Node`], [`Block`] and [`BoxRay`], whose row indices are below six.
 #![allow(unsafe_code)]
 
 use super::Octree;
@@ -48,6 +48,20 @@ unsafe fn row(node: &Node, row: u8) -> __m256 {
     }
 }
 
+#[inline(always)]
+unsafe fn spread_at(v: &[f32; 3], axis: usize) -> __m256 {
+    unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
+}
+
+/// A row of corners against the ray's origin.
+#[inline(always)]
+unsafe fn coarse(block: &Block, row: usize, step: __m256, to: __m256) -> __m256 {
+    unsafe {
+        let corners = _mm_loadu_si128(block.corners.get_unchecked(row).as_ptr().cast());
+        _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(corners)), step, to)
+    }
+}
+
 impl Lanes for Avx2 {
     #[inline(always)]
     fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]) {
@@ -89,16 +103,12 @@ impl Lanes for Avx2 {
             let step = _mm256_set1_ps(block.step);
             let [kx, ky, kz] = ray.axes.map(usize::from);
             let (sx, sy) = (_mm256_set1_ps(ray.slopes[0]), _mm256_set1_ps(ray.slopes[1]));
-            let lane = |row: usize, a: usize| {
-                let coarse = _mm_loadu_si128(block.corners.get_unchecked(row + a).as_ptr().cast());
-                let coarse = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(coarse));
-                _mm256_fmadd_ps(coarse, step, _mm256_set1_ps(*to.get_unchecked(a)))
-            };
-            let sheared = |row: usize| {
-                let z = lane(row, kz);
-                (_mm256_fnmadd_ps(sx, z, lane(row, kx)), _mm256_fnmadd_ps(sy, z, lane(row, ky)))
-            };
-            let ((ax, ay), (bx, by)) = (sheared(0), sheared(3));
+            let (tx, ty, tz) = (spread_at(&to, kx), spread_at(&to, ky), spread_at(&to, kz));
+            let (az, bz) = (coarse(block, kz, step, tz), coarse(block, 3 + kz, step, tz));
+            let ax = _mm256_fnmadd_ps(sx, az, coarse(block, kx, step, tx));
+            let ay = _mm256_fnmadd_ps(sy, az, coarse(block, ky, step, ty));
+            let bx = _mm256_fnmadd_ps(sx, bz, coarse(block, 3 + kx, step, tx));
+            let by = _mm256_fnmadd_ps(sy, bz, coarse(block, 3 + ky, step, ty));
             let (cx, cy) = (_mm256_permute2f128_ps::<1>(ax, ax), _mm256_permute2f128_ps::<1>(ay, ay));
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
@@ -109,17 +119,6 @@ impl Lanes for Avx2 {
             let above = _mm256_cmp_ps::<_CMP_GT_OQ>(most, error);
             let inside = !(_mm256_movemask_ps(_mm256_and_ps(below, above)) as u32);
             (inside | inside >> 4) & 15
-        }
-    }
-
-    #[inline(always)]
-    fn prefetch<T>(slice: &[T], index: usize) {
-        let start = slice.as_ptr().wrapping_add(index).cast::<i8>();
-        let mut line = 0;
-        while line < size_of::<T>() {
-            // SAFETY: prefetching reads nothing and never faults.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line)) };
-            line += 64;
         }
     }
 }

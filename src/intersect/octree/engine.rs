@@ -6,6 +6,7 @@
 
 use super::Octree;
 use super::node::{Block, Link, Node, Target};
+use super::prefetch::prefetch;
 use super::state::{BoxRay, STACK, SiftRay, State};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
@@ -21,8 +22,6 @@ pub(super) trait Lanes {
     fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]);
     /// Which facets of the block the line of the ray may meet.
     fn sift(block: &Block, ray: &SiftRay) -> u32;
-    /// Asks for a cache line.
-    fn prefetch<T>(slice: &[T], index: usize);
 }
 
 thread_local! {
@@ -35,36 +34,38 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
     cost.rays += rays.len() as u64;
     hits.fill(None);
     let Some(root) = tree.root else { return };
-    STATES.with_borrow_mut(|states| {
-        if states.is_empty() {
-            states.resize_with(WIDTH, State::idle);
+    // Taken out, not borrowed by a closure: a closure would be compiled without the caller's instruction set.
+    let mut states = STATES.take();
+    if states.is_empty() {
+        states.resize_with(WIDTH, State::idle);
+    }
+    let mut order: [u8; WIDTH] = std::array::from_fn(|i| i as u8);
+    let mut next = 0;
+    let mut live = 0;
+    while live < WIDTH && next < rays.len() {
+        if states[live].start(tree, root, &rays[next], next) {
+            live += 1;
         }
-        let mut next = 0;
-        let mut live = 0;
-        while live < WIDTH && next < rays.len() {
-            if states[live].start(tree, root, &rays[next], next) {
-                live += 1;
+        next += 1;
+    }
+    let mut turn = 0;
+    while live > 0 {
+        let state = &mut states[usize::from(order[turn])];
+        if !step::<L>(tree, state, cost) {
+            hits[state.index] = state.best.hit();
+            let mut going = false;
+            while !going && next < rays.len() {
+                going = state.start(tree, root, &rays[next], next);
+                next += 1;
             }
-            next += 1;
-        }
-        let mut turn = 0;
-        while live > 0 {
-            let state = &mut states[turn];
-            if !step::<L>(tree, state, cost) {
-                hits[state.index] = state.best.hit();
-                let mut going = false;
-                while !going && next < rays.len() {
-                    going = state.start(tree, root, &rays[next], next);
-                    next += 1;
-                }
-                if !going {
-                    live -= 1;
-                    states.swap(turn, live);
-                }
+            if !going {
+                live -= 1;
+                order.swap(turn, live);
             }
-            turn = if turn + 1 >= live { 0 } else { turn + 1 };
         }
-    });
+        turn = if turn + 1 >= live { 0 } else { turn + 1 };
+    }
+    STATES.set(states);
 }
 
 /// One step; `false` at the end of the ray.
@@ -86,7 +87,7 @@ fn step<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) -> bool {
                 cost.tests += count as u64;
                 s.waiting = L::sift(block, &s.sift) & ((1 << count) - 1);
                 if s.waiting != 0 {
-                    fetch_corners::<L>(tree, block, s.waiting);
+                    fetch_corners(tree, block, s.waiting);
                     return true;
                 }
                 s.pop()
@@ -95,8 +96,8 @@ fn step<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) -> bool {
     };
     if going {
         match s.at.target() {
-            Target::Node(index) => L::prefetch(&tree.nodes, index),
-            Target::Block(index, _) => L::prefetch(&tree.blocks, index),
+            Target::Node(index) => prefetch(&tree.nodes, index),
+            Target::Block(index, _) => prefetch(&tree.blocks, index),
         }
     }
     going
@@ -135,12 +136,12 @@ fn push(s: &mut State, node: &Node, mut mask: u32, enter: &[f32; 8]) -> bool {
 }
 
 #[inline(always)]
-fn fetch_corners<L: Lanes>(tree: &Octree, block: &Block, mut mask: u32) {
+fn fetch_corners(tree: &Octree, block: &Block, mut mask: u32) {
     while mask != 0 {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask - 1;
         for p in block.positions[k] {
-            L::prefetch(&tree.around.mesh.positions, p as usize);
+            prefetch(&tree.around.mesh.positions, p as usize);
         }
     }
 }

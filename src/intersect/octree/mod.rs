@@ -23,6 +23,7 @@ mod flatten;
 mod node;
 mod pack;
 mod portable;
+mod prefetch;
 mod state;
 mod statistics;
 
@@ -31,6 +32,7 @@ use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
 use node::{Block, Node};
+use prefetch::prefetch;
 pub use statistics::Statistics;
 use std::time::Instant;
 
@@ -148,6 +150,26 @@ impl<'m> Octree<'m> {
         &self.statistics
     }
 
+    /// Asks for what the hits after the `i`-th will be described with: without, describing cost 40 % of the time at 200k
+    /// facets.
+    fn fetch_description(&self, found: &[Option<FacetHit>], i: usize) {
+        let mesh = self.around.mesh;
+        let facet = |ahead: usize| found.get(i + ahead).copied().flatten().map(|hit| hit.facet as usize);
+        if let Some(facet) = facet(12) {
+            prefetch(&mesh.facets, facet);
+        }
+        if let Some(facet) = facet(6) {
+            for v in mesh.facets[facet].vertices {
+                prefetch(&mesh.vertices, v as usize);
+            }
+        }
+        if let Some(facet) = facet(3) {
+            for p in mesh.corner_positions(facet) {
+                prefetch(&mesh.positions, p as usize);
+            }
+        }
+    }
+
     fn walk(&self, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
         #[cfg(target_arch = "x86_64")]
         if self.settings.path == Path::Fastest && avx2::available() {
@@ -158,7 +180,7 @@ impl<'m> Octree<'m> {
 }
 
 /// Rays walked before their hits are described: 16 rays that end late cost 2 % of it.
-const BATCH: usize = 1024;
+const BATCH: usize = 512;
 
 impl Intersector for Octree<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
@@ -172,8 +194,9 @@ impl Intersector for Octree<'_> {
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
             let found = &mut found[..rays.len()];
             self.walk(rays, found, cost);
-            for (hit, found) in hits.iter_mut().zip(found) {
-                *hit = found.map(|found| normals::describe(self.around.mesh, &found, self.settings.normals));
+            for (i, hit) in hits.iter_mut().enumerate() {
+                self.fetch_description(found, i);
+                *hit = found[i].map(|found| normals::describe(self.around.mesh, &found, self.settings.normals));
             }
         }
     }

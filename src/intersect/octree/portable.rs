@@ -54,7 +54,4 @@ impl Lanes for Portable {
         }
         mask
     }
-
-    #[inline(always)]
-    fn prefetch<T>(_: &[T], _: usize) {}
 }
