@@ -20,7 +20,7 @@ impl Cell {
         [self.lo, Uv::new(self.hi.x, self.lo.y), self.hi, Uv::new(self.lo.x, self.hi.y)]
     }
 
-    fn center(&self) -> Uv {
+    pub(super) fn center(&self) -> Uv {
         0.5 * (self.lo + self.hi)
     }
 }
@@ -95,7 +95,7 @@ impl Tree<'_, '_, '_> {
         }
         let look = Look::new(self.sheet, cell);
         let crease = self.crease(cell);
-        if crease.is_none() && self.fits(cell, &look, inside) {
+        if crease.is_none() && self.fits(cell, &look) {
             if inside { &mut self.leaves.inside } else { &mut self.leaves.border }.push(cell);
             return;
         }
@@ -132,7 +132,7 @@ impl Tree<'_, '_, '_> {
         if i < j { l[(i + j) / 2] } else { 0.5 * (lo + hi) }
     }
 
-    fn fits(&mut self, cell: Cell, look: &Look, inside: bool) -> bool {
+    fn fits(&mut self, cell: Cell, look: &Look) -> bool {
         let xi =
             cell.corners().iter().fold(self.sheet.tolerance(cell.center()), |x, &c| x.min(self.sheet.tolerance(c)));
         if look.sag[0].max(look.sag[1]) > xi {
@@ -146,9 +146,7 @@ impl Tree<'_, '_, '_> {
             }
         }
         let corners = look.facet(cell);
-        if !inside {
-            return corners_sampled(self.sheet, &corners, xi);
-        }
+        // A cell at the border is only a measure of size, but often the strip gets the same rectangle again.
         quad_bound(&mut self.prover, &corners, xi) <= xi
     }
 
@@ -183,16 +181,6 @@ pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -
         }
     }
     worst
-}
-
-/// Whether a few samples stay within the limit: enough for cells that are only a measure of size.
-fn corners_sampled(sheet: &Sheet<'_>, c: &Corners, limit: f64) -> bool {
-    [[0, 1, 2], [0, 2, 3]].iter().all(|&[i, j, k]| {
-        let xyz = [c[i].1, c[j].1, c[k].1];
-        let third = (c[i].0 + c[j].0 + c[k].0) / 3.0;
-        super::bound::distance(sheet.point(third), &xyz) <= limit
-            && super::bound::distance(sheet.point(0.5 * (c[i].0 + c[k].0)), &xyz) <= limit
-    })
 }
 
 /// Nine points of a cell and what they show.

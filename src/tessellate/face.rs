@@ -84,7 +84,7 @@ pub(super) fn mesh(
     }
     let fixed: FxHashMap<[u32; 2], ()> = segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
     let outline =
-        Outline { nodes, segments, trims, scale: scale(sheet, &rings), next: (shared.len() + own.len()) as u32 };
+        Outline { nodes, segments, trims, scale: scale(sheet, &rings, &leaves), next: (shared.len() + own.len()) as u32 };
     let strip = strip::triangulate(sheet, &mut prover, outline, settings.budget)?;
     let known = shared.len() + own.len();
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
@@ -177,24 +177,28 @@ fn with_poles(ring: &[rings::RingVertex], leaves: &Leaves) -> (Vec<(Uv, u32)>, V
 
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that
 /// the strip's triangles lie along the direction that does not bend.
-fn scale(sheet: &Sheet<'_>, rings: &Rings) -> Uv {
+fn scale(sheet: &Sheet<'_>, rings: &Rings, leaves: &Leaves) -> Uv {
     let points = rings.rings.iter().flatten().map(|v| v.uv);
     let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
     let n = 5;
+    let grid = |k: usize| lo + (Uv::new((k / n) as f64, (k % n) as f64) + 0.5) / n as f64 * (hi - lo);
+    // Cells at the border are where the strip will be.
+    let step = leaves.border.len() / 64 + 1;
+    let mut at: Vec<Uv> = leaves.border.iter().step_by(step).map(|c| c.center()).collect();
+    if at.len() < 4 {
+        at.extend((0..n * n).map(grid));
+    }
     let (mut sum, mut count) = ([0.0; 2], 0.0);
     let diagonal = sheet.size.max(1e-300);
-    for i in 0..n {
-        for j in 0..n {
-            let f = Uv::new((i as f64 + 0.5) / n as f64, (j as f64 + 0.5) / n as f64);
-            let d = sheet.surface.second_derivatives(lo + f * (hi - lo));
-            let Some(forms) = crate::nurbs::FundamentalForms::new(&d) else { continue };
-            // Below this curvature the whole face is one chord.
-            let floor = 8.0 * sheet.field.loosest() / (diagonal * diagonal);
-            let weigh = |k: f64, speed: f64| k.abs().max(floor).sqrt() * speed;
-            sum[0] += weigh(forms.along(Uv::X), d.du.length());
-            sum[1] += weigh(forms.along(Uv::Y), d.dv.length());
-            count += 1.0;
-        }
+    // Below this curvature the whole face is one chord.
+    let floor = 8.0 * sheet.field.loosest() / (diagonal * diagonal);
+    let weigh = |k: f64, speed: f64| k.abs().max(floor).sqrt() * speed;
+    for uv in at {
+        let d = sheet.surface.second_derivatives(uv);
+        let Some(forms) = crate::nurbs::FundamentalForms::new(&d) else { continue };
+        sum[0] += weigh(forms.along(Uv::X), d.du.length());
+        sum[1] += weigh(forms.along(Uv::Y), d.dv.length());
+        count += 1.0;
     }
     let s = Uv::new(sum[0] / count, sum[1] / count);
     if s.is_finite() && s.min_element() > 0.0 { s / s.max_element() } else { Uv::ONE }

@@ -61,7 +61,7 @@ pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
 }
 
 /// Rounds of refinement.
-const ROUNDS: usize = 16;
+const ROUNDS: usize = 40;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
 pub(super) fn triangulate(
@@ -166,12 +166,7 @@ struct Work<'s, 'a> {
 
 impl Work<'_, '_> {
     fn insert(&mut self, n: u32) -> Option<spade::handles::FixedVertexHandle> {
-        let clean = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
-        let p = self.nodes[n as usize].uv * self.scale;
-        let at = Point2::new(clean(p.x), clean(p.y));
-        if !(p.is_finite() && p.abs().max_element() < 1e30) {
-            return None;
-        }
+        let at = self.scaled(self.nodes[n as usize].uv)?;
         let before = self.cdt.num_vertices();
         let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
         if self.cdt.num_vertices() == before {
@@ -180,6 +175,22 @@ impl Work<'_, '_> {
             self.cdt.vertex_data_mut(handle).node = first;
         }
         Some(handle)
+    }
+
+    fn scaled(&self, uv: Uv) -> Option<Point2<f64>> {
+        let clean = |x: f64| if x.abs() < 1e-30 { 0.0 } else { x };
+        let p = uv * self.scale;
+        (p.is_finite() && p.abs().max_element() < 1e30).then(|| Point2::new(clean(p.x), clean(p.y)))
+    }
+
+    /// Whether a point can be added without splitting a constraint or meeting a vertex.
+    fn is_free(&self, uv: Uv) -> bool {
+        use spade::PositionInTriangulation as At;
+        self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
+            At::OnFace(_) => true,
+            At::OnEdge(e) => !self.cdt.directed_edge(e).is_constraint_edge(),
+            _ => false,
+        })
     }
 
     fn constrain(&mut self, a: u32, b: u32) -> bool {
@@ -282,22 +293,19 @@ impl Work<'_, '_> {
         }
         let mut done = false;
         for uv in wanted {
+            if !self.is_free(uv) {
+                continue;
+            }
             let n = self.nodes.len() as u32;
             let place = self.sheet.point(uv);
             self.nodes.push(Node { uv, place, position: self.next });
-            let before = (self.cdt.num_vertices(), self.cdt.num_constraints());
             match self.insert(n) {
-                Some(h) if self.cdt.num_vertices() > before.0 && self.cdt.num_constraints() == before.1 => {
+                Some(h) => {
                     self.handles.push(h);
                     self.next += 1;
                     done = true;
                 }
-                Some(h) if self.cdt.num_vertices() > before.0 => {
-                    // It fell onto a constraint and split it: take it out again.
-                    self.cdt.remove(h);
-                    self.nodes.pop();
-                }
-                _ => {
+                None => {
                     self.nodes.pop();
                 }
             }
