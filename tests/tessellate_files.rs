@@ -86,7 +86,8 @@ fn corpus() {
 fn uncertified() {
     let only = std::env::var("ONLY").unwrap_or_default();
     let tolerance: f64 = std::env::var("TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
-    let corpus = std::env::var("LAMPYRIS_CORPUS").map(PathBuf::from).unwrap_or_else(|_| "../../shared/step-corpus".into());
+    let corpus =
+        std::env::var("LAMPYRIS_CORPUS").map(PathBuf::from).unwrap_or_else(|_| "../../shared/step-corpus".into());
     let mut all = files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step"));
     all.extend(files(&corpus));
     for path in all {
@@ -94,16 +95,38 @@ fn uncertified() {
             continue;
         }
         let import = step::read(&path, &step::Settings::default()).unwrap();
-        let settings = if std::env::var("TOLERANCE").is_ok() { Settings::uniform(tolerance) } else { Settings::default() };
+        let settings =
+            if std::env::var("TOLERANCE").is_ok() { Settings::uniform(tolerance) } else { Settings::default() };
         let made = tessellate(&import.model, &settings);
         println!("{}", line(&path, &made));
         let faces: Vec<_> = import.model.placed_faces().collect();
         for n in made.report.not_certified.iter().take(10) {
             let f = faces[n.face as usize].face.unwrap();
-            println!("face {} #{:?} {:?} gap {} loops {} domain {:?} of {}", n.face, n.entity, f.analytic, f.gap, f.loops.len(), f.surface.domain(), made.mesh.facets.iter().filter(|x| x.face.0 == n.face).count());
-            for (i, q) in made.quality.iter().enumerate().filter(|(i, q)| !q.certified && made.mesh.facets[*i].face.0 == n.face).take(4) {
+            println!(
+                "face {} #{:?} {:?} gap {} loops {} domain {:?} of {}",
+                n.face,
+                n.entity,
+                f.analytic,
+                f.gap,
+                f.loops.len(),
+                f.surface.domain(),
+                made.mesh.facets.iter().filter(|x| x.face.0 == n.face).count()
+            );
+            for (i, q) in made
+                .quality
+                .iter()
+                .enumerate()
+                .filter(|(i, q)| !q.certified && made.mesh.facets[*i].face.0 == n.face)
+                .take(4)
+            {
                 let v = made.mesh.facets[i].vertices.map(|v| made.mesh.vertices[v as usize]);
-                println!("   bound {} tol {} uv {:?} xyz {:?}", q.bound, q.tolerance, v.map(|v| (v.uv.x, v.uv.y)), made.mesh.corners(i).map(|p| p.to_array()));
+                println!(
+                    "   bound {} tol {} uv {:?} xyz {:?}",
+                    q.bound,
+                    q.tolerance,
+                    v.map(|v| (v.uv.x, v.uv.y)),
+                    made.mesh.corners(i).map(|p| p.to_array())
+                );
             }
         }
     }

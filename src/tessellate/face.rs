@@ -83,8 +83,13 @@ pub(super) fn mesh(
         }
     }
     let fixed: FxHashMap<[u32; 2], ()> = segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
-    let outline =
-        Outline { nodes, segments, trims, scale: scale(sheet, &rings, &leaves), next: (shared.len() + own.len()) as u32 };
+    let outline = Outline {
+        nodes,
+        segments,
+        trims,
+        scale: scale(sheet, &rings, &leaves),
+        next: (shared.len() + own.len()) as u32,
+    };
     let strip = strip::triangulate(sheet, &mut prover, outline, settings.budget)?;
     let known = shared.len() + own.len();
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
