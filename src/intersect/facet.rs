@@ -184,15 +184,15 @@ impl FacetRay {
 
     /// The facet that the ray leaves: only its other triangle may be met, and only where the fold between them closes
     /// on the ray.
-    #[cold]
     fn ways_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
         let start = Point::from_array(self.origin);
         let own = Own::new(corners, start);
         let apex = corners[if own.second { 1 } else { 3 }];
-        let off_plane = own.normal.dot(start - corners[0]).abs();
+        let thick = around.reach * around.reach * own.normal.length_squared();
         let height = own.normal.dot(apex - corners[0]);
-        let closes = height * own.normal.dot(self.direction) > 0.0 && height.abs() > around.reach;
-        let other = if !closes || off_plane > around.reach {
+        let off_plane = own.normal.dot(start - corners[0]);
+        let closes = height * own.normal.dot(self.direction) > 0.0 && height * height > thick;
+        let other = if !closes || off_plane * off_plane > thick {
             Way::Never
         } else if distance_to_segment(start, corners[0], corners[2]) <= around.reach {
             Way::From(own.moved(start, around.reach))
@@ -222,7 +222,8 @@ impl FacetRay {
         }
         let start = Point::from_array(self.origin);
         let own = Own::new(&mesh.corners(own as usize), start);
-        let side = own.normal.dot(self.direction).signum();
+        let up = own.normal.normalize_or_zero();
+        let side = up.dot(self.direction).signum();
         let way = |triangle: [Point; 3]| {
             let [a, b, c] = triangle;
             let border = distance_to_segment(start, a, b)
@@ -232,7 +233,7 @@ impl FacetRay {
                 return Way::Plain;
             }
             // Nothing of it rises over the plane that the ray leaves.
-            let rise = triangle.into_iter().map(|p| side * own.normal.dot(p - start)).fold(0.0, f64::max);
+            let rise = triangle.into_iter().map(|p| side * up.dot(p - start)).fold(0.0, f64::max);
             if rise <= around.reach { Way::Never } else { Way::From(own.moved(start, around.reach)) }
         };
         let [a, b, c, d] = *corners;
@@ -251,6 +252,7 @@ enum Way {
 /// The triangle of a facet on which a ray starts.
 struct Own {
     second: bool,
+    /// Twice the area long.
     normal: Vector,
     middle: Point,
 }
@@ -260,7 +262,7 @@ impl Own {
         let [a, b, c, d] = *corners;
         let second = c != d && (c - a).cross(start - a).dot((c - a).cross(d - b)) > 0.0;
         let [p, q, r] = if second { [a, c, d] } else { [a, b, c] };
-        Self { second, normal: (q - p).cross(r - p).normalize_or_zero(), middle: (p + q + r) / 3.0 }
+        Self { second, normal: (q - p).cross(r - p), middle: (p + q + r) / 3.0 }
     }
 
     fn moved(&self, start: Point, reach: f64) -> Point {

@@ -39,6 +39,15 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
     if states.is_empty() {
         states.resize_with(WIDTH, State::idle);
     }
+    if let [ray] = rays {
+        let state = &mut states[0];
+        if state.start(tree, root, ray, 0) {
+            while step::<L>(tree, state, cost) {}
+            hits[0] = state.best.hit();
+        }
+        STATES.set(states);
+        return;
+    }
     let mut order: [u8; WIDTH] = std::array::from_fn(|i| i as u8);
     let mut next = 0;
     let mut live = 0;

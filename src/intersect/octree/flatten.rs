@@ -2,7 +2,7 @@
 
 use super::build::{Cell, Content};
 use super::node::{Block, Link, Node};
-use super::{Settings, Statistics};
+use super::{Settings, Statistics, huge};
 use crate::math::Point;
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -35,9 +35,8 @@ pub(super) fn flatten(
     let mut draft = Draft::default();
     let root = draft.add(cell, settings.collapse, 0, None);
     assert!(draft.blocks.len() <= Link::MOST_BLOCKS, "more blocks than links can name");
-    let blocks = draft
-        .blocks
-        .par_iter()
+    let mut blocks = huge::with_capacity(draft.blocks.len());
+    (draft.blocks.par_iter())
         .map(|(count, facets)| {
             let corners = facets.map(|f| {
                 let f = f.min(mesh.facets.len() as u32 - 1) as usize;
@@ -45,11 +44,13 @@ pub(super) fn flatten(
             });
             Block::new(&corners[..usize::from(*count)])
         })
-        .collect();
+        .collect_into_vec(&mut blocks);
+    let mut nodes = huge::with_capacity(draft.nodes.len());
+    nodes.extend_from_slice(&draft.nodes);
     let left_out = stats.left_out;
     *stats = draft.stats;
     stats.left_out = left_out;
-    Flat { nodes: draft.nodes, blocks, root }
+    Flat { nodes, blocks, root }
 }
 
 impl Draft {

@@ -20,6 +20,7 @@ mod build;
 mod clip;
 mod engine;
 mod flatten;
+mod huge;
 mod node;
 mod pack;
 mod portable;
