@@ -79,7 +79,7 @@ fn files_that_are_no_step_end_with_3_and_say_what_to_do() {
         (picture, "not a STEP file"),
         (text, "ISO-10303-21"),
     ] {
-        for command in [["info", "-q"], ["info", "-v"]] {
+        for command in [["info", "-q"], ["facet", "-v"], ["check", "-q"]] {
             let (code, out, err) = lampyris(&[command[0], command[1], &path.display().to_string()]);
             assert_eq!((code, out.as_str()), (3, ""), "{command:?} {}: {err}", path.display());
             assert!(err.contains(says), "{command:?} {}: {err}", path.display());

@@ -73,10 +73,11 @@ pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     (lines, ends)
 }
 
-/// The lines of the paths that end so.
+/// At most so many of the lines of the paths that end so, evenly over the run, for rays come source by source.
 fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, most: usize) -> Polylines {
     let mut kept = Polylines::default();
-    for (line, _) in lines.lines().zip(ends).filter(|(_, e)| wanted(**e)).take(most) {
+    let all: Vec<_> = lines.lines().zip(ends).filter(|(_, e)| wanted(**e)).collect();
+    for (line, _) in all.iter().step_by(all.len().div_ceil(most).max(1)) {
         kept.push(line.iter().copied());
     }
     kept
@@ -92,14 +93,17 @@ impl Light<'_> {
         let r = self.results;
         let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
         let parts: Vec<String> = (r.receivers.iter())
-            .map(|x| format!("**{}** ({}) meet {}", self.share(x.power), figures(x.power, 4), spoken(&x.name)))
+            .map(|x| {
+                let power = figures(x.power, 4);
+                format!("**{power} {}** ({}) reach {}", self.unit, self.share(x.power), spoken(&x.name))
+            })
             .collect();
-        text += &if parts.is_empty() { "no receiver counts any".into() } else { parts.join(", ") };
+        text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };
         text += ". ";
         for grid in r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(receiver_grid) {
             if let Some(([h, v], peak)) = grid.peak() {
                 text += &format!(
-                    "The brightest direction is {} = {}°, {} = {}° with **{} {}**. ",
+                    "The brightest direction is {} {}°, {} {}° with **{} {}**. ",
                     grid.axes[0].label,
                     figures(h, 2),
                     grid.axes[1].label,
@@ -110,13 +114,13 @@ impl Light<'_> {
             }
         }
         text += &format!(
-            "**{} rays** ({} segments) took **{}** on {} threads: {} million rays/s. {} rays were lost. ",
+            "**{} rays** of {} segments each took **{}** on {} threads, {} million rays/s; {} was lost. ",
             grouped(r.rays),
-            grouped(r.segments),
+            figures(r.segments as f64 / r.rays.max(1) as f64, 4),
             seconds(r.seconds.trace),
             r.threads,
             figures(r.mrays_per_s, 3),
-            if r.lost_rays == 0 { "No".into() } else { grouped(r.lost_rays) }
+            if r.lost_rays == 0 { "none".into() } else { grouped(r.lost_rays) }
         );
         if let Some(check) = self.check {
             text += &verdict(check);
@@ -156,11 +160,10 @@ impl Light<'_> {
             let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
             let cuts = cuts(r, &grid);
             section = section.with(Chart::map(&file_stem(&r.name), &title, &reading(r, &grid), grid));
-            // The first map stands beside the facets, others beside their cuts.
-            section = match view.take() {
-                Some(view) => section.with(view).with(cuts),
-                None => section.with(cuts),
-            };
+            // The map that matters most stands beside the facets and has its cuts drawn.
+            if let Some(view) = view.take() {
+                section = section.with(view).with(cuts);
+            }
         }
         if let Some(view) = view {
             section = section.with(view);

@@ -128,10 +128,18 @@ pub(crate) struct Plan {
 impl Plan {
     fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
+        // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
+        let (mut share, mut given) = (0.0, 0);
         let counts: Vec<u64> = bound
             .emitters
             .iter()
-            .map(|e| e.rays.unwrap_or((settings.rays as f64 * e.power / emitted).round() as u64).max(1))
+            .map(|e| {
+                share += e.power / emitted;
+                let upto = (settings.rays as f64 * share).round() as u64;
+                let own = upto.saturating_sub(given);
+                given = upto;
+                e.rays.unwrap_or(own).max(1)
+            })
             .collect();
         let rays: u64 = counts.iter().sum();
         let mut first = 0;

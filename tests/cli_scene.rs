@@ -1,0 +1,172 @@
+//! Scenes with mistakes, and what `facet`, `trace` and `check` do with good ones, with the real binary.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn lampyris(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
+    let mut command = Command::cargo_bin("lampyris").unwrap();
+    let command = command.current_dir(folder).args(arguments).env("NO_COLOR", "1").env("COLUMNS", "120");
+    let output = command.output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+}
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name)
+}
+
+/// The mirror scene of the fixtures with one text replaced, in a folder of its own.
+fn scene(from: &str, to: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(fixture("scenes/s3_reflector.toml")).unwrap();
+    assert!(text.contains(from), "the fixture has no '{from}'");
+    let model = fixture("step/reflector_freeform_trimmed.stp");
+    let text =
+        text.replacen(from, to, 1).replace("../step/reflector_freeform_trimmed.stp", &model.display().to_string());
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    folder
+}
+
+/// What is in a folder beside the scene.
+fn left_behind(folder: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned());
+    names.filter(|n| n != "scene.toml").collect()
+}
+
+#[test]
+fn mistakes_in_a_scene_end_with_2_show_the_line_and_leave_nothing() {
+    for (from, to, says) in [
+        ("[[receiver]]", "[[reciever]]", &["scene.toml:", "reciever", "receiver"][..]),
+        ("power", "powre", &["scene.toml:", "powre", "power"]),
+        ("reflectance = 0.95", "reflectance = \"much\"", &["scene.toml:", "reflectance"]),
+        ("kind = \"point\"", "kind = \"sun\"", &["scene.toml:", "sun", "point"]),
+    ] {
+        let folder = scene(from, to);
+        let (code, out, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+        assert_eq!((code, out.as_str()), (2, ""), "{to}: {err}");
+        for word in says {
+            assert!(err.contains(word), "{to}: '{word}' is missing in\n{err}");
+        }
+        assert!(!err.contains("panicked"), "{err}");
+        assert_eq!(left_behind(folder.path()), Vec::<String>::new(), "{to}");
+    }
+}
+
+#[test]
+fn a_rule_for_a_part_that_is_not_in_the_model_names_the_parts_that_are() {
+    let folder = scene("[[source]]", "[[material]]\npart = \"no such part\"\nsurface = \"mirror\"\n\n[[source]]");
+    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("no such part") && err.contains("scene.toml:"), "{err}");
+    assert_eq!(left_behind(folder.path()), Vec::<String>::new());
+    let folder = scene("[run]", "[run]");
+    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "--part", "refelctor=0.1"]);
+    assert!(code == 2 && err.contains("--part refelctor"), "{err}");
+    assert_eq!(left_behind(folder.path()), Vec::<String>::new());
+}
+
+#[test]
+fn files_that_cannot_be_read_end_with_3() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("empty.stp"), "").unwrap();
+    std::fs::write(folder.path().join("scene.toml"), "[[model]]\nfile = \"gone.stp\"\n").unwrap();
+    for (arguments, says) in [
+        (&["trace", "gone.toml"][..], "gone.toml"),
+        (&["trace", "scene.toml"], "gone.stp"),
+        (&["check", "empty.stp"], "not a STEP file"),
+        (&["facet", "empty.stp", "-o", "a.obj"], "not a STEP file"),
+        (&["facet", "gone.stp"], "gone.stp"),
+    ] {
+        let (code, out, err) = lampyris(folder.path(), arguments);
+        assert_eq!((code, out.as_str()), (3, ""), "{arguments:?}: {err}");
+        assert!(err.contains(says) && !err.contains("panicked"), "{arguments:?}: {err}");
+    }
+    assert_eq!(left_behind(folder.path()), ["empty.stp"]);
+}
+
+#[test]
+fn facet_writes_what_it_is_asked_for_and_reports_in_the_agreed_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
+    let names = ["a.obj", "a.ply", "a.stl", "a.vtu", "a.glb", "a.data2"];
+    let mut arguments = vec!["facet", lens.as_str(), "--tolerance", "0.05", "--json"];
+    names.iter().for_each(|n| arguments.extend(["-o", n]));
+    let (code, out, err) = lampyris(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let mut found = left_behind(folder.path());
+    found.sort();
+    let mut wanted = names.map(str::to_owned);
+    wanted.sort();
+    assert_eq!(found, wanted);
+    let document: Value = serde_json::from_str(&out).unwrap();
+    for key in [
+        "facets",
+        "quads",
+        "triangles",
+        "vertices",
+        "tolerance_mm",
+        "sag_mm",
+        "over_tolerance",
+        "normal_error_deg",
+        "quad_area_share",
+        "area_mm2",
+        "volume_mm3",
+        "shells",
+        "open_edges",
+        "nonmanifold_edges",
+        "faces",
+        "seconds",
+        "peak_bytes",
+    ] {
+        assert!(document.get(key).is_some(), "{key} is missing");
+    }
+    assert_eq!(document["over_tolerance"], 0);
+    let stl = stl_io::read_stl(&mut std::fs::File::open(folder.path().join("a.stl")).unwrap()).unwrap();
+    let triangles = 2 * document["quads"].as_u64().unwrap() + document["triangles"].as_u64().unwrap();
+    assert_eq!(stl.faces.len() as u64, triangles);
+    // An unknown extension is said before anything is read or written.
+    let (code, _, err) = lampyris(folder.path(), &["facet", "gone.stp", "-o", "mesh.xyz"]);
+    assert!(code == 2 && err.contains("'xyz'") && err.contains(".glb"), "{err}");
+}
+
+#[test]
+fn trace_writes_its_folder_and_dry_run_does_not() {
+    let folder = scene("[run]", "[run]");
+    let (code, out, err) =
+        lampyris(folder.path(), &["trace", "scene.toml", "--rays", "20000", "--dry-run", "-o", "dry"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(out.contains("would trace") && !folder.path().join("dry").exists(), "{out}");
+    let arguments = ["trace", "scene.toml", "--rays", "20000", "-o", "out", "--verify-pruning", "--json"];
+    let (code, out, err) = lampyris(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["pruning"]["identical"], true);
+    for file in document["receivers"][0]["files"].as_array().unwrap() {
+        assert!(folder.path().join("out").join(file.as_str().unwrap()).is_file());
+    }
+    assert!(folder.path().join("out/report.html").is_file());
+}
+
+#[test]
+fn check_counts_no_defect_on_a_lens_and_its_rays_can_be_used_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
+    let arguments = ["check", &lens, "--rays", "6000", "--rays-out", "rays.bin", "--json"];
+    let (code, out, err) = lampyris(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let first: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(first["octree_vs_bvh"]["disagree"], 0);
+    assert_eq!(first["facets_vs_exact"]["unexplained"], 0);
+    for key in ["octree", "octree_single", "bvh2", "cwbvh", "cwbvh_as_shipped", "polish", "exact"] {
+        assert!(first["mrays_per_s"][key].as_f64().is_some_and(|r| r > 0.0), "{key}");
+    }
+    assert_eq!(std::fs::metadata(folder.path().join("rays.bin")).unwrap().len(), 6000 * 56);
+    let (code, out, err) = lampyris(folder.path(), &["check", &lens, "--rays-in", "rays.bin", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let second: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(first["facets_vs_exact"], second["facets_vs_exact"]);
+    std::fs::write(folder.path().join("torn.bin"), [0u8; 57]).unwrap();
+    let (code, _, err) = lampyris(folder.path(), &["check", &lens, "--rays-in", "torn.bin"]);
+    assert!(code == 3 && err.contains("record 1"), "{err}");
+}
