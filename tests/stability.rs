@@ -2,7 +2,9 @@
 
 mod study_support;
 
+use lampyris::intersect::bvh::{self, Bvh, Kind};
 use lampyris::intersect::exact::{self, Exact};
+use lampyris::intersect::octree::{self, Octree};
 use lampyris::study::stability::{Ground, Row, Variant, cases};
 use study_support::Brute;
 
@@ -35,17 +37,30 @@ fn brute_force_over_the_facets_signs() {
     assert!(bad.is_empty(), "{}", table(&bad));
 }
 
-#[test]
-fn the_exact_spline_signs() {
-    let mut rows = Vec::new();
-    for case in cases() {
-        for variant in Variant::ALL {
-            let scene = case.scene(variant);
-            let exact = Exact::build(&scene.model, &exact::Settings::default());
-            rows.push(scene.ask("exact", &exact, Ground::Spline));
+/// The contract: every case in every variant, right within the ground's accuracy, or flagged, and never wrong in silence.
+macro_rules! signs {
+    ($name:ident, $ground:expr, |$scene:ident| $build:expr) => {
+        #[test]
+        fn $name() {
+            let mut rows = Vec::new();
+            for case in cases() {
+                for variant in Variant::ALL {
+                    let $scene = case.scene(variant);
+                    rows.push($scene.ask(stringify!($name), &$build, $ground));
+                }
+            }
+            println!("{}", table(&rows));
+            let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
+            assert!(bad.is_empty(), "{}", table(&bad));
         }
-    }
-    println!("{}", table(&rows));
-    let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
-    assert!(bad.is_empty(), "{}", table(&bad));
+    };
 }
+
+signs!(exact_spline, Ground::Spline, |s| Exact::build(&s.model, &exact::Settings::default()));
+signs!(octree_of_facets, Ground::Facets, |s| Octree::build(&s.mesh, &octree::Settings::default()));
+signs!(textbook_octree, Ground::Facets, |s| Octree::build(&s.mesh, &octree::Settings::textbook()));
+signs!(cwbvh, Ground::Facets, |s| Bvh::build(&s.mesh, &bvh::Settings::default()));
+signs!(bvh2, Ground::Facets, |s| Bvh::build(
+    &s.mesh,
+    &bvh::Settings { kind: Kind::Bvh2, ..bvh::Settings::default() }
+));

@@ -30,6 +30,9 @@ impl Workshop for Plain {
     fn build<'m>(&'m self, mesh: &'m FacetMesh, _: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
         Box::new(Boxes::new(mesh, normals))
     }
+    fn polish<'m>(&'m self, _: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm> {
+        Box::new(Boxes::new(mesh, NormalMode::Bilinear))
+    }
     fn exact(&self) -> &dyn Intersector {
         &*self.exact
     }

@@ -6,7 +6,7 @@
 use super::errors::{Errors, slope};
 use super::rays::{RaySource, Uniform};
 use super::timing::Clock;
-use super::workshop::{Tree, Workshop, answer, normals_name};
+use super::workshop::{Meshed, Tree, Workshop, answer, normals_name, with_all};
 use super::{Progress, Rounds, Timing};
 use crate::intersect::{Hit, Intersector, NormalMode};
 use crate::math::Ray;
@@ -242,46 +242,54 @@ impl Sweep<'_> {
     fn tolerance(&mut self, tolerance: [f64; 2]) -> (f64, f64) {
         let start = Instant::now();
         let meshed = self.workshop.mesh(tolerance);
-        let mut combinations = Vec::new();
-        for &tree in &self.settings.trees {
-            for &normals in &self.settings.normals {
-                combinations.push((tree, normals, self.workshop.build(&meshed.mesh, tree, normals)));
+        let settings = self.settings;
+        let workshop = self.workshop;
+        with_all(workshop, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
+            let prepare = start.elapsed().as_secs_f64();
+            let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
+            for &threads in &settings.threads {
+                let timings = self.race(&runners, threads);
+                for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
+                    let hits = runner.hits.lock().map(|h| h.clone()).unwrap_or_default();
+                    let row = self.row(tolerance, &meshed, *combination, &hits);
+                    self.push(row, timing, threads);
+                }
             }
+            (prepare, start.elapsed().as_secs_f64() - prepare)
+        })
+    }
+
+    fn row(
+        &self,
+        tolerance: [f64; 2],
+        meshed: &Meshed,
+        (tree, normals, who): (Tree, NormalMode, &dyn Intersector),
+        hits: &[Option<Hit>],
+    ) -> Row {
+        let errors = Errors::of(self.rays, hits, &self.truth);
+        let footprint = who.footprint();
+        Row {
+            tolerance_mm: Some(tolerance[0]),
+            adaptive: tolerance[0] != tolerance[1],
+            normals: normals_name(normals).into(),
+            intersector: tree.name().into(),
+            facets: meshed.mesh.facets.len(),
+            bytes: footprint.bytes + meshed.mesh.bytes(),
+            sag_mean_mm: Some(meshed.sag_mean),
+            sag_max_mm: Some(meshed.sag_max),
+            seconds_tessellate: Some(meshed.seconds),
+            seconds_build: footprint.build_seconds,
+            hit_error_mm_p50: errors.position.at(0.5),
+            hit_error_mm_p99: errors.position.at(0.99),
+            direction_error_deg_p50: errors.reflected.at(0.5),
+            direction_error_deg_rms: errors.reflected.rms(),
+            direction_error_deg_p99: errors.reflected.at(0.99),
+            direction_error_deg_max: errors.reflected.max(),
+            refracted_error_deg_rms: errors.refracted.rms(),
+            refracted_error_deg_p99: errors.refracted.at(0.99),
+            flips: errors.flips,
+            ..Row::default()
         }
-        let prepare = start.elapsed().as_secs_f64();
-        let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(&*c.2)).collect();
-        for &threads in &self.settings.threads {
-            let timings = self.race(&runners, threads);
-            for (((tree, normals, who), runner), timing) in combinations.iter().zip(&runners).zip(timings) {
-                let hits = runner.hits.lock().map(|h| h.clone()).unwrap_or_default();
-                let errors = Errors::of(self.rays, &hits, &self.truth);
-                let footprint = who.footprint();
-                let row = Row {
-                    tolerance_mm: Some(tolerance[0]),
-                    adaptive: tolerance[0] != tolerance[1],
-                    normals: normals_name(*normals).into(),
-                    intersector: tree.name().into(),
-                    facets: meshed.mesh.facets.len(),
-                    bytes: footprint.bytes + meshed.mesh.bytes(),
-                    sag_mean_mm: Some(meshed.sag_mean),
-                    sag_max_mm: Some(meshed.sag_max),
-                    seconds_tessellate: Some(meshed.seconds),
-                    seconds_build: footprint.build_seconds,
-                    hit_error_mm_p50: errors.position.at(0.5),
-                    hit_error_mm_p99: errors.position.at(0.99),
-                    direction_error_deg_p50: errors.reflected.at(0.5),
-                    direction_error_deg_rms: errors.reflected.rms(),
-                    direction_error_deg_p99: errors.reflected.at(0.99),
-                    direction_error_deg_max: errors.reflected.max(),
-                    refracted_error_deg_rms: errors.refracted.rms(),
-                    refracted_error_deg_p99: errors.refracted.at(0.99),
-                    flips: errors.flips,
-                    ..Row::default()
-                };
-                self.push(row, timing, threads);
-            }
-        }
-        (prepare, start.elapsed().as_secs_f64() - prepare)
     }
 
     fn push(&mut self, row: Row, timing: Timing, threads: usize) {

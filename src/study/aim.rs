@@ -8,9 +8,9 @@
 use super::errors::Errors;
 use super::rays::{RaySource, Uniform};
 use super::timing::Clock;
-use super::workshop::{Tree, Workshop, answer, normals_name};
+use super::workshop::{Tree, Workshop, answer, normals_name, with_all};
 use super::{Progress, Quantiles, Timing};
-use crate::intersect::{Hit, NormalMode};
+use crate::intersect::{Hit, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
 use crate::model::Model;
 use serde::Serialize;
@@ -192,9 +192,10 @@ fn judge(
     truth: &[Option<Hit>],
 ) -> (f64, u64) {
     let meshed = workshop.mesh([tolerance; 2]);
-    let tree = workshop.build(&meshed.mesh, Tree::Octree, normals);
     let mut found = vec![None; rays.len()];
-    answer(&*tree, rays, rayon::current_num_threads(), &mut found);
+    with_all(workshop, &meshed.mesh, &[Tree::Octree], &[normals], |trees| {
+        answer(trees[0].2, rays, rayon::current_num_threads(), &mut found);
+    });
     let errors = Errors::of(rays, &found, truth);
     (errors.reflected.at(0.99), errors.reflected.count())
 }
@@ -218,40 +219,51 @@ fn candidates(model: &Model, workshop: &dyn Workshop, ask: &Ask) -> (Pilot, Vec<
     let truth = hits(workshop, &rays);
     let (bend, tilt) = pilots(model, &rays, &truth);
     let epsilon = (MARGIN * ask.degrees).to_radians();
-    let mut build_seconds = 0.0;
-    let mut all = Vec::new();
-    for normals in [NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact] {
-        let tree = workshop.build(&meshed.mesh, Tree::Octree, normals);
-        build_seconds = tree.footprint().build_seconds;
-        let mut found = vec![None; rays.len()];
-        let seconds: Vec<f64> = (0..3)
-            .map(|_| {
-                let start = Instant::now();
-                answer(&*tree, &rays, rayon::current_num_threads(), &mut found);
-                start.elapsed().as_secs_f64()
-            })
-            .collect();
-        let measured = Errors::of(&rays, &found, &truth).reflected.at(0.99).to_radians();
-        let (tolerance, order) = match normals {
-            NormalMode::Flat => (epsilon * epsilon / (8.0 * bend.at(0.99).max(1e-300)), 0.5),
-            NormalMode::Bilinear => (epsilon / tilt.at(0.99).max(1e-300), 1.0),
-            // The error of cubic normals has no simple bound; its order is that of bilinear ones or better.
-            NormalMode::Cubic => (coarse * (epsilon / measured.max(1e-300)), 1.0),
-            _ => (coarse, 1.0),
+    const KINDS: [NormalMode; 4] = [NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
+    let (build_seconds, mut all) = with_all(workshop, &meshed.mesh, &[Tree::Octree], &KINDS, |trees| {
+        let candidate = |(_, normals, tree): &(Tree, NormalMode, &dyn Intersector)| {
+            let mut found = vec![None; rays.len()];
+            let seconds: Vec<f64> = (0..3)
+                .map(|_| {
+                    let start = Instant::now();
+                    answer(*tree, &rays, rayon::current_num_threads(), &mut found);
+                    start.elapsed().as_secs_f64()
+                })
+                .collect();
+            let measured = Errors::of(&rays, &found, &truth).reflected.at(0.99).to_radians();
+            let per_ray = Timing::of(seconds).median / rays.len() as f64;
+            let (tolerance, order) = predict(*normals, coarse, epsilon, measured, (&bend, &tilt));
+            Candidate { normals: *normals, tolerance, order, per_ray, predicted: 0.0 }
         };
-        // What the pilots measured at the coarse tolerance guards against an optimistic formula.
-        let scaled = coarse * (epsilon / measured.max(1e-300)).powf(1.0 / order);
-        let tolerance = tolerance
-            .max(scaled)
-            .clamp(1e-3 * coarse, if normals == NormalMode::Exact { coarse } else { 8.0 * coarse });
-        let per_ray = Timing::of(seconds).median / rays.len() as f64;
-        all.push(Candidate { normals, tolerance, order, per_ray, predicted: 0.0 });
-    }
+        let seconds = trees.first().map_or(0.0, |t| t.2.footprint().build_seconds);
+        (seconds, trees.iter().map(candidate).collect::<Vec<_>>())
+    });
     let pilot = Pilot { tolerance: coarse, prepare: mesh_seconds + build_seconds };
     for c in &mut all {
         c.predicted = pilot.seconds(c.tolerance, c.per_ray, ask.job_rays);
     }
     (pilot, all, bounds)
+}
+
+/// The tolerance at which 99 % of the pilots stay within `epsilon` radians, and the order of the error in the sag.
+fn predict(
+    normals: NormalMode,
+    coarse: f64,
+    epsilon: f64,
+    measured: f64,
+    (bend, tilt): (&Quantiles, &Quantiles),
+) -> (f64, f64) {
+    let (formula, order) = match normals {
+        NormalMode::Flat => (epsilon * epsilon / (8.0 * bend.at(0.99).max(1e-300)), 0.5),
+        NormalMode::Bilinear => (epsilon / tilt.at(0.99).max(1e-300), 1.0),
+        // The error of cubic normals has no simple bound; its order is that of bilinear ones or better.
+        NormalMode::Cubic => (coarse * (epsilon / measured.max(1e-300)), 1.0),
+        _ => (coarse, 1.0),
+    };
+    // The formulas take every hit to lie as far off as the sag allows; what the pilots measured says how far they do.
+    let scaled = coarse * (epsilon / measured.max(1e-300)).powf(1.0 / order);
+    let coarsest = if normals == NormalMode::Exact { coarse } else { 8.0 * coarse };
+    (formula.max(scaled).clamp(1e-3 * coarse, coarsest), order)
 }
 
 /// Distributions of the curvature κ, and of 2·κ·tan i, over the pilots' hits.

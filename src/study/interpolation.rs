@@ -3,7 +3,7 @@
 use super::errors::Errors;
 use super::rays::{RaySource, Uniform};
 use super::timing::Clock;
-use super::workshop::{Meshed, Tree, Workshop, answer, normals_name};
+use super::workshop::{Meshed, Tree, Workshop, answer, normals_name, with_all};
 use super::{Progress, Rounds};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::Ray;
@@ -106,18 +106,19 @@ pub(super) fn mesh_of(workshop: &dyn Workshop, facets: usize) -> Meshed {
 fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
     let meshed = mesh_of(workshop, settings.facets);
     let (rays, truth) = hitting(workshop, &meshed, settings);
-    let trees = ALGORITHMS.map(|n| workshop.build(&meshed.mesh, Tree::Octree, n));
     let hits = ALGORITHMS.map(|_| Mutex::new(vec![None; rays.len()]));
-    let mut rounds = Rounds::default();
-    for (tree, hits) in trees.iter().zip(&hits) {
-        let rays = &rays;
-        rounds.add("", move || {
-            if let Ok(mut hits) = hits.lock() {
-                answer(&**tree, rays, 1, &mut hits);
-            }
-        });
-    }
-    let timings = rounds.run(settings.repetitions);
+    let timings = with_all(workshop, &meshed.mesh, &[Tree::Octree], &ALGORITHMS, |trees| {
+        let mut rounds = Rounds::default();
+        for ((_, _, tree), hits) in trees.iter().zip(&hits) {
+            let rays = &rays;
+            rounds.add("", move || {
+                if let Ok(mut hits) = hits.lock() {
+                    answer(*tree, rays, 1, &mut hits);
+                }
+            });
+        }
+        rounds.run(settings.repetitions)
+    });
     let row = |((algorithm, hits), (_, timing)): ((NormalMode, &Mutex<Vec<Option<Hit>>>), _)| {
         let timing: super::Timing = timing;
         let hits = hits.lock().map(|h| h.clone()).unwrap_or_default();

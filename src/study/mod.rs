@@ -17,6 +17,7 @@ pub mod effects;
 mod errors;
 pub mod interpolation;
 pub mod lamp;
+mod product;
 mod quantiles;
 mod random;
 pub mod rays;
@@ -27,6 +28,7 @@ pub mod stability;
 mod timing;
 mod workshop;
 
+pub use product::Product;
 pub use quantiles::{Quantiles, Summary};
 pub use random::Random;
 pub use timing::{Progress, Rounds, Timing};

@@ -4,7 +4,7 @@
 //! facets turn them away: the difference of the two maps is the facets' doing, and most of the noise cancels. What the noise
 //! would be comes from the spread over the run's replicates.
 
-use super::workshop::{Tree, Workshop, normals_name};
+use super::workshop::{Tree, Workshop, normals_name, with_all};
 use crate::intersect::NormalMode;
 use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
 use serde::Serialize;
@@ -54,8 +54,9 @@ pub fn receivers(
     let mut rows = Vec::new();
     for &(tolerance, normals) in combinations {
         let meshed = workshop.mesh([tolerance; 2]);
-        let tree = workshop.build(&meshed.mesh, Tree::Octree, normals);
-        let found = simulate(bound, &*tree, settings, &|_| true);
+        let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &[normals], |trees| {
+            simulate(bound, trees[0].2, settings, &|_| true)
+        });
         for (f, e) in found.receivers.iter().zip(&truth.receivers) {
             rows.push(Row {
                 scene: name.into(),

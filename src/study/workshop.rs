@@ -41,10 +41,36 @@ impl Tree {
 pub trait Workshop: Sync {
     /// Facets within a tolerance `[min, max]`, mm.
     fn mesh(&self, tolerance: [f64; 2]) -> Meshed;
-    /// A structure over facets whose hits carry normals of that kind; `Exact` moves the hits to the spline.
+    /// A structure over facets whose hits carry normals of that kind (`Exact` is [`Workshop::polish`]'s).
     fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
+    /// A structure over facets with its hits moved to the spline.
+    fn polish<'m>(&'m self, facets: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm>;
     /// The certified spline.
     fn exact(&self) -> &dyn Intersector;
+}
+
+/// Structures of one tree over a mesh, for each kind of normals in turn; those of exact normals stand on bilinear ones.
+pub(super) fn with_all<R>(
+    workshop: &dyn Workshop,
+    mesh: &FacetMesh,
+    trees: &[Tree],
+    normals: &[NormalMode],
+    then: impl FnOnce(&[(Tree, NormalMode, &dyn Intersector)]) -> R,
+) -> R {
+    let pairs: Vec<_> = trees.iter().flat_map(|&t| normals.iter().map(move |&n| (t, n))).collect();
+    let base = |n: NormalMode| if n == NormalMode::Exact { NormalMode::Bilinear } else { n };
+    let facets: Vec<_> = pairs.iter().map(|&(t, n)| workshop.build(mesh, t, base(n))).collect();
+    let polished: Vec<_> = pairs
+        .iter()
+        .zip(&facets)
+        .map(|(&(_, n), f)| (n == NormalMode::Exact).then(|| workshop.polish(&**f, mesh)))
+        .collect();
+    let all: Vec<_> = pairs
+        .iter()
+        .zip(facets.iter().zip(&polished))
+        .map(|(&(t, n), (f, p))| (t, n, p.as_deref().unwrap_or(&**f)))
+        .collect();
+    then(&all)
 }
 
 /// As on the command line.

@@ -1,0 +1,69 @@
+use super::workshop::{Meshed, Tree, Workshop};
+use crate::intersect::bvh::{self, Bvh};
+use crate::intersect::exact::{self, Exact};
+use crate::intersect::octree::{self, Octree};
+use crate::intersect::polish::Polished;
+use crate::intersect::{Intersector, NormalMode};
+use crate::mesh::FacetMesh;
+use crate::model::Model;
+use crate::tessellate::{self, tessellate};
+
+/// The product's own mesher, trees and spline, for studies of a model.
+pub struct Product<'a> {
+    model: &'a Model,
+    exact: Exact,
+    /// Everything of the mesher but the tolerance.
+    pub mesher: tessellate::Settings,
+}
+
+impl<'a> Product<'a> {
+    /// Builds the exact spline of the model.
+    pub fn new(model: &'a Model) -> Self {
+        let exact = Exact::build(model, &exact::Settings::default());
+        Self { model, exact, mesher: tessellate::Settings::default() }
+    }
+
+    /// The same, with the sag of every mesh sampled, which takes about twice as long as meshing.
+    pub fn measuring(model: &'a Model) -> Self {
+        let product = Self::new(model);
+        Self { mesher: tessellate::Settings { measure: true, ..product.mesher }, ..product }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'a Model {
+        self.model
+    }
+
+    /// The exact spline, as such.
+    pub fn spline(&self) -> &Exact {
+        &self.exact
+    }
+}
+
+impl Workshop for Product<'_> {
+    fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
+        let made = tessellate(self.model, &tessellate::Settings { tolerance, ..self.mesher.clone() });
+        let sag = made.report.sag_mm;
+        Meshed {
+            mesh: made.mesh,
+            seconds: made.report.seconds.tessellate,
+            sag_mean: sag.sampled_mean.unwrap_or(sag.bound_max),
+            sag_max: sag.sampled_max.unwrap_or(sag.bound_max),
+        }
+    }
+
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
+        match tree {
+            Tree::Octree => Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() })),
+            Tree::CwBvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
+        }
+    }
+
+    fn polish<'m>(&'m self, facets: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm> {
+        Box::new(Polished::new(facets, mesh, &self.exact))
+    }
+
+    fn exact(&self) -> &dyn Intersector {
+        &self.exact
+    }
+}
