@@ -132,7 +132,7 @@ impl Asker<'_> {
     }
 
     fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
-        let slack = 64.0 * self.scene.resolution(ray, truth.t.unwrap_or(0.0));
+        let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, truth.t.unwrap_or(0.0));
         let Some(h) = hit else { return truth.t.is_none() || truth.margin <= self.band + slack };
         let t = self.local_t(h);
         if !self.in_band(ray, t) {
