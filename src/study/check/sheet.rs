@@ -48,7 +48,7 @@ pub(super) struct Stretch {
 }
 
 const SAMPLES: usize = 16;
-const STEPS: usize = 600;
+const STEPS: usize = 1000;
 
 impl Sheet {
     /// `None` for a face without a surface.
@@ -187,7 +187,9 @@ impl Sheet {
                     found.complete = false;
                     break;
                 }
-                at += sign * self.step(&foot, ray, band);
+                // Steps of two bands cannot jump over a border unseen; a ray that lies almost in the sheet gets longer ones.
+                let longest = band * if steps < STEPS / 2 { 2.0 } else { 2.0 + (steps - STEPS / 2) as f64 };
+                at += sign * self.step(&foot, ray, band).min(longest);
                 at = if end == 0 { at.max(limit) } else { at.min(limit) };
                 foot = self.foot(ray.at(at), foot.uv, ray.direction);
             }
