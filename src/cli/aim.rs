@@ -3,7 +3,6 @@
 use super::Failure;
 use super::context::Context;
 use super::options::{self, Meshing, NormalKind, Tracing};
-use super::workshop::Product;
 use crate::intersect::NormalMode;
 use crate::model::Model;
 use crate::study::aim::{Ask, aim};
@@ -25,7 +24,7 @@ pub(super) fn meshing(
     }
     ask.seed = tracing.seed.unwrap_or(ask.seed);
     let bar = context.bar("aiming", "%", 100);
-    let found = aim(model, &Product::new(model), &ask, &|p| {
+    let found = aim(model, &crate::study::Product::new(model), &ask, &|p| {
         bar.set_position((100.0 * p.done) as u64);
     });
     bar.finish_and_clear();

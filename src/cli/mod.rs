@@ -23,7 +23,6 @@ mod study;
 mod suggest;
 mod trace;
 mod witness;
-mod workshop;
 
 use args::{Arguments, Command};
 use clap::Parser;

@@ -5,7 +5,6 @@ use super::context::{Context, print};
 use super::engine::{self, Choice};
 use super::load::{self, Input, Loaded};
 use super::options::{Meshing, Tracing};
-use super::workshop::Product;
 use super::{Failure, Outcome, demo};
 use crate::formats::write_atomic;
 use crate::intersect::bvh::{self, Bvh};
@@ -18,7 +17,7 @@ use crate::model::Model;
 use crate::report::study_report;
 use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
-use crate::study::{self, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
+use crate::study::{self, Product, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
 use crate::tessellate::tessellate;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -114,7 +113,7 @@ type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
     let (_, loaded, name) = model_of(asked.file, context)?;
-    let product = Product::new(&loaded.model);
+    let product = Product::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = asked.meshing.tolerance {
         settings.tolerances = vec![range];
@@ -192,11 +191,13 @@ fn stability_of(progress: Report) -> Result<Found, Failure> {
             rows.push(scene.ask("cwbvh", &cured, Ground::Facets));
             rows.push(scene.ask("cwbvh as shipped", &shipped, Ground::Facets));
             rows.push(scene.ask("exact", &exact, Ground::Spline));
+            let newton = Traditional::new(&scene.model, &exact, Seeds::Middle);
+            rows.push(scene.ask("plain newton", &newton, Ground::Spline));
         }
         let done = (k + 1) as f64 / all.len() as f64;
         progress(Progress { stage: case.name.into(), done, remaining_seconds: None });
     }
-    Found::new(&rows, "")
+    Found::new(&rows, stability::answer(&rows))
 }
 
 fn effects_of(asked: &Asked, threads: usize, context: &Context) -> Result<Found, Failure> {
@@ -215,5 +216,5 @@ fn effects_of(asked: &Asked, threads: usize, context: &Context) -> Result<Found,
     let rows = engine::with_intersector(choice, &loaded.model, &made.mesh, context, |who, _| {
         effects::effects(&name, &bound, who, &run, 5)
     });
-    Found::new(&rows, "")
+    Found::new(&rows, effects::answer(&rows))
 }

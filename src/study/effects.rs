@@ -68,3 +68,18 @@ pub fn effects(
     };
     timings.into_iter().zip(&results).map(row).collect()
 }
+
+/// One sentence: what the effects that the scene does not call for would cost.
+pub fn answer(rows: &[Row]) -> String {
+    match rows {
+        [pruned, full, ..] => format!(
+            "Leaving out what {} does not call for makes it {:.2} times as fast (kernel {} against {}); the results are {}.",
+            pruned.scene,
+            full.seconds_trace_median / pruned.seconds_trace_median,
+            pruned.kernel,
+            full.kernel,
+            if full.identical { "the same bit by bit" } else { "NOT the same" }
+        ),
+        _ => String::new(),
+    }
+}

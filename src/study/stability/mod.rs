@@ -196,6 +196,26 @@ impl Scene<'_> {
     }
 }
 
+/// One sentence: what is wrong in silence, by intersector.
+pub fn answer(rows: &[Row]) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    for r in rows {
+        if !names.contains(&r.intersector.as_str()) {
+            names.push(&r.intersector);
+        }
+    }
+    let part = |name: &&str| {
+        let own = || rows.iter().filter(|r| r.intersector == *name);
+        let sum = |of: fn(&Row) -> u64| own().map(of).sum::<u64>();
+        let (rays, flagged, wrong) = (sum(|r| r.rays), sum(|r| r.flagged), sum(|r| r.wrong));
+        let mut cases: Vec<&str> = own().filter(|r| r.wrong > 0).map(|r| r.case.as_str()).collect();
+        cases.dedup();
+        let of_cases = if wrong > 0 { format!(" in {} cases", cases.len()) } else { String::new() };
+        format!("{name} {wrong} of {rays}{of_cases} ({flagged} flagged)")
+    };
+    format!("Wrong in silence: {}.", names.iter().map(part).collect::<Vec<_>>().join("; "))
+}
+
 /// All cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees.
 pub fn cases() -> Vec<Case> {
     let mut all = spheres::cases();
