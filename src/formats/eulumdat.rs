@@ -207,4 +207,22 @@ mod tests {
             assert!(parse_eulumdat(path, text).is_err());
         }
     }
+
+    #[test]
+    fn damaged_files_are_refused_or_read_but_never_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ldt");
+        write_eulumdat(&path, &of(PhotometricType::C, &steps(0.0, 360.0, 4), &[0.0, 90.0], |_, v| 90.0 - v))
+            .unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        for cut in 0..text.len() {
+            let _ = parse_eulumdat(&path, &text[..cut]);
+            for byte in ["-", "9", "e", ".", "\n", "\u{0}"] {
+                let changed = format!("{}{byte}{}", &text[..cut], &text[cut + 1..]);
+                if let Ok(p) = parse_eulumdat(&path, &changed) {
+                    let _ = (p.expanded(), p.flux());
+                }
+            }
+        }
+    }
 }

@@ -290,4 +290,15 @@ mod tests {
             assert!(e.contains(message) && e.starts_with("lamp.ies:"), "{e}");
         }
     }
+
+    #[test]
+    fn damaged_files_are_refused_or_read_but_never_panic() {
+        // Every truncation, and every byte replaced by bytes that matter to a parser.
+        for cut in 0..TEXT.len() {
+            let _ = parse(&TEXT[..cut]);
+            for byte in ["-", "9", "e", " ", "\n", "[", "\u{0}"] {
+                let _ = parse(&format!("{}{byte}{}", &TEXT[..cut], &TEXT[cut + 1..]));
+            }
+        }
+    }
 }
