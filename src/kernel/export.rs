@@ -3,8 +3,9 @@
 use super::geometry::{curve_to_truck, surface_to_truck, to_truck};
 use super::import::Refusal;
 use super::truck::{self, Curve as TruckCurve, Surface as TruckSurface};
-use crate::math::Frame;
-use crate::model::{EdgeId, Face, Part, TrimLoop};
+use crate::math::{Frame, Homogeneous};
+use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
+use crate::nurbs::{ControlPoint, Curve};
 
 /// A truck face and which face of the part it came from.
 #[derive(Clone, Debug)]
@@ -19,8 +20,9 @@ pub struct TruckFace {
 
 /// The faces of a part where it is placed, as truck faces that share their edges, and those truck cannot hold.
 ///
-/// Truck has no closed edges, so each is cut in two; poles and seams, which exist in the parameter plane alone, are left out of
-/// its wires. A face without edges has no place in truck and is refused.
+/// Truck has no closed edges, so each is cut in two; poles, which exist in the parameter plane alone, are left out of its wires. A
+/// face with a seam is cut open along it and has edges of its own, for truck's wires meet no point twice. A face without
+/// edges has no place in truck and is refused.
 pub fn faces_to_truck(part: &Part, placement: &Frame) -> (Vec<TruckFace>, Vec<Refusal>) {
     let mut exporter = Exporter::new(part, placement);
     let (mut faces, mut refused) = (Vec::new(), Vec::new());
@@ -51,21 +53,22 @@ impl<'a> Exporter<'a> {
 
     fn face(&mut self, f: &Face) -> Result<truck::Face, String> {
         let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)));
-        let mut wires = Vec::new();
-        for l in &f.loops {
-            wires.extend(self.wires(l)?);
-        }
-        if wires.is_empty() {
+        if f.loops.is_empty() {
             return Err("a face without edges: truck has no closed surfaces without a boundary".into());
         }
-        let surface = TruckSurface::NurbsSurface(surface);
-        let face = truck::Face::try_new(wires, surface).map_err(|e| format!("truck refuses its wires: {e}"))?;
+        let build = |wires: Vec<truck::Wire>| {
+            truck::Face::try_new(wires, TruckSurface::NurbsSurface(surface.clone()))
+                .map_err(|e| format!("truck refuses its wires: {e}"))
+        };
+        let shared = f.loops.iter().map(|l| self.wire(l)).collect::<Result<Vec<_>, _>>().and_then(build);
+        let face =
+            shared.or_else(|_| build(f.loops.iter().map(|l| self.cut_open(f, l)).collect::<Result<_, _>>()?))?;
         // A mirrored placement turns Su × Sv against the placed normal; the loops follow Su × Sv.
         Ok(if f.reversed != self.placement.is_mirrored() { face.inverse() } else { face })
     }
 
-    /// The chains of edges between the seams of a loop, each closed by itself.
-    fn wires(&mut self, l: &TrimLoop) -> Result<Vec<truck::Wire>, String> {
+    /// A loop of shared edges.
+    fn wire(&mut self, l: &TrimLoop) -> Result<truck::Wire, String> {
         let mut sides: Vec<truck::Edge> = Vec::new();
         for u in &l.uses {
             let Some(id) = u.edge else { continue };
@@ -78,19 +81,30 @@ impl<'a> Exporter<'a> {
             }
             sides.extend(pieces);
         }
-        let mut wires = Vec::new();
-        let mut wire = truck::Wire::new();
-        for side in sides {
-            let ended = wire.back_vertex().is_some_and(|v| v != side.front());
-            if ended && wire.is_closed() {
-                wires.push(std::mem::take(&mut wire));
-            }
-            wire.push_back(side);
-            if wire.is_closed() && wire.len() > 1 {
-                wires.push(std::mem::take(&mut wire));
+        Ok(sides.into())
+    }
+
+    /// A loop of edges of its own, with a vertex of its own wherever two of them meet.
+    fn cut_open(&self, f: &Face, l: &TrimLoop) -> Result<truck::Wire, String> {
+        let mut curves: Vec<Curve> = Vec::new();
+        for u in &l.uses {
+            let curve = match u.edge {
+                Some(id) => self.part.edges[id.0 as usize].curve.clone(),
+                None => seam(f, u)?,
+            };
+            if curve.bounds().diagonal() > 1e-9 {
+                curves.push(self.placed(if u.reversed { curve.reversed() } else { curve }));
             }
         }
-        if wire.is_empty() { Ok(wires) } else { Err("its edges form no closed wire".into()) }
+        if curves.len() == 1 {
+            let [t0, t1] = curves[0].domain();
+            let t = 0.5 * (t0 + t1);
+            curves = vec![curves[0].restricted(t0, t), curves[0].restricted(t, t1)];
+        }
+        let joints: Vec<truck::Vertex> =
+            curves.iter().map(|c| truck::Vertex::new(to_truck(c.evaluate(c.domain()[0])))).collect();
+        let next = joints.iter().cycle().skip(1);
+        curves.iter().zip(joints.iter().zip(next)).map(|(c, (a, b))| truck_edge(a, b, c)).collect()
     }
 
     fn edge(&mut self, id: EdgeId) -> Result<Vec<truck::Edge>, String> {
@@ -100,17 +114,7 @@ impl<'a> Exporter<'a> {
         }
         let edge = &self.part.edges[index];
         let [front, back] = edge.vertices.map(|v| self.vertices[v.0 as usize].clone());
-        let mut curve = edge.curve.clone();
-        for p in &mut curve.points {
-            *p = crate::nurbs::ControlPoint::weighted(
-                self.placement.point(crate::nurbs::ControlPoint::position(*p)),
-                p.w,
-            );
-        }
-        let truck_edge = |a: &truck::Vertex, b: &truck::Vertex, c: &crate::nurbs::Curve| {
-            truck::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c)))
-                .map_err(|e| format!("an edge: {e}"))
-        };
+        let curve = self.placed(edge.curve.clone());
         let made = if front == back {
             let [t0, t1] = curve.domain();
             let t = 0.5 * (t0 + t1);
@@ -125,4 +129,32 @@ impl<'a> Exporter<'a> {
         self.edges[index] = Some(made.clone());
         Ok(made)
     }
+
+    fn placed(&self, mut curve: Curve) -> Curve {
+        for p in &mut curve.points {
+            *p = Homogeneous::weighted(self.placement.point(p.position()), p.w);
+        }
+        curve
+    }
+}
+
+fn truck_edge(a: &truck::Vertex, b: &truck::Vertex, c: &Curve) -> Result<truck::Edge, String> {
+    truck::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c))).map_err(|e| format!("an edge: {e}"))
+}
+
+/// The curve in space of a use without an edge: a line of constant u or v.
+fn seam(f: &Face, u: &EdgeUse) -> Result<Curve, String> {
+    let [t0, t1] = u.uv.domain();
+    let (a, b) = (u.uv.evaluate(t0), u.uv.evaluate(t1));
+    let constant = (0..2).find(|&k| u.uv.points.iter().all(|p| (p.position()[k] - a[k]).abs() < 1e-9));
+    let constant = constant.ok_or("a seam that is no line of constant parameter")?;
+    let [from, to] = [a[1 - constant], b[1 - constant]];
+    let line = f.surface.isoline(constant, a[constant]);
+    let [low, high] = line.domain();
+    let cut = [from.min(to).max(low), from.max(to).min(high)];
+    if cut[1] - cut[0] < 1e-12 * (high - low) {
+        return Ok(Curve::line(line.evaluate(from), line.evaluate(from), [0.0, 1.0]));
+    }
+    let line = line.restricted(cut[0], cut[1]);
+    Ok(if from > to { line.reversed() } else { line })
 }
