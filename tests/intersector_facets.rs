@@ -5,7 +5,7 @@ mod intersector_common;
 use intersector_common::*;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
 use lampyris::intersect::octree::{self, Octree, Path};
-use lampyris::intersect::{Cost, Hit, Intersector};
+use lampyris::intersect::{Cost, Hit, Intersector, NormalMode};
 use lampyris::math::{Departure, Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
 
@@ -75,27 +75,32 @@ fn nearest_hit_is_that_of_trying_all_facets() {
     }
 }
 
-/// Rays from inside a closed mesh at vertices, points of edges and of diagonals: none may slip through.
+/// A ray from inside a closed mesh at a vertex, a point of an edge or of a diagonal, or along an axis.
+fn at_a_seam(mesh: &FacetMesh, middle: Point, size: f64, k: usize, r: &mut Random) -> Ray {
+    let corners = mesh.corners(r.below(mesh.facets.len()));
+    let (a, b) = (corners[0], corners[[1, 2, 3][k % 3]]);
+    let target = match k % 4 {
+        0 => a,
+        1 => a.midpoint(b),
+        _ => a + (b - a) * r.unit(),
+    };
+    let origin = middle + r.direction() * (size * 0.4 * r.unit());
+    let direction = if k % 8 == 7 {
+        let mut d = Vector::ZERO;
+        d[k / 8 % 3] = [1.0, -1.0][k / 24 % 2];
+        d
+    } else {
+        (target - origin).normalize()
+    };
+    Ray::new(origin, direction)
+}
+
+/// None of such rays may slip through.
 fn leaks(mesh: &FacetMesh, middle: Point, size: f64, count: usize) {
     let mut r = Random(99);
     let mut rays = Vec::new();
     for k in 0..count {
-        let corners = mesh.corners(r.below(mesh.facets.len()));
-        let (a, b) = (corners[0], corners[[1, 2, 3][k % 3]]);
-        let target = match k % 4 {
-            0 => a,
-            1 => a.midpoint(b),
-            _ => a + (b - a) * r.unit(),
-        };
-        let origin = middle + r.direction() * (size * 0.4 * r.unit());
-        let direction = if k % 8 == 7 {
-            let mut d = Vector::ZERO;
-            d[k / 8 % 3] = [1.0, -1.0][k / 24 % 2];
-            d
-        } else {
-            (target - origin).normalize()
-        };
-        rays.push(Ray::new(origin, direction));
+        rays.push(at_a_seam(mesh, middle, size, k, &mut r));
     }
     let hits = ask(mesh, &rays);
     let missed = hits.iter().filter(|h| h.is_none()).count();
@@ -277,4 +282,111 @@ fn odd_meshes_do_no_harm() {
         mesh
     });
     assert_eq!(ask(&stack, &[ray])[0].map(|h| h.primitive), Some(0));
+}
+
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    let (mesh, sources) = lamp(60_000);
+    let mut r = Random(8);
+    let rays: Vec<Ray> =
+        (0..5000).map(|k| Ray::new(sources[k % sources.len()] + r.direction() * 0.3, r.direction())).collect();
+    let build = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let tree = Octree::build(&mesh, &octree::Settings::default());
+            let mut hits = vec![None; rays.len()];
+            let mut cost = Cost::default();
+            tree.intersect_batch(&rays, &mut hits, &mut cost);
+            (tree.statistics().clone(), tree.boxes(), hits, cost)
+        })
+    };
+    let (one, four) = (build(1), build(4));
+    assert!(one == four, "trees or answers differ");
+    assert!(one.0.references >= mesh.facets.len() && one.0.depth() < 20);
+    let around = mesh.bounds().grown(1.0);
+    assert!(one.1.iter().all(|(_, b)| around.contains(b.min) && around.contains(b.max)));
+}
+
+/// Mean angle between the normals of hits and those of the unit sphere, radians.
+fn normal_error(n: usize, normals: NormalMode) -> f64 {
+    let mut mesh = globe(2 * n, n, |v| v);
+    for vertex in &mut mesh.vertices {
+        vertex.normal = mesh.positions[vertex.position as usize];
+    }
+    let tree = Octree::build(&mesh, &octree::Settings { normals, ..Default::default() });
+    let mut r = Random(4);
+    let count = 4000;
+    (0..count)
+        .map(|_| {
+            let hit = tree.intersect(&Ray::new(Point::ZERO, r.direction()), &mut Cost::default()).unwrap();
+            let facet = mesh.corners(hit.primitive as usize);
+            let [a, b, c, d] = facet;
+            let at = if c == d { (a + b + c) / 3.0 } else { (a + b + c + d) / 4.0 };
+            assert!(hit.normal.dot(at) > 0.5, "inward normal {hit:?}");
+            assert!((hit.normal.length() - 1.0).abs() < 1e-12);
+            hit
+        })
+        .zip({
+            let mut r = Random(4);
+            (0..count).map(move |_| r.direction())
+        })
+        .map(|(hit, d)| hit.normal.cross(d).length().asin() / f64::from(count))
+        .sum()
+}
+
+#[test]
+fn normals_converge_with_the_mesh() {
+    // Halving the facets halves the error of flat and nearest normals and quarters that of smooth ones.
+    let orders = [
+        (NormalMode::Flat, 1.0),
+        (NormalMode::Nearest, 1.0),
+        (NormalMode::Bilinear, 2.0),
+        (NormalMode::Cubic, 2.0),
+    ];
+    for (mode, order) in orders {
+        let (coarse, fine) = (normal_error(20, mode), normal_error(40, mode));
+        let reached = (coarse / fine).log2();
+        assert!((reached - order).abs() < 0.25, "{mode:?}: order {reached}, {coarse} to {fine}");
+    }
+}
+
+#[test]
+fn parameters_follow_the_corners() {
+    let mut mesh = FacetMesh::default();
+    add_grid(&mut mesh, 1, 1, 0, |a, b| Point::new(a, b, 0.0));
+    let mut r = Random(6);
+    for _ in 0..200 {
+        let (u, v) = (r.unit(), r.unit());
+        let hit = ask(&mesh, &[Ray::new(Point::new(u, v, 1.0), -Vector::Z)])[0].unwrap();
+        assert!((hit.uv.x - u).abs() < 1e-14 && (hit.uv.y - v).abs() < 1e-14, "{} for ({u}, {v})", hit.uv);
+        assert_eq!(hit.geometric_normal, Vector::Z);
+    }
+}
+
+#[test]
+#[ignore = "ten million rays at edges, vertices and poles: a minute in release"]
+fn ten_million_rays_slip_through_nowhere() {
+    let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -2.0);
+    let mut asked = 0;
+    for (k, scale) in [1e-3, 1.0, 300.0, 1e3].into_iter().cycle().take(20).enumerate() {
+        let shift = if k % 2 == 0 { 0.0 } else { 1e6 };
+        let middle = Point::new(shift, -0.5 * shift, 0.1 * shift);
+        let mesh = if k % 3 == 0 {
+            globe(200, 100, |v| turn * v * scale + middle)
+        } else {
+            ball(60, |v| turn * v * scale + middle)
+        };
+        let tree = Octree::build(&mesh, &octree::Settings::default());
+        let mut r = Random(1000 + k as u64);
+        for _ in 0..50 {
+            let rays: Vec<Ray> = (0..10_000).map(|i| at_a_seam(&mesh, middle, scale, i, &mut r)).collect();
+            let mut hits = vec![None; rays.len()];
+            tree.intersect_batch(&rays, &mut hits, &mut Cost::default());
+            for (ray, hit) in rays.iter().zip(&hits) {
+                assert!(hit.is_some(), "scale {scale}, shift {shift}: {ray:?} slipped through");
+            }
+            asked += rays.len();
+        }
+    }
+    assert_eq!(asked, 10_000_000);
 }

@@ -47,12 +47,12 @@ impl Nearest {
         self.hit
     }
 
-    /// Keeps the nearer hit, of equal ones that on the facet of lowest index.
+    /// Keeps the nearer hit, of equal ones that on the facet of lowest index, there the first triangle's.
     #[inline]
     fn offer(&mut self, hit: FacetHit) {
         let nearer = match self.hit {
             None => hit.t <= self.t,
-            Some(old) => hit.t < old.t || (hit.t == old.t && hit.facet < old.facet),
+            Some(old) => hit.t < old.t || (hit.t == old.t && (hit.facet, hit.second) < (old.facet, old.second)),
         };
         if nearer {
             *self = Self { t: hit.t, hit: Some(hit) };
@@ -136,24 +136,35 @@ impl FacetRay {
         self.axes.map(|a| (a % 3) as usize)
     }
 
-    /// Tests both triangles of a facet and keeps the nearest hit.
+    /// Tests the triangles of a facet (bit 0: the first, bit 1: the second) and keeps the nearest hit.
     #[inline]
-    pub(crate) fn test(&self, facet: u32, corners: &[Point; 4], around: &Surroundings, best: &mut Nearest) {
-        let keep = match self.from {
+    pub(crate) fn test(
+        &self,
+        facet: u32,
+        triangles: u32,
+        corners: &[Point; 4],
+        around: &Surroundings,
+        best: &mut Nearest,
+    ) {
+        let ways = match self.from {
             None => [Way::Plain; 2],
             Some(own) if own == facet => self.ways_of_own(corners, around),
             Some(own) => self.ways_of_other(own, facet, corners, around),
         };
         let [a, b, c, d] = *corners;
-        if let Some((t, b)) = self.triangle(keep[0], [a, b, c], best.t) {
+        if triangles & 1 != 0
+            && let Some((t, b)) = self.triangle(ways[0], [a, b, c], best.t)
+        {
             best.offer(FacetHit { t, facet, second: false, b });
         }
-        if let Some((t, b)) = self.triangle(keep[1], [a, c, d], best.t) {
+        if triangles & 2 != 0
+            && let Some((t, b)) = self.triangle(ways[1], [a, c, d], best.t)
+        {
             best.offer(FacetHit { t, facet, second: true, b });
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn triangle(&self, way: Way, corners: [Point; 3], t_max: f64) -> Option<(f64, [f64; 3])> {
         let origin = match way {
             Way::Plain => self.origin,

@@ -1,9 +1,9 @@
 //! From a facet hit to the answer: surface parameters and the normal to shade with.
 //!
 //! Facet parameters are `(0,0), (1,0), (1,1), (0,1)` at the corners, carried over the two traced triangles linearly.
-//! On a mesh of size h the normal of the flat triangle is wrong by O(h), the bilinear one by O(h²), that of the
-//! cubic patch by O(h²) with a smaller factor, for it sees positions and normals. The patch is that of Vlachos et al., *Curved PN
-//! Triangles*, I3D 2001, and for quads its bicubic relative with the twist of the bilinear patch.
+//! On a mesh of size h the normals of the flat triangle and of the nearest corner are wrong by O(h), those of the bilinear
+//! rule and of the cubic patch by O(h²). The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for
+//! quads its bicubic relative with the twist of the bilinear patch.
 //! Weakness: all but the flat normal are only as good as the vertex normals of the mesh.
 
 use super::facet::FacetHit;

@@ -117,8 +117,7 @@ impl Lanes for Avx2 {
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
             let below = _mm256_cmp_ps::<_CMP_LT_OQ>(least, _mm256_sub_ps(_mm256_setzero_ps(), error));
             let above = _mm256_cmp_ps::<_CMP_GT_OQ>(most, error);
-            let inside = !(_mm256_movemask_ps(_mm256_and_ps(below, above)) as u32);
-            (inside | inside >> 4) & 15
+            !(_mm256_movemask_ps(_mm256_and_ps(below, above)) as u32) & 255
         }
     }
 }

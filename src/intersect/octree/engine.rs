@@ -20,7 +20,7 @@ pub(super) const WIDTH: usize = 16;
 pub(super) trait Lanes {
     /// Which children the ray may meet before `t_max`, and where it enters them.
     fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]);
-    /// Which facets of the block the line of the ray may meet.
+    /// Which triangles of the block the line of the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
     fn sift(block: &Block, ray: &SiftRay) -> u32;
 }
 
@@ -94,7 +94,7 @@ fn step<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) -> bool {
                 s.pop()
             } else {
                 cost.tests += count as u64;
-                s.waiting = L::sift(block, &s.sift) & ((1 << count) - 1);
+                s.waiting = L::sift(block, &s.sift) & (((1 << count) - 1) * 0x11);
                 if s.waiting != 0 {
                     fetch_corners(tree, block, s.waiting);
                     return true;
@@ -145,7 +145,8 @@ fn push(s: &mut State, node: &Node, mut mask: u32, enter: &[f32; 8]) -> bool {
 }
 
 #[inline(always)]
-fn fetch_corners(tree: &Octree, block: &Block, mut mask: u32) {
+fn fetch_corners(tree: &Octree, block: &Block, waiting: u32) {
+    let mut mask = (waiting | waiting >> 4) & 15;
     while mask != 0 {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask - 1;
@@ -158,13 +159,15 @@ fn fetch_corners(tree: &Octree, block: &Block, mut mask: u32) {
 #[inline(always)]
 fn test(tree: &Octree, block: &Block, s: &mut State) {
     let positions = &tree.around.mesh.positions;
-    let mut mask = s.waiting;
+    let waiting = s.waiting;
+    let mut mask = (waiting | waiting >> 4) & 15;
     s.waiting = 0;
     while mask != 0 {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask - 1;
         let corners = block.positions[k].map(|p| positions[p as usize]);
-        s.facets.test(block.facets[k], &corners, &tree.around, &mut s.best);
+        let triangles = waiting >> k & 1 | waiting >> (k + 3) & 2;
+        s.facets.test(block.facets[k], triangles, &corners, &tree.around, &mut s.best);
     }
     s.cap();
 }

@@ -1,7 +1,7 @@
 //! What is walked: 128-byte nodes of up to eight children, 192-byte blocks of up to four facets.
 
 use super::clip::{Box32, down};
-use crate::math::Point;
+use crate::math::{Aabb, Point};
 
 /// Where a child is: a node, or a block with its number of facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,6 +92,18 @@ impl Node {
         }
         self.children[slot] = link.0;
         self.used |= 1 << slot;
+    }
+}
+
+impl Node {
+    /// The box of a child about the middle of the mesh.
+    pub(super) fn child(&self, slot: usize) -> Aabb {
+        let at = |row: usize| {
+            Point::from_array(std::array::from_fn(|a| {
+                f64::from(self.origin[a]) + f64::from(self.bounds[2 * a + row][slot]) * f64::from(self.step[a])
+            }))
+        };
+        Aabb { min: at(0), max: at(1) }
     }
 }
 

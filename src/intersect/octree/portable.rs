@@ -50,7 +50,7 @@ impl Lanes for Portable {
             let w = bx[k] * ay[k] - by[k] * ax[k];
             // Not a number is no reason to drop a facet.
             let outside = u.min(v).min(w) < -error && u.max(v).max(w) > error;
-            mask |= u32::from(!outside) << (k & 3);
+            mask |= u32::from(!outside) << k;
         }
         mask
     }
