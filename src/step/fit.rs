@@ -70,7 +70,11 @@ impl Target<'_> {
         let d = piece.derivatives(t);
         let near = |p: &&Pole| (p.point - d.point).length() <= self.pole_tolerance;
         if let Some(pole) = self.poles.iter().find(near) {
-            let step = 1e-4 * (b - a) * inward;
+            // So far in that what the file's edge misses the pole by no longer turns the azimuth.
+            let miss = (pole.point - d.point).length();
+            let far = |s: &&f64| (piece.evaluate(t + **s * (b - a) * inward) - pole.point).length() > 1e4 * miss;
+            let fraction = [1e-4, 1e-3, 1e-2].iter().find(far).copied().unwrap_or(0.03);
+            let step = fraction * (b - a) * inward;
             let (t1, t2) = (t + step, t + 2.0 * step);
             let second = (self.locate)(t2, piece.evaluate(t2), hint);
             let first = (self.locate)(t1, piece.evaluate(t1), Some(second));

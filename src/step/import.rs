@@ -101,6 +101,12 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
             items.retain(|item| !again(item));
             for item in &items {
                 items_placed.entry(*item).or_insert(p.placement);
+                // Shells of models and elements of sets stand with them.
+                let mut inner = Vec::new();
+                file.entity(*item).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut inner));
+                for id in inner {
+                    items_placed.entry(id).or_insert(p.placement);
+                }
             }
             let units = assembly.units_of(p.representation);
             let made = make_part(&common, units, &p, &items, &mut model, report);

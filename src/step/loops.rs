@@ -149,7 +149,10 @@ pub(super) fn contains(polygon: &[Uv], p: Uv) -> bool {
 /// loops run against their face's orientation.
 pub(super) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
     let first = chained(uses.clone(), chart, tolerance, false);
-    if first.winding.iter().all(|w| w.abs() < 2) {
+    // On a surface with one pole nothing could close a loop that touches it and winds around it all the same.
+    let lone = chart.poles.len() == 1 && first.pieces.iter().any(|p| p.source == Source::Nothing);
+    let allowed = if lone { 0 } else { 1 };
+    if first.winding.iter().all(|w| w.abs() <= allowed) {
         return first;
     }
     let mut second = chained(uses, chart, tolerance, true);
