@@ -30,6 +30,7 @@ mod trace;
 pub mod traditional;
 mod tree;
 mod trim;
+mod wide;
 
 use super::{Certainty, Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, FaceId, Ray, Uv, Vector};
@@ -40,6 +41,7 @@ use query::{Query, Root};
 use rayon::prelude::*;
 use std::time::Instant;
 use tree::Tree;
+use wide::Width;
 
 pub use newton::SurfacePoint;
 
@@ -86,6 +88,7 @@ pub struct Exact {
     leaves: Vec<Leaf>,
     pool: Vec<net::V4>,
     tree: Tree,
+    width: Width,
     settings: Settings,
     build_seconds: f64,
 }
@@ -117,10 +120,10 @@ impl Exact {
             leaves.extend(part.leaves.into_iter().map(|l| Leaf { net: l.net + shift, ..l }));
             pool.extend(part.pool);
         }
-        let boxes: Vec<Aabb> = leaves.iter().map(|l| Aabb { min: l.lo, max: l.hi }).collect();
-        let tree = Tree::build(&boxes, 2);
+        let boxes: Vec<Aabb> = leaves.iter().map(|l: &Leaf| Aabb { min: l.lo, max: l.hi }).collect();
+        let tree = Tree::build(&boxes);
         let build_seconds = start.elapsed().as_secs_f64();
-        Self { geometry, leaves, pool, tree, settings: *settings, build_seconds }
+        Self { geometry, leaves, pool, tree, width: Width::detect(), settings: *settings, build_seconds }
     }
 
     /// Placed faces that are not traced: ready meshes, and surfaces that are not usable.
@@ -140,9 +143,9 @@ impl Exact {
 
     /// The first hit, with its certificate, also for a miss.
     pub fn first(&self, ray: &Ray, cost: &mut Cost) -> Answer {
-        let mut q = Query::new(ray, &self.geometry, self.settings.budget);
+        let mut q = Query::new(ray, &self.geometry, self.tree.center, self.settings.budget);
         if is_sound(ray) {
-            self.walk(&mut q);
+            self.search(&mut q);
         }
         cost.rays += 1;
         cost.nodes += u64::from(q.nodes);
@@ -160,10 +163,10 @@ impl Exact {
 
     /// Every crossing in order of t, each once. A crossing found from both sides of a patch border counts once.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
-        let mut q = Query::new(ray, &self.geometry, self.settings.budget.saturating_mul(4));
+        let mut q = Query::new(ray, &self.geometry, self.tree.center, self.settings.budget.saturating_mul(4));
         q.all = Some(Vec::new());
         if is_sound(ray) {
-            self.walk(&mut q);
+            self.search(&mut q);
         }
         cost.rays += 1;
         cost.nodes += u64::from(q.nodes);
@@ -217,11 +220,7 @@ impl Intersector for Exact {
 
     fn footprint(&self) -> Footprint {
         let nets: usize = self.geometry.patches.iter().map(|p| size_of_val(p) + size_of_val(&*p.net)).sum();
-        let bytes = size_of_val(&*self.leaves)
-            + size_of_val(&*self.pool)
-            + size_of_val(&*self.tree.nodes)
-            + size_of_val(&*self.tree.order)
-            + nets;
+        let bytes = size_of_val(&*self.leaves) + size_of_val(&*self.pool) + size_of_val(&*self.tree.nodes) + nets;
         Footprint { bytes, primitives: self.geometry.patches.len(), build_seconds: self.build_seconds }
     }
 }

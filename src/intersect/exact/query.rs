@@ -2,6 +2,7 @@
 
 use super::geometry::{Geometry, project};
 use super::leaf::Leaf;
+use super::tree::Node;
 use crate::intersect::Certainty;
 use crate::math::{Ray, Uv, Vector, orthonormal_pair};
 
@@ -36,6 +37,10 @@ pub(super) struct Query {
     pub(super) n1: Vector,
     pub(super) n2: Vector,
     pub(super) inverse: [f64; 3],
+    /// Origin about the tree's centre, moved so that planes met first lie nearer and planes met last farther, by more than
+    /// its rounding.
+    enter: [f64; 3],
+    leave: [f64; 3],
     pub(super) t_min: f64,
     /// Roots beyond are of no interest; shrinks with each root found in a search for the first.
     pub(super) t_max: f64,
@@ -55,12 +60,17 @@ pub(super) struct Query {
 }
 
 impl Query {
-    pub(super) fn new(ray: &Ray, geometry: &Geometry, budget: u32) -> Self {
+    pub(super) fn new(ray: &Ray, geometry: &Geometry, center: Vector, budget: u32) -> Self {
         let d = ray.direction;
         let (n1, n2) = orthonormal_pair(d);
         // A finite reciprocal keeps 0 · ∞ out of the slab test; 1e-200 moves no plane.
         let inverse = d.to_array().map(|x| 1.0 / if x.abs() < 1e-200 { 1e-200f64.copysign(x) } else { x });
+        let o = ray.origin - center;
+        let slack = 4.0 * f64::EPSILON * o.abs().max_element();
+        let forward = [0, 1, 2].map(|k| slack.copysign(inverse[k]));
         Self {
+            enter: [0, 1, 2].map(|k| o[k] + forward[k]),
+            leave: [0, 1, 2].map(|k| o[k] - forward[k]),
             o: ray.origin,
             d,
             n1,
@@ -96,18 +106,28 @@ impl Query {
         }
     }
 
-    /// Where a box is entered, or infinity; conservative by a few ulp.
+    /// Where each of a node's boxes is entered, or infinity; conservative.
     #[inline(always)]
-    pub(super) fn slab(&self, lo: &[f64; 3], hi: &[f64; 3]) -> f64 {
-        let (mut near, mut far) = (self.t_min, self.t_max);
+    pub(super) fn slabs(&self, node: &Node) -> [f64; 4] {
+        let (mut near, mut far) = ([self.t_min; 4], [self.t_max; 4]);
         for k in 0..3 {
-            let a = (lo[k] - self.o[k]) * self.inverse[k];
-            let b = (hi[k] - self.o[k]) * self.inverse[k];
-            let (x, y) = if a < b { (a, b) } else { (b, a) };
-            near = if x > near { x } else { near };
-            far = if y < far { y } else { far };
+            let inverse = self.inverse[k];
+            let (first, last) =
+                if inverse >= 0.0 { (&node.lo[k], &node.hi[k]) } else { (&node.hi[k], &node.lo[k]) };
+            for i in 0..4 {
+                let a = (f64::from(first[i]) - self.enter[k]) * inverse;
+                let b = (f64::from(last[i]) - self.leave[k]) * inverse;
+                near[i] = if a > near[i] { a } else { near[i] };
+                far[i] = if b < far[i] { b } else { far[i] };
+            }
         }
-        if near <= far + 4.0 * f64::EPSILON * far.abs() { near } else { f64::INFINITY }
+        let mut out = [f64::INFINITY; 4];
+        for i in 0..4 {
+            if near[i] <= far[i] + 4.0 * f64::EPSILON * far[i].abs() {
+                out[i] = near[i];
+            }
+        }
+        out
     }
 }
 

@@ -9,9 +9,10 @@ use super::Exact;
 use super::leaf::{EXTENSION, Leaf, ROUND};
 use super::net::{self, V4};
 use super::query::{Query, Root};
-use super::tree::MAX_DEPTH;
+use super::tree::{ABSENT, LEAF};
 use crate::intersect::Certainty;
 use crate::math::Vector;
+use smallvec::SmallVec;
 
 /// Row sums above this go to clipping: 5 % is kept for the rounding of `Y`, which stays below 1e-6.
 const UNIQUE: f64 = 0.95;
@@ -29,44 +30,39 @@ impl Exact {
     /// Meets every leaf that the ray may touch, nearest boxes first.
     #[inline(always)]
     pub(super) fn walk(&self, q: &mut Query) {
-        let Some(root) = self.tree.nodes.first() else { return };
-        let near = q.slab(&root.lo, &root.hi);
-        if near == f64::INFINITY {
+        if self.tree.nodes.is_empty() {
             return;
         }
-        let mut stack = [(0u32, 0f64); MAX_DEPTH];
-        stack[0] = (0, near);
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let (index, near) = stack[top];
-            if near > q.t_max {
+        // Entries carry the distance rounded down, so that pruning stays conservative.
+        let mut stack: SmallVec<[(u32, f32); 64]> = SmallVec::new();
+        stack.push((0, f32::NEG_INFINITY));
+        while let Some((index, near)) = stack.pop() {
+            if f64::from(near) > q.t_max {
+                continue;
+            }
+            if index & LEAF != 0 {
+                self.test_leaf(q, index & !LEAF);
                 continue;
             }
             q.nodes += 1;
             let node = &self.tree.nodes[index as usize];
-            if node.count > 0 {
-                for k in node.first..node.first + node.count {
-                    let leaf = self.tree.order[k as usize];
-                    let l = &self.leaves[leaf as usize];
-                    if q.slab(&l.lo.to_array(), &l.hi.to_array()) != f64::INFINITY {
-                        self.test_leaf(q, leaf);
+            let near = q.slabs(node);
+            let mut met = [(ABSENT, f32::INFINITY); 4];
+            let mut count = 0;
+            for k in 0..4 {
+                if near[k] < f64::INFINITY && node.child[k] != ABSENT {
+                    // Insertion, farthest first: the nearest is popped next.
+                    let entry = (node.child[k], (near[k] as f32).next_down());
+                    let mut at = count;
+                    while at > 0 && met[at - 1].1 < entry.1 {
+                        met[at] = met[at - 1];
+                        at -= 1;
                     }
+                    met[at] = entry;
+                    count += 1;
                 }
-                continue;
             }
-            let (a, b) = (&self.tree.nodes[node.first as usize], &self.tree.nodes[node.first as usize + 1]);
-            let (near_a, near_b) = (q.slab(&a.lo, &a.hi), q.slab(&b.lo, &b.hi));
-            let (x, y) = ((node.first, near_a), (node.first + 1, near_b));
-            let (first, second) = if near_a <= near_b { (x, y) } else { (y, x) };
-            if second.1 != f64::INFINITY {
-                stack[top] = second;
-                top += 1;
-            }
-            if first.1 != f64::INFINITY {
-                stack[top] = first;
-                top += 1;
-            }
+            stack.extend_from_slice(&met[..count]);
         }
     }
 
