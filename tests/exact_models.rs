@@ -123,3 +123,68 @@ fn rays_through_edges_of_closed_shells_find_exactly_one_face() {
     }
     assert!(worst.is_empty(), "{worst:?}");
 }
+
+#[test]
+#[ignore = "minutes: every corpus model that reads, 20,000 rays each"]
+fn corpus_certificates() {
+    let folder = std::env::var_os("LAMPYRIS_CORPUS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/step-corpus"), PathBuf::from);
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        println!("no corpus at {}: nothing tested", folder.display());
+        return;
+    };
+    let mut files: Vec<_> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    files.sort();
+    let only = std::env::var("ONLY").unwrap_or_default();
+    let (mut rays, mut flagged, mut edge_rays, mut odd) = (0, 0, 0, 0);
+    for path in files.iter().filter(|p| p.extension().is_some_and(|e| e == "stp" || e == "step")) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if !name.contains(&only) {
+            continue;
+        }
+        let Ok(import) = lampyris::step::read(path, &lampyris::step::Settings::default()) else { continue };
+        let model = import.model;
+        if model.placed_face_count() == 0 {
+            continue;
+        }
+        let exact = Exact::build(&model, &Settings::default());
+        let b = bounds(&model);
+        let mut s = Stream(3);
+        let start = std::time::Instant::now();
+        let mut cost = Cost::default();
+        let n = 20_000;
+        let mut bad = 0;
+        for _ in 0..n {
+            let ray = s.ray(b.center(), 0.5 * b.size());
+            let answer = exact.first(&ray, &mut cost);
+            if answer.certainty == Certainty::Uncertified {
+                bad += 1;
+                if std::env::var("SHOW").is_ok() && bad < 4 {
+                    println!("   {:?} {ray:?}", answer.hit);
+                }
+            }
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        let (m, o, f) = through_edges(&name, &model, 2000);
+        println!(
+            "{name:44} faces {:6} patches {:6} leaves {:7} build {:6.2} s {:8.0} rays/s tests {:5.2} uncertified {bad} | edges {m}: odd {o}, flagged {f}",
+            model.placed_face_count(),
+            exact.patch_count(),
+            exact.leaf_count(),
+            exact_seconds(&exact),
+            n as f64 / seconds,
+            cost.tests as f64 / n as f64
+        );
+        rays += n;
+        flagged += bad;
+        edge_rays += m;
+        odd += o;
+    }
+    println!("{flagged} of {rays} uncertified; {odd} of {edge_rays} rays through edges of closed shells odd");
+    assert!(flagged * 100_000 <= rays, "{flagged} of {rays} uncertified");
+}
+
+fn exact_seconds(exact: &Exact) -> f64 {
+    use lampyris::intersect::Intersector;
+    exact.footprint().build_seconds
+}

@@ -68,7 +68,13 @@ impl<'a> Polished<'a> {
             (10.0 * self.sag, self.sag)
         };
         let sine = normal.dot(ray.direction).abs();
-        (sag > 1e-9 && sine * length < 12.0 * sag).then_some(2.0 * length)
+        (sag > 1e-9 && sine * length < 12.0 * sag).then_some(4.0 * length)
+    }
+
+    /// A distance within which a facet of the surface that a ray leaves is its neighbour: twice the facet's size.
+    fn near(&self, hit: &Hit) -> f64 {
+        let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
+        2.0 * a.distance(c).max(b.distance(d))
     }
 
     fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Outcome {
@@ -119,16 +125,19 @@ fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::Surf
 
 impl Intersector for Polished<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        let mut ray = *ray;
         if let Some(from) = &ray.from
-            && let Some(reach) = self.hidden(ray, from)
+            && let Some(reach) = self.hidden(&ray, from)
         {
-            let near = ray.within(ray.t_min, ray.t_max.min(ray.t_min.max(0.0) + reach));
-            let mut own = Cost::default();
-            if let Some(hit) = self.exact.first(&near, &mut own).hit {
+            let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
+            if let Some(hit) = self.exact.first(&ray.within(ray.t_min, end), &mut Cost::default()).hit {
                 cost.rays += 1;
                 return Some(Hit { primitive: from.primitive, certainty: Certainty::Polished, ..hit });
             }
+            // Nothing on the spline up to there: facets of the surface being left, which a flat ray may still cross, are ghosts.
+            ray.t_min = end;
         }
+        let ray = &ray;
         // The spline may lie ahead of an origin whose facet lies behind it.
         let mut start = ray.t_min - 2.0 * self.sag;
         let mut rays = 0;
@@ -149,6 +158,11 @@ impl Intersector for Polished<'_> {
                 Outcome::Lost if self.exact.skipped().contains(&facet_hit.face) => {
                     answer = in_range(ray, facet_hit)
                 }
+                // The exact model has no point there: a facet of the surface being left.
+                Outcome::Lost
+                    if ray
+                        .from
+                        .is_some_and(|f| f.face == facet_hit.face && facet_hit.t < self.near(&facet_hit)) => {}
                 Outcome::Lost => {
                     cost.fallbacks += 1;
                     answer = in_range(ray, facet_hit);

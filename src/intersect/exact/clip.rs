@@ -5,11 +5,11 @@
 //! says so, solved by Newton when at most one root is left, and halved otherwise. Boxes that come down to rounding are
 //! reported as tangent or uncertified, never dropped.
 
-use super::Exact;
 use super::geometry::project;
 use super::leaf::{Leaf, ROUND};
-use super::net::{self, Net, V4};
+use super::net::{self, Net, Slopes, V4, by_degree};
 use super::query::Query;
+use super::{Exact, wide};
 use crate::intersect::Certainty;
 
 /// Contact closer than this is a matter of rounding, mm.
@@ -24,6 +24,7 @@ struct Node {
 }
 
 /// Range of t over a net; everything when a weight is not positive.
+#[inline(always)]
 fn along(net: &[V4]) -> (f64, f64) {
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     for p in net {
@@ -38,8 +39,8 @@ fn along(net: &[V4]) -> (f64, f64) {
 
 impl Exact {
     /// Looks for every root of the query on a leaf.
-    #[cold]
-    pub(super) fn clip(&self, q: &mut Query, index: u32) {
+    #[inline(always)]
+    pub(super) fn clip_leaf(&self, q: &mut Query, index: u32) {
         q.clips += 1;
         let leaf = &self.leaves[index as usize];
         let degree = leaf.degree;
@@ -85,6 +86,7 @@ impl Exact {
     }
 
     #[allow(clippy::too_many_arguments)]
+    #[inline(always)]
     fn clip_node(
         &self,
         q: &mut Query,
@@ -115,7 +117,8 @@ impl Exact {
         let [[u0, u1], [v0, v1]] = node.rect;
         let (wide_u, wide_v) = (u1 - u0, v1 - v0);
         let mut keep = [[0.0, 1.0]; 2];
-        if let Some((y, rho)) = precondition(net, degree) {
+        let slopes = net::slopes(net, degree);
+        if let Some((y, rho)) = precondition(&slopes) {
             let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + 1e-13);
             keep = linear_hull(net, degree, &y);
             for k in 0..2 {
@@ -179,7 +182,6 @@ impl Exact {
             stack.push(Node { net, rect, near });
             return;
         }
-        let slopes = net::slopes(net, degree);
         let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
         let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
         let direction = if (u_first && wide_u > FINEST) || wide_v <= FINEST { 0 } else { 1 };
@@ -201,7 +203,7 @@ impl Exact {
 
     /// Tangent where the surface is regular and the ray grazes it; uncertified at singular points.
     fn contact(&self, leaf: &Leaf, [u, v]: [f64; 2], q: &Query) -> Certainty {
-        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
+        let jet = wide::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
         let (_, du, dv) = project(&jet);
         let n = du.cross(dv);
         let regular = n.length() > 1e-6 * du.length().max(dv.length()).powi(2);
@@ -211,8 +213,8 @@ impl Exact {
 }
 
 /// The inverse of the middle Jacobian, and the largest row sum of its product with the radii.
-fn precondition(net: &[V4], degree: [u8; 2]) -> Option<([[f64; 2]; 2], f64)> {
-    let s = net::slopes(net, degree);
+#[inline(always)]
+fn precondition(s: &Slopes) -> Option<([[f64; 2]; 2], f64)> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
     let size = (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
     // Below this the rounding of the inverse would reach 1e-6 in the test.
@@ -225,9 +227,14 @@ fn precondition(net: &[V4], degree: [u8; 2]) -> Option<([[f64; 2]; 2], f64)> {
 }
 
 /// Ranges of u and v that can hold a root: where `u = u − g(u, v)` for the preconditioned net g.
-fn linear_hull(net: &[V4], [p, q]: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
+#[inline(always)]
+fn linear_hull(net: &[V4], degree: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    by_degree!(degree, linear_hull_in(net, y))
+}
+
+#[inline(always)]
+fn linear_hull_in(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2]; 2] {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-    let (p, q) = (p as usize, q as usize);
     for i in 0..=p {
         for j in 0..=q {
             let x = &net[i * (q + 1) + j];
@@ -241,6 +248,7 @@ fn linear_hull(net: &[V4], [p, q]: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] 
     range
 }
 
+#[inline(always)]
 fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
     let mut last = f64::INFINITY;
     for _ in 0..12 {

@@ -1,7 +1,8 @@
 //! The model as the tracer sees it: placed faces in world orientation, cut into Bézier patches about centres of their own.
 
-use super::net::{self, Jet, Net, V4};
+use super::net::{Jet, Net, V4};
 use super::trim::Trim;
+use super::wide;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Face, Model, Part, PlacedFace};
 use crate::nurbs::{BezierPatch, Curve};
@@ -194,7 +195,7 @@ impl Patch {
 
     /// Homogeneous point about the centre, and derivatives.
     pub(super) fn jet(&self, [u, v]: [f64; 2]) -> Jet {
-        net::evaluate(&self.net, self.degree, u, v)
+        wide::evaluate(&self.net, self.degree, u, v)
     }
 }
 
@@ -225,7 +226,7 @@ pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet, r
     // Where a derivative vanishes the normal is the limit; 1e-6 of the net away it is right to about 1e-6 rad.
     for (step, last) in [(1e-6, false), (1e-4, false), (1e-2, false), (1e-2, true)] {
         let toward = |x: f64| x + step * (0.5 - x);
-        let (_, du, dv) = project(&net::evaluate(net, degree, toward(u), toward(v)));
+        let (_, du, dv) = project(&wide::evaluate(net, degree, toward(u), toward(v)));
         let n = du.cross(dv);
         if (last || clear(du, dv)) && n.length() > 1e-12 * du.length() * dv.length() {
             return n.normalize();

@@ -7,6 +7,7 @@
 use super::geometry::{Geometry, Patch};
 use super::net::{self, Net, Slopes, V4};
 use super::trim::Region;
+use super::wide;
 use crate::math::Vector;
 
 /// How far beyond its domain a leaf's derivative boxes hold, in local parameters.
@@ -126,7 +127,7 @@ pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
 
 fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Leaf, Net) {
     let degree = patch.degree;
-    let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
+    let middle = wide::evaluate(piece, degree, 0.5, 0.5).s;
     let center = patch.center + xyz(&middle) / middle[3];
     // The offset as the rounded centre has it, so that the net and the centre agree.
     let offset = center - patch.center;
@@ -166,7 +167,7 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
     let leaf = Leaf {
         center,
         slopes,
-        middle: net::evaluate(&centred, degree, 0.5, 0.5).s,
+        middle: wide::evaluate(&centred, degree, 0.5, 0.5).s,
         lo: center + lo - pad,
         hi: center + hi + pad,
         axes,

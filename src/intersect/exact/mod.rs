@@ -41,7 +41,6 @@ use query::{Query, Root};
 use rayon::prelude::*;
 use std::time::Instant;
 use tree::Tree;
-use wide::Width;
 
 pub use newton::SurfacePoint;
 
@@ -88,7 +87,6 @@ pub struct Exact {
     leaves: Vec<Leaf>,
     pool: Vec<net::V4>,
     tree: Tree,
-    width: Width,
     settings: Settings,
     build_seconds: f64,
 }
@@ -123,7 +121,7 @@ impl Exact {
         let boxes: Vec<Aabb> = leaves.iter().map(|l: &Leaf| Aabb { min: l.lo, max: l.hi }).collect();
         let tree = Tree::build(&boxes);
         let build_seconds = start.elapsed().as_secs_f64();
-        Self { geometry, leaves, pool, tree, width: Width::detect(), settings: *settings, build_seconds }
+        Self { geometry, leaves, pool, tree, settings: *settings, build_seconds }
     }
 
     /// Placed faces that are not traced: ready meshes, and surfaces that are not usable.
@@ -199,7 +197,7 @@ impl Exact {
         let patch = &self.geometry.patches[leaf.patch as usize];
         let inside = root.local.map(|x| x.clamp(0.0, 1.0));
         let net = leaf.net(&self.pool);
-        let jet = net::evaluate(net, leaf.degree, root.local[0], root.local[1]);
+        let jet = wide::evaluate(net, leaf.degree, root.local[0], root.local[1]);
         let normal: Vector = face.sign * geometry::normal(net, leaf.degree, inside, &jet, patch.rounding);
         let uv: Uv = patch.uv(leaf.in_patch(inside));
         let (t, certainty) = (root.t, root.certainty);

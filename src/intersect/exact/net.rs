@@ -19,12 +19,29 @@ pub(super) struct Jet {
     pub(super) sv: V4,
 }
 
+/// `a += k x`, each rounded once: the same bits with and without an instruction for it. Where there is none this is slow, so
+/// hot loops reach it through [`super::wide`].
 #[inline(always)]
 pub(super) fn axpy(a: &mut V4, k: f64, x: &V4) {
     for c in 0..4 {
-        a[c] += k * x[c];
+        a[c] = k.mul_add(x[c], a[c]);
     }
 }
+
+/// Runs `$body(args…, p, q)`, compiled for the most frequent degrees with `p` and `q` known.
+macro_rules! by_degree {
+    ($degree:expr, $body:ident($($arg:expr),*)) => {
+        match $degree {
+            [1, 1] => $body($($arg,)* 1, 1),
+            [2, 2] => $body($($arg,)* 2, 2),
+            [3, 3] => $body($($arg,)* 3, 3),
+            [2, 1] => $body($($arg,)* 2, 1),
+            [1, 2] => $body($($arg,)* 1, 2),
+            [p, q] => $body($($arg,)* p as usize, q as usize),
+        }
+    };
+}
+pub(super) use by_degree;
 
 /// Value and derivatives of a net at `(u, v)`, which may lie outside `[0, 1]²`.
 #[inline(always)]
@@ -134,56 +151,85 @@ fn at(direction: usize, q: usize, k: usize, line: usize) -> usize {
 }
 
 /// The two halves of a net in `direction`, by de Casteljau.
+#[inline]
 pub(super) fn halves(net: &[V4], degree: [u8; 2], direction: usize) -> [Net; 2] {
-    let [n, lines] = [degree[direction] as usize, degree[1 - direction] as usize];
-    let q = degree[1] as usize;
     let (mut low, mut high): (Net, Net) = (net.into(), net.into());
-    let mut w = [[0.0; 4]; MAX_DEGREE + 1];
-    for line in 0..=lines {
-        for k in 0..=n {
-            w[k] = net[at(direction, q, k, line)];
-        }
-        for r in 0..=n {
-            low[at(direction, q, r, line)] = w[0];
-            for k in 0..n - r {
-                for c in 0..4 {
-                    w[k][c] = 0.5 * (w[k][c] + w[k + 1][c]);
-                }
-            }
-        }
-        for k in 0..=n {
-            high[at(direction, q, k, line)] = w[k];
-        }
+    if direction == 0 {
+        by_degree!(degree, halve_u(&mut low, &mut high));
+    } else {
+        by_degree!(degree, halve_v(&mut low, &mut high));
     }
     [low, high]
 }
 
+#[inline(always)]
+fn halve_u(low: &mut [V4], high: &mut [V4], p: usize, q: usize) {
+    halve(low, high, [p, q, 0]);
+}
+
+#[inline(always)]
+fn halve_v(low: &mut [V4], high: &mut [V4], p: usize, q: usize) {
+    halve(low, high, [q, p, 1]);
+}
+
+/// Halves along `n` on `lines` lines; both nets hold the whole on entry.
+#[inline(always)]
+fn halve(low: &mut [V4], high: &mut [V4], [n, lines, direction]: [usize; 3]) {
+    let q = if direction == 0 { lines } else { n };
+    for line in 0..=lines {
+        // The high net is halved in place: after round r its first n − r points have moved.
+        for r in 0..=n {
+            low[at(direction, q, r, line)] = high[at(direction, q, 0, line)];
+            for k in 0..n - r {
+                let (i, j) = (at(direction, q, k, line), at(direction, q, k + 1, line));
+                for c in 0..4 {
+                    high[i][c] = 0.5 * (high[i][c] + high[j][c]);
+                }
+            }
+        }
+    }
+}
+
 /// The net over `[a, b]` of `direction`, which may reach outside `[0, 1]`; `b` must not be 0.
-pub(super) fn restrict(net: &mut [V4], degree: [u8; 2], direction: usize, [a, b]: [f64; 2]) {
-    let [n, lines] = [degree[direction] as usize, degree[1 - direction] as usize];
-    let q = degree[1] as usize;
-    let mut w = [[0.0; 4]; MAX_DEGREE + 1];
+#[inline]
+pub(super) fn restrict(net: &mut [V4], degree: [u8; 2], direction: usize, range: [f64; 2]) {
+    if direction == 0 {
+        by_degree!(degree, restrict_u(net, range));
+    } else {
+        by_degree!(degree, restrict_v(net, range));
+    }
+}
+
+#[inline(always)]
+fn restrict_u(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
+    restrict_lines(net, [p, q, 0], range);
+}
+
+#[inline(always)]
+fn restrict_v(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
+    restrict_lines(net, [q, p, 1], range);
+}
+
+#[inline(always)]
+fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f64; 2]) {
+    let q = if direction == 0 { lines } else { n };
     let lerp = |x: V4, y: V4, t: f64| -> V4 { std::array::from_fn(|c| x[c] + (y[c] - x[c]) * t) };
     for line in 0..=lines {
-        for k in 0..=n {
-            w[k] = net[at(direction, q, k, line)];
-        }
         if b != 1.0 {
             for r in 1..=n {
                 for k in (r..=n).rev() {
-                    w[k] = lerp(w[k - 1], w[k], b);
+                    let i = at(direction, q, k, line);
+                    net[i] = lerp(net[at(direction, q, k - 1, line)], net[i], b);
                 }
             }
         }
         if a != 0.0 {
             for r in 1..=n {
                 for k in 0..=n - r {
-                    w[k] = lerp(w[k], w[k + 1], a / b);
+                    let i = at(direction, q, k, line);
+                    net[i] = lerp(net[i], net[at(direction, q, k + 1, line)], a / b);
                 }
             }
-        }
-        for k in 0..=n {
-            net[at(direction, q, k, line)] = w[k];
         }
     }
 }
@@ -202,27 +248,38 @@ pub(super) struct Slopes {
 }
 
 /// Boxes around the derivatives, from the hulls of the difference nets.
+#[inline]
 pub(super) fn slopes(net: &[V4], degree: [u8; 2]) -> Slopes {
-    let [p, q] = degree.map(usize::from);
-    let range = |n: f64, pairs: &mut dyn Iterator<Item = (usize, usize)>| {
-        let (mut lo, mut hi) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
-        for (a, b) in pairs {
-            for c in 0..4 {
-                let x = n * (net[b][c] - net[a][c]);
-                lo[c] = lo[c].min(x);
-                hi[c] = hi[c].max(x);
+    by_degree!(degree, slopes_in(net))
+}
+
+#[inline(always)]
+fn slopes_in(net: &[V4], p: usize, q: usize) -> Slopes {
+    let m = q + 1;
+    let net = &net[..(p + 1) * m];
+    let (mut lo, mut hi) = ([[f64::INFINITY; 4]; 2], [[f64::NEG_INFINITY; 4]; 2]);
+    let mut grow = |d: usize, a: &V4, b: &V4| {
+        for c in 0..4 {
+            let x = b[c] - a[c];
+            lo[d][c] = if x < lo[d][c] { x } else { lo[d][c] };
+            hi[d][c] = if x > hi[d][c] { x } else { hi[d][c] };
+        }
+    };
+    for i in 0..=p {
+        for j in 0..=q {
+            let here = &net[i * m + j];
+            if i < p {
+                grow(0, here, &net[(i + 1) * m + j]);
+            }
+            if j < q {
+                grow(1, here, &net[i * m + j + 1]);
             }
         }
-        let middle: V4 = std::array::from_fn(|c| 0.5 * (lo[c] + hi[c]));
-        let radius: V4 = std::array::from_fn(|c| 0.5 * (hi[c] - lo[c]));
-        (middle, radius)
-    };
-    let m = q + 1;
-    let mut in_u = (0..p).flat_map(|i| (0..=q).map(move |j| (i * m + j, (i + 1) * m + j)));
-    let (u, ru) = range(p as f64, &mut in_u);
-    let mut in_v = (0..=p).flat_map(|i| (0..q).map(move |j| (i * m + j, i * m + j + 1)));
-    let (v, rv) = range(q as f64, &mut in_v);
-    Slopes { u, v, ru, rv }
+    }
+    let half = [0.5 * p as f64, 0.5 * q as f64];
+    let middle = |d: usize| -> V4 { std::array::from_fn(|c| half[d] * (lo[d][c] + hi[d][c])) };
+    let radius = |d: usize| -> V4 { std::array::from_fn(|c| half[d] * (hi[d][c] - lo[d][c])) };
+    Slopes { u: middle(0), v: middle(1), ru: radius(0), rv: radius(1) }
 }
 
 #[cfg(test)]

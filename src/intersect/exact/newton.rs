@@ -1,7 +1,7 @@
 //! Newton's method from a seed on one face: the last step of polishing, and by itself the plain iterative tracer.
 
+use super::Exact;
 use super::geometry::{self, project};
-use super::{Exact, net};
 use crate::math::{FaceId, Ray, Uv, Vector, orthonormal_pair};
 
 /// A point of a face on a ray.
@@ -91,7 +91,7 @@ impl Exact {
     pub fn distance_at(&self, face: FaceId, uv: Uv, point: crate::math::Point) -> Option<f64> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
-        let jet = net::evaluate(&patch.net, patch.degree, patch.local(uv)[0], patch.local(uv)[1]);
+        let jet = patch.jet(patch.local(uv));
         Some((point - patch.center - project(&jet).0).length())
     }
 

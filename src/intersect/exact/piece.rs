@@ -58,7 +58,7 @@ impl Piece {
     }
 
     /// u where the piece crosses height `v`, which must lie in its range.
-    fn u_at(&self, v: f64) -> f64 {
+    pub(super) fn u_at(&self, v: f64) -> f64 {
         let (mut lo, mut hi) = (0.0, 1.0);
         let rising = self.v[1] > self.v[0];
         let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
@@ -85,11 +85,17 @@ impl Piece {
         u
     }
 
+    /// Whether the piece crosses the height `v`; half-open, so that a joint counts once.
+    #[inline]
+    pub(super) fn spans(&self, v: f64) -> bool {
+        let (low, high) = if self.v[0] < self.v[1] { (self.v[0], self.v[1]) } else { (self.v[1], self.v[0]) };
+        low <= v && v < high
+    }
+
     /// Whether the half-line from `q` towards +u crosses the piece; heights are half-open, so that a joint counts once.
     #[inline]
     pub(super) fn crosses(&self, q: Uv) -> bool {
-        let (low, high) = if self.v[0] < self.v[1] { (self.v[0], self.v[1]) } else { (self.v[1], self.v[0]) };
-        if q.y < low || q.y >= high || q.x > self.max.x {
+        if !self.spans(q.y) || q.x > self.max.x {
             return false;
         }
         q.x < self.min.x || q.x < self.u_at(q.y)
@@ -153,10 +159,14 @@ pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
     all
 }
 
+/// Most pieces that one Bézier piece of a trim is split into.
+const MOST: usize = 4096;
+
 /// Control points, parameters at the ends, and how often it was halved.
 type Part = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
 
 fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, edge: (Option<EdgeId>, bool)) {
+    let first = out.len();
     let mut stack = vec![whole];
     while let Some((points, range, depth)) = stack.pop() {
         let at = |k: usize| points[k].truncate() / points[k].z;
@@ -165,9 +175,11 @@ fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, edge: (Option<EdgeId>, 
         let monotone = (0..n).all(|k| if rising { at(k + 1).y >= at(k).y } else { at(k + 1).y <= at(k).y });
         let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
         let size = hull.1 - hull.0;
-        let flat = size.y < 1e-13 * (longest.y + hull.1.y.abs());
-        let short = size.x <= longest.x && size.y <= longest.y;
-        if ((monotone || flat) && short) || depth >= 24 {
+        let flat = size.y < 1e-11 * (longest.y + hull.1.y.abs());
+        // Curves far longer than the domain, and more pieces than any real trim has, stay as they are: no input may cost
+        // more than this.
+        let short = (size.x <= longest.x && size.y <= longest.y) || depth >= 8;
+        if ((monotone || flat) && short) || depth >= 24 || out.len() > first + MOST {
             out.push(Piece::new(points, range, edge));
             continue;
         }

@@ -5,11 +5,11 @@
 //! `middle − Y f(middle) ± |Y| R · ½` (Krawczyk's operator); when that misses the leaf there is none, and when the row
 //! sums of `|Y| R` stay below 1 there is at most one in the enlarged domain, which Newton's method then finds.
 
-use super::Exact;
 use super::leaf::{EXTENSION, Leaf, ROUND};
 use super::net::{self, V4};
 use super::query::{Query, Root};
 use super::tree::{ABSENT, LEAF};
+use super::{Exact, wide};
 use crate::intersect::Certainty;
 use crate::math::Vector;
 use smallvec::SmallVec;
@@ -62,7 +62,9 @@ impl Exact {
                     count += 1;
                 }
             }
-            stack.extend_from_slice(&met[..count]);
+            for &entry in &met[..count] {
+                stack.push(entry);
+            }
         }
     }
 
@@ -190,7 +192,7 @@ impl Exact {
         let trim = &self.geometry.trims[face.trim as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
         let uv = patch.uv(leaf.in_patch(local));
-        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
+        let jet = wide::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
         let (_, du, dv) = super::geometry::project(&jet);
         // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the
         // gap over the sine, and still the edge must decide for both of its faces.

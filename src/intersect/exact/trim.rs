@@ -110,11 +110,18 @@ impl Trim {
             }
         }
         for j in 0..self.count[1] {
+            let middle = |i: usize| self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
+            // Crossings of the row's middle height, once for all its cells.
+            let v = middle(0).y;
+            let spanning = self.rows[j].iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
+            let mut crossings: Vec<f64> = spanning.map(|p| p.u_at(v)).collect();
+            crossings.sort_by(f64::total_cmp);
             for i in 0..self.count[0] {
                 let cell = j * self.count[0] + i;
                 if self.cells[cell] != Region::Border {
-                    let middle = self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
-                    self.cells[cell] = if self.parity(middle, j) { Region::Inside } else { Region::Outside };
+                    let right = crossings.len() - crossings.partition_point(|&u| u <= middle(i).x);
+                    let inside = (right % 2 == 1) != self.outside_is_inside;
+                    self.cells[cell] = if inside { Region::Inside } else { Region::Outside };
                 }
             }
         }

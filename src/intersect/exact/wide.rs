@@ -1,46 +1,70 @@
-//! The walk compiled twice: for every processor, and for those with 256-bit vectors. Both give the same bits.
+//! The hot loops compiled twice: for every processor, and for those with 256-bit vectors and fused multiply-add.
 //!
 //! `unsafe` is needed to call a function compiled for a feature that the build as a whole does not assume. It is sound
-//! because [`Width::detect`] alone makes [`Width::Avx2`], after asking the processor. Nothing else differs: additions and
-//! multiplications are not fused, so vectors of any width round alike.
+//! because the processor is asked first. Both give the same bits: what is fused is written as `mul_add`, which rounds once
+//! everywhere, and vectors of any width round alike.
 #![allow(unsafe_code)]
 
 use super::Exact;
+use super::net::{self, Jet, V4};
 use super::query::Query;
 
-/// What the processor offers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Width {
-    Any,
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
+/// Whether the wide version may run; the answer is cached by the standard library.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn is_wide() -> bool {
+    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
 }
 
-impl Width {
-    pub(super) fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            return Self::Avx2;
-        }
-        Self::Any
+/// Value and derivatives of a net, for callers outside of the hot loops: [`net::evaluate`].
+#[inline]
+pub(super) fn evaluate(control: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
+    #[cfg(target_arch = "x86_64")]
+    if is_wide() {
+        // SAFETY: the features were found.
+        return unsafe { evaluate_wide(control, degree, u, v) };
     }
+    net::evaluate(control, degree, u, v)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn evaluate_wide(control: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
+    net::evaluate(control, degree, u, v)
 }
 
 impl Exact {
     /// Meets every leaf that the ray may touch.
     #[inline]
     pub(super) fn search(&self, q: &mut Query) {
-        match self.width {
-            Width::Any => self.walk(q),
-            // SAFETY: `Width::detect` has found the feature.
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx2 => unsafe { self.walk_avx2(q) },
+        #[cfg(target_arch = "x86_64")]
+        if is_wide() {
+            // SAFETY: the features were found.
+            return unsafe { self.walk_wide(q) };
         }
+        self.walk(q);
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn walk_avx2(&self, q: &mut Query) {
+    #[target_feature(enable = "avx2,fma")]
+    fn walk_wide(&self, q: &mut Query) {
         self.walk(q);
+    }
+
+    /// Looks for every root on a leaf by clipping.
+    #[cold]
+    pub(super) fn clip(&self, q: &mut Query, leaf: u32) {
+        #[cfg(target_arch = "x86_64")]
+        if is_wide() {
+            // SAFETY: the features were found.
+            return unsafe { self.clip_wide(q, leaf) };
+        }
+        self.clip_leaf(q, leaf);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn clip_wide(&self, q: &mut Query, leaf: u32) {
+        self.clip_leaf(q, leaf);
     }
 }
