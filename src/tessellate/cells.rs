@@ -5,6 +5,7 @@
 
 use super::bound::{Prover, from_line};
 use super::rings::{Follows, Rings};
+use super::settings::Judge;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 
@@ -28,8 +29,8 @@ impl Cell {
 /// The leaves.
 #[derive(Default)]
 pub(super) struct Leaves {
-    /// Wholly inside, clear of the border, and proved.
-    pub(super) inside: Vec<Cell>,
+    /// Wholly inside, clear of the border, and proved: with the bound and the tolerance it was held to.
+    pub(super) inside: Vec<(Cell, f64, f64)>,
     /// Those that the border touches.
     pub(super) border: Vec<Cell>,
     /// Whether the budget ended the splitting.
@@ -39,42 +40,50 @@ pub(super) struct Leaves {
 /// Part of a cell's size that it must keep from the border.
 const CLEARANCE: f64 = 0.3;
 
-struct Tree<'t, 's, 'a> {
+/// Depth down to which the halves are visited in parallel, each with half of the budget.
+const PARALLEL: u32 = 5;
+
+struct Tree<'s, 'a> {
     sheet: &'s Sheet<'a>,
-    prover: Prover<'s, 'a>,
+    judge: Judge,
     segments: Vec<[Uv; 2]>,
     ladder: [Vec<f64>; 2],
-    budget: usize,
     max_angle: Option<f64>,
-    leaves: &'t mut Leaves,
+}
+
+/// What one branch of the tree works with.
+struct Branch<'s, 'a> {
+    prover: Prover<'s, 'a>,
+    leaves: Leaves,
+    budget: usize,
 }
 
 /// Splits the box around the rings until every cell fits.
 pub(super) fn split(
     sheet: &Sheet<'_>,
-    prover: Prover<'_, '_>,
+    judge: Judge,
     rings: &Rings,
     budget: usize,
     max_angle: Option<f64>,
 ) -> Leaves {
-    let mut leaves = Leaves::default();
     let segments: Vec<[Uv; 2]> =
         rings.rings.iter().flat_map(|r| (0..r.len()).map(move |i| [r[i].uv, r[(i + 1) % r.len()].uv])).collect();
     let (lo, hi) =
         segments.iter().flatten().fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     if !(lo.x < hi.x && lo.y < hi.y) || sheet.affine {
-        return leaves;
+        return Leaves::default();
     }
     let root = Cell { lo, hi };
     let ladder = [ladder(sheet, rings, root, 0), ladder(sheet, rings, root, 1)];
     let all: Vec<u32> = (0..segments.len() as u32).collect();
-    let mut tree = Tree { sheet, prover, segments, ladder, budget, max_angle, leaves: &mut leaves };
-    tree.visit(root, &all, false, 0);
-    leaves
+    let tree = Tree { sheet, judge, segments, ladder, max_angle };
+    let mut branch = Branch { prover: Prover::new(sheet, judge), leaves: Leaves::default(), budget };
+    tree.visit(&mut branch, root, &all, false, 0);
+    branch.leaves
 }
 
-impl Tree<'_, '_, '_> {
-    fn visit(&mut self, cell: Cell, candidates: &[u32], known_inside: bool, depth: u32) {
+impl Tree<'_, '_> {
+    fn visit(&self, out: &mut Branch<'_, '_>, cell: Cell, candidates: &[u32], known_inside: bool, depth: u32) {
         let mut inside = known_inside;
         let mut near: Vec<u32> = Vec::new();
         if !inside {
@@ -88,15 +97,21 @@ impl Tree<'_, '_, '_> {
                 inside = true;
             }
         }
-        if self.leaves.inside.len() + self.leaves.border.len() >= self.budget || depth > 60 {
-            self.leaves.exhausted = true;
-            self.leaves.border.push(cell);
+        if out.leaves.inside.len() + out.leaves.border.len() >= out.budget || depth > 60 {
+            out.leaves.exhausted = true;
+            out.leaves.border.push(cell);
             return;
         }
         let look = Look::new(self.sheet, cell);
         let crease = self.crease(cell);
-        if crease.is_none() && self.fits(cell, &look) {
-            if inside { &mut self.leaves.inside } else { &mut self.leaves.border }.push(cell);
+        if crease.is_none()
+            && let Some((bound, xi)) = self.fits(&mut out.prover, cell, &look)
+        {
+            if inside {
+                out.leaves.inside.push((cell, bound, xi));
+            } else {
+                out.leaves.border.push(cell);
+            }
             return;
         }
         let (direction, at) = crease.unwrap_or_else(|| {
@@ -104,14 +119,30 @@ impl Tree<'_, '_, '_> {
             (d, self.cut(cell, d))
         });
         if !(at > cell.lo[direction] && at < cell.hi[direction]) {
-            self.leaves.border.push(cell);
+            out.leaves.border.push(cell);
             return;
         }
         let (mut a, mut b) = (cell, cell);
         a.hi[direction] = at;
         b.lo[direction] = at;
-        self.visit(a, &near, inside, depth + 1);
-        self.visit(b, &near, inside, depth + 1);
+        if depth >= PARALLEL {
+            self.visit(out, a, &near, inside, depth + 1);
+            self.visit(out, b, &near, inside, depth + 1);
+            return;
+        }
+        let budget = out.budget / 2;
+        let half = |cell: Cell| {
+            let prover = Prover::new(self.sheet, self.judge);
+            let mut branch = Branch { prover, leaves: Leaves::default(), budget };
+            self.visit(&mut branch, cell, &near, inside, depth + 1);
+            branch.leaves
+        };
+        let (first, second) = rayon::join(|| half(a), || half(b));
+        for part in [first, second] {
+            out.leaves.inside.extend(part.inside);
+            out.leaves.border.extend(part.border);
+            out.leaves.exhausted |= part.exhausted;
+        }
     }
 
     /// A crease of the surface across the cell.
@@ -132,22 +163,23 @@ impl Tree<'_, '_, '_> {
         if i < j { l[(i + j) / 2] } else { 0.5 * (lo + hi) }
     }
 
-    fn fits(&mut self, cell: Cell, look: &Look) -> bool {
+    /// Bound and tolerance of a cell that is within it.
+    fn fits(&self, prover: &mut Prover<'_, '_>, cell: Cell, look: &Look) -> Option<(f64, f64)> {
         let xi =
             cell.corners().iter().fold(self.sheet.tolerance(cell.center()), |x, &c| x.min(self.sheet.tolerance(c)));
         if look.sag[0].max(look.sag[1]) > xi {
-            return false;
+            return None;
         }
         if let Some(max) = self.max_angle {
             let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.sheet.normal(c)).collect();
             let turned = n.iter().any(|a| n.iter().any(|b| a.angle_between(*b) > 2.0 * max));
             if turned {
-                return false;
+                return None;
             }
         }
-        let corners = look.facet(cell);
         // A cell at the border is only a measure of size, but often the strip gets the same rectangle again.
-        quad_bound(&mut self.prover, &corners, xi) <= xi
+        let bound = quad_bound(prover, &look.facet(cell), xi);
+        (bound <= xi).then_some((bound, xi))
     }
 
     /// Whether a point lies inside the rings: parity of crossings along u.

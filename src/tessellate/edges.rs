@@ -87,6 +87,10 @@ fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f6
             let (ua, ub) = (s.side.uv.evaluate(a), s.side.uv.evaluate(b));
             [0.25, 0.5, 0.75].iter().any(|&f| {
                 let on = s.sheet.point(s.sheet.surface.clamp(ua.lerp(ub, f)));
+                // At the same parameter it is usually close enough; only else is the nearest point looked for.
+                if (on - at(a + (b - a) * f)).length() <= slack(s) {
+                    return false;
+                }
                 let reach = (chord[1] - chord[0]).length();
                 let near = nearest_on(&at, a, b, on);
                 let off = (on - near).length();

@@ -44,7 +44,7 @@ pub(super) fn mesh(
         return None;
     }
     let angle = settings.angle_deg.map(f64::to_radians);
-    let leaves = cells::split(sheet, Prover::new(sheet, settings.judge), &rings, settings.budget, angle);
+    let leaves = cells::split(sheet, settings.judge, &rings, settings.budget, angle);
     let mut prover = Prover::new(sheet, settings.judge);
     let grid = grid::build(sheet, &mut prover, &leaves);
     let place = |position: u32, own: &[Point]| {
@@ -90,7 +90,7 @@ pub(super) fn mesh(
         scale: scale(sheet, &rings, &leaves),
         next: (shared.len() + own.len()) as u32,
     };
-    let strip = strip::triangulate(sheet, &mut prover, outline, settings.budget)?;
+    let strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
     let known = shared.len() + own.len();
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
     let mut out =
@@ -135,9 +135,27 @@ impl Emit<'_, '_, '_> {
             if corner[3] == u32::MAX { [corner[0], corner[1], corner[2], corner[2]] } else { corner };
         let turned =
             if self.sheet.flipped() { if c == d { [a, c, b, b] } else { [a, d, c, b] } } else { [a, b, c, d] };
+        self.mend_normals(turned);
         self.out.facets.push(turned);
         self.out.bounds.push(bound);
         self.out.tolerances.push(tolerance);
+    }
+
+    /// Where the surface has no normal, a corner takes that of its first facet.
+    fn mend_normals(&mut self, [a, b, c, d]: [u32; 4]) {
+        let bare = |n: u32, out: &FaceMesh| out.corners[n as usize].1 == Vector::ZERO;
+        if ![a, b, c, d].iter().any(|&n| bare(n, &self.out)) {
+            return;
+        }
+        let place = |uv: Uv| self.sheet.point(uv);
+        let p = [a, b, c, d].map(|n| place(self.out.corners[n as usize].2));
+        let n = (p[1] - p[0]).cross(p[2] - p[0]) + (p[2] - p[0]).cross(p[3] - p[0]);
+        let n = n.try_normalize().unwrap_or(Vector::Z);
+        for k in [a, b, c, d] {
+            if bare(k, &self.out) {
+                self.out.corners[k as usize].1 = n;
+            }
+        }
     }
 
     fn corner(&mut self, node: u32, uv: Uv) -> u32 {

@@ -31,7 +31,7 @@ pub(super) fn build(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, leaves: &Lea
     let cells: Vec<[u32; 4]> = leaves
         .inside
         .iter()
-        .map(|cell| {
+        .map(|(cell, _, _)| {
             cell.corners().map(|c| {
                 *ids.entry([c.x.to_bits(), c.y.to_bits()]).or_insert_with(|| {
                     let id = grid.nodes.len() as u32;
@@ -58,7 +58,7 @@ pub(super) fn build(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, leaves: &Lea
     };
     let mut segments: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let mut order: Vec<[u32; 2]> = Vec::new();
-    for (cell, corners) in leaves.inside.iter().zip(&cells) {
+    for ((cell, bound, xi), corners) in leaves.inside.iter().zip(&cells) {
         let (lo, hi) = (cell.lo, cell.hi);
         let inner = [
             between(1, lo.y, lo.x, hi.x),
@@ -68,17 +68,10 @@ pub(super) fn build(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, leaves: &Lea
         ];
         let polygon: Vec<u32> =
             (0..4).flat_map(|k| std::iter::once(corners[k]).chain(inner[k].iter().copied())).collect();
-        let xi = polygon.iter().fold(sheet.tolerance(0.5 * (lo + hi)), |x, &n| {
-            if n == corners[0] || n == corners[1] || n == corners[2] || n == corners[3] {
-                x.min(sheet.tolerance(grid.nodes[n as usize].0))
-            } else {
-                x
-            }
-        });
         let made = if polygon.len() == 4 {
-            whole(sheet, prover, *cell, corners, &grid.nodes, xi)
+            whole(sheet, *cell, corners, &grid.nodes, [*bound, *xi])
         } else {
-            resolve(sheet, prover, &polygon, &grid.nodes, xi)
+            resolve(sheet, prover, &polygon, &grid.nodes, *xi)
         };
         let Some(made) = made else { continue };
         grid.facets.extend(made);
@@ -98,19 +91,14 @@ pub(super) fn build(sheet: &Sheet<'_>, prover: &mut Prover<'_, '_>, leaves: &Lea
 
 fn whole(
     sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
     cell: Cell,
     corners: &[u32; 4],
     nodes: &[(Uv, Point)],
-    xi: f64,
+    [bound, tolerance]: [f64; 2],
 ) -> Option<Vec<GridFacet>> {
-    let c = facet_of(sheet, cell);
-    let r = (0..4).find(|&r| nodes[corners[r] as usize].0 == c[0].0)?;
-    let bound = quad_bound(prover, &c, xi);
-    (bound <= xi).then(|| {
-        let nodes = std::array::from_fn(|k| corners[(k + r) % 4]);
-        vec![GridFacet { nodes, bound, tolerance: xi }]
-    })
+    let first = facet_of(sheet, cell)[0].0;
+    let r = (0..4).find(|&r| nodes[corners[r] as usize].0 == first)?;
+    Some(vec![GridFacet { nodes: std::array::from_fn(|k| corners[(k + r) % 4]), bound, tolerance }])
 }
 
 /// Largest polygon that is resolved by trying all triangulations.

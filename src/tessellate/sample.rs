@@ -75,8 +75,20 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
             let x = p[t[0]] * b[0] + p[t[1]] * b[1] + p[t[2]] * b[2];
             // Parameters linear on the triangle start the search; the foot is what counts.
             let start = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];
-            let foot = project(surface, x, start);
-            let away = (surface.evaluate(foot) - x).length();
+            let mut foot = project(surface, x, start);
+            let mut away = (surface.evaluate(foot) - x).length();
+            if away > out.sag {
+                // A single start may end beside the nearest point: uneven weights bend the parameters.
+                for k in 0..64 {
+                    let c = [(k % 8) as f64 / 7.0, (k / 8) as f64 / 7.0];
+                    let (c, d) = (c[0].min(1.0 - c[1]), c[1]);
+                    let other = project(surface, x, uv[t[0]] * c.max(0.0) + uv[t[1]] * d + uv[t[2]] * (1.0 - c.max(0.0) - d));
+                    let nearer = (surface.evaluate(other) - x).length();
+                    if nearer < away {
+                        (foot, away) = (other, nearer);
+                    }
+                }
+            }
             out.sag = out.sag.max(away);
             sum += away;
             count += 1.0;
@@ -99,12 +111,12 @@ fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Ve
     n[0] * ((1.0 - u) * (1.0 - v)) + n[1] * (u * (1.0 - v)) + n[2] * (u * v) + n[3] * ((1.0 - u) * v)
 }
 
-/// Parameters of a near point of the surface, by Gauss–Newton from a start; never farther away than the start.
+/// Parameters of a near point of the surface, by damped Gauss–Newton from a start; never farther away than the start.
 fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
-    let mut best = (surface.clamp(start), (surface.evaluate(start) - x).length());
-    let mut uv = best.0;
-    for _ in 0..6 {
-        let d = surface.derivatives(uv);
+    let mut best = surface.clamp(start);
+    let mut away = (surface.evaluate(best) - x).length();
+    for _ in 0..12 {
+        let d = surface.derivatives(best);
         let e = x - d.point;
         let (a, b, c) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
         let det = a * c - b * b;
@@ -112,13 +124,20 @@ fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
             break;
         }
         let (r, s) = (e.dot(d.du), e.dot(d.dv));
-        uv = surface.clamp(uv + Uv::new(c * r - b * s, a * s - b * r) / det);
-        let away = (surface.evaluate(uv) - x).length();
-        if away < best.1 {
-            best = (uv, away);
+        let step = Uv::new(c * r - b * s, a * s - b * r) / det;
+        let tries = [1.0, 0.5, 0.25, 0.1].map(|f| surface.clamp(best + step * f));
+        let Some((next, nearer)) =
+            tries.into_iter().map(|u| (u, (surface.evaluate(u) - x).length())).find(|n| n.1 < away)
+        else {
+            break;
+        };
+        let gain = away - nearer;
+        (best, away) = (next, nearer);
+        if gain <= 1e-9 * away {
+            break;
         }
     }
-    best.0
+    best
 }
 
 /// Nearest point of a triangle: Ericson, *Real-Time Collision Detection*, 5.1.5.

@@ -2,9 +2,11 @@
 //! triangle cannot be proved.
 
 use super::bound::Prover;
+use super::settings::Judge;
 use super::sheet::Sheet;
 use super::trim::Trim;
 use crate::math::{Point, Uv};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
@@ -64,12 +66,7 @@ pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
 const ROUNDS: usize = 40;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
-pub(super) fn triangulate(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    outline: Outline,
-    budget: usize,
-) -> Option<Strip> {
+pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, budget: usize) -> Option<Strip> {
     let mut work = Work {
         sheet,
         nodes: outline.nodes,
@@ -95,15 +92,15 @@ pub(super) fn triangulate(
     let most = (initial * 6 + 4000).min(budget.max(initial));
     for round in 0..=ROUNDS {
         let triangles = work.inside(rings);
-        let mut bad = Vec::new();
-        for &t in &triangles {
-            let name = sorted(t);
-            let (bound, xi) =
-                *known.entry(name).or_insert_with(|| prove(sheet, prover, &work.nodes, t, &outline.trims));
-            if bound > xi {
-                bad.push(t);
-            }
-        }
+        let fresh: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
+        let proved: Vec<(f64, f64)> = fresh
+            .par_iter()
+            .with_min_len(16)
+            .map_init(|| Prover::new(sheet, judge), |prover, &t| prove(sheet, prover, &work.nodes, t, &outline.trims))
+            .collect();
+        known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
+        let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1;
+        let bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
         if bad.is_empty()
             || round == ROUNDS
             || work.nodes.len() >= most

@@ -26,20 +26,30 @@ impl Trim {
         xyz: [Point; 2],
     ) -> Self {
         let (a, b) = (t[0].min(t[1]), t[0].max(t[1]));
+        // The file's own gap between edge and face, as measured at the ends and at places between.
+        let gap = |f: f64| {
+            let at = a + (b - a) * f;
+            (sheet.point(sheet.surface.clamp(side.uv.evaluate(at))) - curve.evaluate(at)).length()
+        };
         let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
-        let offset = ends[0].max(ends[1]);
+        let offset = [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max);
         if a >= b || a.is_nan() || b.is_nan() {
             return Self { deviation: offset, between: Vec::new() };
         }
-        let mut deviation = 0f64;
-        let pieces = if curve.degree == 1 { 1 } else { 8 };
-        for k in 0..pieces {
+        let over = |pieces: i32| {
             let cut = |k: i32| if k == pieces { b } else { a + (b - a) * k as f64 / pieces as f64 };
-            let (lo, hi) = (cut(k), cut(k + 1));
-            if lo < hi {
-                let piece = curve.restricted(lo, hi);
-                deviation = piece.points.iter().map(|p| from_line(p.project(), &xyz)).fold(deviation, f64::max);
+            let mut worst = 0f64;
+            for k in 0..pieces {
+                if cut(k) < cut(k + 1) {
+                    let piece = curve.restricted(cut(k), cut(k + 1));
+                    worst = piece.points.iter().map(|p| from_line(p.project(), &xyz)).fold(worst, f64::max);
+                }
             }
+            worst
+        };
+        let mut deviation = over(if curve.degree == 1 { 1 } else { 2 });
+        if curve.degree > 1 && deviation + offset > 0.5 * sheet.field.tightest() {
+            deviation = over(8);
         }
         let mut trim = Self { deviation: deviation + offset, between: Vec::new() };
         if !sheet.affine {
