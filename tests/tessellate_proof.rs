@@ -33,8 +33,7 @@ fn torus() -> Model {
 /// A bicubic sheet of 100 × 100 mm with waves of two lengths.
 fn freeform() -> Model {
     let n = 20;
-    let knots: Vec<f64> =
-        (0..n + 4).map(|i| (i as f64 - 3.0).clamp(0.0, (n - 3) as f64)).collect();
+    let knots: Vec<f64> = (0..n + 4).map(|i| (i as f64 - 3.0).clamp(0.0, (n - 3) as f64)).collect();
     let points = (0..n * n)
         .map(|k| {
             let (x, y) = ((k / n) as f64 / (n - 1) as f64, (k % n) as f64 / (n - 1) as f64);
@@ -134,7 +133,11 @@ fn with_hole(surface: Surface) -> Model {
     part.edges = vec![Edge { curve, vertices: [VertexId(0); 2], entity: None }];
     let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
     let rim = (0..4)
-        .map(|k| EdgeUse { edge: None, reversed: false, uv: UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]) })
+        .map(|k| EdgeUse {
+            edge: None,
+            reversed: false,
+            uv: UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]),
+        })
         .collect();
     part.shells[0].faces[0].loops = vec![
         TrimLoop { uses: rim },

@@ -82,7 +82,11 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
                 for k in 0..64 {
                     let c = [(k % 8) as f64 / 7.0, (k / 8) as f64 / 7.0];
                     let (c, d) = (c[0].min(1.0 - c[1]), c[1]);
-                    let other = project(surface, x, uv[t[0]] * c.max(0.0) + uv[t[1]] * d + uv[t[2]] * (1.0 - c.max(0.0) - d));
+                    let other = project(
+                        surface,
+                        x,
+                        uv[t[0]] * c.max(0.0) + uv[t[1]] * d + uv[t[2]] * (1.0 - c.max(0.0) - d),
+                    );
                     let nearer = (surface.evaluate(other) - x).length();
                     if nearer < away {
                         (foot, away) = (other, nearer);

@@ -96,7 +96,10 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
         let proved: Vec<(f64, f64)> = fresh
             .par_iter()
             .with_min_len(16)
-            .map_init(|| Prover::new(sheet, judge), |prover, &t| prove(sheet, prover, &work.nodes, t, &outline.trims))
+            .map_init(
+                || Prover::new(sheet, judge),
+                |prover, &t| prove(sheet, prover, &work.nodes, t, &outline.trims),
+            )
             .collect();
         known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
         let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1;
