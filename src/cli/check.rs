@@ -166,7 +166,7 @@ fn own_rays(
     };
     let witness = Witness::new(octree, count, count);
     simulate(&bound, &witness, &settings, &|_| true);
-    Ok(witness.rays(count as usize, mesh, lift))
+    Ok(witness.rays(count as usize, model, lift))
 }
 
 fn described(c: &Check) -> String {

@@ -71,7 +71,7 @@ fn described(r: &Report) -> String {
         format!("{}: {} quads, {} triangles; {} vertices", n(r.facets), n(r.quads), n(r.triangles), n(r.vertices)),
     );
     line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
-    line("tolerance", format!("{}..{} mm", r.tolerance_mm.min, r.tolerance_mm.max));
+    line("tolerance", format!("{}..{} mm", figures(r.tolerance_mm.min, 4), figures(r.tolerance_mm.max, 4)));
     line(
         "certified",
         format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),
@@ -112,7 +112,7 @@ fn described(r: &Report) -> String {
 
 /// For each facet the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
 /// the largest curvature there, 1/mm.
-fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
     use rayon::prelude::*;
     let faces: Vec<PlacedFace> = model.placed_faces().collect();
     (0..mesh.facets.len())

@@ -3,14 +3,17 @@
 use super::context::Context;
 use super::engine::{self, Choice};
 use super::load::Loaded;
-use super::options::{Meshing, Tracing};
+use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
 use super::witness::Witness;
 use super::{Failure, look};
 use crate::formats::{
     Polylines, write_facets, write_grid_csv, write_grid_npz, write_grid_png, write_vti, write_vtp,
 };
+use crate::intersect::Intersector;
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::Exact;
+use crate::intersect::octree::Octree;
+use crate::math::Ray;
 use crate::report::{Cell, Light, Report, Table, file_stem, path_lines, receiver_grid};
 use crate::simulate::{BoundScene, Results, RunSettings, Scene, Verification, simulate, verify_pruning};
 use crate::study::check::{self, Check, Court, check};
@@ -80,8 +83,7 @@ impl Prepared<'_> {
                 bar.set_position(p.rays);
                 true
             };
-            let asked: &dyn crate::intersect::Intersector =
-                if self.job.recheck > 0 { &witness } else { intersector };
+            let asked: &dyn Intersector = if self.job.recheck > 0 { &witness } else { intersector };
             let (mut results, verification) = if verify {
                 let (results, verification) = verify_pruning(&self.bound, asked, &settings, &progress);
                 (results, Some(verification))
@@ -97,22 +99,21 @@ impl Prepared<'_> {
             results.seconds.read = self.job.loaded.seconds;
             results.seconds.tessellate = self.seconds;
             results.seconds.build = footprint.build_seconds;
-            let rays = witness.rays(self.job.recheck, mesh, 4.0 * self.mesh_settings.tolerance[1]);
+            let rays = witness.rays(self.job.recheck, model, 4.0 * self.mesh_settings.tolerance[1]);
             let check = (!rays.is_empty()).then(|| self.court(intersector, &rays, context));
             Outcome { results, check, verification }
         })
     }
 
-    fn court(
-        &self,
-        octree: &dyn crate::intersect::Intersector,
-        rays: &Vec<crate::math::Ray>,
-        context: &Context,
-    ) -> Check {
+    fn court(&self, octree: &dyn Intersector, rays: &Vec<Ray>, context: &Context) -> Check {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let spinner = context.spinner("building BVH and spline for the cross-check");
         let bvh = Bvh::build(mesh, &Default::default());
         let exact = Exact::build(model, &Default::default());
+        // The court is about facets: a run on the spline, or polished to it, is no witness for the octree.
+        let facets = self.choice.intersector == IntersectorKind::Octree && self.choice.normals != NormalKind::Exact;
+        let own = (!facets).then(|| Octree::build(mesh, &Default::default()));
+        let octree = own.as_ref().map_or(octree, |own| own as &dyn Intersector);
         spinner.finish_and_clear();
         let bar = context.bar("checking", "rays", rays.len() as u64);
         let court = Court { model, mesh, octree, bvh: &bvh, exact: &exact };

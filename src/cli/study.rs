@@ -6,7 +6,7 @@ use super::engine::{self, Choice};
 use super::load::{self, Input, Loaded};
 use super::options::{Meshing, Tracing};
 use super::{Failure, Outcome, demo};
-use crate::formats::write_atomic;
+use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{
     Exact,
@@ -14,7 +14,7 @@ use crate::intersect::exact::{
 };
 use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
-use crate::report::study_report;
+use crate::report::{Section, View, study_report};
 use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
 use crate::study::{self, Product, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
@@ -77,7 +77,10 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
     let text = format!("{document:#}\n");
     write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
-    let report = study_report(&document, provenance);
+    let mut report = study_report(&document, provenance);
+    if asked.kind == StudyKind::Accuracy {
+        report.sections.insert(1, error_view(asked, context)?);
+    }
     report.write(&folder)?;
     if context.json {
         print(&text)?;
@@ -121,6 +124,23 @@ fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) ->
     settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
     let study = accuracy::accuracy(&name, &product, &settings, progress);
     Found::new(&study.rows, study.answer)
+}
+
+/// Where on the surface the normals err, on facets of the tolerance asked for.
+fn error_view(asked: &Asked, context: &Context) -> Result<Section, Failure> {
+    let (scene, loaded, _) = model_of(asked.file, context)?;
+    let settings = engine::mesh_settings(asked.meshing, scene.as_ref(), &loaded.model)?;
+    let (made, _) = engine::facets(&loaded.model, &settings, context);
+    let (errors, _) = super::facet::per_facet(&loaded.model, &made.mesh);
+    let facets = super::look::facets(&loaded.model, &made.mesh, scene.as_ref());
+    let [low, high] = settings.tolerance;
+    let text = format!(
+        "Largest angle between the bilinear normal and the spline's on each of {} facets within {low}..{high} mm.",
+        made.mesh.facets.len()
+    );
+    let view =
+        View::of_values("error", "Error of the normal", &facets, "normal error (°)", &errors, ColourMap::Viridis);
+    Ok(Section::new("Where the error sits").with(view.caption(&text)))
 }
 
 fn interpolation_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {

@@ -2,7 +2,7 @@
 
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
 use crate::math::{Point, Ray};
-use crate::mesh::FacetMesh;
+use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
 
 /// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
@@ -27,24 +27,22 @@ impl<'a> Witness<'a> {
     }
 
     /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts `lift` mm
-    /// above the facet it left, in free space, so that all intersectors are asked the same question whatever they take
-    /// for the surface.
-    pub(super) fn rays(self, wanted: usize, mesh: &FacetMesh, lift: f64) -> Vec<Ray> {
+    /// above it, in free space, so that all intersectors are asked the same question whatever they take for the surface; one that
+    /// left a ready mesh, which has no surface, is left out.
+    pub(super) fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
+        let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.noted.into_inner().unwrap_or_else(|e| e.into_inner());
         noted.sort_by_key(|(hash, _)| *hash);
-        noted.truncate(wanted);
-        noted.into_iter().map(|(_, ray)| lifted(ray, mesh, lift)).collect()
+        noted.into_iter().filter_map(|(_, ray)| lifted(ray, &faces, lift)).take(wanted).collect()
     }
 }
 
-fn lifted(ray: Ray, mesh: &FacetMesh, lift: f64) -> Ray {
-    let Some(departure) = ray.from.filter(|d| (d.primitive as usize) < mesh.facets.len()) else {
-        return Ray { from: None, ..ray };
-    };
-    let [a, b, c, d] = mesh.corners(departure.primitive as usize);
-    let normal = (c - a).cross(d - b).normalize_or_zero();
+fn lifted(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
+    let Some(departure) = ray.from else { return Some(ray) };
+    let placed = faces.get(departure.face.index())?;
+    let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
     let side = if normal.dot(ray.direction) < 0.0 { -lift } else { lift };
-    Ray::new(ray.origin + side * normal, ray.direction)
+    Some(Ray::new(ray.origin + side * normal, ray.direction))
 }
 
 /// Mixes the bits of origin and direction (the finaliser of SplitMix64, Steele et al. 2014).
@@ -94,7 +92,7 @@ mod tests {
         let sample = |rays: &[Ray]| {
             let witness = Witness::new(&Nothing, 500, rays.len() as u64);
             witness.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
-            witness.rays(500, &FacetMesh::default(), 0.1)
+            witness.rays(500, &Model::default(), 0.1)
         };
         let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
         assert_eq!(forward.len(), 500);

@@ -125,7 +125,12 @@ fn slopes(rows: &[&Value]) -> Chart {
         };
         series.push(Series { name, points, ..Series::default() });
         let style = SeriesStyle::Dashed;
-        series.push(Series { name: format!("theory {theory}"), points: line, style, ..Series::default() });
+        series.push(Series {
+            name: format!("{normals}, theory {theory}"),
+            points: line,
+            style,
+            ..Series::default()
+        });
     }
     let caption = "Error of reflected and refracted directions against the mean sag reached, octree. Dashed: the slope theory expects \
         (½ for flat and nearest normals, 1 for interpolated ones), through the coarsest measurement.";
