@@ -131,6 +131,25 @@ fn facet_writes_what_it_is_asked_for_and_reports_in_the_agreed_keys() {
 }
 
 #[test]
+fn a_whole_far_field_in_candela_is_written_as_ies_and_holds_the_flux() {
+    let far = "[[receiver]]\nname = \"all\"\nkind = \"far_field\"\nangles = \"C\"\ncells = [36, 180]\n\n[[receiver]]\nabsorbs = false";
+    let folder = scene("[[receiver]]", far);
+    let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text.replace("[run]", "[run]\nunit = \"lm\"")).unwrap();
+    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "--rays", "50000", "-o", "out"]);
+    assert_eq!(code, 0, "{err}");
+    let out = folder.path().join("out");
+    let results: Value = serde_json::from_str(&std::fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
+    let received = results["receivers"][0]["power"].as_f64().unwrap();
+    let photometry = lampyris::formats::read_ies(&out.join("all.ies")).unwrap();
+    // The flux of the file is a trapezium sum over 1° cells of a beam some 10° wide: within 3 %.
+    assert!((photometry.flux() / received - 1.0).abs() < 0.03, "{} {received}", photometry.flux());
+    let data3 = lampyris::formats::read_data3(&out.join("wall.data3")).unwrap();
+    assert_eq!(data3.size, [200, 200]);
+    assert!(!data3.rays.is_empty());
+}
+
+#[test]
 fn trace_writes_its_folder_and_dry_run_does_not() {
     let folder = scene("[run]", "[run]");
     let (code, out, err) =

@@ -5,16 +5,14 @@ use super::engine::{self, Choice};
 use super::load::Loaded;
 use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
 use super::witness::Witness;
-use super::{Failure, look};
-use crate::formats::{
-    Polylines, write_facets, write_grid_csv, write_grid_npz, write_grid_png, write_vti, write_vtp,
-};
+use super::{Failure, files, look};
+use crate::formats::{Polylines, write_facets, write_vtp};
 use crate::intersect::Intersector;
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::Exact;
 use crate::intersect::octree::Octree;
 use crate::math::Ray;
-use crate::report::{Cell, Light, Report, Table, file_stem, path_lines, receiver_grid};
+use crate::report::{Cell, Light, Report, Table, file_stem, path_lines};
 use crate::simulate::{BoundScene, Results, RunSettings, Scene, Verification, simulate, verify_pruning};
 use crate::study::check::{self, Check, Court, check};
 use crate::tessellate::{self, Tessellation};
@@ -137,17 +135,9 @@ impl Prepared<'_> {
         let spinner = context.spinner("writing");
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+        let arriving = files::arriving(&outcome.results);
         for receiver in &mut outcome.results.receivers {
-            let Some(grid) = receiver_grid(receiver) else { continue };
-            let stem = file_stem(&receiver.name);
-            type Writer = fn(&Path, &crate::formats::Grid) -> Result<(), crate::formats::Error>;
-            let writers: [(&str, Writer); 4] =
-                [("csv", write_grid_csv), ("npz", write_grid_npz), ("png", write_grid_png), ("vti", write_vti)];
-            for (extension, write) in writers {
-                let name = format!("{stem}.{extension}");
-                write(&folder.join(&name), &grid)?;
-                receiver.files.push(name);
-            }
+            receiver.files = files::write(folder, receiver, &arriving)?;
         }
         let (paths, _) = path_lines(&outcome.results.paths);
         write_vtp(&folder.join("paths.vtp"), &paths)?;
@@ -237,7 +227,10 @@ pub(super) fn highlights(folder: &Path, results: &Results) -> Vec<(PathBuf, Stri
     ];
     for r in results.receivers.iter().filter(|r| !r.files.is_empty()) {
         let stem = file_stem(&r.name);
-        list.push((folder.join(format!("{stem}.csv")), format!("{} cell by cell (also .npz .png .vti)", r.name)));
+        list.push((
+            folder.join(format!("{stem}.csv")),
+            format!("{} cell by cell (also .npz .png .vti and more)", r.name),
+        ));
     }
     list.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));
     list

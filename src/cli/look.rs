@@ -34,7 +34,7 @@ pub(super) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scen
             let name = shown_name(model, k);
             match scene.and_then(|s| medium(s, part, &instance.name)) {
                 Some(index) => {
-                    Group { opacity: 0.28, index_ratio: 1.0 / index, ..Group::solid(&name, [0.62, 0.80, 0.95]) }
+                    Group { opacity: 0.2, index_ratio: 1.0 / index, ..Group::solid(&name, [0.62, 0.80, 0.95]) }
                 }
                 None => Group::solid(&name, colour),
             }

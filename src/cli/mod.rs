@@ -11,6 +11,7 @@ mod demo;
 mod engine;
 mod facet;
 mod failure;
+mod files;
 mod info;
 mod job;
 mod load;
