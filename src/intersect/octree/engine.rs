@@ -167,7 +167,13 @@ fn test(tree: &Octree, block: &Block, s: &mut State) {
         mask &= mask - 1;
         let corners = block.positions[k].map(|p| positions[p as usize]);
         let triangles = waiting >> k & 1 | waiting >> (k + 3) & 2;
-        s.facets.test(block.facets[k], triangles, &corners, &tree.around, &mut s.best);
+        let facet = block.facets[k];
+        let before = s.best.t;
+        s.facets.test(facet, triangles, &corners, &tree.around, &mut s.best);
+        if s.best.t < before {
+            // Its normal will be asked for unless a nearer hit comes.
+            prefetch(&tree.around.mesh.facets, facet as usize);
+        }
     }
     s.cap();
 }
