@@ -306,7 +306,8 @@ impl Sweep<'_> {
 }
 
 /// Slopes over the uniform tolerances of the first tree, of the median error: the error goes with tan i, whose mean square
-/// over isotropic rays has no limit, so an rms follows the few most grazing rays instead of the facets.
+/// over isotropic rays has no limit, so an rms follows the few most grazing rays instead of the facets. Where more than half of the
+/// hits are on planes, the 99th percentile stands in for the median.
 fn slopes(rows: &[Row]) -> Vec<Slope> {
     let mut names: Vec<&str> = Vec::new();
     for r in rows.iter().filter(|r| r.tolerance_mm.is_some()) {
@@ -319,15 +320,13 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
         let own = |r: &&Row| {
             r.normals == name && r.intersector == first.intersector && r.threads == first.threads && !r.adaptive
         };
+        let all: Vec<&Row> = rows.iter().filter(own).filter(|r| r.tolerance_mm.is_some()).collect();
         // Below 1e-7° an error is rounding and follows no power law.
-        let used: Vec<&Row> = rows
-            .iter()
-            .filter(own)
-            .filter(|r| r.tolerance_mm.is_some() && r.direction_error_deg_p50 > 1e-7)
-            .collect();
-        let sag: Vec<_> = used.iter().map(|r| (r.sag_mean_mm.unwrap_or(0.0), r.direction_error_deg_p50)).collect();
-        let length: Vec<_> =
-            used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), r.direction_error_deg_p50)).collect();
+        let planes = all.iter().any(|r| r.direction_error_deg_p50 <= 1e-7);
+        let error = |r: &Row| if planes { r.direction_error_deg_p99 } else { r.direction_error_deg_p50 };
+        let used: Vec<&Row> = all.into_iter().filter(|r| error(r) > 1e-7).collect();
+        let sag: Vec<_> = used.iter().map(|r| (r.sag_mean_mm.unwrap_or(0.0), error(r))).collect();
+        let length: Vec<_> = used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), error(r))).collect();
         let theory_in_sag = match name {
             "flat" | "nearest" => Some(0.5),
             "bilinear" => Some(1.0),
