@@ -102,7 +102,7 @@ fn fixed<const N: usize, const M: usize>(net: &[V4], u: f64, v: f64) -> Jet {
     jet
 }
 
-#[cold]
+#[inline(always)]
 fn any_degree(net: &[V4], [p, q]: [u8; 2], u: f64, v: f64) -> Jet {
     let (p, q) = (p as usize, q as usize);
     let (bu, du) = bernstein(p, u);
@@ -283,10 +283,10 @@ fn slopes_in(net: &[V4], p: usize, q: usize) -> Slopes {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn sample(p: usize, q: usize) -> Net {
+    pub(in super::super) fn sample(p: usize, q: usize) -> Net {
         (0..(p + 1) * (q + 1))
             .map(|k| {
                 let x = k as f64;

@@ -68,3 +68,21 @@ impl Exact {
         self.clip_leaf(q, leaf);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_and_plain_evaluation_give_the_same_bits() {
+        for (p, q) in [(1, 1), (2, 2), (3, 3), (2, 3), (5, 4), (13, 6)] {
+            let control = net::tests::sample(p, q);
+            for k in 0..50 {
+                let (u, v) = (k as f64 / 49.0, (k * 17 % 50) as f64 / 49.0);
+                let degree = [p as u8, q as u8];
+                let (a, b) = (evaluate(&control, degree, u, v), net::evaluate(&control, degree, u, v));
+                assert_eq!((a.s, a.su, a.sv), (b.s, b.su, b.sv), "degree {p} {q}");
+            }
+        }
+    }
+}
