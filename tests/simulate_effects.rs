@@ -246,3 +246,30 @@ fn nested_bodies() {
     close(r.receivers[0].power, (t(1.5) * t(1.125)).powi(2), 1e-9);
     assert_eq!((r.effects.kernel, r.lost_rays), ("nested", 0));
 }
+
+/// Two plates that touch, exactly or within the glue distance, and overlap by as much: one interface between them, no light lost.
+#[test]
+fn touching_plates_are_one_interface() {
+    for gap in [0.0, 5e-4, -5e-4, 1e-13, -1e-13] {
+        let mut world = World::default();
+        world.cuboid("crown", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+        world.cuboid("flint", Point::new(-50.0, -50.0, 3.0 + gap), Point::new(50.0, 50.0, 7.0));
+        for tilt in [0.0, 0.5] {
+            let text = format!(
+                "[run]\nrays = 200\nmax_bounces = 100\ninterfaces = 'split'\nsplit_floor = 0\n[[medium]]\nname = 'crown'\nindex = 1.5\n[[medium]]\nname = 'flint'\nindex = 1.7
+                [[material]]\npart = 'crown'\nmedium = 'crown'\n[[material]]\npart = 'flint'\nmedium = 'flint'
+                [[source]]\nkind = 'collimated'\nat = [0, 0, -20]\ndirection = [{tilt}, 0, 1]\nradius = 3
+                [[receiver]]\nname = 'on'\nat = [0, 0, 40]\nsize = [200, 200]\ncells = [1, 1]\n"
+            );
+            let r = world.run(&text, |_| ());
+            assert_eq!(r.lost_rays, 0, "gap {gap}, tilt {tilt}");
+            if tilt == 0.0 {
+                // All orders between three interfaces, by adding reflections of incoherent plates.
+                let r12 = |a: f64, b: f64| ((a - b) / (a + b)).powi(2);
+                let (a, b, c) = (r12(1.0, 1.5), r12(1.5, 1.7), r12(1.7, 1.0));
+                let pair = |r: f64, s: f64| (r + s - 2.0 * r * s) / (1.0 - r * s);
+                close(r.receivers[0].power, 1.0 - pair(pair(a, b), c), 1e-5);
+            }
+        }
+    }
+}

@@ -262,7 +262,7 @@ impl Receiver {
     }
 }
 
-fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
+pub(crate) fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
     let side = Frame::from_axis(origin, forward, Some(up));
     // from_axis makes x the upward one; right, up, forward as seen by one who looks along the light is left-handed.
     Frame { x: side.y, y: side.x, ..side }

@@ -121,3 +121,20 @@ pub(super) fn find(
     let nested = order.iter().enumerate().any(meets);
     Ok((bodies, of_face, nested))
 }
+
+/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch.
+pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
+    let boxed = |f: crate::model::PlacedFace<'_>| (f.id.index(), bounds(&f).grown(0.5 * scene.run.glue_mm));
+    let mut faces: Vec<(usize, Aabb)> =
+        model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
+    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let mut touching = vec![false; of_face.len()];
+    for (i, (a, box_a)) in faces.iter().enumerate() {
+        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
+            if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
+                (touching[*a], touching[*b]) = (true, true);
+            }
+        }
+    }
+    touching
+}

@@ -4,7 +4,7 @@ mod bodies;
 mod nearest;
 mod select;
 
-use super::emitter::Emitter;
+use super::emitter::{self, Area, Emitter, Loaded};
 use super::receiver::Receiver;
 use super::scene::{Material, OneOrMany, ReceiverKind, Scene, SurfaceKind};
 use super::{Error, ErrorKind};
@@ -13,6 +13,7 @@ use crate::optics::{Coating, Scatter};
 use crate::simulate::scene::Key;
 pub(crate) use bodies::Body;
 use nearest::Nearest;
+pub(crate) use nearest::{inside, polygons};
 
 /// What a placed face is to light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub(crate) struct FaceOptics {
     pub(crate) body: u16,
     /// Whether it bounds a closed solid that lets no light in.
     pub(crate) sealed: bool,
+    /// Whether it may lie on a face of another body.
+    pub(crate) touching: bool,
 }
 
 /// The body around everything.
@@ -82,11 +85,15 @@ impl Scene {
             let error = self.error(ErrorKind::Value, &[], "the scene has no source");
             return Err(error.help("add a [[source]]"));
         }
-        let light = light(self);
+        let loaded: Vec<Option<Loaded>> =
+            self.sources.iter().enumerate().map(|(i, s)| emitter::load(self, i, s)).collect::<Result<_, _>>()?;
+        let light = light(self, &loaded);
         let chosen = chosen_rules(self, model)?;
         let mut surfaces = vec![Surface::Absorber, Surface::Interface];
         let default = Material { surface: Some(self.default_surface), ..Material::default() };
         let (bodies, body_of_face, nested) = bodies::find(self, model, &chosen, &light)?;
+        let touching =
+            if nested { bodies::touching(self, model, &body_of_face) } else { vec![false; chosen.len()] };
         let mut faces = Vec::with_capacity(chosen.len());
         for ((f, (rule, _)), &body) in model.placed_faces().zip(&chosen).zip(&body_of_face) {
             let surface = match rule.map(|r| &self.materials[r]) {
@@ -101,11 +108,14 @@ impl Scene {
                 Surface::Coated(c) => c.opaque,
             };
             let sealed = closed && body == AMBIENT && opaque;
-            faces.push(FaceOptics { surface: surface_index(&mut surfaces, surface), body, sealed });
+            let touching = touching[f.id.index()];
+            faces.push(FaceOptics { surface: surface_index(&mut surfaces, surface), body, sealed, touching });
         }
-        let emitters =
-            self.sources.iter().enumerate().map(|(i, s)| Emitter::new(self, i, s, model, &bodies, &light));
-        let emitters = emitters.collect::<Result<_, _>>()?;
+        let mut emitters = Vec::new();
+        for (i, loaded) in loaded.into_iter().enumerate() {
+            let area = shining(self, i, model)?;
+            emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?);
+        }
         let mut receivers = Vec::new();
         for (i, r) in self.receivers.iter().enumerate() {
             let faces = match r.kind {
@@ -136,7 +146,8 @@ fn chosen_rules(scene: &Scene, model: &Model) -> Result<Chosen, Error> {
     let mut chosen = vec![(None, None); model.placed_face_count()];
     let mut nearest = Nearest::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
-        for face in select::faces(scene, i, rule, model, &mut nearest)? {
+        let base = [Key::Name("material"), Key::Index(i)];
+        for face in select::faces(scene, &base, &rule.faces(), model, &mut nearest)? {
             if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);
             }
@@ -148,14 +159,36 @@ fn chosen_rules(scene: &Scene, model: &Model) -> Result<Chosen, Error> {
     Ok(chosen)
 }
 
-fn light(scene: &Scene) -> Light {
-    let line = |s: &super::scene::Source| match &s.spectrum {
-        None => Some(scene.run.wavelength_nm),
-        Some(key) => key.optics().ok().and_then(|s| s.single_line()),
-    };
-    let mut lines = scene.sources.iter().map(line);
-    let first = lines.next().flatten();
-    let coloured = first.is_none() || lines.any(|l| l != first);
+/// The faces that a source shines from.
+fn shining(scene: &Scene, index: usize, model: &Model) -> Result<Option<Area>, Error> {
+    let Some(on) = &scene.sources[index].on else { return Ok(None) };
+    let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
+    let chosen = select::faces(scene, &base, on, model, &mut Nearest::new(model))?;
+    match Area::new(model, &chosen) {
+        Some(area) => Ok(Some(area)),
+        None => Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from")),
+    }
+}
+
+/// The wavelengths of all sources.
+fn light(scene: &Scene, loaded: &[Option<Loaded>]) -> Light {
+    let lines = scene.sources.iter().zip(loaded).flat_map(|(s, loaded)| match (&s.spectrum, loaded) {
+        (Some(key), _) => vec![key.optics().ok().and_then(|s| s.single_line())],
+        (None, Some(Loaded::Rays(list))) => {
+            let mut all: Vec<f64> = list.rays.iter().filter_map(|r| r.wavelength_nm).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            match all[..] {
+                [] => vec![Some(scene.run.wavelength_nm)],
+                [one] => vec![Some(one)],
+                _ => vec![None],
+            }
+        }
+        _ => vec![Some(scene.run.wavelength_nm)],
+    });
+    let lines: Vec<Option<f64>> = lines.collect();
+    let first = lines.first().copied().flatten();
+    let coloured = first.is_none() || lines.iter().any(|l| *l != first);
     Light { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
 }
 

@@ -72,7 +72,8 @@ pub(super) fn bounds(f: &PlacedFace<'_>) -> Aabb {
     if local.is_empty() { local } else { Aabb::around(local.corners().map(|c| f.placement.point(c))) }
 }
 
-fn polygons(face: &Face) -> Vec<Vec<Uv>> {
+/// The trimming loops as polygons in the parameter plane.
+pub(crate) fn polygons(face: &Face) -> Vec<Vec<Uv>> {
     let points = |u: &crate::model::EdgeUse| {
         let [a, b] = u.uv.domain();
         let reversed = u.reversed;
@@ -88,7 +89,7 @@ fn polygons(face: &Face) -> Vec<Vec<Uv>> {
 }
 
 /// Whether a parameter point lies inside the loops: an odd number of crossings.
-fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
+pub(crate) fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
     let crossings = loops
         .iter()
         .flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])))

@@ -1,7 +1,7 @@
 use super::nearest::Nearest;
 use crate::math::Point;
 use crate::model::{Model, PlacedFace};
-use crate::simulate::scene::{Key, Material, OneOrMany, Scene, suggest};
+use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, suggest};
 use crate::simulate::{Error, ErrorKind};
 
 /// Whether a name fits a pattern in which `*` stands for anything.
@@ -27,12 +27,12 @@ fn any_fits(patterns: &Option<OneOrMany<String>>, name: &str) -> bool {
 /// Selects the placed faces that a rule means; an error when there is none, or when one of its points or names means none.
 pub(super) fn faces(
     scene: &Scene,
-    index: usize,
-    rule: &Material,
+    base: &[Key<'_>],
+    rule: &FaceSelector,
     model: &Model,
     nearest: &mut Nearest<'_>,
 ) -> Result<Vec<usize>, Error> {
-    let path = |key| [Key::Name("material"), Key::Index(index), Key::Name(key)];
+    let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
     let colour = rule.colour.as_ref().and_then(|c| c.rgb());
     let selected = |f: &PlacedFace<'_>| {
         any_fits(&rule.part, &model.part(f.part).name)
@@ -44,9 +44,9 @@ pub(super) fn faces(
             })
     };
     let candidates: Vec<usize> = model.placed_faces().filter(selected).map(|f| f.id.index()).collect();
-    each_name_means_something(scene, index, rule, model)?;
+    each_name_means_something(scene, base, rule, model)?;
     if candidates.is_empty() {
-        let message = "this material matches no face of the model";
+        let message = "this matches no face of the model";
         return Err(scene.error(ErrorKind::NoMatch, &path(""), message).help("loosen its selectors, or remove it"));
     }
     let Some(points) = &rule.at else { return Ok(candidates) };
@@ -61,7 +61,12 @@ pub(super) fn faces(
     Ok(chosen)
 }
 
-fn each_name_means_something(scene: &Scene, index: usize, rule: &Material, model: &Model) -> Result<(), Error> {
+fn each_name_means_something(
+    scene: &Scene,
+    base: &[Key<'_>],
+    rule: &FaceSelector,
+    model: &Model,
+) -> Result<(), Error> {
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
     let instances = model.instances.iter().map(|i| i.name.as_str());
     let faces = model.placed_faces().map(|f| f.face.map_or("", |f| f.name.as_str()));
@@ -75,7 +80,7 @@ fn each_name_means_something(scene: &Scene, index: usize, rule: &Material, model
             if names.iter().any(|n| fits(pattern, n)) {
                 continue;
             }
-            let at = [Key::Name("material"), Key::Index(index), Key::Name(key)];
+            let at: Vec<_> = base.iter().copied().chain([Key::Name(key)]).collect();
             let error = scene.error(ErrorKind::NoMatch, &at, format!("no {key} is called '{pattern}'"));
             return Err(error.help(advice(pattern, names)));
         }

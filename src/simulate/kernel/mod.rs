@@ -14,10 +14,10 @@ pub(crate) use local::Local;
 pub use local::{Cause, Counts, Event, LostRay, PathVertex, Tallies};
 
 use super::bind::BoundScene;
-use super::emitter::Stream;
+use super::emitter::{Stream, Ticket};
 use super::run::{Plan, RunSettings};
 use crate::intersect::{Cost, Hit, Intersector};
-use crate::math::Ray;
+use crate::math::{Departure, FaceId, Ray, Vector};
 use crate::optics::polarised::Stokes;
 
 /// What all replicates share.
@@ -123,12 +123,16 @@ impl<C: Carry> Wave<C> {
     #[inline]
     fn start(&mut self, context: &Context<'_>, start: Start, local: &mut Local) {
         let emitter = &context.bound.emitters[start.source];
-        let mut ray = emitter.emit(&start.stream, start.ray, start.index);
+        let emission = emitter.emit(&start.stream, start.ticket);
+        let mut ray = emission.ray;
+        if let Some((face, normal)) = emission.from {
+            settle(context, face, normal, &mut ray);
+        }
         local.counts.rays += 1;
         local.ends.emitted += start.quanta as u64;
         let Some(mut carry) = C::inside(&emitter.inside) else {
             return local.lose(LostRay {
-                ray: start.ray,
+                ray: start.ticket.ray,
                 branch: 0,
                 bounce: 0,
                 cause: Cause::TooDeep,
@@ -139,14 +143,13 @@ impl<C: Carry> Wave<C> {
             });
         };
         if C::COLOURED {
-            let nm = emitter.wavelength(&start.stream, start.ray, start.index);
-            carry.light(nm, || match emitter.polarised {
+            carry.light(emission.wavelength, || match emitter.polarised {
                 Some(field) => Stokes::linear(1.0, ray.direction, field),
                 None => Stokes::unpolarised(1.0, ray.direction),
             });
         }
         let mut path = Path {
-            ray: start.ray,
+            ray: start.ticket.ray,
             branch: 0,
             bounce: 0,
             quanta: start.quanta,
@@ -164,8 +167,7 @@ impl<C: Carry> Wave<C> {
 /// A ray about to start.
 struct Start {
     source: usize,
-    ray: u64,
-    index: u32,
+    ticket: Ticket,
     quanta: f64,
     stream: Stream,
 }
@@ -192,7 +194,9 @@ impl Sources {
         self.range = share.range(self.replicate, context.plan.replicates);
         self.next = self.range[0];
         let s = context.settings;
-        self.stream = Some(Stream::new(s.seed, s.sampling, self.replicate, source as u32));
+        let which = [self.replicate, context.plan.replicates];
+        let rays = self.range[1] - self.range[0];
+        self.stream = Some(Stream::new(s.seed, s.sampling, which, source as u32, rays));
     }
 
     #[inline]
@@ -205,8 +209,24 @@ impl Sources {
         }
         let ray = self.next;
         self.next += 1;
-        let index = (ray - self.range[0]) as u32;
+        let ticket = Ticket { ray, index: (ray - self.range[0]) as u32 };
         let quanta = context.plan.shares[self.source].quanta;
-        Some(Start { source: self.source, ray, index, quanta, stream: self.stream? })
+        Some(Start { source: self.source, ticket, quanta, stream: self.stream? })
+    }
+}
+
+/// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it.
+///
+/// Facets lie up to their sag off the spline: a ray that started there could hit its own facet. Looked for within 1 mm, less
+/// where another face is in between; a ray whose face is not found starts on the spline.
+fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) {
+    for reach in [1.0, 0.1, 0.01, 1e-3] {
+        let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
+        let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        if hit.face == face {
+            let from = Departure { face, primitive: hit.primitive, uv: hit.uv };
+            *ray = Ray::new(probe.at(hit.t), ray.direction).leaving(from);
+            return;
+        }
     }
 }

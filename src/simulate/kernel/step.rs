@@ -7,6 +7,7 @@ use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
 use crate::simulate::random::{Key, Purpose};
 use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::tally::QUANTA;
+use std::cell::Cell;
 
 /// Ends the ray at the nearest receiver that stops light or at its next scattering, unless a face comes first.
 #[inline]
@@ -76,7 +77,7 @@ pub(super) fn step<C: Carry>(
         lose(path, ray, Cause::InsideSolid, Some(hit.face), local);
         return false;
     }
-    let meeting = Meeting { hit, face, entering, point };
+    let meeting = Meeting { hit, face, entering, point, skip: Cell::new(0.0) };
     let going = match &context.bound.surfaces[face.surface as usize] {
         Surface::Absorber => {
             record(context, path, point, Event::Absorbed, local);
@@ -100,6 +101,8 @@ pub(super) struct Meeting<'a> {
     pub(super) face: FaceOptics,
     pub(super) entering: bool,
     pub(super) point: Point,
+    /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
+    pub(super) skip: Cell<f64>,
 }
 
 /// Starts the next segment; false when a limit cuts the path off.
@@ -112,10 +115,14 @@ pub(super) fn onward<C: Carry>(
     going: Vector,
     local: &mut Local,
 ) -> bool {
-    let Meeting { hit, point, .. } = *meeting;
+    let (hit, point) = (meeting.hit, meeting.point);
     let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
     path.bounce += 1;
-    proceed(context, path, ray, Ray::new(point, going).leaving(from), local)
+    let mut next = Ray::new(point, going).leaving(from);
+    if meeting.skip.get() > 0.0 {
+        next.t_min = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
+    }
+    proceed(context, path, ray, next, local)
 }
 
 /// Takes the next ray of a path, unless a limit cuts the path off.
@@ -183,7 +190,8 @@ pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
 /// Counts the light on receivers that let it pass.
 fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &mut Local) {
     for &r in &context.passing {
-        let mut after = ray.t_min;
+        // A receiver that lies in a face, or in another receiver, is reached.
+        let (mut after, end) = (ray.t_min, end.next_up());
         // A sphere may be crossed twice.
         while let Some(t) = context.bound.receivers[r as usize].crossing(ray, after, end) {
             count(context, path, r, ray.at(t), local);

@@ -2,7 +2,8 @@
 
 use super::step::{Meeting, key, lose, onward, record};
 use super::{Carry, Cause, Context, Event, Local, Path};
-use crate::math::{Ray, Vector};
+use crate::intersect::Cost;
+use crate::math::{Departure, Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
 use crate::optics::{Coating, Split, fresnel, reflect, refract};
 use crate::simulate::bind::{AMBIENT, Coated};
@@ -185,13 +186,42 @@ fn cross<C: Carry>(
     at: &Meeting<'_>,
     local: &mut Local,
 ) -> Option<C> {
-    let across = path.carry.across(at.face.body, at.entering);
+    let mut across = path.carry.across(at.face.body, at.entering);
+    if at.face.touching
+        && let Some(other) = glued(context, ray, at)
+    {
+        // Whichever way the light goes on, it has met both faces.
+        at.skip.set(context.bound.scene.run.glue_mm);
+        across = match across {
+            // Through both faces at once, whichever the ray met first.
+            Some(first) if !(at.entering && path.carry.body() == at.face.body) => {
+                Some(first.across(other, !at.entering).unwrap_or(first))
+            }
+            // The second face of an interface that was crossed at the first.
+            _ => Some(path.carry),
+        };
+    }
     if across.is_none() {
         record(context, path, at.point, Event::Lost, local);
         let cause = if path.carry.is_full() && at.entering { Cause::TooDeep } else { Cause::ImpossibleMedium };
         lose(path, ray, cause, Some(at.hit.face), local);
     }
     across
+}
+
+/// The body on the other side of a face that lies on a face of another body within the glue distance.
+///
+/// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
+/// whether rounding puts it before or behind.
+fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
+    let cos = ray.direction.dot(at.hit.geometric_normal).abs().max(1e-3);
+    let reach = context.bound.scene.run.glue_mm / cos;
+    let from = Departure { face: at.hit.face, primitive: at.hit.primitive, uv: at.hit.uv };
+    let probe = Ray::new(at.point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
+    let hit = context.intersector.intersect(&probe, &mut Cost::default())?;
+    let other = context.bound.faces.get(hit.face.index())?;
+    let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
+    (other.touching && other.body != at.face.body && entering != at.entering).then_some(other.body)
 }
 
 /// The normal, the cosine of incidence and the refracted direction, on the far side of the facet; `None` at total reflection.

@@ -120,6 +120,32 @@ pub enum LobeKind {
     Abg,
 }
 
+/// Faces of a model. All selectors that are given must hold; `*` in a name stands for anything.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FaceSelector {
+    /// Name of the part.
+    pub part: Option<OneOrMany<String>>,
+    /// Name of the instance.
+    pub instance: Option<OneOrMany<String>>,
+    /// Name of the face.
+    pub face: Option<OneOrMany<String>>,
+    /// Colour that the face shows.
+    pub colour: Option<ColourKey>,
+    /// `#id` of the face in the STEP file.
+    pub entity: Option<OneOrMany<u64>>,
+    /// The face nearest to each of these points, mm.
+    pub at: Option<OneOrMany<[f64; 3]>>,
+}
+
+impl Material {
+    /// Its selectors.
+    pub(crate) fn faces(&self) -> FaceSelector {
+        let Self { part, instance, face, colour, entity, at, .. } = self.clone();
+        FaceSelector { part, instance, face, colour, entity, at }
+    }
+}
+
 /// A colour as three numbers or as `#rrggbb`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(untagged)]

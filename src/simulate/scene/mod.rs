@@ -16,7 +16,8 @@ mod surface;
 
 use super::{Error, ErrorKind};
 pub use material::{
-    ColourKey, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey, SurfaceKind,
+    ColourKey, FaceSelector, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey,
+    SurfaceKind,
 };
 pub use medium::{ByWavelength, Medium};
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};

@@ -1,4 +1,4 @@
-use super::{Key, OneOrMany, Scene, SpectrumKey};
+use super::{FaceSelector, Key, OneOrMany, Scene, SpectrumKey};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,8 +13,15 @@ pub struct Source {
     pub name: String,
     /// How the light leaves.
     pub kind: SourceKind,
-    /// Power, watts; all sources of a scene in the same unit.
-    pub power: f64,
+    /// Power, watts (or lumens, as the run says); 1 unless said otherwise, or what the source's file says.
+    pub power: Option<f64>,
+    /// IES LM-63, EULUMDAT, ray list (CSV or NPZ) or Data_1, relative to the scene file.
+    ///
+    /// Its main axis points along `direction`, for type C with the plane C 0 along `x`, for types A and B with upward along `x`
+    /// (+y unless said otherwise). Ray lists stand with their origin in `at`.
+    pub file: Option<String>,
+    /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`.
+    pub on: Option<FaceSelector>,
     /// Position or centre, mm.
     pub at: [f64; 3],
     /// Main direction; need not be of unit length.
@@ -44,7 +51,9 @@ impl Default for Source {
         Self {
             name: String::new(),
             kind: SourceKind::Point,
-            power: 1.0,
+            power: None,
+            file: None,
+            on: None,
             at: [0.0; 3],
             direction: [0.0, 0.0, 1.0],
             x: None,
@@ -75,6 +84,15 @@ pub enum SourceKind {
     Lambertian,
     /// Radiant intensity proportional to cosⁿ, n being `exponent`.
     Cosine,
+    /// The intensity of an IES LM-63 file.
+    Ies,
+    /// The intensity of a EULUMDAT file.
+    Eulumdat,
+    /// The rays of a CSV or NPZ file.
+    Rays,
+    /// The rays of a Data_1 file.
+    #[serde(rename = "data_1")]
+    Data1,
 }
 
 impl Source {
@@ -84,8 +102,23 @@ impl Source {
             Err(scene.error(ErrorKind::Value, &at, message))
         };
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
-        if !(self.power > 0.0 && self.power.is_finite()) {
-            return fail("power", format!("a power of {} is not positive", self.power));
+        if let Some(power) = self.power
+            && !(power > 0.0 && power.is_finite())
+        {
+            return fail("power", format!("a power of {power} is not positive"));
+        }
+        let from_file =
+            matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat | SourceKind::Rays | SourceKind::Data1);
+        if from_file != self.file.is_some() {
+            let message =
+                if from_file { "this kind of source needs `file`" } else { "`file` belongs to another kind" };
+            return fail("file", message.into());
+        }
+        if self.on.is_some() && from_file {
+            return fail("on", "a measured source does not shine from faces".into());
+        }
+        if self.on.is_some() && (self.radius.is_some() || self.size.is_some()) {
+            return fail("on", "faces that shine have neither `radius` nor `size`".into());
         }
         if !finite(&self.at) {
             return fail("at", "not a point".into());

@@ -1,0 +1,64 @@
+use crate::formats::{LightRay, PhotometricType, read_data1, read_eulumdat, read_ies, read_rays};
+use crate::optics::IntensitySampler;
+use crate::simulate::scene::{Key, Scene, Source, SourceKind};
+use crate::simulate::{Error, ErrorKind};
+
+/// What the file of a source holds.
+#[derive(Clone, Debug)]
+pub(crate) enum Loaded {
+    /// A measured intensity, the type of its angles and its flux.
+    Intensity(IntensitySampler, PhotometricType, f64),
+    Rays(RayList),
+}
+
+/// Measured rays, to be drawn in proportion to their power.
+#[derive(Clone, Debug)]
+pub(crate) struct RayList {
+    pub(crate) rays: Vec<LightRay>,
+    /// Power up to and including each ray.
+    sums: Vec<f64>,
+}
+
+impl RayList {
+    pub(crate) fn power(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+
+    /// The ray at a share of the summed power.
+    pub(crate) fn at(&self, share: f64) -> &LightRay {
+        let at = share * self.power();
+        &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
+    }
+}
+
+/// Reads the file of a source, when it has one.
+pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Option<Loaded>, Error> {
+    let Some(file) = &source.file else { return Ok(None) };
+    let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];
+    let path = scene.resolve(file);
+    let unreadable = |e: crate::formats::Error| scene.error(ErrorKind::Unreadable, &at, e.to_string());
+    let intensity = |p: crate::formats::Photometry| {
+        let sampler = IntensitySampler::new(&p).map_err(|e| scene.error(ErrorKind::Value, &at, e.to_string()))?;
+        let flux = sampler.flux();
+        Ok(Some(Loaded::Intensity(sampler, p.kind, flux)))
+    };
+    let list = |rays: Vec<LightRay>| {
+        let mut sum = 0.0;
+        let add = |r: &LightRay| {
+            sum += r.power;
+            sum
+        };
+        let sums: Vec<f64> = rays.iter().map(add).collect();
+        match sum > 0.0 {
+            true => Ok(Some(Loaded::Rays(RayList { rays, sums }))),
+            false => Err(scene.error(ErrorKind::Value, &at, "the rays of this list carry no power")),
+        }
+    };
+    match source.kind {
+        SourceKind::Ies => intensity(read_ies(&path).map_err(unreadable)?),
+        SourceKind::Eulumdat => intensity(read_eulumdat(&path).map_err(unreadable)?),
+        SourceKind::Rays => list(read_rays(&path).map_err(unreadable)?),
+        SourceKind::Data1 => list(read_data1(&path).map_err(unreadable)?),
+        _ => Ok(None),
+    }
+}

@@ -1,0 +1,182 @@
+//! Sources in the form that makes rays.
+
+mod area;
+mod file;
+mod stream;
+
+use super::bind::{Body, Light};
+use super::scene::{self, Scene, SourceKind};
+use super::{Error, ErrorKind};
+use crate::formats::PhotometricType;
+use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
+use crate::optics::{IntensitySampler, Spectrum, Wavelengths};
+pub(crate) use area::Area;
+pub(crate) use file::{Loaded, load};
+use smallvec::SmallVec;
+use std::f64::consts::TAU;
+pub(crate) use stream::{Stream, Ticket};
+
+/// A source ready to emit.
+#[derive(Clone, Debug)]
+pub(crate) struct Emitter {
+    pub(crate) power: f64,
+    pub(crate) rays: Option<u64>,
+    /// Bodies around it, outermost first.
+    pub(crate) inside: SmallVec<[u16; 4]>,
+    /// Its spectrum, when the scene has several wavelengths.
+    wavelengths: Option<Wavelengths>,
+    /// Direction of the electric field of polarised light.
+    pub(crate) polarised: Option<Vector>,
+    frame: Frame,
+    shape: Shape,
+    lobe: Lobe,
+}
+
+#[derive(Clone, Debug)]
+enum Shape {
+    Point,
+    Faces(Area),
+    /// Origins and directions of measured rays.
+    List(file::RayList),
+    Disc(f64),
+    Rectangle([f64; 2]),
+}
+
+#[derive(Clone, Debug)]
+enum Lobe {
+    Measured(IntensitySampler),
+    /// Even within a cone of that cosine; -1 for all directions.
+    Cone(f64),
+    Collimated,
+    /// Intensity ∝ cosⁿ; `1/(n+1)` is kept.
+    Cosine(f64),
+}
+
+/// A ray as it leaves its source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Emission {
+    pub(crate) ray: Ray,
+    /// The face it leaves, with the face's outward normal there.
+    pub(crate) from: Option<(FaceId, Vector)>,
+    /// Wavelength, nm; absent when the scene has but one.
+    pub(crate) wavelength: Option<f64>,
+}
+
+impl Emitter {
+    pub(crate) fn new(
+        scene: &Scene,
+        i: usize,
+        bodies: &[Body],
+        light: &Light,
+        loaded: Option<Loaded>,
+        area: Option<Area>,
+    ) -> Result<Self, Error> {
+        let s = &scene.sources[i];
+        let (direction, at) = (Vector::from_array(s.direction), Point::from_array(s.at));
+        let mut shape = match (s.radius, s.size) {
+            (Some(r), _) => Shape::Disc(r),
+            (None, Some([a, b])) => Shape::Rectangle([0.5 * a, 0.5 * b]),
+            (None, None) => Shape::Point,
+        };
+        if let Some(area) = area {
+            shape = Shape::Faces(area);
+        }
+        let mut frame = Frame::from_axis(at, direction, s.x.map(Vector::from_array));
+        let mut lobe = match s.kind {
+            SourceKind::Cone => Lobe::Cone(s.half_angle_deg.unwrap_or(180.0).to_radians().cos()),
+            SourceKind::Collimated => Lobe::Collimated,
+            SourceKind::Lambertian => Lobe::Cosine(0.5),
+            SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
+            _ => Lobe::Cone(-1.0),
+        };
+        let mut own_power = 1.0;
+        let mut coloured_list = false;
+        match loaded {
+            Some(Loaded::Intensity(sampler, kind, flux)) => {
+                if kind != PhotometricType::C {
+                    // To positive H, to positive V, forward: as far fields have it.
+                    frame = super::receiver::far_axes(at, direction, s.x.map_or(Vector::Y, Vector::from_array));
+                }
+                (lobe, own_power) = (Lobe::Measured(sampler), flux);
+            }
+            Some(Loaded::Rays(list)) => {
+                own_power = list.power();
+                coloured_list = list.rays.iter().any(|r| r.wavelength_nm.is_some());
+                shape = Shape::List(list);
+            }
+            None => {}
+        }
+        let mut inside = SmallVec::new();
+        for instance in s.inside.iter().flat_map(|n| n.as_slice()) {
+            let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
+                let at = [scene::Key::Name("source"), scene::Key::Index(i), scene::Key::Name("inside")];
+                let message = format!("no instance called '{instance}' has a medium");
+                return Err(scene.error(ErrorKind::NoMatch, &at, message).help("name an instance with a `medium`"));
+            };
+            inside.push(body as u16 + 1);
+        }
+        let wavelengths = match (&s.spectrum, light.coloured) {
+            (_, false) => None,
+            (None, true) if coloured_list => None,
+            (None, true) => Spectrum::line(scene.run.wavelength_nm).sampler().ok(),
+            (Some(key), true) => key.optics().ok().and_then(|s| s.sampler().ok()),
+        };
+        let polarised = s.polarised.map(Vector::from_array);
+        let power = s.power.unwrap_or(own_power);
+        Ok(Self { wavelengths, polarised, power, rays: s.rays, inside, frame, shape, lobe })
+    }
+
+    /// A ray of this source.
+    #[inline]
+    pub(crate) fn emit(&self, stream: &Stream, ticket: Ticket) -> Emission {
+        let f = &self.frame;
+        let wavelength = self.wavelengths.as_ref().map(|w| w.sample(stream.pair(ticket, 2)[0]));
+        let mut emission = Emission { ray: Ray::new(f.origin, f.z), from: None, wavelength };
+        let mut axes = (f.x, f.y, f.z);
+        match &self.shape {
+            Shape::Point => {}
+            Shape::Disc(radius) => {
+                let [u, v] = stream.pair(ticket, 0);
+                let (sin, cos) = (TAU * v).sin_cos();
+                let r = radius * u.sqrt();
+                emission.ray.origin = f.origin + f.x * (r * cos) + f.y * (r * sin);
+            }
+            Shape::Rectangle([a, b]) => {
+                let [u, v] = stream.pair(ticket, 0);
+                emission.ray.origin = f.origin + f.x * (a * (2.0 * u - 1.0)) + f.y * (b * (2.0 * v - 1.0));
+            }
+            Shape::Faces(area) => {
+                let (point, normal, face) = area.point(stream, ticket);
+                let (x, y) = orthonormal_pair(normal);
+                emission.ray.origin = point;
+                emission.from = Some((face, normal));
+                axes = (x, y, normal);
+            }
+            Shape::List(list) => {
+                let r = list.at(stream.systematic(ticket));
+                emission.ray = Ray::new(f.point(r.origin), f.direction(r.direction));
+                emission.wavelength = emission.wavelength.or(r.wavelength_nm);
+                return emission;
+            }
+        }
+        let turned = |cos_theta: f64, v: f64| {
+            let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt();
+            let (sin, cos) = (TAU * v).sin_cos();
+            axes.0 * (sin_theta * cos) + axes.1 * (sin_theta * sin) + axes.2 * cos_theta
+        };
+        emission.ray.direction = match &self.lobe {
+            Lobe::Collimated => axes.2,
+            Lobe::Cone(limit) => {
+                let [u, v] = stream.pair(ticket, 1);
+                turned(1.0 - u * (1.0 - limit), v)
+            }
+            Lobe::Cosine(exponent) => {
+                let [u, v] = stream.pair(ticket, 1);
+                let u = 1.0 - u;
+                turned(if *exponent == 0.5 { u.sqrt() } else { u.powf(*exponent) }, v)
+            }
+            Lobe::Measured(sampler) => f.direction(sampler.sample(stream.pair(ticket, 1))),
+        };
+        emission
+    }
+}
