@@ -218,7 +218,12 @@ fn fit_edge(chart: &Chart, curve: &Curve, task: &Task<'_>, budget: &Budget) -> R
     for p in &mut fit.curve.points {
         for d in 0..2 {
             if chart.period[d].is_none() {
-                p[d] = p[d].clamp(chart.range[d][0], chart.range[d][1]);
+                // Farther out lie the control points of curves that touch the border, which themselves stay inside.
+                let [a, b] = chart.range[d];
+                let inside = p[d].clamp(a, b);
+                if (p[d] - inside).abs() <= 1e-6 * (b - a) {
+                    p[d] = inside;
+                }
             }
         }
     }
