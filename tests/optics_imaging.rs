@@ -310,11 +310,14 @@ impl Intersector for Facets<'_> {
     }
 }
 
-/// Root-mean-square miss of the focus in mm over the facets of uniform tolerances, flat and bilinear.
-fn misses(model: &Model, tolerance: f64, rays: &[Ray], acts: &[Act], focus: Point) -> [f64; 2] {
-    let settings = tessellate::Settings { tolerance: [tolerance; 2], ..tessellate::Settings::default() };
-    let mesh = tessellate(model, &settings).mesh;
-    [false, true].map(|bilinear| {
+/// Root-mean-square miss of the focus in mm over the facets of a uniform tolerance, flat and bilinear, and the mean sag
+/// that these facets reach: a coarse tolerance is often kept with room to spare.
+fn misses(model: &Model, tolerance: f64, rays: &[Ray], acts: &[Act], focus: Point) -> ([f64; 2], f64) {
+    let settings =
+        tessellate::Settings { tolerance: [tolerance; 2], measure: true, ..tessellate::Settings::default() };
+    let made = tessellate(model, &settings);
+    let mesh = made.mesh;
+    let missed = [false, true].map(|bilinear| {
         let scene = Facets { mesh: &mesh, bilinear };
         let (mut sum, mut count) = (0.0, 0.0);
         for ray in rays {
@@ -324,14 +327,18 @@ fn misses(model: &Model, tolerance: f64, rays: &[Ray], acts: &[Act], focus: Poin
         }
         assert!(count > 0.98 * rays.len() as f64, "rays are found on the facets too");
         (sum / count).sqrt()
-    })
+    });
+    (missed, made.report.sag_mm.sampled_mean.expect("measured"))
 }
 
 /// The error falls as the square root of the sag with flat normals and in proportion to it with interpolated ones.
+///
+/// The root mean square follows the few rays that meet slivers along a trim: 300 rays leave its order uncertain by 0.2.
 fn check_orders(model: &Model, rays: &[Ray], acts: &[Act], focus: Point) {
-    let errors = [0.32, 0.02].map(|tolerance| misses(model, tolerance, rays, acts, focus));
-    // Orders over a factor of 16 in the sag.
-    let order = |k: usize| (errors[0][k] / errors[1][k]).ln() / 16f64.ln();
+    let [(coarse, coarse_sag), (fine, fine_sag)] =
+        [0.32, 0.02].map(|tolerance| misses(model, tolerance, rays, acts, focus));
+    let errors = [coarse, fine];
+    let order = |k: usize| (coarse[k] / fine[k]).ln() / (coarse_sag / fine_sag).ln();
     assert!((0.4..0.6).contains(&order(0)), "flat: order {} of {errors:?}", order(0));
     assert!((0.85..1.2).contains(&order(1)), "bilinear: order {} of {errors:?}", order(1));
 }
@@ -339,13 +346,13 @@ fn check_orders(model: &Model, rays: &[Ray], acts: &[Act], focus: Point) {
 #[test]
 fn on_facets_of_a_paraboloid_the_error_falls_at_the_orders_of_theory() {
     let model = model(vec![turned(&conic(50.0, -1.0, 0.0, 60.0))]);
-    let rays: Vec<Ray> = aperture(55.0, 300).map(|(x, y)| down(x, y, 100.0)).collect();
+    let rays: Vec<Ray> = aperture(55.0, 3000).map(|(x, y)| down(x, y, 100.0)).collect();
     check_orders(&model, &rays, &[Act::Mirror], Point::new(0.0, 0.0, 25.0));
 }
 
 #[test]
 fn on_facets_of_a_hyperbolic_lens_the_error_falls_at_the_orders_of_theory() {
     let model = model(vec![disk(0.0, 22.0), turned(&conic(-25.0, -2.25, 20.0, 22.0))]);
-    let rays: Vec<Ray> = aperture(20.0, 300).map(|(x, y)| up(x, y, -5.0)).collect();
+    let rays: Vec<Ray> = aperture(20.0, 3000).map(|(x, y)| up(x, y, -5.0)).collect();
     check_orders(&model, &rays, &[Act::Refract(1.0 / 1.5), Act::Refract(1.5)], Point::new(0.0, 0.0, 70.0));
 }
