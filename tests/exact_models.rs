@@ -148,6 +148,10 @@ fn corpus_certificates() {
             continue;
         }
         let exact = Exact::build(&model, &Settings::default());
+        if exact.patch_count() == 0 {
+            // Ready meshes alone: nothing to be exact about.
+            continue;
+        }
         let b = bounds(&model);
         let mut s = Stream(3);
         let start = std::time::Instant::now();
