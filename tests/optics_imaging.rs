@@ -5,7 +5,7 @@ use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use lampyris::math::{Departure, Frame, Homogeneous, Point, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
-use lampyris::model::{Analytic, Face, Model, Part, Shell};
+use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::{ControlPoint, Curve, Surface, sweep};
 use lampyris::optics::{catalogue, line, reflect, refract};
 use lampyris::tessellate::{self, tessellate};
@@ -62,16 +62,7 @@ fn disk(z: f64, reach: f64) -> Surface {
 }
 
 fn model(surfaces: Vec<Surface>) -> Model {
-    let face = |surface| Face {
-        name: String::new(),
-        entity: None,
-        colour: None,
-        surface,
-        analytic: Analytic::Other,
-        reversed: false,
-        loops: Vec::new(),
-        gap: 0.0,
-    };
+    let face = Face::whole;
     let faces = surfaces.into_iter().map(face).collect();
     Model::from_part(Part { shells: vec![Shell { faces, ..Shell::default() }], ..Part::default() })
 }

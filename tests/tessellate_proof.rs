@@ -1,23 +1,14 @@
 //! The bound against sampling: what it costs in facets, how errors converge, and that nothing proved is ever over.
 
 use lampyris::math::{Frame, Homogeneous, Point, Uv, Vector};
-use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Judge, Settings, Tessellation, tessellate};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
 fn model(surface: Surface, closed: bool) -> Model {
-    let face = Face {
-        name: String::new(),
-        entity: None,
-        colour: None,
-        surface,
-        analytic: Analytic::Other,
-        reversed: false,
-        loops: Vec::new(),
-        gap: 0.0,
-    };
+    let face = Face::whole(surface);
     let shell = Shell { faces: vec![face], closed, ..Shell::default() };
     Model::from_part(Part { shells: vec![shell], ..Part::default() })
 }

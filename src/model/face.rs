@@ -85,6 +85,22 @@ pub struct Face {
     pub gap: f64,
 }
 
+impl Face {
+    /// A nameless face that is the whole domain of its surface, with `Su × Sv` outward.
+    pub fn whole(surface: Surface) -> Self {
+        Self {
+            name: String::new(),
+            entity: None,
+            colour: None,
+            surface,
+            analytic: Analytic::Other,
+            reversed: false,
+            loops: Vec::new(),
+            gap: 0.0,
+        }
+    }
+}
+
 /// A closed chain of edge uses in the parameter plane.
 #[derive(Clone, Debug, Default)]
 pub struct TrimLoop {
@@ -95,7 +111,7 @@ pub struct TrimLoop {
 /// One side of an edge, as a face's loop runs along it.
 #[derive(Clone, Debug)]
 pub struct EdgeUse {
-    /// The edge; `None` for a synthesised seam or a pole, which exists in the parameter plane alone.
+    /// The edge; `None` for a pole or a joint of no length, which exists in the parameter plane alone.
     pub edge: Option<EdgeId>,
     /// Whether the loop runs against the edge's parameter.
     pub reversed: bool,

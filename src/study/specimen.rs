@@ -3,22 +3,13 @@
 
 use crate::math::{Aabb, Frame, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{Analytic, Face, Model, Part, PlacedFace, Shell};
+use crate::model::{Face, Model, Part, PlacedFace, Shell};
 use crate::nurbs::Surface;
 use rustc_hash::FxHashMap;
 
 /// A face that is the whole domain of its surface.
 pub fn face(surface: Surface) -> Face {
-    Face {
-        name: String::new(),
-        entity: None,
-        colour: None,
-        surface,
-        analytic: Analytic::Other,
-        reversed: false,
-        loops: Vec::new(),
-        gap: 0.0,
-    }
+    Face::whole(surface)
 }
 
 /// A model of one shell with these untrimmed surfaces as its faces.

@@ -157,22 +157,13 @@ fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::math::{Frame, Vector};
-    use crate::model::{Analytic, Part, Shell};
+    use crate::model::{Part, Shell};
     use crate::nurbs::sweep;
     use std::f64::consts::{FRAC_PI_2, TAU};
 
     #[test]
     fn distances_to_a_sphere_and_a_plane() {
-        let face = |surface| Face {
-            name: String::new(),
-            entity: None,
-            colour: None,
-            surface,
-            analytic: Analytic::Other,
-            reversed: false,
-            loops: Vec::new(),
-            gap: 0.0,
-        };
+        let face = Face::whole;
         let sphere = sweep::sphere(&Frame::IDENTITY, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]);
         let plane = sweep::plane(&Frame::translation(Vector::Z * 20.0), [[-1.0, 1.0], [-1.0, 1.0]]);
         let shell = Shell { faces: vec![face(sphere), face(plane)], ..Shell::default() };
