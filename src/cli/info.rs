@@ -9,7 +9,7 @@ use comfy_table::{ContentArrangement, Table, presets};
 use std::path::Path;
 
 pub(super) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
-    let report = load::step_file(path, context)?.report;
+    let report = load::step_file(path, None, context)?.report;
     if context.json {
         let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::running(e.to_string()))?;
         print(&(text + "\n"))?;

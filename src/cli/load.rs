@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::{Failure, Outcome};
 use crate::model::Model;
+use crate::simulate::scene::ModelUse;
 use crate::simulate::{self, Scene};
 use crate::step::{self, Import, ImportReport};
 use std::path::Path;
@@ -23,10 +24,10 @@ pub(super) enum Input {
     Scene(Box<Scene>, Loaded),
 }
 
-/// Reads one STEP file.
-pub(super) fn step_file(path: &Path, context: &Context) -> Result<Import, Failure> {
+/// Reads one STEP file, its lengths in the file's own unit or in one of so many mm.
+pub(super) fn step_file(path: &Path, unit_mm: Option<f64>, context: &Context) -> Result<Import, Failure> {
     let spinner = context.spinner(&format!("reading {}", path.display()));
-    let import = step::read(path, &step::Settings::default());
+    let import = step::read(path, &step::Settings { length_unit_mm: unit_mm, ..step::Settings::default() });
     spinner.finish_and_clear();
     Ok(import?)
 }
@@ -34,7 +35,7 @@ pub(super) fn step_file(path: &Path, context: &Context) -> Result<Import, Failur
 /// A STEP file as a model.
 pub(super) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failure> {
     let start = Instant::now();
-    let Import { model, report } = step_file(path, context)?;
+    let Import { model, report } = step_file(path, None, context)?;
     if model.placed_face_count() == 0 {
         let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
         return Err(failure.help("run `lampyris info` on it to see what it holds and what was refused"));
@@ -42,15 +43,15 @@ pub(super) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failu
     Ok(Loaded { model, reports: vec![report], seconds: start.elapsed().as_secs_f64() })
 }
 
-/// Reads the models of a scene with `read`, which gets the name of each as the scene has it.
+/// Reads the models of a scene with `read`, which gets each entry of the scene.
 pub(super) fn scene_models(
     scene: &Scene,
-    read: impl Fn(&str) -> Result<Import, Failure>,
+    read: impl Fn(&ModelUse) -> Result<Import, Failure>,
 ) -> Result<Loaded, Failure> {
     let start = Instant::now();
     let (mut models, mut reports) = (Vec::new(), Vec::new());
     for entry in &scene.models {
-        let Import { model, report } = read(&entry.file)?;
+        let Import { model, report } = read(entry)?;
         models.push(model);
         reports.push(report);
     }
@@ -61,7 +62,7 @@ pub(super) fn scene_models(
 /// Reads a scene file and the models it names.
 pub(super) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loaded), Failure> {
     let scene = Scene::read(path)?;
-    let loaded = scene_models(&scene, |file| step_file(&scene.resolve(file), context))?;
+    let loaded = scene_models(&scene, |entry| step_file(&scene.resolve(&entry.file), entry.unit_mm, context))?;
     Ok((scene, loaded))
 }
 

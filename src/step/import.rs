@@ -72,7 +72,11 @@ fn schema(file: &File<'_>) -> Vec<String> {
 fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Model {
     let mut units: FxHashMap<u64, Units> = FxHashMap::default();
     let mut fallback = None;
-    for (id, assigned) in contexts(file) {
+    for (id, mut assigned) in contexts(file) {
+        if let Some(length) = settings.length_unit_mm {
+            let accuracy = assigned.units.accuracy.map(|a| a / assigned.units.length * length);
+            assigned.units = Units { length, accuracy, ..assigned.units };
+        }
         units.insert(id, assigned.units);
         if assigned.length_name.is_some() {
             fallback.get_or_insert(assigned.units);
@@ -86,7 +90,14 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
         }
     }
     let common = Common { file, styles: Styles::read(file), settings };
-    let assembly = Assembly::read(file, units, fallback.unwrap_or(Units::DEFAULT));
+    let assembly = Assembly::read(
+        file,
+        units,
+        fallback.unwrap_or(Units {
+            length: settings.length_unit_mm.unwrap_or(Units::DEFAULT.length),
+            ..Units::DEFAULT
+        }),
+    );
     let (placed, assembly) = assembly.walk();
     report.problems.extend(assembly.problems.iter().cloned());
     let mut model = Model { name: name.to_string(), ..Model::default() };

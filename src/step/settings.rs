@@ -6,10 +6,12 @@ pub struct Settings {
     pub uv_tolerance: f64,
     /// Surface evaluations that one face may take before it is refused; 1e6 are about a second.
     pub face_budget: u64,
+    /// Millimetres per unit of length, for files whose own unit is wrong; every context of the file then has it.
+    pub length_unit_mm: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { uv_tolerance: 1e-6, face_budget: 3_000_000 }
+        Self { uv_tolerance: 1e-6, face_budget: 3_000_000, length_unit_mm: None }
     }
 }

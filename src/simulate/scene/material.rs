@@ -1,3 +1,4 @@
+use super::{Error, ErrorKind, Key, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,22 @@ pub struct ModelUse {
     pub unit_mm: Option<f64>,
     /// Where it stands.
     pub placement: Placement,
+}
+
+impl ModelUse {
+    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+        let fail = |keys: &[&str], message: &str| {
+            let mut at = vec![Key::Name("model"), Key::Index(index)];
+            at.extend(keys.iter().map(|k| Key::Name(k)));
+            Err(scene.error(ErrorKind::Value, &at, message.to_owned()))
+        };
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        match self {
+            m if m.unit_mm.is_some_and(|u| !positive(u)) => fail(&["unit_mm"], "`unit_mm` must be positive"),
+            m if !positive(m.placement.scale) => fail(&["placement", "scale"], "`scale` must be positive"),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A placement: scale, then turn, then shift.

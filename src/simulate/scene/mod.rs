@@ -142,6 +142,8 @@ impl Scene {
 
     fn check(&self) -> Result<(), Error> {
         self.run.check(self)?;
+        self.accuracy.check(self)?;
+        self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;
         medium::check(self)?;
         surface::check(self)?;
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;

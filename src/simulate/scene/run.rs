@@ -103,6 +103,22 @@ pub struct Accuracy {
     pub normals: Option<String>,
 }
 
+impl Accuracy {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
+        let fail = |key: &str, message: &str| {
+            let at = [Key::Name("accuracy"), Key::Name(key)];
+            Err(scene.error(ErrorKind::Value, &at, format!("`{key}` {message}")))
+        };
+        match (self.tolerance_mm, self.angle_deg) {
+            (Some([low, high]), _) if !(low > 0.0 && low <= high && high.is_finite()) => {
+                fail("tolerance_mm", "must be two positive lengths, the tighter one first, as in [0.05, 0.2]")
+            }
+            (_, Some(angle)) if !(angle > 0.0 && angle < 90.0) => fail("angle_deg", "must be above 0 and below 90"),
+            _ => Ok(()),
+        }
+    }
+}
+
 impl Run {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
