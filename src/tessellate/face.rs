@@ -100,7 +100,7 @@ pub(super) fn mesh(
     for f in &grid.facets {
         emit.facet(f.nodes, None, f.bound, f.tolerance);
     }
-    for f in pair::join(&strip, &fixed) {
+    for f in pair::join(&strip, &fixed, &mut prover) {
         emit.facet(f.nodes, f.pole, f.bound, f.tolerance);
     }
     (!emit.out.facets.is_empty()).then_some(emit.out)

@@ -1,5 +1,6 @@
 //! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
 
+use super::bound::Prover;
 use super::strip::{Node, Strip, key};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
@@ -19,7 +20,7 @@ const SHARPEST: f64 = 0.9995;
 const GOOD: f64 = 0.5;
 
 /// Pairs greedily, squarest first. `fixed` edges are not crossed; triangles without area go into their neighbours.
-pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>) -> Vec<StripFacet> {
+pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut Prover<'_, '_>) -> Vec<StripFacet> {
     let t = &strip.triangles;
     let node = |n: u32| strip.nodes[n as usize];
     let collapsed: Vec<bool> = t.iter().map(|t| flat(t.map(node))).collect();
@@ -55,8 +56,11 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>) -> Vec<StripF
         let bound = strip.bounds[i].max(strip.bounds[j]);
         let tolerance = strip.tolerances[i].min(strip.tolerances[j]);
         if score < 0.0 {
-            let full = if collapsed[i] { j } else { i };
-            facets.push(with_pole(strip, t[full], q, strip.bounds[full], tolerance));
+            let (full, empty) = if collapsed[i] { (j, i) } else { (i, j) };
+            // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
+            let (uv, xyz) = (t[empty].map(|n| node(n).uv), t[full].map(|n| node(n).place));
+            let covered = strip.bounds[full].max(prover.piece(uv, xyz, tolerance));
+            facets.push(with_pole(strip, t[full], q, covered, tolerance));
         } else {
             facets.push(StripFacet { nodes: q, bound, tolerance, pole: None });
         }

@@ -174,5 +174,14 @@ fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
         return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
     }
     let sum = va + vb + vc;
+    if !(sum > 0.0 && sum.is_finite()) {
+        // No area: the nearest of the three sides.
+        let on = |x: Point, y: Point| {
+            let l = (y - x).length_squared();
+            if l > 0.0 { x + (y - x) * ((p - x).dot(y - x) / l).clamp(0.0, 1.0) } else { x }
+        };
+        let near = |x: Point, y: Point| if (p - x).length() <= (p - y).length() { x } else { y };
+        return near(near(on(a, b), on(b, c)), on(c, a));
+    }
     a + ab * (vb / sum) + ac * (vc / sum)
 }
