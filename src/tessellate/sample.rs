@@ -147,6 +147,15 @@ fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
 /// Nearest point of a triangle: Ericson, *Real-Time Collision Detection*, 5.1.5.
 fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
     let (ab, ac, ap) = (b - a, c - a, p - a);
+    if ab.cross(ac).length() <= 1e-12 * ab.length().max(ac.length()).powi(2) {
+        // No area: the nearest of the three sides.
+        let on = |x: Point, y: Point| {
+            let l = (y - x).length_squared();
+            if l > 0.0 { x + (y - x) * ((p - x).dot(y - x) / l).clamp(0.0, 1.0) } else { x }
+        };
+        let near = |x: Point, y: Point| if (p - x).length() <= (p - y).length() { x } else { y };
+        return near(near(on(a, b), on(b, c)), on(c, a));
+    }
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {
         return a;
@@ -174,14 +183,5 @@ fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
         return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
     }
     let sum = va + vb + vc;
-    if !(sum > 0.0 && sum.is_finite()) {
-        // No area: the nearest of the three sides.
-        let on = |x: Point, y: Point| {
-            let l = (y - x).length_squared();
-            if l > 0.0 { x + (y - x) * ((p - x).dot(y - x) / l).clamp(0.0, 1.0) } else { x }
-        };
-        let near = |x: Point, y: Point| if (p - x).length() <= (p - y).length() { x } else { y };
-        return near(near(on(a, b), on(b, c)), on(c, a));
-    }
     a + ab * (vb / sum) + ac * (vc / sum)
 }
