@@ -137,8 +137,11 @@ fn prove(
     } else {
         uv.iter().fold(sheet.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(sheet.tolerance(p)))
     };
-    if n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position {
-        return (0.0, xi);
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        if n[i].position == n[j].position {
+            // A pole is a point all along; the two ends of a closed curve are not, and must be divided.
+            return (prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi), xi);
+        }
     }
     let mut worst = 0f64;
     for (i, j) in [(0, 1), (1, 2), (2, 0)] {
