@@ -147,8 +147,8 @@ fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
 /// Nearest point of a triangle: Ericson, *Real-Time Collision Detection*, 5.1.5.
 fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
     let (ab, ac, ap) = (b - a, c - a, p - a);
-    if ab.cross(ac).length() <= 1e-12 * ab.length().max(ac.length()).powi(2) {
-        // No area: the nearest of the three sides.
+    if ab.cross(ac).length() <= 1e-8 * ab.length().max(ac.length()).powi(2) {
+        // A needle: the nearest of its three sides; region tests by differences of products lose all their digits there.
         let on = |x: Point, y: Point| {
             let l = (y - x).length_squared();
             if l > 0.0 { x + (y - x) * ((p - x).dot(y - x) / l).clamp(0.0, 1.0) } else { x }
