@@ -1,6 +1,6 @@
 use super::args::Arguments;
 use crate::report::Provenance;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 
@@ -70,8 +70,12 @@ impl Context {
             return bar;
         }
         let template =
-            format!("  {{msg:<12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} {unit}  {{per_sec}}  {{eta}} left");
+            format!("  {{msg:<12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} {unit}  {{rate}}  {{eta}} left");
+        let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+            let _ = write!(text, "{}/s", HumanCount(state.per_sec() as u64));
+        };
         let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = style.with_key("rate", rate);
         bar.set_style(style.progress_chars("━╸ "));
         bar.set_message(label.to_owned());
         bar
