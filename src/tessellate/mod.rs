@@ -19,6 +19,7 @@ mod cells;
 mod edges;
 mod face;
 mod grid;
+mod matching;
 mod net;
 mod pair;
 mod report;

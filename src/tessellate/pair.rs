@@ -1,6 +1,7 @@
 //! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
 
 use super::bound::Prover;
+use super::matching;
 use super::strip::{Node, Strip, key};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
@@ -14,6 +15,9 @@ pub(super) struct StripFacet {
     pub(super) pole: Option<Uv>,
 }
 
+/// How far from square (negative: a triangle without area is taken in), two triangles, and the quad they make.
+pub(super) type Candidate = (f64, usize, usize, [u32; 4]);
+
 /// Cosine of the sharpest and bluntest corner that a quad may have.
 const SHARPEST: f64 = 0.9995;
 /// Cosine below which a quad is made before any triangle's lack of mates is looked at.
@@ -25,7 +29,7 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
     let node = |n: u32| strip.nodes[n as usize];
     let collapsed: Vec<bool> = t.iter().map(|t| flat(t.map(node))).collect();
     let mut sides: FxHashMap<[u32; 2], (usize, usize)> = FxHashMap::default();
-    let mut candidates: Vec<(f64, usize, usize, [u32; 4])> = Vec::new();
+    let mut candidates: Vec<Candidate> = Vec::new();
     for (i, tri) in t.iter().enumerate() {
         for k in 0..3 {
             let (c, a) = (tri[k], tri[(k + 1) % 3]);
@@ -43,7 +47,9 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
                 if collapsed[i] != collapsed[j] && node(a).position != node(c).position {
                     candidates.push((-1.0, i, j, [a, b, c, d]));
                 }
-            } else if let Some(score) = squareness([a, b, c, d].map(node)) {
+            } else if both_hold(strip, i, j)
+                && let Some(score) = squareness([a, b, c, d].map(node))
+            {
                 candidates.push((score, i, j, [a, b, c, d]));
             }
         }
@@ -51,8 +57,10 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
     candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
     let mut taken = vec![false; t.len()];
     let mut facets = Vec::new();
-    for c in choose(&candidates, &mut taken) {
+    let first = choose(&candidates, &mut taken);
+    for c in matching::augment(&candidates, t.len(), &first) {
         let (score, i, j, q) = candidates[c];
+        (taken[i], taken[j]) = (true, true);
         let bound = strip.bounds[i].max(strip.bounds[j]);
         let tolerance = strip.tolerances[i].min(strip.tolerances[j]);
         if score < 0.0 {
@@ -75,11 +83,64 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
             });
         }
     }
-    facets
+    kites(strip, facets)
+}
+
+/// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
+/// convex quad with the meridian between them as its diagonal.
+fn kites(strip: &Strip, facets: Vec<StripFacet>) -> Vec<StripFacet> {
+    let node = |n: u32| strip.nodes[n as usize];
+    // A sector is (a, b, pole): the next one around starts at b.
+    let mut starts: FxHashMap<u32, usize> = FxHashMap::default();
+    for (i, f) in facets.iter().enumerate().filter(|(_, f)| f.pole.is_some()) {
+        starts.insert(f.nodes[0], i);
+    }
+    let next = |f: &StripFacet| {
+        let j = *starts.get(&f.nodes[1])?;
+        (node(facets[j].nodes[2]).position == node(f.nodes[2]).position).then_some(j)
+    };
+    let follows: Vec<Option<usize>> =
+        facets.iter().map(|f| if f.pole.is_some() { next(f) } else { None }).collect();
+    let mut led = vec![false; facets.len()];
+    follows.iter().flatten().for_each(|&j| led[j] = true);
+    let heads = (0..facets.len()).filter(|&i| !led[i]).chain((0..facets.len()).filter(|&i| led[i]));
+    let mut into: Vec<Option<usize>> = vec![None; facets.len()];
+    let mut gone = vec![false; facets.len()];
+    for head in heads {
+        let mut at = Some(head);
+        while let Some(i) = at {
+            if gone[i] || into[i].is_some() {
+                break;
+            }
+            at = follows[i];
+            let Some(j) = follows[i].filter(|&j| j != i && !gone[j] && into[j].is_none()) else { continue };
+            let (f, g) = (&facets[i], &facets[j]);
+            let holds = f.bound.max(g.bound) <= f.tolerance.min(g.tolerance);
+            if holds && squareness([f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]].map(node)).is_some() {
+                (into[i], gone[j]) = (Some(j), true);
+                at = follows[j];
+            }
+        }
+    }
+    let mut out = Vec::with_capacity(facets.len());
+    for (i, f) in facets.iter().enumerate().filter(|(i, _)| !gone[*i]) {
+        let Some(g) = into[i].map(|j| &facets[j]) else {
+            out.push(StripFacet { ..*f });
+            continue;
+        };
+        let pole = f.pole.zip(g.pole).map(|(x, y)| 0.5 * (x + y));
+        out.push(StripFacet {
+            nodes: [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]],
+            bound: f.bound.max(g.bound),
+            tolerance: f.tolerance.min(g.tolerance),
+            pole,
+        });
+    }
+    out
 }
 
 /// Pairs to make: good quads in order of squareness, then those of triangles that have but one mate left, then the rest.
-fn choose(candidates: &[(f64, usize, usize, [u32; 4])], taken: &mut [bool]) -> Vec<usize> {
+fn choose(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     let mut chosen = Vec::new();
     let mut of: Vec<[u32; 3]> = vec![[u32::MAX; 3]; taken.len()];
     for (c, &(score, i, j, _)) in candidates.iter().enumerate() {
@@ -144,6 +205,12 @@ fn with_pole(strip: &Strip, full: [u32; 3], quad: [u32; 4], bound: f64, toleranc
         }
         None => StripFacet { nodes: [full[0], full[1], full[2], full[2]], bound, tolerance, pole: None },
     }
+}
+
+/// Whether two triangles that hold their own tolerances hold that of both together, which is the tighter of the two.
+fn both_hold(strip: &Strip, i: usize, j: usize) -> bool {
+    let (b, x) = (&strip.bounds, &strip.tolerances);
+    b[i].max(b[j]) <= x[i].min(x[j]) || b[i] > x[i] || b[j] > x[j]
 }
 
 /// Largest cosine of a corner of a quad; `None` when it is not convex or folds along its diagonal.
