@@ -16,6 +16,10 @@ fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
     let bvh = bvh::Settings::default();
     vec![
         ("octree", Box::new(Octree::build(mesh, &octree))),
+        (
+            "octree, AVX2",
+            Box::new(Octree::build(mesh, &octree::Settings { path: Path::Avx2, ..octree::Settings::default() })),
+        ),
         ("octree, portable", Box::new(Octree::build(mesh, &portable))),
         ("octree, textbook", Box::new(Octree::build(mesh, &octree::Settings::textbook()))),
         ("Bvh2", Box::new(Bvh::build(mesh, &bvh::Settings { kind: Kind::Bvh2, ..bvh }))),

@@ -204,7 +204,13 @@ impl<'m> Bvh<'m> {
         );
         self.walk(ray32, cost, |_, id| {
             let before = best.t;
-            facet_ray.test(self.codes[id] >> 1, 1 << (self.codes[id] & 1), &corners[id], &self.around, &mut best);
+            facet_ray.test(
+                self.codes[id] >> 1,
+                1 << (self.codes[id] & 1),
+                corners[id].each_ref(),
+                &self.around,
+                &mut best,
+            );
             if best.t < before { far(best.t) } else { f32::INFINITY }
         });
         best.hit()

@@ -14,6 +14,7 @@
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
+use std::hint::select_unpredictable;
 
 /// Share of the way to the middle of its triangle by which a start on a border is moved inside.
 const NUDGE: f64 = 1.0 / 1048576.0;
@@ -35,7 +36,16 @@ pub(crate) struct FacetHit {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nearest {
     pub(crate) t: f64,
-    hit: Option<FacetHit>,
+    hit: Option<Reached>,
+}
+
+/// A hit with its edge functions.
+#[derive(Clone, Copy, Debug)]
+struct Reached {
+    t: f64,
+    facet: u32,
+    second: bool,
+    edges: [f64; 3],
 }
 
 impl Nearest {
@@ -44,12 +54,15 @@ impl Nearest {
     }
 
     pub(crate) fn hit(&self) -> Option<FacetHit> {
-        self.hit
+        let Reached { t, facet, second, edges } = self.hit?;
+        // Divided here once, not at each hit that a nearer one supersedes.
+        let det = edges[0] + edges[1] + edges[2];
+        Some(FacetHit { t, facet, second, b: edges.map(|e| e / det) })
     }
 
     /// Keeps the nearer hit, of equal ones that on the facet of lowest index, there the first triangle's.
-    #[inline]
-    fn offer(&mut self, hit: FacetHit) {
+    #[inline(always)]
+    fn offer(&mut self, hit: Reached) {
         let nearer = match self.hit {
             None => hit.t <= self.t,
             Some(old) => hit.t < old.t || (hit.t == old.t && (hit.facet, hit.second) < (old.facet, old.second)),
@@ -104,17 +117,14 @@ pub(crate) struct FacetRay {
 }
 
 impl FacetRay {
+    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
         let a = ray.direction.abs();
-        let kz = if a.x > a.y {
-            if a.x > a.z { 0 } else { 2 }
-        } else if a.y > a.z {
-            1
-        } else {
-            2
-        };
-        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
+        let of_yz = select_unpredictable(a.y > a.z, 1, 2);
+        let of_xz = select_unpredictable(a.x > a.z, 0, 2);
+        let kz: usize = select_unpredictable(a.x > a.y, of_xz, of_yz);
+        let [kx, ky] = [[1, 2], [2, 0], [0, 1]][kz];
         let sz = 1.0 / d[kz];
         Self {
             origin: ray.origin.to_array(),
@@ -126,9 +136,9 @@ impl FacetRay {
         }
     }
 
-    /// Slopes against the main axis.
-    pub(crate) fn slopes(&self) -> [f64; 2] {
-        [self.shear[0], self.shear[1]]
+    /// Slopes against the main axis, and the inverse of the direction along it.
+    pub(crate) fn shear(&self) -> [f64; 3] {
+        self.shear
     }
 
     /// The two lateral axes and the main one.
@@ -137,64 +147,93 @@ impl FacetRay {
     }
 
     /// Tests the triangles of a facet (bit 0: the first, bit 1: the second) and keeps the nearest hit.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn test(
         &self,
         facet: u32,
         triangles: u32,
-        corners: &[Point; 4],
+        corners: [&Point; 4],
         around: &Surroundings,
         best: &mut Nearest,
     ) {
-        let ways = match self.from {
-            None => [Way::Plain; 2],
-            Some(own) if own == facet => self.ways_of_own(corners, around),
-            Some(own) => self.ways_of_other(own, facet, corners, around),
+        let Some(own) = self.from else { return self.quad(facet, triangles, corners, self.origin, best) };
+        let [first, second] = if own == facet {
+            self.ways_of_own(&corners.map(|p| *p), around)
+        } else {
+            match self.ways_of_other(own, facet, corners, around) {
+                None => return self.quad(facet, triangles, corners, self.origin, best),
+                Some(ways) => ways,
+            }
         };
-        let [a, b, c, d] = *corners;
-        if triangles & 1 != 0
-            && let Some((t, b)) = self.triangle(ways[0], [a, b, c], best.t)
-        {
-            best.offer(FacetHit { t, facet, second: false, b });
-        }
-        if triangles & 2 != 0
-            && let Some((t, b)) = self.triangle(ways[1], [a, c, d], best.t)
-        {
-            best.offer(FacetHit { t, facet, second: true, b });
+        for (bit, way) in [(1, first), (2, second)] {
+            let origin = match way {
+                Way::Plain => self.origin,
+                Way::From(moved) => moved.to_array(),
+                Way::Never => continue,
+            };
+            self.quad(facet, triangles & bit, corners, origin, best);
         }
     }
 
+    /// Both triangles from one origin: they share the shear of their corners and the edge function of the diagonal.
     #[inline(always)]
-    fn triangle(&self, way: Way, corners: [Point; 3], t_max: f64) -> Option<(f64, [f64; 3])> {
-        let origin = match way {
-            Way::Plain => self.origin,
-            Way::From(moved) => moved.to_array(),
-            Way::Never => return None,
-        };
+    fn quad(&self, facet: u32, triangles: u32, corners: [&Point; 4], origin: [f64; 3], best: &mut Nearest) {
         let [kx, ky, kz] = self.axes();
-        let [sx, sy, sz] = self.shear;
-        let [a, b, c] = corners.map(|p| {
-            let p = p.to_array();
-            let z = p[kz] - origin[kz];
-            [(p[kx] - origin[kx]) - sx * z, (p[ky] - origin[ky]) - sy * z, z]
-        });
-        let mut u = c[0] * b[1] - c[1] * b[0];
-        let mut v = a[0] * c[1] - a[1] * c[0];
-        let mut w = b[0] * a[1] - b[1] * a[0];
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            (u, v, w) = exact_edges(a, b, c);
+        let [sx, sy, _] = self.shear;
+        let z: [f64; 4] = std::array::from_fn(|k| corners[k][kz] - origin[kz]);
+        let x: [f64; 4] = std::array::from_fn(|k| (corners[k][kx] - origin[kx]) - sx * z[k]);
+        let y: [f64; 4] = std::array::from_fn(|k| (corners[k][ky] - origin[ky]) - sy * z[k]);
+        let edge = |p: usize, q: usize| x[p] * y[q] - y[p] * x[q];
+        let diagonal = edge(0, 2);
+        let first = [edge(2, 1), diagonal, edge(1, 0)];
+        let second = [edge(3, 2), edge(0, 3), -diagonal];
+        let zero = |e: [f64; 3]| (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
+        let at = |k: usize| [x[k], y[k], z[k]];
+        if zero(first) | zero(second) {
+            if triangles & 1 != 0 {
+                self.on_an_edge(facet, false, first, [at(0), at(1), at(2)], best);
+            }
+            if triangles & 2 != 0 {
+                self.on_an_edge(facet, true, second, [at(0), at(2), at(3)], best);
+            }
+            return;
         }
-        if u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0 {
-            return None;
+        let met = triangles & (u32::from(one_sided(first)) | u32::from(one_sided(second)) << 1);
+        if met == 3 {
+            self.keep(facet, false, first, [z[0], z[1], z[2]], best);
         }
+        if met != 0 {
+            let other = met & 2 != 0;
+            let edges = std::array::from_fn(|k| select_unpredictable(other, second[k], first[k]));
+            let heights = [z[0], select_unpredictable(other, z[2], z[1]), select_unpredictable(other, z[3], z[2])];
+            self.keep(facet, other, edges, heights, best);
+        }
+    }
+
+    #[cold]
+    fn on_an_edge(&self, facet: u32, second: bool, edges: [f64; 3], corners: [[f64; 3]; 3], best: &mut Nearest) {
+        let [a, b, c] = corners;
+        let edges = if edges.contains(&0.0) { exact_edges(a, b, c) } else { edges };
+        if one_sided(edges) {
+            self.keep(facet, second, edges, [a[2], b[2], c[2]], best);
+        }
+    }
+
+    /// A hit with these edge functions, if it lies within the range of the ray.
+    #[inline(always)]
+    fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
+        let [u, v, w] = edges;
         let det = u + v + w;
-        let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
+        let t = (u * heights[0] + v * heights[1] + w * heights[2]) * self.shear[2] / det;
         // A NaN (det = 0, or no direction) fails the comparisons.
-        (t >= self.t_min && t <= t_max).then(|| (t, [u / det, v / det, w / det]))
+        if t >= self.t_min && t <= best.t {
+            best.offer(Reached { t, facet, second, edges });
+        }
     }
 
     /// The facet that the ray leaves: only its other triangle may be met, and only where the fold between them closes
     /// on the ray.
+    #[cold]
     fn ways_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
         let start = Point::from_array(self.origin);
         let own = Own::new(corners, start);
@@ -213,13 +252,15 @@ impl FacetRay {
         if own.second { [other, Way::Never] } else { [Way::Never, other] }
     }
 
-    #[inline]
-    fn ways_of_other(&self, own: u32, facet: u32, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
+    /// How to ask a facet near the start; `None` for all others.
+    #[inline(always)]
+    fn ways_of_other(&self, own: u32, facet: u32, corners: [&Point; 4], around: &Surroundings) -> Option<[Way; 2]> {
         let start = Point::from_array(self.origin);
+        let corners = &corners.map(|p| *p);
         let [a, b, c, d] = *corners;
         let (low, high) = (a.min(b).min(c).min(d), a.max(b).max(c).max(d));
         let near = start.cmpge(low - around.reach).all() && start.cmple(high + around.reach).all();
-        if near { self.ways_of_neighbour(own, facet, corners, around) } else { [Way::Plain; 2] }
+        near.then(|| self.ways_of_neighbour(own, facet, corners, around))
     }
 
     #[cold]
@@ -281,12 +322,20 @@ impl Own {
     }
 }
 
+/// Whether no two edge functions have opposite signs.
+#[inline(always)]
+fn one_sided(e: [f64; 3]) -> bool {
+    let below = (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0);
+    let above = (e[0] > 0.0) | (e[1] > 0.0) | (e[2] > 0.0);
+    !(below & above)
+}
+
 /// The edge functions with their exact signs.
 #[cold]
-fn exact_edges(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> (f64, f64, f64) {
+fn exact_edges(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
     let zero = Coord { x: 0.0, y: 0.0 };
     let edge = |p: [f64; 3], q: [f64; 3]| orient2d(Coord { x: p[0], y: p[1] }, Coord { x: q[0], y: q[1] }, zero);
-    (edge(c, b), edge(a, c), edge(b, a))
+    [edge(c, b), edge(a, c), edge(b, a)]
 }
 
 fn distance_to_segment(p: Point, a: Point, b: Point) -> f64 {

@@ -7,7 +7,7 @@
 use super::Octree;
 use super::engine::{self, Lanes};
 use super::node::{Block, Node};
-use super::state::{BoxRay, SiftRay, edge_error};
+use super::state::{BoxRay, SiftRay, corner_error, edge_error};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::math::Ray;
@@ -15,7 +15,12 @@ use std::arch::x86_64::*;
 
 /// Whether this processor can run [`walk`].
 pub(super) fn available() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") && is_x86_feature_detected!("bmi1")
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
 }
 
 /// Finds the nearest hit of each ray.
@@ -23,7 +28,7 @@ pub(super) fn available() -> bool {
 /// # Panics
 /// Where [`available`] is false.
 pub(super) fn walk(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
-    #[target_feature(enable = "avx2,fma,bmi1")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
     fn run(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
         engine::walk::<Avx2>(tree, rays, hits, cost);
     }
@@ -32,7 +37,8 @@ pub(super) fn walk(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], c
     unsafe { run(tree, rays, hits, cost) }
 }
 
-struct Avx2;
+/// Eight lanes of f32.
+pub(super) struct Avx2;
 
 /// Component `K` in all lanes.
 #[inline(always)]
@@ -41,9 +47,9 @@ unsafe fn spread<const K: i32>(v: __m128) -> __m256 {
 }
 
 #[inline(always)]
-unsafe fn row(node: &Node, row: u8) -> __m256 {
+unsafe fn row(node: &Node, row: usize) -> __m256 {
     unsafe {
-        let bytes = node.bounds.get_unchecked(usize::from(row)).as_ptr().cast();
+        let bytes = node.bounds.get_unchecked(row).as_ptr().cast();
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes)))
     }
 }
@@ -53,18 +59,50 @@ unsafe fn spread_at(v: &[f32; 3], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
 }
 
-/// A row of corners against the ray's origin.
+/// Half a row of corners against the ray's origin.
 #[inline(always)]
-unsafe fn coarse(block: &Block, row: usize, step: __m256, to: __m256) -> __m256 {
+unsafe fn coarse(block: &Block, axis: usize, first: usize, step: __m256, to: __m256) -> __m256 {
     unsafe {
-        let corners = _mm_loadu_si128(block.corners.get_unchecked(row).as_ptr().cast());
+        let corners = _mm_loadu_si128(block.corners.get_unchecked(axis).as_ptr().add(first).cast());
         _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(corners)), step, to)
+    }
+}
+
+/// One layer of a sorting network: `partner` is what each lane is compared with, `LESS` the lanes that keep the lesser.
+#[inline(always)]
+unsafe fn layer<const LESS: i32>(keys: __m256i, partner: __m256i) -> __m256i {
+    unsafe { _mm256_blend_epi32::<LESS>(_mm256_max_epi32(keys, partner), _mm256_min_epi32(keys, partner)) }
+}
+
+/// Sorts the children that are met by falling distance, with the least network of eight, and stores them.
+///
+/// A key is a distance that is not negative with the child in its lowest three bits; children that are not met have
+/// the key −1 and come last.
+#[inline(always)]
+pub(super) unsafe fn sort(
+    met: u32,
+    keys: __m256i,
+    node: &Node,
+    enters: &mut [f32; 8],
+    links: &mut [u32; 8],
+) -> usize {
+    unsafe {
+        let k = layer::<0xCC>(keys, _mm256_shuffle_epi32::<0x4E>(keys));
+        let k = layer::<0xF0>(k, _mm256_permute4x64_epi64::<0x4E>(k));
+        let k = layer::<0xAA>(k, _mm256_shuffle_epi32::<0xB1>(k));
+        let k = layer::<0x30>(k, _mm256_permute4x64_epi64::<0xD8>(k));
+        let k = layer::<0x50>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7)));
+        let k = layer::<0x54>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 2, 1, 4, 3, 6, 5, 7)));
+        let children = _mm256_load_si256(node.children.as_ptr().cast());
+        _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, k));
+        _mm256_storeu_si256(enters.as_mut_ptr().cast(), k);
+        met.count_ones() as usize
     }
 }
 
 impl Lanes for Avx2 {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]) {
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.
         unsafe {
             let inverse = _mm_load_ps(ray.inverse.as_ptr());
@@ -74,7 +112,7 @@ impl Lanes for Avx2 {
             let scale = _mm_mul_ps(_mm_load_ps(node.step.as_ptr()), inverse);
             let (early, late) = (_mm_sub_ps(base, slack), _mm_add_ps(base, slack));
             let (sx, sy, sz) = (spread::<0x00>(scale), spread::<0x55>(scale), spread::<0xAA>(scale));
-            let [nx, ny, nz] = ray.near;
+            let [nx, ny, nz] = [ray.near(0), ray.near(1), ray.near(2)];
             let enter_x = _mm256_fmadd_ps(row(node, nx), sx, spread::<0x00>(early));
             let enter_y = _mm256_fmadd_ps(row(node, ny), sy, spread::<0x55>(early));
             let enter_z = _mm256_fmadd_ps(row(node, nz), sz, spread::<0xAA>(early));
@@ -86,29 +124,40 @@ impl Lanes for Avx2 {
             let leave =
                 _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
             let leave = _mm256_mul_ps(leave, _mm256_set1_ps(1.0 + 5e-7));
-            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave)) as u32;
-            let mut out = [0f32; 8];
-            _mm256_storeu_ps(out.as_mut_ptr(), enter);
-            (mask & node.used, out)
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let used = _mm256_sllv_epi32(
+                _mm256_set1_epi32(node.used as i32),
+                _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24),
+            );
+            let met = _mm256_and_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave), _mm256_castsi256_ps(used));
+            let keys = _mm256_or_si256(
+                _mm256_and_si256(_mm256_castps_si256(enter), _mm256_set1_epi32(0x7FFF_FFF8)),
+                lanes,
+            );
+            let none = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            let keys = _mm256_castps_si256(_mm256_blendv_ps(none, _mm256_castsi256_ps(keys), met));
+            sort(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
         }
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SiftRay) -> u32 {
+    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
         // SAFETY: see the head of the file; `axes` are 0..3 by construction.
         unsafe {
             let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
             let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
-            let error = _mm256_set1_ps(edge_error(block.step, far, ray.slack));
+            let corner = corner_error(block.step, far, ray.slack);
+            let error = _mm256_set1_ps(edge_error(block.step, corner));
             let step = _mm256_set1_ps(block.step);
             let [kx, ky, kz] = ray.axes.map(usize::from);
-            let (sx, sy) = (_mm256_set1_ps(ray.slopes[0]), _mm256_set1_ps(ray.slopes[1]));
+            let [sx, sy, sz] = ray.shear;
+            let (sx, sy, sz) = (_mm256_set1_ps(sx), _mm256_set1_ps(sy), _mm256_set1_ps(sz));
             let (tx, ty, tz) = (spread_at(&to, kx), spread_at(&to, ky), spread_at(&to, kz));
-            let (az, bz) = (coarse(block, kz, step, tz), coarse(block, 3 + kz, step, tz));
-            let ax = _mm256_fnmadd_ps(sx, az, coarse(block, kx, step, tx));
-            let ay = _mm256_fnmadd_ps(sy, az, coarse(block, ky, step, ty));
-            let bx = _mm256_fnmadd_ps(sx, bz, coarse(block, 3 + kx, step, tx));
-            let by = _mm256_fnmadd_ps(sy, bz, coarse(block, 3 + ky, step, ty));
+            let (az, bz) = (coarse(block, kz, 0, step, tz), coarse(block, kz, 8, step, tz));
+            let ax = _mm256_fnmadd_ps(sx, az, coarse(block, kx, 0, step, tx));
+            let ay = _mm256_fnmadd_ps(sy, az, coarse(block, ky, 0, step, ty));
+            let bx = _mm256_fnmadd_ps(sx, bz, coarse(block, kx, 8, step, tx));
+            let by = _mm256_fnmadd_ps(sy, bz, coarse(block, ky, 8, step, ty));
             let (cx, cy) = (_mm256_permute2f128_ps::<1>(ax, ax), _mm256_permute2f128_ps::<1>(ay, ay));
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
@@ -117,7 +166,26 @@ impl Lanes for Avx2 {
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
             let below = _mm256_cmp_ps::<_CMP_LT_OQ>(least, _mm256_sub_ps(_mm256_setzero_ps(), error));
             let above = _mm256_cmp_ps::<_CMP_GT_OQ>(most, error);
-            !(_mm256_movemask_ps(_mm256_and_ps(below, above)) as u32) & 255
+            let (at, bt) = (_mm256_mul_ps(az, sz), _mm256_mul_ps(bz, sz));
+            let ct = _mm256_permute2f128_ps::<1>(at, at);
+            let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
+            let last = _mm256_max_ps(_mm256_max_ps(at, bt), ct);
+            let late = _mm256_cmp_ps::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
+            let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
+            let outside = _mm256_or_ps(_mm256_and_ps(below, above), _mm256_or_ps(late, early));
+            !(_mm256_movemask_ps(outside) as u32) & 255
+        }
+    }
+
+    #[inline(always)]
+    fn open(enters: &[f32; 16], t_max: f32) -> u32 {
+        // SAFETY: see the head of the file.
+        unsafe {
+            let t_max = _mm256_set1_ps(t_max);
+            let (low, high) = (_mm256_loadu_ps(enters.as_ptr()), _mm256_loadu_ps(enters.as_ptr().add(8)));
+            let low = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(low, t_max));
+            let high = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(high, t_max));
+            (low | high << 8) as u32
         }
     }
 }

@@ -1,31 +1,77 @@
 //! The walk, written once for all instruction sets.
 //!
-//! Each step of a ray is one node, the sifting of one block, or the exact test of what the sieve left. After a step the
-//! ray asks for the memory of its next one and the turn goes to another ray. Interleaving sixteen rays brought 57 % at
-//! 200k facets and 99 % at 2M against one ray at a time.
+//! Each step of a ray is one node, the sifting of one block, or the exact test of what the sieve left. A batch keeps
+//! [`WIDTH`] rays under way and does all steps of one kind in a row, without branches that depend on a ray: what the
+//! processor guesses wrong about a ray costs as much as a whole node. After a step the ray asks for the memory of its next one.
 
 use super::Octree;
 use super::node::{Block, Link, Node, Target};
-use super::prefetch::prefetch;
-use super::state::{BoxRay, STACK, SiftRay, State};
+use super::prefetch::{prefetch, prefetch_either};
+use super::state::{BoxRay, SiftRay, State};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::math::Ray;
 use std::cell::RefCell;
+use std::hint::select_unpredictable;
 
 /// Rays under way at a time.
-pub(super) const WIDTH: usize = 16;
+pub(super) const WIDTH: usize = 32;
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
-    /// Which children the ray may meet before `t_max`, and where it enters them.
-    fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]);
-    /// Which triangles of the block the line of the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
-    fn sift(block: &Block, ray: &SiftRay) -> u32;
+    /// Where the ray enters the children that it may meet before `t_max`, and their links, the farthest first; gives
+    /// their number. What lies beyond it is of no meaning.
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
+    /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
+    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32;
+    /// Which distances do not lie beyond `t_max`, one bit each.
+    fn open(enters: &[f32; 16], t_max: f32) -> u32;
 }
 
+/// Kinds of steps; the first three are those of [`Link::kind`].
+const NODE: usize = 0;
+const BLOCK: usize = 1;
+const END: usize = 2;
+/// Asking for the corners of facets that the sieve left, and testing them.
+const CORNERS: usize = 3;
+const EXACT: usize = 4;
+
+/// Rays by the kind of their next step.
+#[derive(Default)]
+struct Agenda {
+    rays: [[u8; WIDTH]; 8],
+    count: [usize; 8],
+}
+
+impl Agenda {
+    #[inline(always)]
+    fn put(&mut self, kind: usize, ray: u8) {
+        let kind = kind & 7;
+        self.rays[kind][self.count[kind] % WIDTH] = ray;
+        self.count[kind] += 1;
+    }
+
+    #[inline(always)]
+    fn take(&mut self, kind: usize) -> ([u8; WIDTH], usize) {
+        (self.rays[kind], std::mem::take(&mut self.count[kind]).min(WIDTH))
+    }
+}
+
+type States = [State; WIDTH];
+
 thread_local! {
-    static STATES: RefCell<Vec<State>> = const { RefCell::new(Vec::new()) };
+    static STATES: RefCell<Option<Box<States>>> = const { RefCell::new(None) };
+}
+
+/// Not inlined: its frame of 150 kB would be probed page by page at each walk.
+#[cold]
+#[inline(never)]
+fn idle() -> Box<States> {
+    let states: Vec<State> = (0..WIDTH).map(|_| State::idle()).collect();
+    match states.try_into() {
+        Ok(states) => states,
+        Err(_) => unreachable!("as many as asked for"),
+    }
 }
 
 /// Finds the nearest hit of each ray.
@@ -35,144 +81,156 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
     hits.fill(None);
     let Some(root) = tree.root else { return };
     // Taken out, not borrowed by a closure: a closure would be compiled without the caller's instruction set.
-    let mut states = STATES.take();
-    if states.is_empty() {
-        states.resize_with(WIDTH, State::idle);
-    }
+    let mut states = STATES.take().unwrap_or_else(idle);
     if let [ray] = rays {
         let state = &mut states[0];
-        if state.start(tree, root, ray, 0) {
-            while step::<L>(tree, state, cost) {}
-            hits[0] = state.best.hit();
-        }
-        STATES.set(states);
-        return;
+        state.start(tree, root, ray, 0);
+        alone::<L>(tree, state, cost);
+        hits[0] = state.best.hit();
+    } else {
+        together::<L>(tree, root, &mut states, rays, hits, cost);
     }
-    let mut order: [u8; WIDTH] = std::array::from_fn(|i| i as u8);
-    let mut next = 0;
-    let mut live = 0;
-    while live < WIDTH && next < rays.len() {
-        if states[live].start(tree, root, &rays[next], next) {
-            live += 1;
-        }
-        next += 1;
-    }
-    let mut turn = 0;
-    while live > 0 {
-        let state = &mut states[usize::from(order[turn])];
-        if !step::<L>(tree, state, cost) {
-            hits[state.index] = state.best.hit();
-            let mut going = false;
-            while !going && next < rays.len() {
-                going = state.start(tree, root, &rays[next], next);
-                next += 1;
-            }
-            if !going {
-                live -= 1;
-                order.swap(turn, live);
-            }
-        }
-        turn = if turn + 1 >= live { 0 } else { turn + 1 };
-    }
-    STATES.set(states);
+    STATES.set(Some(states));
 }
 
-/// One step; `false` at the end of the ray.
+/// One ray from its start to its end.
 #[inline(always)]
-fn step<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) -> bool {
-    let going = match s.at.target() {
-        Target::Node(index) => {
-            cost.nodes += 1;
-            let node = &tree.nodes[index];
-            let (mask, enter) = L::enter(node, &s.boxes);
-            push(s, node, mask, &enter)
-        }
-        Target::Block(index, count) => {
-            let block = &tree.blocks[index];
-            if s.waiting != 0 {
-                test(tree, block, s);
-                s.pop()
-            } else {
-                cost.tests += count as u64;
-                s.waiting = L::sift(block, &s.sift) & (((1 << count) - 1) * 0x11);
-                if s.waiting != 0 {
-                    fetch_corners(tree, block, s.waiting);
-                    return true;
-                }
-                s.pop()
-            }
-        }
-    };
-    if going {
+fn alone<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) {
+    loop {
         match s.at.target() {
-            Target::Node(index) => prefetch(&tree.nodes, index),
-            Target::Block(index, _) => prefetch(&tree.blocks, index),
+            Target::Node(index) => {
+                cost.nodes += 1;
+                let t_max = s.boxes.t_max;
+                let count = s.enter::<L>(&tree.nodes[index]);
+                s.at = if count > 0 { s.nearest(count) } else { s.pop(t_max) };
+            }
+            Target::Block(index, count) => {
+                cost.tests += count as u64;
+                s.block = index as u32;
+                s.waiting = L::sift(&tree.blocks[index], &s.sift, &s.boxes) & mask(count);
+                if s.waiting != 0 {
+                    test(tree, s);
+                }
+                s.at = s.pop(s.boxes.t_max);
+            }
+            Target::End => return,
         }
     }
-    going
 }
 
-/// Goes to the nearest child and stacks the others, farthest lowest.
+/// Many rays, all steps of a kind in a row.
 #[inline(always)]
-fn push(s: &mut State, node: &Node, mut mask: u32, enter: &[f32; 8]) -> bool {
-    if mask == 0 {
-        return s.pop();
+fn together<L: Lanes>(
+    tree: &Octree,
+    root: Link,
+    states: &mut States,
+    rays: &[Ray],
+    hits: &mut [Option<FacetHit>],
+    cost: &mut Cost,
+) {
+    let mut agenda = Agenda::default();
+    let mut live = rays.len().min(WIDTH);
+    let mut next = live;
+    for (ray, state) in states.iter_mut().enumerate().take(live) {
+        state.start(tree, root, &rays[ray], ray);
+        agenda.put(state.at.kind(), ray as u8);
     }
-    let first = (mask.trailing_zeros() & 7) as usize;
-    mask &= mask - 1;
-    if mask == 0 {
-        s.at = Link(node.children[first]);
-        return true;
-    }
-    let base = s.top.min(STACK - 8);
-    s.stack[base] = (enter[first], node.children[first]);
-    let mut top = base + 1;
-    while mask != 0 {
-        let k = (mask.trailing_zeros() & 7) as usize;
-        mask &= mask - 1;
-        let entry = (enter[k], node.children[k]);
-        let mut place = top;
-        while place > base && s.stack[place - 1].0 < entry.0 {
-            s.stack[place] = s.stack[place - 1];
-            place -= 1;
+    while live > 0 {
+        let (list, n) = agenda.take(NODE);
+        cost.nodes += n as u64;
+        for &ray in &list[..n] {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            let count = s.enter::<L>(&tree.nodes[s.at.as_node()]);
+            s.at = s.next::<L>(count);
+            fetch(tree, s.at);
+            agenda.put(s.at.kind(), ray);
         }
-        s.stack[place] = entry;
-        top += 1;
+        let (list, n) = agenda.take(BLOCK);
+        for &ray in &list[..n] {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            let (index, count) = s.at.as_block();
+            cost.tests += count as u64;
+            s.block = index as u32;
+            s.waiting = L::sift(&tree.blocks[index], &s.sift, &s.boxes) & mask(count);
+            s.at = s.next::<L>(0);
+            fetch(tree, s.at);
+            agenda.put(select_unpredictable(s.waiting != 0, CORNERS, s.at.kind()), ray);
+        }
+        let (list, n) = agenda.take(EXACT);
+        for &ray in &list[..n] {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            test(tree, s);
+            // What was next may lie beyond the new hit.
+            s.reconsider::<L>();
+            fetch(tree, s.at);
+            agenda.put(s.at.kind(), ray);
+        }
+        let (list, n) = agenda.take(CORNERS);
+        for &ray in &list[..n] {
+            let s = &states[usize::from(ray) % WIDTH];
+            fetch_corners(tree, s);
+            agenda.put(EXACT, ray);
+        }
+        let (list, n) = agenda.take(END);
+        for &ray in &list[..n] {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            hits[s.index] = s.best.hit();
+            if next < rays.len() {
+                s.start(tree, root, &rays[next], next);
+                agenda.put(s.at.kind(), ray);
+                next += 1;
+            } else {
+                live -= 1;
+            }
+        }
     }
-    s.top = top - 1;
-    s.at = Link(s.stack[top - 1].1);
-    true
 }
 
+/// The lanes of a block that hold facets.
 #[inline(always)]
-fn fetch_corners(tree: &Octree, block: &Block, waiting: u32) {
-    let mut mask = (waiting | waiting >> 4) & 15;
-    while mask != 0 {
+fn mask(count: usize) -> u32 {
+    ((1 << count) - 1) * 0x11
+}
+
+/// Asks for the memory of a node or block; at the end for the first block.
+#[inline(always)]
+fn fetch(tree: &Octree, link: Link) {
+    let block = select_unpredictable(link == Link::END, 0, link.as_block().0);
+    prefetch_either(link.kind() != NODE, (&tree.blocks, block), (&tree.nodes, link.as_node()));
+}
+
+/// Asks for the corners of the facets that wait; nearly always it is one.
+#[inline(always)]
+fn fetch_corners(tree: &Octree, s: &State) {
+    let block = &tree.blocks[s.block as usize];
+    let mut mask = (s.waiting | s.waiting >> 4) & 15;
+    loop {
         let k = (mask.trailing_zeros() & 3) as usize;
-        mask &= mask - 1;
+        mask &= mask.wrapping_sub(1);
         for p in block.positions[k] {
             prefetch(&tree.around.mesh.positions, p as usize);
         }
+        if mask == 0 {
+            return;
+        }
     }
 }
 
+/// Tests the facets that wait.
 #[inline(always)]
-fn test(tree: &Octree, block: &Block, s: &mut State) {
+fn test(tree: &Octree, s: &mut State) {
     let positions = &tree.around.mesh.positions;
+    let block = &tree.blocks[s.block as usize];
     let waiting = s.waiting;
     let mut mask = (waiting | waiting >> 4) & 15;
-    s.waiting = 0;
-    while mask != 0 {
+    loop {
         let k = (mask.trailing_zeros() & 3) as usize;
-        mask &= mask - 1;
-        let corners = block.positions[k].map(|p| positions[p as usize]);
+        mask &= mask.wrapping_sub(1);
+        let corners = block.positions[k].map(|p| &positions[p as usize]);
         let triangles = waiting >> k & 1 | waiting >> (k + 3) & 2;
-        let facet = block.facets[k];
-        let before = s.best.t;
-        s.facets.test(facet, triangles, &corners, &tree.around, &mut s.best);
-        if s.best.t < before {
-            // Its normal will be asked for unless a nearer hit comes.
-            prefetch(&tree.around.mesh.facets, facet as usize);
+        s.facets.test(block.facets[k], triangles, corners, &tree.around, &mut s.best);
+        if mask == 0 {
+            break;
         }
     }
     s.cap();

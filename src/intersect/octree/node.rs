@@ -13,12 +13,16 @@ pub(super) enum Target {
     Node(usize),
     /// Index and number of facets.
     Block(usize, usize),
+    /// Nothing left to visit.
+    End,
 }
 
 impl Link {
     const BLOCK: u32 = 1 << 31;
-    /// Blocks that a link can tell apart.
-    pub(super) const MOST_BLOCKS: usize = 1 << 29;
+    /// Blocks that a link can tell apart; the last name is taken by [`Self::END`].
+    pub(super) const MOST_BLOCKS: usize = (1 << 29) - 1;
+    /// Where a ray goes that has nothing left to visit.
+    pub(super) const END: Self = Self(u32::MAX);
 
     pub(super) fn node(index: usize) -> Self {
         Self(index as u32)
@@ -32,9 +36,30 @@ impl Link {
     pub(super) fn target(self) -> Target {
         if self.0 & Self::BLOCK == 0 {
             Target::Node(self.0 as usize)
+        } else if self == Self::END {
+            Target::End
         } else {
-            Target::Block(((self.0 & !Self::BLOCK) >> 2) as usize, (self.0 & 3) as usize + 1)
+            let (index, count) = self.as_block();
+            Target::Block(index, count)
         }
+    }
+
+    /// The index of a node, if it is one.
+    #[inline(always)]
+    pub(super) fn as_node(self) -> usize {
+        self.0 as usize
+    }
+
+    /// The index of a block and its number of facets, if it is one.
+    #[inline(always)]
+    pub(super) fn as_block(self) -> (usize, usize) {
+        (((self.0 & !Self::BLOCK) >> 2) as usize, (self.0 & 3) as usize + 1)
+    }
+
+    /// 0 for a node, 1 for a block, 2 for the end.
+    #[inline(always)]
+    pub(super) fn kind(self) -> usize {
+        (self.0 >> 31) as usize + usize::from(self == Self::END)
     }
 
     /// The same link after its target moved up.
@@ -111,8 +136,8 @@ impl Node {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    /// x, y, z of corners 0 (lanes 0–3) and 2 (lanes 4–7) of the four facets, then of corners 1 and 3.
-    pub(super) corners: [[u16; 8]; 6],
+    /// x, y, z of corners 0 (lanes 0–3), 2 (4–7), 1 (8–11) and 3 (12–15) of the four facets.
+    pub(super) corners: [[u16; 16]; 3],
     pub(super) origin: [f32; 3],
     pub(super) step: f32,
     pub(super) facets: [u32; 4],
@@ -129,16 +154,15 @@ impl Block {
         let origin = low.to_array().map(down);
         let largest = (0..3).map(|a| high[a] - f64::from(origin[a])).fold(0.0, f64::max);
         let step = ((largest / 65535.0 * (1.0 + 1e-6)) as f32).max(1e-30);
-        let mut block = Self { corners: [[0; 8]; 6], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
+        let mut block = Self { corners: [[0; 16]; 3], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
         for (lane, (facet, positions, corners)) in facets.iter().enumerate() {
             block.facets[lane] = *facet;
             block.positions[lane] = *positions;
             for a in 0..3 {
                 let coarse = |k: usize| ((corners[k][a] - f64::from(origin[a])) / f64::from(step)).round() as u16;
-                block.corners[a][lane] = coarse(0);
-                block.corners[a][4 + lane] = coarse(2);
-                block.corners[3 + a][lane] = coarse(1);
-                block.corners[3 + a][4 + lane] = coarse(3);
+                for (place, k) in [0, 2, 1, 3].into_iter().enumerate() {
+                    block.corners[a][4 * place + lane] = coarse(k);
+                }
             }
         }
         block

@@ -2,56 +2,77 @@
 
 use super::engine::Lanes;
 use super::node::{Block, Node};
-use super::state::{BoxRay, SiftRay, edge_error};
+use super::state::{BoxRay, SiftRay, corner_error, edge_error};
 
 /// Eight lanes as arrays; compilers vectorise most of it for the baseline of the target.
 pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay) -> (u32, [f32; 8]) {
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         let mut enter = [ray.t_min; 8];
         let mut leave = [ray.t_max; 8];
         for a in 0..3 {
             let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
             let scale = node.step[a] * ray.inverse[a];
             let (early, late) = (base - ray.slack[a], base + ray.slack[a]);
-            let near = ray.near[a] as usize;
+            let near = ray.near(a);
             for k in 0..8 {
                 enter[k] = enter[k].max(f32::from(node.bounds[near][k]) * scale + early);
                 leave[k] = leave[k].min(f32::from(node.bounds[near ^ 1][k]) * scale + late);
             }
         }
-        let mut mask = 0;
+        let mut count = 0;
         for k in 0..8 {
-            mask |= u32::from(enter[k] <= leave[k] * (1.0 + 5e-7)) << k;
+            if node.used >> k & 1 == 1 && enter[k] <= leave[k] * (1.0 + 5e-7) {
+                let mut place = count;
+                while place > 0 && enters[place - 1] < enter[k] {
+                    enters[place] = enters[place - 1];
+                    links[place] = links[place - 1];
+                    place -= 1;
+                }
+                enters[place] = enter[k];
+                links[place] = node.children[k];
+                count += 1;
+            }
         }
-        (mask & node.used, enter)
+        count
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SiftRay) -> u32 {
+    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
         let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
         let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
-        let error = edge_error(block.step, far, ray.slack);
+        let corner = corner_error(block.step, far, ray.slack);
+        let error = edge_error(block.step, corner);
+        let (t_min, t_max) = (boxes.t_min - 2.0 * corner, boxes.t_max + 2.0 * corner);
         let [kx, ky, kz] = ray.axes.map(usize::from);
-        let [sx, sy] = ray.slopes;
-        let sheared = |row: usize| -> ([f32; 8], [f32; 8]) {
-            let lane = |a: usize, k: usize| f32::from(block.corners[row + a][k]) * block.step + to[a];
+        let [sx, sy, sz] = ray.shear;
+        let sheared = |row: usize| -> [[f32; 8]; 3] {
+            let lane = |a: usize, k: usize| f32::from(block.corners[a][row + k]) * block.step + to[a];
             let z: [f32; 8] = std::array::from_fn(|k| lane(kz, k));
-            (std::array::from_fn(|k| lane(kx, k) - sx * z[k]), std::array::from_fn(|k| lane(ky, k) - sy * z[k]))
+            let x = std::array::from_fn(|k| lane(kx, k) - sx * z[k]);
+            let y = std::array::from_fn(|k| lane(ky, k) - sy * z[k]);
+            [x, y, z.map(|z| z * sz)]
         };
-        let ((ax, ay), (bx, by)) = (sheared(0), sheared(3));
+        let ([ax, ay, at], [bx, by, bt]) = (sheared(0), sheared(8));
         let mut mask = 0;
         for k in 0..8 {
-            let (cx, cy) = (ax[k ^ 4], ay[k ^ 4]);
+            let (cx, cy, ct) = (ax[k ^ 4], ay[k ^ 4], at[k ^ 4]);
             let u = cx * by[k] - cy * bx[k];
             let v = ax[k] * cy - ay[k] * cx;
             let w = bx[k] * ay[k] - by[k] * ax[k];
             // Not a number is no reason to drop a facet.
             let outside = u.min(v).min(w) < -error && u.max(v).max(w) > error;
-            mask |= u32::from(!outside) << k;
+            let late = at[k].min(bt[k]).min(ct) > t_max;
+            let early = at[k].max(bt[k]).max(ct) < t_min;
+            mask |= u32::from(!(outside | late | early)) << k;
         }
         mask
+    }
+
+    #[inline(always)]
+    fn open(enters: &[f32; 16], t_max: f32) -> u32 {
+        enters.iter().enumerate().fold(0, |open, (k, &enter)| open | u32::from(enter <= t_max) << k)
     }
 }

@@ -20,3 +20,25 @@ pub(super) fn prefetch<T>(slice: &[T], index: usize) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (slice, index);
 }
+
+/// Asks for the cache lines of one element of either slice, without a branch on which. An index out of bounds is harmless.
+#[inline(always)]
+pub(super) fn prefetch_either<T, U>(choice: bool, yes: (&[T], usize), no: (&[U], usize)) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        use std::hint::select_unpredictable;
+        let a = yes.0.as_ptr().wrapping_add(yes.1).cast::<i8>();
+        let b = no.0.as_ptr().wrapping_add(no.1).cast::<i8>();
+        let start = select_unpredictable(choice, a, b);
+        let size = select_unpredictable(choice, size_of::<T>(), size_of::<U>());
+        let mut line = 0;
+        while line < size_of::<T>().max(size_of::<U>()) {
+            // SAFETY: see the head of the file.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line.min(size - 64))) };
+            line += 64;
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (choice, yes, no);
+}

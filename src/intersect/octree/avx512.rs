@@ -1,0 +1,165 @@
+//! The walk with AVX-512: what enters and what leaves a box, or both halves of the corners of a block, in one register.
+//!
+//! Sound because [`walk`] is entered only after [`available`] found the features at run time, because loads stay inside the
+//! fixed-size arrays of [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and
+//! because octants are below eight and axes below three.
+#![allow(unsafe_code)]
+
+use super::Octree;
+use super::avx2::{self, Avx2};
+use super::engine::{self, Lanes};
+use super::node::{Block, Node};
+use super::state::{BoxRay, SiftRay, corner_error, edge_error};
+use crate::intersect::Cost;
+use crate::intersect::facet::FacetHit;
+use crate::math::Ray;
+use std::arch::x86_64::*;
+
+/// Whether this processor can run [`walk`].
+pub(super) fn available() -> bool {
+    avx2::available()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+}
+
+/// Finds the nearest hit of each ray.
+///
+/// # Panics
+/// Where [`available`] is false.
+pub(super) fn walk(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl")]
+    fn run(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
+        engine::walk::<Avx512>(tree, rays, hits, cost);
+    }
+    assert!(available());
+    // SAFETY: the features were just found.
+    unsafe { run(tree, rays, hits, cost) }
+}
+
+struct Avx512;
+
+/// By octant: the rows of bounds where a ray enters and leaves along x, then y, then z.
+static ROWS: [[u64; 8]; 8] = {
+    let mut rows = [[0; 8]; 8];
+    let mut octant = 0;
+    while octant < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            let near = 2 * axis + (octant >> axis & 1);
+            rows[octant][2 * axis] = near as u64;
+            rows[octant][2 * axis + 1] = (near ^ 1) as u64;
+            axis += 1;
+        }
+        octant += 1;
+    }
+    rows
+};
+
+/// Bytes as numbers.
+#[inline(always)]
+unsafe fn numbers(bytes: __m128i) -> __m512 {
+    unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes)) }
+}
+
+/// Lane `k` in the lower half, lane `k + 4` in the upper.
+#[inline(always)]
+unsafe fn spread(v: __m256, k: i32) -> __m512 {
+    unsafe {
+        let lanes = _mm512_mask_blend_epi32(0xFF00, _mm512_set1_epi32(k), _mm512_set1_epi32(k + 4));
+        _mm512_permutexvar_ps(lanes, _mm512_castps256_ps512(v))
+    }
+}
+
+/// The lower half in both halves exchanged: lanes 4–7, then 0–3.
+#[inline(always)]
+unsafe fn exchanged(v: __m256) -> __m256 {
+    unsafe { _mm256_permute2f128_ps::<1>(v, v) }
+}
+
+/// The corners of a block along an axis against the ray's origin.
+#[inline(always)]
+unsafe fn coarse(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512 {
+    unsafe {
+        let axis = usize::from(axis);
+        let corners = _mm256_loadu_si256(block.corners.get_unchecked(axis).as_ptr().cast());
+        let to = _mm512_set1_ps(*to.get_unchecked(axis));
+        _mm512_fmadd_ps(_mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(corners)), step, to)
+    }
+}
+
+impl Lanes for Avx512 {
+    #[inline(always)]
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+        // SAFETY: see the head of the file.
+        unsafe {
+            // Leaving is computed negated, so that the greatest is wanted of both.
+            let inverse = _mm256_load_ps(ray.inverse.as_ptr());
+            let slack = _mm256_broadcast_ps(&_mm_load_ps(ray.slack.as_ptr()));
+            let origin = _mm256_broadcast_ps(&_mm_load_ps(node.origin.as_ptr()));
+            let step = _mm256_broadcast_ps(&_mm_load_ps(node.step.as_ptr()));
+            let to = _mm256_sub_ps(origin, _mm256_broadcast_ps(&_mm_load_ps(ray.origin.as_ptr())));
+            let scale = _mm256_mul_ps(step, inverse);
+            let base = _mm256_fmsub_ps(to, inverse, slack);
+            let order = _mm512_loadu_si512(ROWS.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
+            let rows = _mm512_permutexvar_epi64(order, _mm512_loadu_si512((node as *const Node).cast()));
+            let x = numbers(_mm512_castsi512_si128(rows));
+            let y = numbers(_mm512_extracti64x2_epi64::<1>(rows));
+            let z = numbers(_mm512_extracti64x2_epi64::<2>(rows));
+            let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(-ray.t_max));
+            let x = _mm512_fmadd_ps(x, spread(scale, 0), spread(base, 0));
+            let y = _mm512_fmadd_ps(y, spread(scale, 1), spread(base, 1));
+            let z = _mm512_fmadd_ps(z, spread(scale, 2), spread(base, 2));
+            let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
+            let enter = _mm512_castps512_ps256(most);
+            let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-(1.0 + 5e-7)));
+            let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.used as u8, enter, leave);
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            // The distance but its sign and lowest three bits, these of the lane.
+            let distance = _mm256_set1_epi32(0x7FFF_FFF8);
+            let keys = _mm256_ternarylogic_epi32::<0xF8>(lanes, _mm256_castps_si256(enter), distance);
+            let keys = _mm256_mask_blend_epi32(met, _mm256_set1_epi32(-1), keys);
+            avx2::sort(u32::from(met), keys, node, enters, links)
+        }
+    }
+
+    #[inline(always)]
+    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
+        // SAFETY: see the head of the file.
+        unsafe {
+            let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
+            let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
+            let corner = corner_error(block.step, far, ray.slack);
+            let error = _mm256_set1_ps(edge_error(block.step, corner));
+            let step = _mm512_set1_ps(block.step);
+            let [kx, ky, kz] = ray.axes;
+            let [sx, sy, sz] = ray.shear;
+            let z = coarse(block, kz, step, &to);
+            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, coarse(block, kx, step, &to));
+            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, coarse(block, ky, step, &to));
+            let t = _mm512_mul_ps(z, _mm512_set1_ps(sz));
+            let (ax, bx) = (_mm512_castps512_ps256(x), _mm512_extractf32x8_ps::<1>(x));
+            let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
+            let (at, bt) = (_mm512_castps512_ps256(t), _mm512_extractf32x8_ps::<1>(t));
+            let (cx, cy, ct) = (exchanged(ax), exchanged(ay), exchanged(at));
+            let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
+            let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
+            let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));
+            let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
+            let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
+            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(least, _mm256_sub_ps(_mm256_setzero_ps(), error));
+            let above = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(most, error);
+            let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
+            let last = _mm256_max_ps(_mm256_max_ps(at, bt), ct);
+            let late = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
+            let early = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
+            u32::from(!(below & above | late | early))
+        }
+    }
+
+    /// As with AVX2: loads of 64 bytes would wait for the entries written by halves.
+    #[inline(always)]
+    fn open(enters: &[f32; 16], t_max: f32) -> u32 {
+        Avx2::open(enters, t_max)
+    }
+}
