@@ -3,6 +3,7 @@ use crate::math::Vector;
 /// The mirror image of direction `d` in a surface with unit normal `n` (either side).
 ///
 /// The length is brought back to 1 in first order, so that 10⁴ reflections in a light guide do not drift.
+#[inline]
 pub fn reflect(d: Vector, n: Vector) -> Vector {
     unit(d - n * (2.0 * d.dot(n)))
 }
@@ -19,14 +20,22 @@ pub fn reflect(d: Vector, n: Vector) -> Vector {
 /// assert!((t.x.asin().to_degrees() - 28.12551).abs() < 1e-5);
 /// assert!(refract(d, Vector::Z, 1.5).is_none());
 /// ```
+#[inline]
 pub fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
+    Some(refract_with_cosine(d, n, eta)?.0)
+}
+
+/// The same with the cosine of the angle of refraction, which Fresnel's equations want too.
+#[inline]
+pub fn refract_with_cosine(d: Vector, n: Vector, eta: f64) -> Option<(Vector, f64)> {
     let along = d.dot(n);
     let cos_t = cos_transmitted(along.abs(), eta)?;
     // Tangential part scaled by eta, normal part of length cos_t on the far side.
-    Some(unit((d - n * along) * eta + n * cos_t.copysign(along)))
+    Some((unit((d - n * along) * eta + n * cos_t.copysign(along)), cos_t))
 }
 
 /// Cosine of the angle of refraction, `None` at and beyond the critical angle.
+#[inline]
 pub(super) fn cos_transmitted(cos_i: f64, eta: f64) -> Option<f64> {
     // (1 - cos)(1 + cos) keeps the sine exact near normal incidence, where 1 - cos² would cancel.
     let sin2_t = eta * eta * ((1.0 - cos_i) * (1.0 + cos_i)).max(0.0);
@@ -34,6 +43,7 @@ pub(super) fn cos_transmitted(cos_i: f64, eta: f64) -> Option<f64> {
 }
 
 /// One Newton step of the normalisation: exact to the last bits for lengths within 1e-8 of 1.
+#[inline]
 fn unit(v: Vector) -> Vector {
     v * (1.5 - 0.5 * v.length_squared())
 }

@@ -21,6 +21,7 @@ impl Power {
     pub const NONE: Self = Self { rs: 0.0, rp: 0.0 };
 
     /// The share of unpolarised light: the mean of both.
+    #[inline]
     pub fn unpolarised(&self) -> f64 {
         0.5 * (self.rs + self.rp)
     }
@@ -40,15 +41,17 @@ impl Power {
 /// let r = lampyris::optics::fresnel::dielectric(1.0, 1.0 / 1.5);
 /// assert!((r.unpolarised() - 0.04).abs() < 1e-15);
 /// ```
+#[inline]
 pub fn dielectric(cos_i: f64, eta: f64) -> Power {
-    match cos_transmitted(cos_i, eta) {
-        None => Power::TOTAL,
-        Some(cos_t) => {
-            let rs = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-            let rp = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-            Power { rs: rs * rs, rp: rp * rp }
-        }
-    }
+    cos_transmitted(cos_i, eta).map_or(Power::TOTAL, |cos_t| of_cosines(cos_i, cos_t, eta))
+}
+
+/// The same where the cosine of the angle of refraction is known.
+#[inline]
+pub fn of_cosines(cos_i: f64, cos_t: f64, eta: f64) -> Power {
+    let rs = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    let rp = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    Power { rs: rs * rs, rp: rp * rp }
 }
 
 /// Reflection at a metal of complex index `n + i·k` seen from a medium of index `outside`; the rest is absorbed.

@@ -31,7 +31,7 @@ mod table;
 mod testing;
 
 pub use abg::Abg;
-pub use bend::{reflect, refract};
+pub use bend::{reflect, refract, refract_with_cosine};
 pub use coating::{Coating, CoatingTable, Split};
 pub use effects::{Effect, Effects};
 pub use error::{Error, ErrorKind};

@@ -3,7 +3,45 @@
 //! Source: Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., A.5 (concentric disk of Shirley and Chiu 1997).
 
 use crate::math::{Uv, Vector, orthonormal_pair};
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_PI_4, TAU};
+
+/// Sine and cosine of `2π·turns`, for `|turns|` up to 2⁴⁰: right to 3e-16, the same bits on every machine, and without a call.
+///
+/// The Taylor series to x¹⁷ leave 1e-17 on an eighth of a turn.
+#[inline]
+pub fn sin_cos_turns(turns: f64) -> (f64, f64) {
+    // One addition rounds to whole quarters.
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    let quarters = (4.0 * turns + SHIFT) - SHIFT;
+    let x = (turns - 0.25 * quarters) * TAU;
+    let y = x * x;
+    let series = |c: [f64; 8]| {
+        let high = (c[4] + y * c[5]) + (y * y) * (c[6] + y * c[7]);
+        let low = (c[0] + y * c[1]) + (y * y) * (c[2] + y * c[3]);
+        low + (y * y) * (y * y) * high
+    };
+    let sin = x + x * y * series(SINE);
+    let cos = 1.0 + y * series(COSINE);
+    let quarter = quarters as i64;
+    let (a, b) = if quarter & 1 == 0 { (sin, cos) } else { (cos, sin) };
+    (if quarter & 2 == 0 { a } else { -a }, if (quarter + 1) & 2 == 0 { b } else { -b })
+}
+
+/// `±1/(2k + 3)!` and `±1/(2k + 2)!`.
+const SINE: [f64; 8] = inverse_factorials(3);
+const COSINE: [f64; 8] = inverse_factorials(2);
+
+const fn inverse_factorials(first: u32) -> [f64; 8] {
+    let mut terms = [0.0; 8];
+    let (mut k, mut factorial) = (0, if first == 3 { 6.0 } else { 2.0 });
+    while k < 8 {
+        terms[k] = if k % 2 == 0 { -1.0 / factorial } else { 1.0 / factorial };
+        let n = first as f64 + 2.0 * k as f64;
+        factorial *= (n + 1.0) * (n + 2.0);
+        k += 1;
+    }
+    terms
+}
 
 /// A uniform point of the unit disk; neighbouring pairs stay neighbours.
 pub fn disk([u, v]: [f64; 2]) -> Uv {
@@ -19,7 +57,7 @@ pub fn disk([u, v]: [f64; 2]) -> Uv {
 pub fn sphere([u, v]: [f64; 2]) -> Vector {
     let z = 1.0 - 2.0 * u;
     let r = ((1.0 - z) * (1.0 + z)).sqrt();
-    let (s, c) = (2.0 * PI * v).sin_cos();
+    let (s, c) = sin_cos_turns(v);
     Vector::new(r * c, r * s, z)
 }
 
@@ -47,7 +85,7 @@ pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
 /// The direction at an angle from `axis`, at azimuth `2π·turn`.
 pub(super) fn around(axis: Vector, cos: f64, sin: f64, turn: f64) -> Vector {
     let (a, b) = orthonormal_pair(axis);
-    let (s, c) = (2.0 * PI * turn).sin_cos();
+    let (s, c) = sin_cos_turns(turn);
     (axis * cos + (a * c + b * s) * sin).normalize()
 }
 
@@ -61,6 +99,18 @@ mod tests {
 
     fn mean(values: impl Iterator<Item = f64>) -> f64 {
         values.sum::<f64>() / N as f64
+    }
+
+    #[test]
+    fn sines_of_turns_agree_with_the_library() {
+        for i in -40_000..40_000 {
+            let turns = f64::from(i) / 9973.0;
+            let (s, c) = sin_cos_turns(turns);
+            let (es, ec) = ((turns - turns.round()) * TAU).sin_cos();
+            assert!((s - es).abs() < 4e-16 && (c - ec).abs() < 4e-16, "{turns}: {s} {es} {c} {ec}");
+        }
+        let quarters = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0)];
+        (0..8).for_each(|i| assert_eq!(sin_cos_turns(0.25 * i as f64), quarters[i % 4]));
     }
 
     #[test]

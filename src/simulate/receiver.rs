@@ -1,7 +1,7 @@
 //! Receivers in the form the kernel asks: where a ray meets them, and which cell counts it.
 
 use super::scene::{self, FarFieldType, ReceiverKind};
-use crate::math::{Frame, Point, Ray, Vector};
+use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use crate::optics::xyz_of_watt;
 use std::f64::consts::TAU;
 
@@ -157,6 +157,28 @@ impl Receiver {
     /// Sums to keep: the cells of power, then those of each channel.
     pub(crate) fn sum_count(&self) -> usize {
         self.cell_count() * (1 + self.channels.count())
+    }
+
+    /// Whether it may have a point in common with a box; asked with care, so that `true` costs time alone.
+    pub(crate) fn meets(&self, region: &Aabb) -> bool {
+        match &self.shape {
+            Shape::Plane { frame, half, .. } => {
+                let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+                let corners =
+                    corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1]));
+                let apart = |box_corners: [Point; 8]| {
+                    let sides = box_corners.map(|c| (c - frame.origin).dot(frame.z));
+                    sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0)
+                };
+                !(Aabb::around(corners).intersection(*region).is_empty() || apart(region.corners()))
+            }
+            Shape::Sphere { frame, radius } => {
+                let far = region.corners().map(|c| (c - frame.origin).length()).into_iter().fold(0.0, f64::max);
+                let nearest = frame.origin.clamp(region.min, region.max);
+                far >= *radius && (nearest - frame.origin).length() <= *radius
+            }
+            Shape::FarField { .. } | Shape::Absorbed { .. } => false,
+        }
     }
 
     /// Distances at which a ray crosses the receiver, in `(after, before)`; the nearest.

@@ -197,17 +197,22 @@ fn run(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> (Tallies, Plan, Cost, f64, usize) {
     let start = Instant::now();
-    let select = |wanted: fn(&super::receiver::Receiver) -> bool| -> Vec<u32> {
+    let select = |wanted: &dyn Fn(&super::receiver::Receiver) -> bool| -> Vec<u32> {
         (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
     };
+    let region = bound.region;
+    let stands = |r: &super::receiver::Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
+    let outside = select(&|r| r.absorbs && stands(r) && !r.meets(&region));
     let context = Context {
         bound,
         intersector,
         settings,
         plan: Plan::new(bound, settings),
-        blocking: select(|r| r.absorbs && matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. })),
-        passing: select(|r| !r.absorbs && matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. })),
-        far: select(|r| matches!(r.shape, Shape::FarField { .. })),
+        blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
+        outside,
+        region,
+        passing: select(&|r| !r.absorbs && stands(r)),
+        far: select(&|r| matches!(r.shape, Shape::FarField { .. })),
     };
     let replicates = context.plan.replicates;
     let [shard, shards] = settings.shard;

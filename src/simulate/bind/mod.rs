@@ -8,6 +8,7 @@ use super::emitter::{self, Area, Emitter, Loaded};
 use super::receiver::Receiver;
 use super::scene::{Material, OneOrMany, ReceiverKind, Scene, SurfaceKind};
 use super::{Error, ErrorKind};
+use crate::math::Aabb;
 use crate::model::Model;
 use crate::optics::{Coating, Scatter};
 use crate::simulate::scene::Key;
@@ -73,6 +74,8 @@ pub struct BoundScene {
     pub(crate) nested: bool,
     pub(crate) emitters: Vec<Emitter>,
     pub(crate) receivers: Vec<Receiver>,
+    /// Around all faces and the places of the sources, with room to spare.
+    pub(crate) region: Aabb,
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,
     pub(crate) instance_of_face: Vec<u32>,
@@ -124,6 +127,9 @@ impl Scene {
             };
             receivers.push(Receiver::new(r, faces));
         }
+        let faces_box = model.placed_faces().map(|f| nearest::bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
+        let region = faces_box.union(Aabb::around(emitters.iter().flat_map(Emitter::reach)));
+        let region = if region.is_empty() { region } else { region.grown(1e-3 * region.diagonal()) };
         Ok(BoundScene {
             scene: self.clone(),
             faces,
@@ -133,6 +139,7 @@ impl Scene {
             nested,
             emitters,
             receivers,
+            region,
             instances: model.instances.iter().map(|i| i.name.clone()).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
         })

@@ -9,11 +9,11 @@ use super::scene::{self, Scene, SourceKind};
 use super::{Error, ErrorKind};
 use crate::formats::PhotometricType;
 use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
+use crate::optics::sampling::sin_cos_turns;
 use crate::optics::{IntensitySampler, Spectrum, Wavelengths};
 pub(crate) use area::Area;
 pub(crate) use file::{Loaded, load};
 use smallvec::SmallVec;
-use std::f64::consts::TAU;
 pub(crate) use stream::{Stream, Ticket};
 
 /// A source ready to emit.
@@ -126,6 +126,22 @@ impl Emitter {
         Ok(Self { wavelengths, polarised, power, rays: s.rays, inside, frame, shape, lobe })
     }
 
+    /// Which pairs of numbers it asks for.
+    pub(crate) fn pairs(&self) -> [bool; 3] {
+        let place = !matches!(self.shape, Shape::Point | Shape::List(_));
+        [place, !matches!(self.lobe, Lobe::Collimated), self.wavelengths.is_some()]
+    }
+
+    /// Points around the places it shines from, faces and lists of rays left out.
+    pub(crate) fn reach(&self) -> [Point; 2] {
+        let size = match &self.shape {
+            Shape::Disc(radius) => *radius,
+            Shape::Rectangle([a, b]) => a.hypot(*b),
+            Shape::Point | Shape::Faces(_) | Shape::List(_) => 0.0,
+        };
+        [self.frame.origin - Vector::splat(size), self.frame.origin + Vector::splat(size)]
+    }
+
     /// A ray of this source.
     #[inline]
     pub(crate) fn emit(&self, stream: &Stream, ticket: Ticket) -> Emission {
@@ -137,7 +153,7 @@ impl Emitter {
             Shape::Point => {}
             Shape::Disc(radius) => {
                 let [u, v] = stream.pair(ticket, 0);
-                let (sin, cos) = (TAU * v).sin_cos();
+                let (sin, cos) = sin_cos_turns(v);
                 let r = radius * u.sqrt();
                 emission.ray.origin = f.origin + f.x * (r * cos) + f.y * (r * sin);
             }
@@ -161,7 +177,7 @@ impl Emitter {
         }
         let turned = |cos_theta: f64, v: f64| {
             let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt();
-            let (sin, cos) = (TAU * v).sin_cos();
+            let (sin, cos) = sin_cos_turns(v);
             axes.0 * (sin_theta * cos) + axes.1 * (sin_theta * sin) + axes.2 * cos_theta
         };
         emission.ray.direction = match &self.lobe {

@@ -1,7 +1,7 @@
 use super::Context;
 use crate::math::{FaceId, Point, Vector};
 use crate::simulate::bind::BoundScene;
-use crate::simulate::tally::{Grid, Moments, Sum};
+use crate::simulate::tally::{Grid, Moments, Sum, count};
 use serde::{Deserialize, Serialize};
 
 /// Why a ray was lost.
@@ -156,7 +156,7 @@ impl Local {
 
     #[inline]
     pub(crate) fn absorb(&mut self, face: FaceId, quanta: f64) {
-        self.ends.absorbed += quanta as u64;
+        self.ends.absorbed += count(quanta);
         self.absorbed.add(face.index(), quanta);
     }
 

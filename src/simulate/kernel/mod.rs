@@ -8,16 +8,19 @@ mod carry;
 mod local;
 mod step;
 mod surface;
+mod wide;
 
 pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Stack};
 pub(crate) use local::Local;
 pub use local::{Cause, Counts, Event, LostRay, PathVertex, Tallies};
+pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
 use super::emitter::{Stream, Ticket};
 use super::run::{Plan, RunSettings};
+use super::tally::count;
 use crate::intersect::{Cost, Hit, Intersector};
-use crate::math::{Departure, FaceId, Ray, Vector};
+use crate::math::{Aabb, Departure, FaceId, Ray, Vector};
 use crate::optics::polarised::Stokes;
 
 /// What all replicates share.
@@ -26,8 +29,12 @@ pub(crate) struct Context<'a> {
     pub(crate) intersector: &'a dyn Intersector,
     pub(crate) settings: &'a RunSettings,
     pub(crate) plan: Plan,
-    /// Receivers that stand in space and end light.
+    /// Receivers that stand among the faces and end light.
     pub(crate) blocking: Vec<u32>,
+    /// Receivers that end light and do not meet `region`.
+    pub(crate) outside: Vec<u32>,
+    /// A box around all faces and sources; only how fast a path is followed depends on it.
+    pub(crate) region: Aabb,
     /// Receivers that count light passing through.
     pub(crate) passing: Vec<u32>,
     pub(crate) far: Vec<u32>,
@@ -64,46 +71,56 @@ impl Context<'_> {
 }
 
 /// Traces the rays of one replicate and adds them to `local`. Returns the intersector's work.
-pub(crate) fn trace<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
+#[inline(always)]
+fn trace_rays<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
     let batch = context.settings.batch.max(1);
     let mut cost = Cost::default();
     let mut wave = Wave::<C>::with_capacity(batch);
     let mut sources = Sources::new(context, replicate);
-    loop {
-        while wave.paths.len() < batch {
-            match wave.pending.pop() {
-                Some((path, ray)) => wave.push(path, ray),
-                None => match sources.next(context) {
-                    Some(start) => wave.start(context, start, local),
-                    None => break,
-                },
-            }
-        }
-        if wave.paths.is_empty() {
-            return cost;
-        }
-        wave.hits.clear();
-        wave.hits.resize(wave.rays.len(), None);
-        context.intersector.intersect_batch(&wave.rays, &mut wave.hits, &mut cost);
-        local.counts.segments += wave.rays.len() as u64;
-        let mut kept = 0;
-        for i in 0..wave.paths.len() {
-            let (mut path, mut ray) = (wave.paths[i], wave.rays[i]);
-            if step::step(context, &mut path, &mut ray, wave.hits[i].as_ref(), local, &mut wave.pending) {
-                wave.paths[kept] = path;
-                wave.rays[kept] = ray;
-                kept += 1;
-            }
-        }
-        wave.paths.truncate(kept);
-        wave.rays.truncate(kept);
+    while wave.paths.len() < batch
+        && let Some((path, ray)) = sources.begin(context, local)
+    {
+        wave.paths.push(path);
+        wave.rays.push(ray);
     }
+    wave.hits.resize(wave.rays.len(), None);
+    while !wave.paths.is_empty() {
+        let n = wave.rays.len();
+        context.intersector.intersect_batch(&wave.rays, &mut wave.hits[..n], &mut cost);
+        local.counts.segments += n as u64;
+        let mut i = 0;
+        while i < wave.paths.len() {
+            let (path, ray) = (&mut wave.paths[i], &mut wave.rays[i]);
+            if !step::step(context, path, ray, wave.hits[i].as_ref(), local, &mut wave.pending) {
+                // A path that ends leaves its place to another.
+                match wave.pending.pop().or_else(|| sources.begin(context, local)) {
+                    Some(next) => (*path, *ray) = next,
+                    None => {
+                        wave.drop(i);
+                        continue;
+                    }
+                }
+            }
+            i += 1;
+        }
+        while wave.paths.len() < batch
+            && let Some((path, ray)) = wave.pending.pop()
+        {
+            wave.paths.push(path);
+            wave.rays.push(ray);
+        }
+        if wave.hits.len() < wave.rays.len() {
+            wave.hits.resize(wave.rays.len(), None);
+        }
+    }
+    cost
 }
 
 /// Rays under way in one batch.
 struct Wave<C> {
     paths: Vec<Path<C>>,
     rays: Vec<Ray>,
+    /// As long as `rays` or longer.
     hits: Vec<Option<Hit>>,
     /// Paths that split off and wait for room.
     pending: Vec<(Path<C>, Ray)>,
@@ -115,61 +132,12 @@ impl<C: Carry> Wave<C> {
         Self { paths, rays, hits, pending: Vec::new() }
     }
 
-    fn push(&mut self, path: Path<C>, ray: Ray) {
-        self.paths.push(path);
-        self.rays.push(ray);
+    /// Takes out a path that has ended; the last one of the wave, with the hit it has not been through yet, takes its place.
+    fn drop(&mut self, i: usize) {
+        self.hits.swap(i, self.paths.len() - 1);
+        self.paths.swap_remove(i);
+        self.rays.swap_remove(i);
     }
-
-    #[inline]
-    fn start(&mut self, context: &Context<'_>, start: Start, local: &mut Local) {
-        let emitter = &context.bound.emitters[start.source];
-        let emission = emitter.emit(&start.stream, start.ticket);
-        let mut ray = emission.ray;
-        if let Some((face, normal)) = emission.from {
-            settle(context, face, normal, &mut ray);
-        }
-        local.counts.rays += 1;
-        local.ends.emitted += start.quanta as u64;
-        let Some(mut carry) = C::inside(&emitter.inside) else {
-            return local.lose(LostRay {
-                ray: start.ticket.ray,
-                branch: 0,
-                bounce: 0,
-                cause: Cause::TooDeep,
-                quanta: start.quanta as u64,
-                origin: ray.origin,
-                direction: ray.direction,
-                face: None,
-            });
-        };
-        if C::COLOURED {
-            carry.light(emission.wavelength, || match emitter.polarised {
-                Some(field) => Stokes::linear(1.0, ray.direction, field),
-                None => Stokes::unpolarised(1.0, ray.direction),
-            });
-        }
-        let mut path = Path {
-            ray: start.ticket.ray,
-            branch: 0,
-            bounce: 0,
-            quanta: start.quanta,
-            first: start.quanta,
-            length: 0.0,
-            receiver: NO_RECEIVER,
-            carry,
-        };
-        step::record(context, &path, ray.origin, Event::Emitted, local);
-        step::aim(context, &mut path, &mut ray);
-        self.push(path, ray);
-    }
-}
-
-/// A ray about to start.
-struct Start {
-    source: usize,
-    ticket: Ticket,
-    quanta: f64,
-    stream: Stream,
 }
 
 /// Goes through the rays of one replicate, source by source.
@@ -196,23 +164,76 @@ impl Sources {
         let s = context.settings;
         let which = [self.replicate, context.plan.replicates];
         let rays = self.range[1] - self.range[0];
-        self.stream = Some(Stream::new(s.seed, s.sampling, which, source as u32, rays));
+        let pairs = context.bound.emitters[source].pairs();
+        self.stream = Some(Stream::new(s.seed, s.sampling, which, source as u32, rays, pairs));
     }
 
+    /// Starts the next ray that can start; `None` at the end of the replicate.
     #[inline]
-    fn next(&mut self, context: &Context<'_>) -> Option<Start> {
-        while self.next >= self.range[1] {
-            if self.source >= context.plan.shares.len() {
-                return None;
+    fn begin<C: Carry>(&mut self, context: &Context<'_>, local: &mut Local) -> Option<(Path<C>, Ray)> {
+        loop {
+            while self.next >= self.range[1] {
+                if self.source >= context.plan.shares.len() {
+                    return None;
+                }
+                self.enter(context, self.source + 1);
             }
-            self.enter(context, self.source + 1);
+            let ray = self.next;
+            self.next += 1;
+            let ticket = Ticket { ray, index: (ray - self.range[0]) as u32 };
+            let quanta = context.plan.shares[self.source].quanta;
+            let stream = self.stream.as_mut()?;
+            stream.prepare(ticket);
+            if let Some(started) = start(context, self.source, stream, ticket, quanta, local) {
+                return Some(started);
+            }
         }
-        let ray = self.next;
-        self.next += 1;
-        let ticket = Ticket { ray, index: (ray - self.range[0]) as u32 };
-        let quanta = context.plan.shares[self.source].quanta;
-        Some(Start { source: self.source, ticket, quanta, stream: self.stream? })
     }
+}
+
+/// A ray as it leaves its source; `None` when it cannot start.
+#[inline]
+fn start<C: Carry>(
+    context: &Context<'_>,
+    source: usize,
+    stream: &Stream,
+    ticket: Ticket,
+    quanta: f64,
+    local: &mut Local,
+) -> Option<(Path<C>, Ray)> {
+    let emitter = &context.bound.emitters[source];
+    let emission = emitter.emit(stream, ticket);
+    let mut ray = emission.ray;
+    if let Some((face, normal)) = emission.from {
+        settle(context, face, normal, &mut ray);
+    }
+    local.counts.rays += 1;
+    local.ends.emitted += count(quanta);
+    let Some(mut carry) = C::inside(&emitter.inside) else {
+        local.lose(LostRay {
+            ray: ticket.ray,
+            branch: 0,
+            bounce: 0,
+            cause: Cause::TooDeep,
+            quanta: count(quanta),
+            origin: ray.origin,
+            direction: ray.direction,
+            face: None,
+        });
+        return None;
+    };
+    if C::COLOURED {
+        carry.light(emission.wavelength, || match emitter.polarised {
+            Some(field) => Stokes::linear(1.0, ray.direction, field),
+            None => Stokes::unpolarised(1.0, ray.direction),
+        });
+    }
+    let receiver = NO_RECEIVER;
+    let mut path =
+        Path { ray: ticket.ray, branch: 0, bounce: 0, quanta, first: quanta, length: 0.0, receiver, carry };
+    step::record(context, &path, ray.origin, Event::Emitted, local);
+    step::aim(context, &mut path, &mut ray);
+    Some((path, ray))
 }
 
 /// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it.

@@ -5,10 +5,11 @@ use super::{Carry, Cause, Context, Event, Local, Path};
 use crate::intersect::Cost;
 use crate::math::{Departure, Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
-use crate::optics::{Coating, Split, fresnel, reflect, refract};
+use crate::optics::{Coating, Split, fresnel, reflect, refract_with_cosine};
 use crate::simulate::bind::{AMBIENT, Coated};
 use crate::simulate::random::Purpose;
 use crate::simulate::scene::Interfaces;
+use crate::simulate::tally::whole;
 
 /// A perfect conductor: s keeps its sign, p changes it, in the convention of [`Stokes`].
 const CONDUCTOR: Mueller = Mueller { a: 1.0, b: 0.0, c: -1.0, e: 0.0 };
@@ -48,7 +49,7 @@ pub(super) fn mirror<C: Carry>(
     local: &mut Local,
 ) -> Vector {
     let (normal, _) = shading(direction, at, local);
-    let kept = (path.quanta * share).round();
+    let kept = whole(path.quanta * share);
     record(context, path, at.point, Event::Reflected, local);
     local.absorb(at.hit.face, path.quanta - kept);
     path.quanta = kept;
@@ -102,14 +103,14 @@ pub(super) fn interface<C: Carry>(
     let eta = bodies[here as usize].index(nm) / bodies[there as usize].index(nm);
     let d = ray.direction;
     let (normal, cos_i, transmitted) = refracted(d, eta, at, local);
-    let Some(transmitted) = transmitted else {
+    let Some((transmitted, cos_t)) = transmitted else {
         record(context, path, at.point, Event::Reflected, local);
         if path.carry.stokes().is_some() {
             turn(context, path, &polarised::reflected(cos_i, eta), d, normal);
         }
         return Some(mirrored(d, normal, at, local));
     };
-    let mut share = fresnel::dielectric(cos_i, eta).unpolarised();
+    let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
     let mut matrices = None;
     if path.carry.stokes().is_some() {
         let [r, t] = [polarised::reflected(cos_i, eta), polarised::transmitted(cos_i, eta)];
@@ -151,7 +152,7 @@ fn divide<C: Carry>(
         rough(context, both.scatter, path, specular, both.normal, at, local)
     };
     if s.interfaces == Interfaces::Split && path.quanta > s.split_floor * path.first {
-        let kept = (path.quanta * both.share).round();
+        let kept = whole(path.quanta * both.share);
         if kept >= 1.0 && kept < path.quanta {
             let mut child = Path { quanta: kept, branch: branch(path.branch, path.bounce), ..*path };
             record(context, &child, at.point, Event::Split, local);
@@ -224,17 +225,18 @@ fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
     (other.touching && other.body != at.face.body && entering != at.entering).then_some(other.body)
 }
 
-/// The normal, the cosine of incidence and the refracted direction, on the far side of the facet; `None` at total reflection.
+/// The normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these
+/// at total reflection.
 #[inline]
-fn refracted(d: Vector, eta: f64, at: &Meeting<'_>, local: &mut Local) -> (Vector, f64, Option<Vector>) {
+fn refracted(d: Vector, eta: f64, at: &Meeting<'_>, local: &mut Local) -> (Vector, f64, Option<(Vector, f64)>) {
     let flat = at.hit.geometric_normal;
     let (normal, cos_i) = shading(d, at, local);
-    let transmitted = refract(d, normal, eta);
-    if transmitted.is_none_or(|t| t.dot(flat) * d.dot(flat) > 0.0) {
+    let transmitted = refract_with_cosine(d, normal, eta);
+    if transmitted.is_none_or(|(t, _)| t.dot(flat) * d.dot(flat) > 0.0) {
         return (normal, cos_i, transmitted);
     }
     local.counts.corrected_normals += 1;
-    (flat, d.dot(flat).abs().min(1.0), refract(d, flat, eta))
+    (flat, d.dot(flat).abs().min(1.0), refract_with_cosine(d, flat, eta))
 }
 
 /// A surface with a coating, scatter or both; the direction to go on in, `None` when the path ends.
@@ -266,7 +268,7 @@ pub(super) fn coated<C: Carry>(
         matrices = Some(m);
     }
     let total = (shares[0] + shares[1]).min(1.0);
-    let kept = (path.quanta * total).round();
+    let kept = whole(path.quanta * total);
     if kept < path.quanta {
         local.absorb(at.hit.face, path.quanta - kept);
         path.quanta = kept;
@@ -280,7 +282,7 @@ pub(super) fn coated<C: Carry>(
         Some(_) => shares[0] / (shares[0] + shares[1]),
     };
     let scatter = coated.scatter.is_some().then_some(coated);
-    let transmitted = transmitted.unwrap_or(d);
+    let transmitted = transmitted.map_or(d, |(t, _)| t);
     divide(context, path, ray, at, Both { share, matrices, normal, across, transmitted, scatter }, local, pending)
 }
 

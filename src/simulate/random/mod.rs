@@ -11,7 +11,7 @@ mod philox;
 mod sobol;
 
 pub use philox::philox4x32;
-pub use sobol::{DIMENSIONS, scrambled};
+pub use sobol::{BLOCK, DIMENSIONS, scrambled, scrambled_block};
 
 /// What a random number is for; part of its key, so that adding an effect shifts no other number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
