@@ -1,13 +1,15 @@
 //! The tree over the parameter rectangle: cells are halved across the direction that bends more until they fit.
 //!
-//! Cuts fall on a ladder of preferred parameters (samples of border edges that run along parameter lines, or lines spread
-//! evenly in curvature), so that neighbouring cells and the border line up; below the ladder they halve.
+//! Cuts fall on a ladder of preferred parameters, so that neighbouring cells and the border line up; below the ladder they
+//! halve. A cell is kept whole when it is clear of the border, or when the border runs along its sides, corner on sample.
 
-use super::bound::{Prover, from_line};
+use super::bound::Prover;
+use super::ladder::ladder;
+use super::look::{Look, quad_bound};
 use super::rings::{Follows, Rings};
 use super::settings::Judge;
 use super::sheet::Sheet;
-use crate::math::{Point, Uv};
+use crate::math::Uv;
 
 /// A rectangle `[lo, hi]` of the parameter plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,9 +31,9 @@ impl Cell {
 /// The leaves.
 #[derive(Default)]
 pub(super) struct Leaves {
-    /// Wholly inside, clear of the border, and proved: with the bound and the tolerance it was held to.
+    /// Wholly inside, not cut by the border, and proved: with the bound and the tolerance it was held to.
     pub(super) inside: Vec<(Cell, f64, f64)>,
-    /// Those that the border touches.
+    /// Those that the border cuts or comes near to.
     pub(super) border: Vec<Cell>,
     /// Whether the budget ended the splitting.
     pub(super) exhausted: bool,
@@ -47,6 +49,10 @@ struct Tree<'s, 'a> {
     sheet: &'s Sheet<'a>,
     judge: Judge,
     segments: Vec<[Uv; 2]>,
+    /// Segments that are one point in space.
+    poles: Vec<bool>,
+    /// Parameters nearer than this are one.
+    same: Uv,
     ladder: [Vec<f64>; 2],
     max_angle: Option<f64>,
 }
@@ -76,10 +82,16 @@ pub(super) fn split(
     let root = Cell { lo, hi };
     let ladder = [ladder(sheet, rings, root, 0), ladder(sheet, rings, root, 1)];
     let all: Vec<u32> = (0..segments.len() as u32).collect();
-    let tree = Tree { sheet, judge, segments, ladder, max_angle };
+    let poles = rings.rings.iter().flatten().map(|v| v.follows == Follows::Pole).collect();
+    let tree = Tree { sheet, judge, segments, poles, same: same(lo, hi), ladder, max_angle };
     let mut branch = Branch { prover: Prover::new(sheet, judge), leaves: Leaves::default(), budget };
     tree.visit(&mut branch, root, &all, false, 0);
     branch.leaves
+}
+
+/// Parameters nearer than this are one, in a face that spans the box.
+pub(super) fn same(lo: Uv, hi: Uv) -> Uv {
+    1e-7 * (hi - lo)
 }
 
 impl Tree<'_, '_> {
@@ -107,7 +119,7 @@ impl Tree<'_, '_> {
         if crease.is_none()
             && let Some((bound, xi)) = self.fits(&mut out.prover, cell, &look)
         {
-            if inside {
+            if inside || self.aligned(cell, &near) && self.contains(cell.center()) {
                 out.leaves.inside.push((cell, bound, xi));
             } else {
                 out.leaves.border.push(cell);
@@ -143,6 +155,25 @@ impl Tree<'_, '_> {
             out.leaves.border.extend(part.border);
             out.leaves.exhausted |= part.exhausted;
         }
+    }
+
+    /// Whether the segments near a cell leave it whole: they run along its sides, or beyond and along them, and no
+    /// corner stands between two samples.
+    fn aligned(&self, cell: Cell, near: &[u32]) -> bool {
+        near.iter().all(|&s| {
+            let [a, b] = self.segments[s as usize];
+            (0..2).any(|d| {
+                let (e, eps) = (1 - d, self.same);
+                if (a[d] - b[d]).abs() > eps[d] || self.poles[s as usize] {
+                    return false;
+                }
+                let beyond = a[d] < cell.lo[d] - eps[d] || a[d] > cell.hi[d] + eps[d];
+                let on = (a[d] - cell.lo[d]).abs() <= eps[d] || (a[d] - cell.hi[d]).abs() <= eps[d];
+                let (from, to) = (a[e].min(b[e]) + eps[e], a[e].max(b[e]) - eps[e]);
+                let between = |x: f64| from < x && x < to;
+                beyond || on && !between(cell.lo[e]) && !between(cell.hi[e])
+            })
+        })
     }
 
     /// A crease of the surface across the cell.
@@ -194,80 +225,6 @@ impl Tree<'_, '_> {
     }
 }
 
-/// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
-pub(super) type Corners = [(Uv, Point); 4];
-
-/// Bound of a quad's two triangles, edges and diagonal included.
-pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
-    let mut worst = 0f64;
-    for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
-        worst = worst.max(prover.piece([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit));
-        if worst > limit {
-            return worst;
-        }
-    }
-    for [i, j] in [[0, 2], [0, 1], [1, 2], [2, 3], [3, 0]] {
-        worst = worst.max(prover.side([c[i].0, c[j].0], [c[i].1, c[j].1], limit));
-        if worst > limit {
-            return worst;
-        }
-    }
-    worst
-}
-
-/// Nine points of a cell and what they show.
-struct Look {
-    p: [[Point; 3]; 3],
-    /// Largest distance of a middle from its chord, for lines along u and along v.
-    sag: [f64; 2],
-}
-
-impl Look {
-    fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
-        let step = 0.5 * (cell.hi - cell.lo);
-        let at = |i: usize, j: usize| {
-            let mut uv = cell.lo + step * Uv::new(i as f64, j as f64);
-            if i == 2 {
-                uv.x = cell.hi.x;
-            }
-            if j == 2 {
-                uv.y = cell.hi.y;
-            }
-            sheet.point(uv)
-        };
-        let p: [[Point; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)));
-        let u = (0..3).map(|j| from_line(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
-        let v = (0..3).map(|i| from_line(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
-        Self { p, sag: [u, v] }
-    }
-
-    fn direction(&self) -> usize {
-        let [u, v] = self.sag;
-        let p = &self.p;
-        let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
-        if (u - v).abs() > 0.05 * u.max(v) {
-            return if u > v { 0 } else { 1 };
-        }
-        let along_u = length(0, 1, 2, 1).max(length(0, 1, 1, 1));
-        let along_v = length(1, 0, 1, 2).max(length(1, 0, 1, 1));
-        if along_u >= along_v { 0 } else { 1 }
-    }
-
-    /// The cell as a facet, cut along the diagonal that lies nearer to the surface.
-    fn facet(&self, cell: Cell) -> Corners {
-        let p = [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]];
-        let uv = cell.corners();
-        let m = self.p[1][1];
-        let r = if from_line(m, &[p[1], p[3]]) < from_line(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 };
-        std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4]))
-    }
-}
-
-/// The facet of a cell with its better diagonal.
-pub(super) fn facet_of(sheet: &Sheet<'_>, cell: Cell) -> Corners {
-    Look::new(sheet, cell).facet(cell)
-}
-
 /// Whether a segment meets a rectangle.
 fn touches([a, b]: [Uv; 2], lo: Uv, hi: Uv) -> bool {
     if a.max(b).cmplt(lo).any() || a.min(b).cmpgt(hi).any() {
@@ -277,100 +234,4 @@ fn touches([a, b]: [Uv; 2], lo: Uv, hi: Uv) -> bool {
     let (d, c, h) = (b - a, 0.5 * (lo + hi), 0.5 * (hi - lo));
     let off = d.perp_dot(c - a).abs();
     off <= d.x.abs() * h.y + d.y.abs() * h.x
-}
-
-/// Preferred cuts in direction `d`.
-fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> Vec<f64> {
-    let other = 1 - d;
-    let (lo, hi) = (root.lo[d], root.hi[d]);
-    let flat = 1e-7 * (root.hi[other] - root.lo[other]);
-    // Runs of samples along a parameter line, longest first.
-    let mut runs: Vec<Vec<f64>> = Vec::new();
-    for ring in &rings.rings {
-        let n = ring.len();
-        let level = |i: usize| {
-            let (a, b) = (ring[i % n], ring[(i + 1) % n]);
-            a.follows != Follows::Pole && (a.uv[other] - b.uv[other]).abs() <= flat
-        };
-        let start = (0..n).find(|&i| !level(i)).map_or(0, |i| i + 1);
-        let mut run: Vec<f64> = Vec::new();
-        for i in start..start + n {
-            if level(i) {
-                if run.is_empty() {
-                    run.push(ring[i % n].uv[d]);
-                }
-                run.push(ring[(i + 1) % n].uv[d]);
-            }
-            if !level(i) || i + 1 == start + n {
-                if run.len() > 2 {
-                    run.sort_by(f64::total_cmp);
-                    runs.push(std::mem::take(&mut run));
-                }
-                run.clear();
-            }
-        }
-    }
-    runs.sort_by_key(|r| std::cmp::Reverse(r.len()));
-    let mut covered: Vec<[f64; 2]> = Vec::new();
-    let mut steps: Vec<f64> = Vec::new();
-    for run in runs {
-        let fresh = |x: f64| !covered.iter().any(|c| c[0] - 1e-9 <= x && x <= c[1] + 1e-9);
-        let new: Vec<f64> = run.iter().copied().filter(|&x| fresh(x)).collect();
-        steps.extend(new);
-        covered.push([run[0], run[run.len() - 1]]);
-    }
-    let share: f64 = covered.iter().map(|c| c[1] - c[0]).sum();
-    if share < 0.5 * (hi - lo) {
-        steps = even(sheet, root, d);
-    }
-    steps.sort_by(f64::total_cmp);
-    steps.dedup_by(|b, a| *b - *a <= 1e-9 * (hi - lo));
-    steps.retain(|&x| x > lo && x < hi);
-    steps
-}
-
-/// Lines spread evenly in `√(curvature / tolerance)`, as many as the sharpest of a few lines needs, times a power of two.
-fn even(sheet: &Sheet<'_>, root: Cell, d: usize) -> Vec<f64> {
-    let (n, m) = (32, 5);
-    let other = 1 - d;
-    let at = |i: usize, j: usize| {
-        let mut f = Uv::ZERO;
-        f[d] = i as f64 / n as f64;
-        f[other] = (j as f64 + 0.5) / m as f64;
-        root.lo + f * (root.hi - root.lo)
-    };
-    let mut density = vec![0f64; n + 1];
-    for j in 0..m {
-        for (i, slot) in density.iter_mut().enumerate() {
-            let uv = at(i, j);
-            let der = sheet.surface.second_derivatives(uv);
-            let Some(forms) = crate::nurbs::FundamentalForms::new(&der) else { continue };
-            let (mut along, mut across) = (Uv::ZERO, Uv::ZERO);
-            along[d] = 1.0;
-            across[other] = 1.0;
-            let (k, c) = (forms.along(along), forms.along(across));
-            let wide = if d == 0 { der.dv } else { der.du }.length() * (root.hi[other] - root.lo[other]);
-            let xi = sheet.field.at(forms.sharpest());
-            let share = if k * c > 0.0 { 1.0 - (c.abs() * wide * wide / (8.0 * xi)).min(0.5) } else { 1.0 };
-            let speed = if d == 0 { der.du } else { der.dv }.length();
-            *slot = slot.max((k.abs() / (8.0 * xi * share)).sqrt() * speed);
-        }
-    }
-    let step = (root.hi[d] - root.lo[d]) / n as f64;
-    let mut sum = vec![0.0];
-    for i in 0..n {
-        sum.push(sum[i] + 0.5 * (density[i] + density[i + 1]) * step);
-    }
-    let total = sum[n];
-    if !total.is_finite() || total <= 1.0 {
-        return Vec::new();
-    }
-    let count = (total * 1.03).ceil().min(4096.0) as usize;
-    (1..count)
-        .map(|k| {
-            let goal = total * k as f64 / count as f64;
-            let i = sum.partition_point(|&s| s <= goal).clamp(1, n) - 1;
-            root.lo[d] + step * (i as f64 + ((goal - sum[i]) / (sum[i + 1] - sum[i])).clamp(0.0, 1.0))
-        })
-        .collect()
 }

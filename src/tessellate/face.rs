@@ -1,16 +1,17 @@
 //! One face from its border and its surface to facets.
 
+use super::Settings;
 use super::bound::Prover;
 use super::cells::{self, Leaves};
 use super::edges::Division;
+use super::grid::{self, Ground};
 use super::pair;
 use super::rings::{self, Follows, Rings};
 use super::sheet::Sheet;
 use super::strip::{self, Node, Outline, key};
 use super::trim::Trim;
-use super::{Settings, grid};
 use crate::math::{Point, Uv, Vector};
-use crate::model::{EdgeId, Face, Part};
+use crate::model::{EdgeId, Face, Part, TrimLoop};
 use rustc_hash::FxHashMap;
 
 /// The facets of a face in its part's coordinates.
@@ -46,64 +47,124 @@ pub(super) fn mesh(
     let angle = settings.angle_deg.map(f64::to_radians);
     let leaves = cells::split(sheet, settings.judge, &rings, settings.budget, angle);
     let mut prover = Prover::new(sheet, settings.judge);
-    let grid = grid::build(sheet, &mut prover, &leaves);
-    let place = |position: u32, own: &[Point]| {
-        let p = position as usize;
-        shared.get(p).or_else(|| own.get(p - shared.len())).copied().unwrap_or(Point::ZERO)
-    };
-    let mut own = rings.own.clone();
-    let mut nodes: Vec<Node> = Vec::with_capacity(grid.nodes.len());
-    for &(uv, p) in &grid.nodes {
-        nodes.push(Node { uv, place: p, position: (shared.len() + own.len()) as u32 });
-        own.push(p);
+    let mut border = border(part, &loops, sheet, &rings, shared);
+    let fixed: FxHashMap<[u32; 2], ()> = border.segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
+    let known = shared.len() + rings.own.len();
+    let (lo, hi) = rings.bounds();
+    let mut ground =
+        Ground { nodes: &mut border.nodes, trims: &border.trims, same: cells::same(lo, hi), next: known as u32 };
+    let grid = grid::build(sheet, &mut prover, &leaves, &mut ground);
+    let next = ground.next;
+    border.divide_poles(&leaves);
+    // Where cells reach the border, both are done.
+    let mut segments: Vec<[u32; 2]> = Vec::new();
+    let mut met: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+    let all = border.segments.iter().chain(&grid.outline);
+    all.clone().for_each(|s| *met.entry(key(s[0], s[1])).or_insert(0) += 1);
+    segments.extend(all.filter(|s| met[&key(s[0], s[1])] % 2 == 1));
+    let outline =
+        Outline { nodes: border.nodes, segments, trims: border.trims, scale: scale(sheet, &rings, &leaves), next };
+    let mut strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
+    for &(t, bound, tolerance) in &grid.triangles {
+        strip.triangles.push(t);
+        strip.bounds.push(bound);
+        strip.tolerances.push(tolerance);
     }
-    let mut segments = grid.outline.clone();
-    let mut trims: FxHashMap<[u32; 2], Trim> = FxHashMap::default();
-    let sides: Vec<_> = loops.iter().flat_map(|l| &l.uses).collect();
-    let mut followed: FxHashMap<[u32; 2], EdgeId> = FxHashMap::default();
-    for ring in &rings.rings {
-        let first = nodes.len() as u32;
-        let (points, follows) = with_poles(ring, &leaves);
-        let n = points.len() as u32;
-        for &(uv, position) in &points {
-            nodes.push(Node { uv, place: place(position, &own), position });
-        }
-        for (k, follow) in (0..n).zip(follows) {
-            let (a, b) = (first + k, first + (k + 1) % n);
-            segments.push([a, b]);
-            if let Follows::Edge { side, t } = follow {
-                let u = sides[side as usize];
-                let (x, y) = (nodes[a as usize], nodes[b as usize]);
-                if let Some(edge) = u.edge {
-                    let curve = &part.edges[edge.0 as usize].curve;
-                    trims.insert(key(a, b), Trim::new(sheet, curve, u, t, [x.uv, y.uv], [x.place, y.place]));
-                    followed.insert(key(a, b), edge);
-                }
-            }
-        }
-    }
-    let fixed: FxHashMap<[u32; 2], ()> = segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
-    let outline = Outline {
-        nodes,
-        segments,
-        trims,
-        scale: scale(sheet, &rings, &leaves),
-        next: (shared.len() + own.len()) as u32,
-    };
-    let strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
-    let known = shared.len() + own.len();
+    let mut own = rings.own;
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
     let mut out =
         FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
-    out.crossing = strip.conflicts.iter().filter_map(|s| followed.get(&key(s[0], s[1])).copied()).collect();
+    out.crossing = strip.conflicts.iter().filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };
-    for f in &grid.facets {
-        emit.facet(f.nodes, None, f.bound, f.tolerance);
+    for &(nodes, bound, tolerance) in &grid.quads {
+        emit.facet(nodes, None, bound, tolerance);
     }
     for f in pair::join(&strip, &fixed, &mut prover) {
         emit.facet(f.nodes, f.pole, f.bound, f.tolerance);
     }
     (!emit.out.facets.is_empty()).then_some(emit.out)
+}
+
+/// The rings as nodes and segments.
+struct Border {
+    nodes: Vec<Node>,
+    segments: Vec<[u32; 2]>,
+    trims: FxHashMap<[u32; 2], Trim>,
+    /// The edge that a segment follows.
+    followed: FxHashMap<[u32; 2], EdgeId>,
+    /// Segments that are one point in space.
+    poles: Vec<[u32; 2]>,
+}
+
+fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, shared: &[Point]) -> Border {
+    let place = |position: u32| {
+        let p = position as usize;
+        shared.get(p).or_else(|| rings.own.get(p - shared.len())).copied().unwrap_or(Point::ZERO)
+    };
+    let mut out = Border {
+        nodes: Vec::new(),
+        segments: Vec::new(),
+        trims: FxHashMap::default(),
+        followed: FxHashMap::default(),
+        poles: Vec::new(),
+    };
+    let sides: Vec<_> = loops.iter().flat_map(|l| &l.uses).collect();
+    for ring in &rings.rings {
+        let first = out.nodes.len() as u32;
+        let n = ring.len() as u32;
+        out.nodes.extend(ring.iter().map(|v| Node { uv: v.uv, place: place(v.position), position: v.position }));
+        for (k, v) in (0..n).zip(ring) {
+            let (a, b) = (first + k, first + (k + 1) % n);
+            match v.follows {
+                Follows::Pole => out.poles.push([a, b]),
+                Follows::Seam => out.segments.push([a, b]),
+                Follows::Edge { side, t } => {
+                    out.segments.push([a, b]);
+                    let u = sides[side as usize];
+                    let (x, y) = (out.nodes[a as usize], out.nodes[b as usize]);
+                    if let Some(edge) = u.edge {
+                        let curve = &part.edges[edge.0 as usize].curve;
+                        let trim = Trim::new(sheet, curve, u, t, [x.uv, y.uv], [x.place, y.place]);
+                        out.trims.insert(key(a, b), trim);
+                        out.followed.insert(key(a, b), edge);
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+impl Border {
+    /// Divides poles where the cells beside them are.
+    fn divide_poles(&mut self, leaves: &Leaves) {
+        for [from, to] in std::mem::take(&mut self.poles) {
+            let (a, b) = (self.nodes[from as usize].uv, self.nodes[to as usize].uv);
+            let d = if (b - a).x.abs() > (b - a).y.abs() { 0 } else { 1 };
+            let (lo, hi) = (a[d].min(b[d]), a[d].max(b[d]));
+            let touching = leaves.border.iter().filter(|c| {
+                let slack = 1e-6 * (c.hi[1 - d] - c.lo[1 - d]);
+                c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
+            });
+            let mut at: Vec<f64> =
+                touching.flat_map(|c| [c.lo[d], c.hi[d]]).filter(|&x| x > lo && x < hi).collect();
+            at.sort_by(f64::total_cmp);
+            at.dedup_by(|y, x| *y - *x < 1e-9 * (hi - lo));
+            if a[d] > b[d] {
+                at.reverse();
+            }
+            let mut last = from;
+            for x in at {
+                let mut uv = a.lerp(b, (x - a[d]) / (b[d] - a[d]));
+                uv[d] = x;
+                let id = self.nodes.len() as u32;
+                self.nodes.push(Node { uv, ..self.nodes[from as usize] });
+                self.segments.push([last, id]);
+                last = id;
+            }
+            self.segments.push([last, to]);
+        }
+    }
 }
 
 struct Emit<'e, 's, 'a> {
@@ -165,44 +226,10 @@ impl Emit<'_, '_, '_> {
     }
 }
 
-/// Vertices of a ring, with poles divided where the cells beside them are.
-fn with_poles(ring: &[rings::RingVertex], leaves: &Leaves) -> (Vec<(Uv, u32)>, Vec<Follows>) {
-    let (mut points, mut follows) = (Vec::new(), Vec::new());
-    for (i, v) in ring.iter().enumerate() {
-        points.push((v.uv, v.position));
-        follows.push(v.follows);
-        if v.follows != Follows::Pole {
-            continue;
-        }
-        let (a, b) = (v.uv, ring[(i + 1) % ring.len()].uv);
-        let d = if (b - a).x.abs() > (b - a).y.abs() { 0 } else { 1 };
-        let (lo, hi) = (a[d].min(b[d]), a[d].max(b[d]));
-        let touching = leaves.border.iter().filter(|c| {
-            let slack = 1e-6 * (c.hi[1 - d] - c.lo[1 - d]);
-            c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
-        });
-        let mut at: Vec<f64> = touching.flat_map(|c| [c.lo[d], c.hi[d]]).filter(|&x| x > lo && x < hi).collect();
-        at.sort_by(f64::total_cmp);
-        at.dedup_by(|y, x| *y - *x < 1e-9 * (hi - lo));
-        if a[d] > b[d] {
-            at.reverse();
-        }
-        for x in at {
-            let f = (x - a[d]) / (b[d] - a[d]);
-            let mut uv = a.lerp(b, f);
-            uv[d] = x;
-            points.push((uv, v.position));
-            follows.push(Follows::Pole);
-        }
-    }
-    (points, follows)
-}
-
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that
 /// the strip's triangles lie along the direction that does not bend.
 fn scale(sheet: &Sheet<'_>, rings: &Rings, leaves: &Leaves) -> Uv {
-    let points = rings.rings.iter().flatten().map(|v| v.uv);
-    let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let (lo, hi) = rings.bounds();
     let n = 5;
     let grid = |k: usize| lo + (Uv::new((k / n) as f64, (k % n) as f64) + 0.5) / n as f64 * (hi - lo);
     // Cells at the border are where the strip will be.

@@ -19,6 +19,8 @@ mod cells;
 mod edges;
 mod face;
 mod grid;
+mod ladder;
+mod look;
 mod matching;
 mod net;
 mod pair;

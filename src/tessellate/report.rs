@@ -135,7 +135,7 @@ pub(super) fn fill(made: &mut Tessellation, model: &Model, settings: &Settings, 
     let areas: Vec<f64> = (0..mesh.facets.len()).map(|f| mesh.facet_area(f)).collect();
     report.area_mm2 = areas.iter().sum();
     let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
-    report.quad_area_share = if report.area_mm2 > 0.0 { in_quads / report.area_mm2 } else { 0.0 };
+    report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
     report.faces.failed = failed.len();
     report.faces.meshed = model.placed_face_count() - failed.len();
     name_uncertified(&mut report, made, model);

@@ -34,6 +34,14 @@ pub(super) struct Rings {
     pub(super) own: Vec<Point>,
 }
 
+impl Rings {
+    /// The box around all polygons.
+    pub(super) fn bounds(&self) -> (Uv, Uv) {
+        let all = self.rings.iter().flatten();
+        all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
+    }
+}
+
 /// The loops of a face; of an untrimmed one, the rim of its domain.
 pub(super) fn loops(face: &Face) -> Vec<TrimLoop> {
     if !face.loops.is_empty() {

@@ -77,8 +77,11 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
         handles: Vec::new(),
     };
     let mut conflicts = Vec::new();
-    for n in 0..work.nodes.len() as u32 {
-        let handle = work.insert(n)?;
+    // Nodes inside whole cells are left out, but in a long outline they keep the region that a constraint clears small.
+    let mut used = vec![outline.segments.len() > 4000; work.nodes.len()];
+    outline.segments.iter().flatten().for_each(|&n| used[n as usize] = true);
+    for (n, used) in (0..).zip(used) {
+        let handle = if used { Some(work.insert(n)?) } else { None };
         work.handles.push(handle);
     }
     for &[a, b] in &outline.segments {
@@ -88,8 +91,8 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
     }
     let rings = (!conflicts.is_empty()).then_some(&outline.segments);
     let mut known: FxHashMap<[u32; 3], (f64, f64)> = FxHashMap::default();
-    let initial = work.nodes.len();
-    let most = (initial * 6 + 4000).min(budget.max(initial));
+    let (initial, budget) = (work.cdt.num_vertices(), budget.max(work.cdt.num_vertices()));
+    let most = (initial * 6 + 4000).min(budget);
     for round in 0..=ROUNDS {
         let triangles = work.inside(rings);
         let fresh: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
@@ -106,7 +109,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
         let bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
         if bad.is_empty()
             || round == ROUNDS
-            || work.nodes.len() >= most
+            || work.cdt.num_vertices() >= most
             || !work.refine(&bad, &outline.trims, &known)
         {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
@@ -122,7 +125,7 @@ fn sorted(mut t: [u32; 3]) -> [u32; 3] {
 }
 
 /// Bound and tolerance of one triangle, the border's own deviation included.
-fn prove(
+pub(super) fn prove(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
     nodes: &[Node],
@@ -164,7 +167,8 @@ struct Work<'s, 'a> {
     cdt: Cdt,
     /// How often each constraint edge of the triangulation turns outside into inside.
     odd: FxHashMap<[u32; 2], u32>,
-    handles: Vec<spade::handles::FixedVertexHandle>,
+    /// Of those nodes that are in the triangulation.
+    handles: Vec<Option<spade::handles::FixedVertexHandle>>,
 }
 
 impl Work<'_, '_> {
@@ -174,7 +178,7 @@ impl Work<'_, '_> {
         let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
         if self.cdt.num_vertices() == before {
             // The place was taken: its first owner keeps it.
-            let first = self.handles.iter().position(|&h| h == handle).unwrap_or(n as usize) as u32;
+            let first = self.handles.iter().position(|&h| h == Some(handle)).unwrap_or(n as usize) as u32;
             self.cdt.vertex_data_mut(handle).node = first;
         }
         Some(handle)
@@ -197,7 +201,7 @@ impl Work<'_, '_> {
     }
 
     fn constrain(&mut self, a: u32, b: u32) -> bool {
-        let (from, to) = (self.handles[a as usize], self.handles[b as usize]);
+        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
         if from == to {
             return true;
         }
@@ -304,7 +308,7 @@ impl Work<'_, '_> {
             self.nodes.push(Node { uv, place, position: self.next });
             match self.insert(n) {
                 Some(h) => {
-                    self.handles.push(h);
+                    self.handles.push(Some(h));
                     self.next += 1;
                     done = true;
                 }

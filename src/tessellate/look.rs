@@ -1,0 +1,80 @@
+//! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
+
+use super::bound::{Prover, from_line};
+use super::cells::Cell;
+use super::sheet::Sheet;
+use crate::math::{Point, Uv};
+
+/// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
+pub(super) type Corners = [(Uv, Point); 4];
+
+/// Bound of a quad's two triangles, edges and diagonal included.
+pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
+    let mut worst = 0f64;
+    for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
+        worst = worst.max(prover.piece([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit));
+        if worst > limit {
+            return worst;
+        }
+    }
+    for [i, j] in [[0, 2], [0, 1], [1, 2], [2, 3], [3, 0]] {
+        worst = worst.max(prover.side([c[i].0, c[j].0], [c[i].1, c[j].1], limit));
+        if worst > limit {
+            return worst;
+        }
+    }
+    worst
+}
+
+/// Nine points of a cell and what they show.
+pub(super) struct Look {
+    p: [[Point; 3]; 3],
+    /// Largest distance of a middle from its chord, for lines along u and along v.
+    pub(super) sag: [f64; 2],
+}
+
+impl Look {
+    pub(super) fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
+        let step = 0.5 * (cell.hi - cell.lo);
+        let at = |i: usize, j: usize| {
+            let mut uv = cell.lo + step * Uv::new(i as f64, j as f64);
+            if i == 2 {
+                uv.x = cell.hi.x;
+            }
+            if j == 2 {
+                uv.y = cell.hi.y;
+            }
+            sheet.point(uv)
+        };
+        let p: [[Point; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)));
+        let u = (0..3).map(|j| from_line(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
+        let v = (0..3).map(|i| from_line(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
+        Self { p, sag: [u, v] }
+    }
+
+    pub(super) fn direction(&self) -> usize {
+        let [u, v] = self.sag;
+        let p = &self.p;
+        let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
+        if (u - v).abs() > 0.05 * u.max(v) {
+            return if u > v { 0 } else { 1 };
+        }
+        let along_u = length(0, 1, 2, 1).max(length(0, 1, 1, 1));
+        let along_v = length(1, 0, 1, 2).max(length(1, 0, 1, 1));
+        if along_u >= along_v { 0 } else { 1 }
+    }
+
+    /// The cell as a facet, cut along the diagonal that lies nearer to the surface.
+    pub(super) fn facet(&self, cell: Cell) -> Corners {
+        let p = [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]];
+        let uv = cell.corners();
+        let m = self.p[1][1];
+        let r = if from_line(m, &[p[1], p[3]]) < from_line(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 };
+        std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4]))
+    }
+}
+
+/// The facet of a cell with its better diagonal.
+pub(super) fn facet_of(sheet: &Sheet<'_>, cell: Cell) -> Corners {
+    Look::new(sheet, cell).facet(cell)
+}
