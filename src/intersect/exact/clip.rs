@@ -59,8 +59,9 @@ impl Exact {
             .collect();
         let mut rect = [[0.0, 1.0]; 2];
         for d in 0..2 {
-            if leaf.beyond[d] > 1e-9 {
-                rect[d] = [-leaf.beyond[d], 1.0 + leaf.beyond[d]];
+            let [lo, hi] = leaf.reach[d];
+            if lo < -1e-9 || hi > 1.0 + 1e-9 {
+                rect[d] = [if lo < -1e-9 { lo } else { 0.0 }, if hi > 1.0 + 1e-9 { hi } else { 1.0 }];
                 net::restrict(&mut root, degree, d, rect[d]);
             }
         }

@@ -78,8 +78,9 @@ impl Geometry {
             match placed.face {
                 Some(face) if is_usable(face) => {
                     let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
-                        geometry.trims.push(Trim::new(face, band.max(2.0 * face.gap.min(0.05))));
-                        geometry.grids.push(PatchGrid::new(face));
+                        let grid = PatchGrid::new(face);
+                        geometry.trims.push(Trim::new(face, grid.closed, band.max(2.0 * face.gap.min(0.05))));
+                        geometry.grids.push(grid);
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
                     geometry.place(&placed, face, trim, grid);

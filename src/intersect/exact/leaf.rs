@@ -4,7 +4,7 @@
 //! [`EXTENSION`], an axis-parallel and an oriented box. Patches are halved until the derivative boxes, preconditioned by the
 //! inverse of their middles, deviate from the identity by less than `Settings::flatness` when seen along the normal.
 
-use super::geometry::{Geometry, Patch};
+use super::geometry::{Geometry, Patch, PatchGrid};
 use super::net::{self, Net, Slopes, V4};
 use super::trim::Region;
 use super::wide;
@@ -36,8 +36,9 @@ pub(super) struct Leaf {
     pub(super) radius: f64,
     /// Bound of the error of the control points, mm.
     pub(super) slop: f64,
-    /// How far roots beyond the domain still count, local units: positive where a trim may lie on the border.
-    pub(super) beyond: [f64; 2],
+    /// The rectangle in which roots count, local units: wider than the unit square on sides that are the border of a surface
+    /// along which a trim may run.
+    pub(super) reach: [[f64; 2]; 2],
     /// First control point in the pool.
     pub(super) net: u32,
     pub(super) patch: u32,
@@ -107,7 +108,10 @@ pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
             leaf.whole = region == Region::Inside;
             leaf.patch = index;
             leaf.face = patch.face;
-            widen_border(&mut leaf, trim.whole, geometry.faces[patch.face as usize].band);
+            let face = &geometry.faces[patch.face as usize];
+            if !trim.whole && !leaf.whole {
+                widen(&mut leaf, border_sides(&geometry.grids[face.grid as usize], patch, rect), face.band);
+            }
             leaf.net = out.pool.len() as u32;
             out.pool.extend(centred);
             out.leaves.push(leaf);
@@ -175,7 +179,7 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
         ohi: ohi + pad,
         radius,
         slop,
-        beyond: [1e-12; 2],
+        reach: [[-1e-12, 1.0 + 1e-12]; 2],
         net: 0,
         patch: 0,
         face: 0,
@@ -186,21 +190,34 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
     (leaf, centred)
 }
 
+/// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border.
+fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool; 2]; 2] {
+    [0, 1].map(|d: usize| {
+        let ends = [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]];
+        [0, 1].map(|end| !grid.closed[d] && rect[d][end] == end as f64 && patch.domain[d][end] == ends[end])
+    })
+}
+
 /// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
-/// side of the shared edge decides there, not the end of the surface.
-fn widen_border(leaf: &mut Leaf, untrimmed: bool, band: f64) {
-    if untrimmed || leaf.whole {
-        return;
-    }
+/// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
+fn widen(leaf: &mut Leaf, border: [[bool; 2]; 2], band: f64) {
     // Roots on grazed faces stray beyond the band by the inverse of the sine.
-    let reach = 32.0 * band;
+    let far = 32.0 * band;
     for (d, slope) in [&leaf.slopes.u, &leaf.slopes.v].into_iter().enumerate() {
-        leaf.beyond[d] = (reach / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
+        let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
+        if border[d][0] {
+            leaf.reach[d][0] = -beyond;
+        }
+        if border[d][1] {
+            leaf.reach[d][1] = 1.0 + beyond;
+        }
     }
-    leaf.lo -= reach;
-    leaf.hi += reach;
-    leaf.olo -= reach;
-    leaf.ohi += reach;
+    if border.iter().flatten().any(|&b| b) {
+        leaf.lo -= far;
+        leaf.hi += far;
+        leaf.olo -= far;
+        leaf.ohi += far;
+    }
 }
 
 fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {

@@ -2,7 +2,9 @@
 
 use crate::math::Uv;
 use crate::model::{EdgeId, Face};
+use crate::nurbs::UvCurve;
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 /// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
@@ -14,7 +16,7 @@ pub(super) struct Piece {
     /// Hull of the control points and the ends.
     pub(super) min: Uv,
     pub(super) max: Uv,
-    /// The shared edge it belongs to; `None` for seams and poles.
+    /// The shared edge it belongs to; `None` for poles, and for seams where the surface closes on itself.
     pub(super) edge: Option<EdgeId>,
     /// Whether the loop runs against the piece.
     pub(super) reversed: bool,
@@ -126,18 +128,25 @@ impl Piece {
     }
 }
 
-/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed.
-pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
+/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed; `closed` says in
+/// which parameters the surface closes on itself.
+pub(super) fn pieces_of(face: &Face, closed: [bool; 2], longest: Uv) -> Vec<Piece> {
     let mut all = Vec::new();
+    let mut uses: FxHashMap<EdgeId, u32> = FxHashMap::default();
+    for edge in face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge) {
+        *uses.entry(edge).or_default() += 1;
+    }
     for trim in &face.loops {
         let first = all.len();
         for edge_use in &trim.uses {
             let start = all.len();
+            let twice = edge_use.edge.is_some_and(|e| uses[&e] > 1);
+            let edge = edge_use.edge.filter(|_| !(twice && is_seam(face, closed, &edge_use.uv)));
             let breaks = edge_use.uv.breakpoints();
             for (points, range) in edge_use.uv.bezier_pieces().into_iter().zip(breaks.windows(2)) {
                 if points.iter().all(|p| p.is_finite() && p.z > 0.0) {
                     let whole = (points.into(), [range[0], range[1]], 0);
-                    split(&mut all, whole, longest, (edge_use.edge, edge_use.reversed));
+                    split(&mut all, whole, longest, (edge, edge_use.reversed));
                 }
             }
             if edge_use.reversed {
@@ -157,6 +166,16 @@ pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
         }
     }
     all
+}
+
+/// Whether a curve runs along an end of the domain where the surface closes on itself: nothing ends there.
+fn is_seam(face: &Face, closed: [bool; 2], curve: &UvCurve) -> bool {
+    let domain = face.surface.domain();
+    (0..2).any(|d| {
+        let [lo, hi] = domain[d];
+        let on = |end: f64| curve.points.iter().all(|p| (p.truncate()[d] / p.z - end).abs() <= 1e-9 * (hi - lo));
+        closed[d] && (on(lo) || on(hi))
+    })
 }
 
 /// Most pieces that one Bézier piece of a trim is split into.

@@ -102,7 +102,7 @@ impl Exact {
         let du = -(y00 * f1 + y01 * f2);
         let dv = -(y10 * f1 + y11 * f2);
         let margin = 1e-14 + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
-        let half = [0.5 + leaf.beyond[0], 0.5 + leaf.beyond[1]];
+        let half = leaf.reach.map(|[lo, hi]| (0.5 - lo).max(hi - 0.5));
         let reach_u = half[0] * (1.0 + row_u + 1e-6) + margin;
         let reach_v = half[1] * (1.0 + row_v + 1e-6) + margin;
         if du.abs() > reach_u || dv.abs() > reach_v {
@@ -143,8 +143,9 @@ impl Exact {
             return self.clip(q, index);
         }
         // The only root of the enlarged domain: outside of the leaf it is another leaf's.
-        let e = 1e-12 + margin;
-        if !(within(u, leaf.beyond[0] + e) && within(v, leaf.beyond[1] + e)) {
+        let e = margin;
+        let counts = |x: f64, [lo, hi]: [f64; 2]| x >= lo - e && x <= hi + e;
+        if !(counts(u, leaf.reach[0]) && counts(v, leaf.reach[1])) {
             return;
         }
         let p = Vector::new(s[0], s[1], s[2]) / s[3];

@@ -44,7 +44,7 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    pub(super) fn new(face: &Face, band: f64) -> Self {
+    pub(super) fn new(face: &Face, closed: [bool; 2], band: f64) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
         let segments: usize = face.loops.iter().flat_map(|l| &l.uses).map(|u| u.uv.points.len()).sum();
@@ -56,7 +56,7 @@ impl Trim {
         };
         let cell = extent / n as f64;
         let mut trim = Self {
-            pieces: pieces_of(face, cell),
+            pieces: pieces_of(face, closed, cell),
             origin: Uv::new(u0, v0),
             density: Uv::ONE / cell,
             count: [n, n],

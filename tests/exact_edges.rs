@@ -1,0 +1,137 @@
+//! Rays through edges that two faces share: each must find exactly one of the two, or both or none where the surface folds
+//! away from the ray.
+
+mod exact_common;
+use exact_common::*;
+use lampyris::intersect::{Certainty, Cost};
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::math::{Aabb, Frame, Point, Ray, Vector};
+use lampyris::model::{Edge, Model};
+use std::path::{Path, PathBuf};
+
+fn read(path: &Path) -> Option<Model> {
+    lampyris::step::read(path, &lampyris::step::Settings::default()).ok().map(|i| i.model)
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut files: Vec<_> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    files.retain(|p| p.extension().is_some_and(|e| e == "stp" || e == "step"));
+    files.sort();
+    files
+}
+
+/// Edges of the parts whose every edge is used exactly twice, with the placements of their instances.
+fn closed_edges(model: &Model) -> Vec<(&Edge, &Frame)> {
+    let mut edges = Vec::new();
+    for instance in &model.instances {
+        let part = &model.parts[instance.part.0 as usize];
+        let mut uses = vec![0; part.edges.len()];
+        let loops = part.shells.iter().flat_map(|s| &s.faces).flat_map(|f| &f.loops);
+        loops.flat_map(|l| &l.uses).filter_map(|u| u.edge).for_each(|e| uses[e.0 as usize] += 1);
+        if part.shells.iter().all(|s| s.closed) && uses.iter().all(|&n| n == 2) {
+            edges.extend(part.edges.iter().map(|e| (e, &instance.placement)));
+        }
+    }
+    edges
+}
+
+#[derive(Default, Debug)]
+struct Found {
+    rays: u32,
+    /// Rays that cross closed shells an odd number of times.
+    odd: u32,
+    /// Of these, the ones without any flag.
+    silent: u32,
+}
+
+fn bounds(model: &Model) -> Aabb {
+    model.placed_faces().filter_map(|p| p.face.map(|f| (f, p.placement))).fold(Aabb::EMPTY, |b, (f, place)| {
+        b.union(Aabb::around(f.surface.points.iter().map(|p| place.point(p.project()))))
+    })
+}
+
+/// `ends`: aims at the vertices instead of the curves' insides.
+fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
+    let exact = Exact::build(model, &Settings::default());
+    let edges = closed_edges(model);
+    let mut found = Found::default();
+    if edges.is_empty() {
+        return found;
+    }
+    let show = std::env::var("SHOW").is_ok();
+    let mut s = Stream(17);
+    let reach = 4.0 * bounds(model).diagonal();
+    for k in 0..n {
+        let (edge, placement) = edges[(s.next() * edges.len() as f64) as usize];
+        let [a, b] = edge.curve.domain();
+        let at = if ends { a } else { s.within(a, b) };
+        let target: Point = placement.point(edge.curve.evaluate(at));
+        // Two thirds pass by at distances down to a micrometre's thousandth.
+        let off: Vector = if k % 3 == 0 { Vector::ZERO } else { s.direction() * 10f64.powf(s.within(-12.0, -2.5)) };
+        let d = s.direction();
+        found.rays += 1;
+        let ray = Ray::new(target + off - d * reach, d);
+        let crossings = exact.crossings(&ray, &mut Cost::default());
+        if crossings.len() % 2 == 0 {
+            continue;
+        }
+        found.odd += 1;
+        let flagged = crossings.iter().any(|h| h.certainty != Certainty::Certified)
+            || exact.first(&ray.within(reach - 0.5, reach + 0.5), &mut Cost::default()).near_trim;
+        found.silent += u32::from(!flagged);
+        if show {
+            println!(
+                "{name}: flagged {flagged} edge #{:?} [{a} {b}] at {at} target {target:?} off {:e} d {d:?}",
+                edge.entity, off.length()
+            );
+            for c in crossings.iter() {
+                println!("   t {:.9} face {:?} uv {:?} n.d {:.4} {:?}", c.t - reach, c.face, c.uv, c.normal.dot(d), c.certainty);
+            }
+        }
+    }
+    found
+}
+
+/// Rays at random: on a shell without border each must cross an even number of times.
+fn at_random(model: &Model, n: usize) -> u32 {
+    let exact = Exact::build(model, &Settings::default());
+    let b = bounds(model);
+    let mut s = Stream(7);
+    let mut odd = 0;
+    for _ in 0..n {
+        let ray = s.ray(b.center(), 0.5 * b.size());
+        odd += (exact.crossings(&ray, &mut Cost::default()).len() % 2) as u32;
+    }
+    odd
+}
+
+#[test]
+fn fixtures_find_exactly_one_face_at_an_edge() {
+    for path in files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step")) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let model = read(&path).expect("fixtures are readable");
+        for ends in [false, true] {
+            let found = through_edges(&name, &model, 3000, ends);
+            println!("{name} {ends} {found:?}");
+            assert_eq!(found.odd, 0, "{name}: {found:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "minutes: every corpus model that reads"]
+fn corpus_finds_exactly_one_face_at_an_edge() {
+    let folder = std::env::var_os("LAMPYRIS_CORPUS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/step-corpus"), PathBuf::from);
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
+    for path in files(&folder) {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if !name.contains(&only) {
+            continue;
+        }
+        let Some(model) = read(&path) else { continue };
+        let found = [false, true].map(|ends| through_edges(&name, &model, 3000, ends));
+        println!("{name:44} {found:?} odd at random {}", at_random(&model, 2000));
+    }
+}
