@@ -1,61 +1,175 @@
 //! Which side of a shared edge a ray passes: one computation that both faces of the edge ask, so that a ray which crosses
 //! a closed shell at an edge finds exactly one of them.
 //!
-//! The edge's curve is seen along the ray, as a plane curve about the ray at the origin. Newton's method runs to its nearest
-//! point from one of [`SEEDS`] fixed parameters, so that both faces compute the same bits.
+//! The edges near a root are seen along the ray, as plane curves about the ray at the origin, and the nearest one decides: by
+//! its side where it is met in its inside, together with its neighbour in the loop where it is met at a vertex. Newton's
+//! method runs to the nearest point from one of [`SEEDS`] fixed parameters and ends on one of [`STATIONS`], so that all
+//! faces compute the same bits. A ray through a vertex itself falls into one of the sectors between its edges' directions.
 
 use super::geometry::{FaceRecord, Geometry};
 use super::query::Query;
+use super::trim::{Near, Trim};
+use super::uses;
 use crate::math::{Point, Vector};
 use crate::nurbs::Curve;
 
 /// Fixed parameters from which the nearest point is sought.
 const SEEDS: f64 = 64.0;
+/// Fixed parameters at which it may lie; what is lost is the square of 1e-12 of the edge.
+const STATIONS: f64 = (1u64 << 40) as f64;
 
-/// Whether the ray passes to the left of the edge, seen along the ray; `None` when the ray runs along the edge.
-fn left_of(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<bool> {
+/// Rays this near to a vertex are told by sectors, mm: what rounds the sides there is a thousandth of it.
+pub(super) const AT_VERTEX: f64 = 1e-9;
+/// Directions at a vertex are chords over this part of the edge, which tells edges apart that touch there.
+const CHORD: f64 = 1.0 / 1024.0;
+
+/// How a ray passes an edge.
+#[derive(Clone, Copy, Debug)]
+struct Pass {
+    /// To the left of the edge in the sense of its parameter, seen along the ray.
+    left: bool,
+    /// Distance from the ray, in the units of the part.
+    distance: f64,
+    /// The direction of the edge there, across the ray.
+    along: [f64; 2],
+    /// Whether it is nearest at its start or at its end.
+    end: Option<bool>,
+}
+
+/// How a ray, the frame's origin and the two directions across it, passes an edge near a parameter; `None` when it runs
+/// along the edge.
+fn pass(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<Pass> {
     let [t0, t1] = curve.domain();
-    let relative = ((near - t0) / (t1 - t0) * SEEDS).round().clamp(0.0, SEEDS);
-    let mut t = t0 + (t1 - t0) * relative / SEEDS;
-    let mut side = None;
-    for step in 0..24 {
-        let c = curve.derivatives(t);
+    let seed = ((near - t0) / (t1 - t0) * SEEDS).round().clamp(0.0, SEEDS);
+    // Relative to the domain.
+    let mut s = seed / SEEDS;
+    let at = |s: f64| {
+        let c = curve.derivatives(if s == 1.0 { t1 } else { t0 + (t1 - t0) * s });
         let (x, d) = (c.point - o, c.first);
-        let (x, d) = ((n1.dot(x), n2.dot(x)), (n1.dot(d), n2.dot(d)));
-        let length = d.0 * d.0 + d.1 * d.1;
-        if !(length > 1e-20 * c.first.length_squared()) {
-            return None;
-        }
-        side = Some(d.1 * x.0 - d.0 * x.1 > 0.0);
-        let next = (t - (x.0 * d.0 + x.1 * d.1) / length).clamp(t0, t1);
-        // Past quadratic convergence the iterate alternates in its last bits: an even number of steps fixes which.
-        if (next - t).abs() <= 1e-15 * (t1 - t0) || step >= 20 {
+        let (x, d) = ([n1.dot(x), n2.dot(x)], [n1.dot(d), n2.dot(d)]);
+        let length = d[0] * d[0] + d[1] * d[1];
+        (length > 1e-20 * c.first.length_squared()).then_some((x, d, length))
+    };
+    for _ in 0..24 {
+        let (x, d, length) = at(s)?;
+        let step = (x[0] * d[0] + x[1] * d[1]) / (length * (t1 - t0));
+        let next = (s - step.clamp(-4.0 / SEEDS, 4.0 / SEEDS)).clamp(0.0, 1.0);
+        let done = (next - s).abs() <= 1e-15;
+        s = next;
+        if done {
             break;
         }
-        t = next;
     }
-    side
+    s = (s * STATIONS).round() / STATIONS;
+    let (x, along, _) = at(s)?;
+    let left = along[1] * x[0] - along[0] * x[1] > 0.0;
+    let end = (s == 0.0 || s == 1.0).then_some(s == 1.0);
+    Some(Pass { left, distance: x[0].hypot(x[1]), along, end })
 }
 
 impl Geometry {
-    /// Whether a root of a face near one of its trims counts, by the side of the shared edge; `None` where no edge can tell.
+    /// Whether a root of a face near its trims counts, by the sides of the shared edges; `None` where no edge can tell.
     ///
-    /// `facing` is the sign of `(Su × Sv) · d` at the root, `piece` and `t` the nearest trimming piece and the parameter on it.
-    pub(super) fn side_of_edge(
+    /// `facing` is the sign of `(Su × Sv) · d` at the root, `near` what trims there are about it.
+    pub(super) fn side_of_edges(
         &self,
         face: &FaceRecord,
+        trim: &Trim,
         q: &Query,
         facing: f64,
-        (piece, t): (u32, f64),
+        near: &[Near],
     ) -> Option<bool> {
-        let piece = &self.trims[face.trim as usize].pieces[piece as usize];
-        let curve = self.edges.get(face.part as usize)?.get(piece.edge?.0 as usize)?;
-        let parameter = piece.range[0] + (piece.range[1] - piece.range[0]) * t;
         let place = &face.placement;
         // Mirrored placements turn sides around; `facing` is measured in the world as well, so the frame stays the world's.
         let o: Point = place.local_point(q.o);
         let frame = [o, place.local_direction(q.n1), place.local_direction(q.n2)];
-        let left = left_of(curve, parameter, frame)?;
-        Some(left ^ piece.reversed ^ (facing < 0.0))
+        let curve = |owner: u32| {
+            let edge = trim.uses[owner as usize].edge?;
+            self.edges.get(face.part as usize)?.get(edge.0 as usize)
+        };
+        // The side on which the face lies, and the edge's direction in the loop, with the face to its left.
+        let mirrored = facing < 0.0;
+        if let Some(inside) = self.in_sector(face, trim, near, mirrored, frame) {
+            return Some(inside);
+        }
+        let mut best: Option<(u32, Pass)> = None;
+        for n in near.iter().filter(|n| trim.uses[n.owner as usize].edge.is_some()) {
+            let passed = pass(curve(n.owner)?, n.parameter, frame)?;
+            if best.is_none_or(|b| passed.distance < b.1.distance) {
+                best = Some((n.owner, passed));
+            }
+        }
+        let (owner, first) = best?;
+        let inside = |owner: u32, p: &Pass| p.left ^ trim.uses[owner as usize].reversed ^ mirrored;
+        let own = inside(owner, &first);
+        let Some(at_end) = first.end else { return Some(own) };
+        let forward = at_end != trim.uses[owner as usize].reversed;
+        let Some(other) = uses::around(&trim.uses, owner, forward) else { return Some(own) };
+        let other_curve = curve(other)?;
+        // Where the loop comes from the vertex, or goes to it.
+        let its_end = forward == trim.uses[other as usize].reversed;
+        let Some(second) = pass(other_curve, other_curve.domain()[usize::from(its_end)], frame) else {
+            return Some(own);
+        };
+        let direction = |owner: u32, p: &Pass| {
+            let sign = if trim.uses[owner as usize].reversed { -1.0 } else { 1.0 };
+            p.along.map(|x| sign * x)
+        };
+        let (a, b) = (direction(owner, &first), direction(other, &second));
+        let turn = a[0] * b[1] - a[1] * b[0];
+        // The loop turns towards the face at a convex corner.
+        let convex = (turn > 0.0) == (forward != mirrored);
+        let beside = inside(other, &second);
+        Some(if convex { own && beside } else { own || beside })
+    }
+
+    /// Whether a ray through a vertex falls into one of the face's sectors there; `None` when it passes no vertex.
+    ///
+    /// Directions are compared, never subtracted: whatever their rounding, each falls into exactly one of the sectors about a
+    /// vertex.
+    fn in_sector(
+        &self,
+        face: &FaceRecord,
+        trim: &Trim,
+        near: &[Near],
+        mirrored: bool,
+        [o, n1, n2]: [Vector; 3],
+    ) -> Option<bool> {
+        let flat = |x: Vector| [n1.dot(x), n2.dot(x)];
+        let angle = |x: [f64; 2]| x[1].atan2(x[0]);
+        let rounding = 256.0 * f64::EPSILON * o.abs().max_element();
+        let mut found = None;
+        for owner in near.iter().map(|n| n.owner) {
+            for forward in [true, false] {
+                let here = &trim.uses[owner as usize];
+                let Some(edge) = here.edge else { continue };
+                let end = usize::from(forward != here.reversed);
+                let (place, radius) = self.ends[face.part as usize][edge.0 as usize][end];
+                let vertex = flat(place - o);
+                if !(vertex[0].hypot(vertex[1]) <= radius.max(rounding)) {
+                    continue;
+                }
+                let other = uses::around(&trim.uses, owner, forward)?;
+                // Away from the vertex along the loop, and back from it.
+                let (goes, comes) = if forward { (other, owner) } else { (owner, other) };
+                let away = |owner: u32, leaves: bool| {
+                    let u = &trim.uses[owner as usize];
+                    let at_end = leaves == u.reversed;
+                    let curve = &self.edges[face.part as usize][u.edge?.0 as usize];
+                    let [t0, t1] = curve.domain();
+                    let (from, to) =
+                        if at_end { (t1, t1 - (t1 - t0) * CHORD) } else { (t0, t0 + (t1 - t0) * CHORD) };
+                    let chord = curve.evaluate(to) - curve.evaluate(from);
+                    let d = flat(chord);
+                    (d[0].hypot(d[1]) > 1e-10 * chord.length()).then(|| angle(d))
+                };
+                let (from, to) = (away(goes, true)?, away(comes, false)?);
+                let (from, to) = if mirrored { (to, from) } else { (from, to) };
+                let at = angle(vertex.map(|x| -x));
+                let inside = if from < to { from <= at && at < to } else { from <= at || at < to };
+                found = Some(inside || found == Some(true));
+            }
+        }
+        found
     }
 }

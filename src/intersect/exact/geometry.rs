@@ -1,12 +1,16 @@
 //! The model as the tracer sees it: placed faces in world orientation, cut into Bézier patches about centres of their own.
 
+use super::edge::AT_VERTEX;
 use super::net::{Jet, Net, V4};
 use super::trim::Trim;
 use super::wide;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
-use crate::model::{Face, Model, Part, PlacedFace};
+use crate::model::{Edge, Face, Model, Part, PlacedFace};
 use crate::nurbs::{BezierPatch, Curve};
 use rustc_hash::FxHashMap;
+
+/// Gaps of a file wider than this are not bridged, but flagged, mm.
+const MOST_GAP: f64 = 0.05;
 
 /// One placed face.
 #[derive(Debug)]
@@ -26,6 +30,9 @@ pub(super) struct FaceRecord {
     pub(super) part: u32,
     /// Distance from a trim within which the side of the shared edge decides, mm.
     pub(super) band: f64,
+    /// Distance from a trim within which a root is flagged, mm: as far as the file's edges lie off the face, and more
+    /// for rays that graze it.
+    pub(super) flagged: f64,
 }
 
 /// Break lines of a surface's patches.
@@ -34,6 +41,8 @@ pub(super) struct PatchGrid {
     pub(super) breaks: [Vec<f64>; 2],
     /// Whether the surface closes on itself in u and in v.
     pub(super) closed: [bool; 2],
+    /// Whether the side at the low and at the high end of u, and of v, is a single point.
+    pub(super) poles: [[bool; 2]; 2],
 }
 
 /// A rational Bézier patch in world orientation.
@@ -60,6 +69,8 @@ pub(super) struct Geometry {
     pub(super) grids: Vec<PatchGrid>,
     /// Edge curves of each part, in its own coordinates.
     pub(super) edges: Vec<Vec<Curve>>,
+    /// The vertices at their ends, and how far from each its sectors decide, mm: beyond all ends that miss it.
+    pub(super) ends: Vec<Vec<[(Point, f64); 2]>>,
     /// Smallest distance from a trim that is flagged, mm.
     pub(super) band: f64,
     /// Position in `faces` of each placed face that has a surface.
@@ -71,7 +82,12 @@ pub(super) struct Geometry {
 impl Geometry {
     pub(super) fn new(model: &Model, band: f64) -> Self {
         let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
-        let mut geometry = Self { band, edges: model.parts.iter().map(curves).collect(), ..Self::default() };
+        let mut geometry = Self {
+            band,
+            edges: model.parts.iter().map(curves).collect(),
+            ends: model.parts.iter().map(ends_of).collect(),
+            ..Self::default()
+        };
         // Instances share the trims and break lines of their part.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
         for placed in model.placed_faces() {
@@ -79,7 +95,7 @@ impl Geometry {
                 Some(face) if is_usable(face) => {
                     let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
                         let grid = PatchGrid::new(face);
-                        geometry.trims.push(Trim::new(face, grid.closed, band.max(2.0 * face.gap.min(0.05))));
+                        geometry.trims.push(Trim::new(face, grid.closed, band.max(8.0 * face.gap)));
                         geometry.grids.push(grid);
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
@@ -98,9 +114,20 @@ impl Geometry {
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
         // A file's edge may lie off its faces by `gap`: both faces must look that far.
-        let band = (self.band).max(2.0 * face.gap.min(0.05) * placement.scale);
+        let band = (self.band).max(2.0 * face.gap.min(MOST_GAP) * placement.scale);
+        let flagged = self.band.max(8.0 * face.gap * placement.scale);
         let part = placed.part.0;
-        self.faces.push(FaceRecord { id: placed.id, sign, trim, first_patch, grid, placement, part, band });
+        self.faces.push(FaceRecord {
+            id: placed.id,
+            sign,
+            trim,
+            first_patch,
+            grid,
+            placement,
+            part,
+            band,
+            flagged,
+        });
         self.patches.extend(face.surface.bezier_patches().iter().map(|p| Patch::new(p, record, placed)));
     }
 
@@ -113,6 +140,23 @@ impl Geometry {
         };
         face.first_patch + span(0, uv.x) * (grid.breaks[1].len() as u32 - 1) + span(1, uv.y)
     }
+}
+
+/// The vertices at the ends of a part's edges, with the radii within which their sectors decide.
+fn ends_of(part: &Part) -> Vec<[(Point, f64); 2]> {
+    let end = |e: &Edge, k: usize| e.curve.evaluate(e.curve.domain()[k]);
+    let mut radii = vec![AT_VERTEX; part.vertices.len()];
+    for (e, k) in part.edges.iter().flat_map(|e| [(e, 0), (e, 1)]) {
+        let vertex = e.vertices[k].0 as usize;
+        if let (Some(radius), Some(place)) = (radii.get_mut(vertex), part.vertices.get(vertex)) {
+            *radius = radius.max((4.0 * end(e, k).distance(*place)).min(MOST_GAP));
+        }
+    }
+    let place = |e: &Edge, k: usize| {
+        let vertex = e.vertices[k].0 as usize;
+        part.vertices.get(vertex).map_or((end(e, k), AT_VERTEX), |p| (*p, radii[vertex]))
+    };
+    part.edges.iter().map(|e| [place(e, 0), place(e, 1)]).collect()
 }
 
 /// Whether a surface can be traced at all.
@@ -140,14 +184,18 @@ impl PatchGrid {
         });
         let domain = s.domain();
         let tolerance = 1e-9 * (1.0 + s.bounds().diagonal());
-        let closed = [0, 1].map(|d| {
-            (0..5).all(|k| {
-                let other = domain[1 - d][0] + (domain[1 - d][1] - domain[1 - d][0]) * k as f64 / 4.0;
-                let point = |x: f64| s.evaluate(if d == 0 { Uv::new(x, other) } else { Uv::new(other, x) });
-                point(domain[d][0]).distance(point(domain[d][1])) <= tolerance
+        // Five points along the side at the low or high end of a parameter.
+        let side = |d: usize, end: usize| -> [Point; 5] {
+            std::array::from_fn(|k| {
+                let along = domain[1 - d][0] + (domain[1 - d][1] - domain[1 - d][0]) * k as f64 / 4.0;
+                let x = domain[d][end];
+                s.evaluate(if d == 0 { Uv::new(x, along) } else { Uv::new(along, x) })
             })
-        });
-        Self { breaks, closed }
+        };
+        let same = |a: &Point, b: &Point| a.distance(*b) <= tolerance;
+        let closed = [0, 1].map(|d| side(d, 0).iter().zip(&side(d, 1)).all(|(a, b)| same(a, b)));
+        let poles = [0, 1].map(|d| [0, 1].map(|end| side(d, end).iter().all(|p| same(p, &side(d, end)[0]))));
+        Self { breaks, closed, poles }
     }
 }
 

@@ -190,11 +190,15 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
     (leaf, centred)
 }
 
-/// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border.
+/// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border, nor
+/// is a pole, beyond which the surface comes back.
 fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool; 2]; 2] {
     [0, 1].map(|d: usize| {
         let ends = [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]];
-        [0, 1].map(|end| !grid.closed[d] && rect[d][end] == end as f64 && patch.domain[d][end] == ends[end])
+        [0, 1].map(|end| {
+            let ends_here = rect[d][end] == end as f64 && patch.domain[d][end] == ends[end];
+            ends_here && !grid.closed[d] && !grid.poles[d][end]
+        })
     })
 }
 

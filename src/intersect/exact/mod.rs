@@ -30,6 +30,7 @@ mod trace;
 pub mod traditional;
 mod tree;
 mod trim;
+mod uses;
 mod wide;
 
 use super::{Certainty, Cost, Footprint, Hit, Intersector};

@@ -1,10 +1,8 @@
 //! Pieces of trimming curves that are monotone in v: what the in/out test counts.
 
 use crate::math::Uv;
-use crate::model::{EdgeId, Face};
-use crate::nurbs::UvCurve;
+use crate::model::Face;
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 /// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
@@ -16,8 +14,8 @@ pub(super) struct Piece {
     /// Hull of the control points and the ends.
     pub(super) min: Uv,
     pub(super) max: Uv,
-    /// The shared edge it belongs to; `None` for poles, and for seams where the surface closes on itself.
-    pub(super) edge: Option<EdgeId>,
+    /// Index of the use it belongs to, in the order of the face's loops.
+    pub(super) owner: u32,
     /// Whether the loop runs against the piece.
     pub(super) reversed: bool,
     /// The edge's parameters at the ends.
@@ -25,11 +23,11 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], (edge, reversed): (Option<EdgeId>, bool)) -> Self {
+    fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], (owner, reversed): (u32, bool)) -> Self {
         let at = |p: &DVec3| p.truncate() / p.z;
         let v = [at(&points[0]).y, at(&points[points.len() - 1]).y];
         let (min, max) = (Uv::INFINITY, Uv::NEG_INFINITY);
-        let mut piece = Self { points, v, min, max, edge, reversed, range };
+        let mut piece = Self { points, v, min, max, owner, reversed, range };
         piece.update_hull();
         piece
     }
@@ -128,30 +126,25 @@ impl Piece {
     }
 }
 
-/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed; `closed` says in
-/// which parameters the surface closes on itself.
-pub(super) fn pieces_of(face: &Face, closed: [bool; 2], longest: Uv) -> Vec<Piece> {
+/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed.
+pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
     let mut all = Vec::new();
-    let mut uses: FxHashMap<EdgeId, u32> = FxHashMap::default();
-    for edge in face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge) {
-        *uses.entry(edge).or_default() += 1;
-    }
+    let mut owner = 0;
     for trim in &face.loops {
         let first = all.len();
         for edge_use in &trim.uses {
             let start = all.len();
-            let twice = edge_use.edge.is_some_and(|e| uses[&e] > 1);
-            let edge = edge_use.edge.filter(|_| !(twice && is_seam(face, closed, &edge_use.uv)));
             let breaks = edge_use.uv.breakpoints();
             for (points, range) in edge_use.uv.bezier_pieces().into_iter().zip(breaks.windows(2)) {
                 if points.iter().all(|p| p.is_finite() && p.z > 0.0) {
                     let whole = (points.into(), [range[0], range[1]], 0);
-                    split(&mut all, whole, longest, (edge, edge_use.reversed));
+                    split(&mut all, whole, longest, (owner, edge_use.reversed));
                 }
             }
             if edge_use.reversed {
                 all[start..].reverse();
             }
+            owner += 1;
         }
         // Each piece begins at the very height where the one before it ends, so that parity never slips through.
         let n = all.len() - first;
@@ -168,23 +161,13 @@ pub(super) fn pieces_of(face: &Face, closed: [bool; 2], longest: Uv) -> Vec<Piec
     all
 }
 
-/// Whether a curve runs along an end of the domain where the surface closes on itself: nothing ends there.
-fn is_seam(face: &Face, closed: [bool; 2], curve: &UvCurve) -> bool {
-    let domain = face.surface.domain();
-    (0..2).any(|d| {
-        let [lo, hi] = domain[d];
-        let on = |end: f64| curve.points.iter().all(|p| (p.truncate()[d] / p.z - end).abs() <= 1e-9 * (hi - lo));
-        closed[d] && (on(lo) || on(hi))
-    })
-}
-
 /// Most pieces that one Bézier piece of a trim is split into.
 const MOST: usize = 4096;
 
 /// Control points, parameters at the ends, and how often it was halved.
 type Part = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
 
-fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, edge: (Option<EdgeId>, bool)) {
+fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, owner: (u32, bool)) {
     let first = out.len();
     let mut stack = vec![whole];
     while let Some((points, range, depth)) = stack.pop() {
@@ -199,7 +182,7 @@ fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, edge: (Option<EdgeId>, 
         // more than this.
         let short = (size.x <= longest.x && size.y <= longest.y) || depth >= 8;
         if ((monotone || flat) && short) || depth >= 24 || out.len() > first + MOST {
-            out.push(Piece::new(points, range, edge));
+            out.push(Piece::new(points, range, owner));
             continue;
         }
         let (mut low, mut high) = (points.clone(), points.clone());

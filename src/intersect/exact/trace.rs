@@ -201,13 +201,17 @@ impl Exact {
         let across = |a: Vector, d: usize| (a - q.d * a.dot(q.d)) / scale(d);
         let (su, sv) = (across(du, 0), across(dv, 1));
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
-        let place = trim.locate(uv, metric, face.band);
-        let Some(near) = place.near else { return (place.inside, false) };
+        let mut place = trim.locate(uv, metric, face.flagged);
+        let flagged = !place.near.is_empty();
+        place.near.retain(|n| n.distance <= face.band);
+        if place.near.is_empty() {
+            return (place.inside, flagged);
+        }
         let facing = du.cross(dv).dot(q.d);
-        let inside = match self.geometry.side_of_edge(face, q, facing, near) {
+        let inside = match self.geometry.side_of_edges(face, trim, q, facing, &place.near) {
             Some(inside) => inside,
             // Seams and poles bound nothing in space: what lies on them is part of the face.
-            None if trim.pieces[near.0 as usize].edge.is_none() => true,
+            None if place.near.iter().all(|n| trim.uses[n.owner as usize].edge.is_none()) => true,
             None => place.inside,
         };
         (inside, true)

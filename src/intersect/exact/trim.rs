@@ -1,9 +1,10 @@
 //! Inside or outside of a trimmed face: a grid of decided cells over the domain, and curve by curve where a trim passes.
 //!
 //! The test counts crossings of a half-line towards +u with pieces monotone in v whose joints are bit-equal, so it has one
-//! answer for every point, however close to a curve. Within `band` mm of a curve the nearest piece is named.
+//! answer for every point, however close to a curve. Uses that pass within `band` mm are named.
 
 use super::piece::{Piece, pieces_of};
+use super::uses::{Use, uses_of};
 use crate::math::Uv;
 use crate::model::Face;
 use smallvec::SmallVec;
@@ -17,17 +18,29 @@ pub(super) enum Region {
 }
 
 /// Where a point of the domain lies.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Place {
     pub(super) inside: bool,
-    /// Index of the trimming piece within the band, and the nearest parameter on it.
-    pub(super) near: Option<(u32, f64)>,
+    /// The uses within the band.
+    pub(super) near: SmallVec<[Near; 2]>,
+}
+
+/// A use of an edge near a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    /// Index into [`Trim::uses`].
+    pub(super) owner: u32,
+    /// The edge's parameter at the nearest point.
+    pub(super) parameter: f64,
+    /// mm.
+    pub(super) distance: f64,
 }
 
 /// The trimming of one face.
 #[derive(Debug)]
 pub(super) struct Trim {
-    pub(super) pieces: Vec<Piece>,
+    pieces: Vec<Piece>,
+    pub(super) uses: Vec<Use>,
     origin: Uv,
     /// Cells per unit of u and v.
     density: Uv,
@@ -56,7 +69,8 @@ impl Trim {
         };
         let cell = extent / n as f64;
         let mut trim = Self {
-            pieces: pieces_of(face, closed, cell),
+            pieces: pieces_of(face, cell),
+            uses: uses_of(face, closed),
             origin: Uv::new(u0, v0),
             density: Uv::ONE / cell,
             count: [n, n],
@@ -150,20 +164,20 @@ impl Trim {
         found.unwrap_or(Region::Border)
     }
 
-    /// Whether `q` is inside, and the piece within `band` mm; `metric` as for [`Piece::nearest`].
+    /// Whether `q` is inside, and what uses pass within `band` mm; `metric` as for [`Piece::nearest`].
     pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
         let i = *self.cell_range(q.x, q.x, 0).start();
         let j = *self.cell_range(q.y, q.y, 1).start();
         let cell = j * self.count[0] + i;
         match self.cells[cell] {
-            Region::Inside => return Place { inside: true, near: None },
-            Region::Outside => return Place { inside: false, near: None },
+            Region::Inside => return Place { inside: true, near: SmallVec::new() },
+            Region::Outside => return Place { inside: false, near: SmallVec::new() },
             Region::Border => {}
         }
         // How far a millimetre reaches in u and v: from the inverse of the metric.
         let determinant = (metric[0] * metric[2] - metric[1] * metric[1]).max(f64::MIN_POSITIVE);
         let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
-        let mut best: Option<(u32, f64, f64)> = None;
+        let mut near: SmallVec<[Near; 2]> = SmallVec::new();
         for &k in self.near.get(&(cell as u32)).into_iter().flatten() {
             let piece = &self.pieces[k as usize];
             let outside = q.x < piece.min.x - reach.x
@@ -174,11 +188,18 @@ impl Trim {
                 continue;
             }
             let (t, distance) = piece.nearest(q, metric);
-            if distance <= band && best.is_none_or(|b| distance < b.2) {
-                best = Some((k, t, distance));
+            if distance > band {
+                continue;
+            }
+            let parameter = piece.range[0] + (piece.range[1] - piece.range[0]) * t;
+            let found = Near { owner: piece.owner, parameter, distance };
+            match near.iter_mut().find(|n| n.owner == piece.owner) {
+                Some(n) if distance < n.distance => *n = found,
+                Some(_) => {}
+                None => near.push(found),
             }
         }
-        Place { inside: self.parity(q, j), near: best.map(|(k, t, _)| (k, t)) }
+        Place { inside: self.parity(q, j), near }
     }
 }
 

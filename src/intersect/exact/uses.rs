@@ -1,0 +1,74 @@
+//! Uses of edges around a face: what bounds it, and which use follows which around a vertex.
+
+use crate::model::{EdgeId, Face};
+use crate::nurbs::UvCurve;
+use rustc_hash::FxHashMap;
+
+/// One use of an edge in a loop.
+#[derive(Clone, Debug)]
+pub(super) struct Use {
+    /// The edge that ends the face here; `None` for poles, and for seams where the surface closes on itself.
+    pub(super) edge: Option<EdgeId>,
+    /// Whether the loop runs against the edge.
+    pub(super) reversed: bool,
+    next: u32,
+    previous: u32,
+    /// The other use of the same seam.
+    twin: Option<u32>,
+}
+
+/// All uses of a face in the order of its loops; `closed` says in which parameters its surface closes on itself.
+pub(super) fn uses_of(face: &Face, closed: [bool; 2]) -> Vec<Use> {
+    let mut by_edge: FxHashMap<EdgeId, Vec<u32>> = FxHashMap::default();
+    for (k, u) in face.loops.iter().flat_map(|l| &l.uses).enumerate() {
+        if let Some(edge) = u.edge {
+            by_edge.entry(edge).or_default().push(k as u32);
+        }
+    }
+    let mut uses: Vec<Use> = Vec::new();
+    for trim in &face.loops {
+        let (first, n) = (uses.len() as u32, trim.uses.len() as u32);
+        for (k, u) in (0u32..).zip(&trim.uses) {
+            let twin = u.edge.and_then(|e| match by_edge[&e].as_slice() {
+                &[a, b] => Some(if a == first + k { b } else { a }),
+                _ => None,
+            });
+            let twin = twin.filter(|_| is_seam(face, closed, &u.uv));
+            uses.push(Use {
+                edge: u.edge.filter(|_| twin.is_none()),
+                reversed: u.reversed,
+                next: first + (k + 1) % n,
+                previous: first + (k + n - 1) % n,
+                twin,
+            });
+        }
+    }
+    uses
+}
+
+/// The use that bounds the face on the other side of the vertex where `from` ends in the loop's direction, or begins
+/// when not `forward`; across seams and poles, which bound nothing.
+pub(super) fn around(uses: &[Use], from: u32, forward: bool) -> Option<u32> {
+    let step = |k: u32| if forward { uses[k as usize].next } else { uses[k as usize].previous };
+    let mut at = from;
+    // A seam and a pole at each end are all that a vertex of a face can have.
+    for _ in 0..8 {
+        at = step(at);
+        let here = &uses[at as usize];
+        if here.edge.is_some() {
+            return Some(at);
+        }
+        at = here.twin.unwrap_or(at);
+    }
+    None
+}
+
+/// Whether a curve runs along an end of the domain where the surface closes on itself: nothing ends there.
+fn is_seam(face: &Face, closed: [bool; 2], curve: &UvCurve) -> bool {
+    let domain = face.surface.domain();
+    (0..2).any(|d| {
+        let [lo, hi] = domain[d];
+        let on = |end: f64| curve.points.iter().all(|p| (p.truncate()[d] / p.z - end).abs() <= 1e-9 * (hi - lo));
+        closed[d] && (on(lo) || on(hi))
+    })
+}
