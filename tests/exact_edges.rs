@@ -73,7 +73,7 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
         found.rays += 1;
         let ray = Ray::new(target + off - d * reach, d);
         let crossings = exact.crossings(&ray, &mut Cost::default());
-        if crossings.len() % 2 == 0 {
+        if crossings.len().is_multiple_of(2) {
             continue;
         }
         found.odd += 1;
