@@ -103,6 +103,14 @@ impl Chain {
         self.winding != [0, 0]
     }
 
+    /// Whether the chain runs along an edge twice, as along a seam.
+    pub(super) fn is_cut_open(&self) -> bool {
+        let twice = |i: usize, p: &Piece| {
+            matches!(p.source, Source::Edge(_)) && self.pieces[..i].iter().any(|q| q.source == p.source)
+        };
+        self.pieces.iter().enumerate().any(|(i, p)| twice(i, p))
+    }
+
     pub(super) fn shift(&mut self, by: Uv) {
         self.pieces = std::mem::take(&mut self.pieces).into_iter().map(|p| p.shifted(by)).collect();
     }

@@ -7,6 +7,7 @@ use super::part::{Converted, place};
 use super::part21::Entity;
 use super::settings::Settings;
 use super::styles::Styles;
+use super::surfaces::Reach;
 use super::tessellated::Leaves;
 use super::topology::Items;
 use crate::math::{Aabb, Point};
@@ -81,10 +82,11 @@ fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome
         implicit = a.flag(2) == Some(true);
         let basis = geometry.follow(e, a.id(0), "basis surface")?;
         let hull = boundaries.iter().flatten().fold(Aabb::EMPTY, |b, c: &Curve| b.union(c.bounds()));
-        let reach = if hull.is_empty() { (Point::ZERO, 0.0) } else { (hull.center(), 0.5 * hull.diagonal()) };
+        let points: Vec<Point> = boundaries.iter().flatten().map(|c| c.evaluate(c.domain()[0])).collect();
+        let reach = Reach::around(hull, &points);
         task(geometry.chart(basis.id, reach, 0)?, &boundaries, settings)
     } else {
-        let mut chart = geometry.chart(id, (Point::ZERO, 0.0), 0)?;
+        let mut chart = geometry.chart(id, Reach::UNKNOWN, 0)?;
         if let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1) {
             let range = rectangle(geometry, e, &chart)?;
             for d in 0..2 {

@@ -4,9 +4,11 @@ use super::edges::CutEdge;
 use super::face::{Built, EdgeShape, Task, build, trim_loops};
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::loops::Source;
+use super::order::{Ends, follow};
 use super::part21::File;
 use super::settings::Settings;
 use super::styles::Styles;
+use super::surfaces::Reach;
 use super::topology::{EdgeKey, FacePlan, Items, face, number_edges};
 use super::units::Units;
 use crate::math::{Aabb, Point};
@@ -147,8 +149,9 @@ fn build_face(
     let mut loops = Vec::with_capacity(plan.loops.len());
     let mut bounds = Aabb::EMPTY;
     let mut edge_gap = 0f64;
+    let mut repairs = Vec::new();
     for uses in &plan.loops {
-        let mut kept = Vec::with_capacity(uses.len());
+        let mut kept: Vec<Ends<usize>> = Vec::with_capacity(uses.len());
         for (key, reversed) in uses {
             let k = index[key];
             let edge = edges[k].as_ref().map_err(|r| Refusal {
@@ -160,13 +163,26 @@ fn build_face(
             let Some(curve) = &edge.curve else { continue };
             bounds = bounds.union(curve.bounds());
             shapes.entry(k).or_insert(EdgeShape { curve });
-            kept.push((k, *reversed));
+            let [a, b] = curve.domain().map(|t| curve.evaluate(t));
+            let (from, to) = if *reversed { (b, a) } else { (a, b) };
+            kept.push(Ends { edge: k, reversed: *reversed, from, to });
         }
+        // Far above the gaps of real files, far below the length of an edge that is run the wrong way.
+        let shortest = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > 1e-9).fold(1.0, f64::min);
+        repairs.extend(follow(&mut kept, (0.1 * shortest).max(1e-6)));
         if !kept.is_empty() {
-            loops.push(kept);
+            loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
         }
     }
-    let reach = if bounds.is_empty() { (Point::ZERO, 0.0) } else { (bounds.center(), 0.5 * bounds.diagonal()) };
+    let points: Vec<Point> = shapes
+        .values()
+        .flat_map(|s| {
+            let [a, b] = s.curve.domain();
+            [0.0, 0.4, 0.8].map(|f| s.curve.evaluate(a + f * (b - a)))
+        })
+        .take(60)
+        .collect();
+    let reach = Reach::around(bounds, &points);
     let chart = geometry.chart(plan.surface, reach, 0).map_err(|r| Refusal {
         id,
         entity: entity.name(),
@@ -183,10 +199,12 @@ fn build_face(
         budget: settings.face_budget,
         implicit_outer: false,
     };
-    build(task).map_err(|reason| {
+    let mut built = build(task).map_err(|reason| {
         let surface = geometry.file.entity(plan.surface).map(|s| s.name()).unwrap_or_default();
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
-    })
+    })?;
+    built.repairs.extend(repairs.into_iter().map(String::from));
+    Ok(built)
 }
 
 /// Numbers a built face's seams and vertices into the part.

@@ -4,6 +4,7 @@ use super::chart::Chart;
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::Entity;
 use super::units::Units;
+use super::surfaces::Reach;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::Curve;
 
@@ -37,7 +38,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let representation = definition.own("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
         let item = representation.list(1).ids().first().copied();
         let item = self.follow(definition, item, "curve in the parameter plane")?;
-        let chart = self.chart(basis.id, (Point::ZERO, 0.0), depth + 1)?;
+        let chart = self.chart(basis.id, Reach::UNKNOWN, depth + 1)?;
         let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
             return Err(Refusal::of(e, "its parameters cannot be taken over to the swept conic"));
         };

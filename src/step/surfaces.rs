@@ -4,17 +4,45 @@ use super::chart::{Chart, Kind, SplineChart};
 use super::curves::{Shape, explicit_knots, knot_form};
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::{Args, Entity};
-use crate::math::{Frame, Point, Vector};
+use crate::math::{Aabb, Frame, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::{Curve, sanitise};
 use std::f64::consts::PI;
+
+/// Where a face is, for surfaces whose curves have no ends or cross their axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach<'r> {
+    /// Middle of its edges.
+    pub(super) center: Point,
+    /// Distance from there that holds them all, mm.
+    pub(super) radius: f64,
+    /// Some points of its edges.
+    pub(super) points: &'r [Point],
+}
+
+impl<'r> Reach<'r> {
+    /// Nothing is known of the face.
+    pub(super) const UNKNOWN: Self = Self { center: Point::ZERO, radius: 0.0, points: &[] };
+
+    /// Around edges in a box.
+    pub(super) fn around(bounds: Aabb, points: &'r [Point]) -> Self {
+        if bounds.is_empty() {
+            return Self::UNKNOWN;
+        }
+        Self { center: bounds.center(), radius: 0.5 * bounds.diagonal(), points }
+    }
+
+    fn grown(self, by: f64) -> Self {
+        Self { radius: self.radius + by, ..self }
+    }
+}
 
 /// Deepest chain of surfaces that refer to surfaces.
 pub(super) const MAX_DEPTH: usize = 8;
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// A surface. `reach` is a point and a radius that contain the face, for curves without ends.
-    pub(super) fn chart(&self, id: u64, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+    /// A surface.
+    pub(super) fn chart(&self, id: u64, reach: Reach<'_>, depth: usize) -> Outcome<Chart> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::of(e, "surfaces refer to each other too deeply"));
@@ -103,7 +131,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         if let Some(a) = e.own("OFFSET_SURFACE", 1) {
             let basis = self.follow(e, a.id(0), "basis surface")?;
             let distance = length(a.real(1)).ok_or_else(|| Refusal::of(e, "its distance is missing"))?;
-            let basis = self.chart(basis.id, (reach.0, reach.1 + distance.abs()), depth + 1)?;
+            let basis = self.chart(basis.id, reach.grown(distance.abs()), depth + 1)?;
             // Along the normal of the file's surface, which the chart's may oppose.
             let signed = if basis.flipped { -distance } else { distance };
             return super::offset::offset(&basis, signed)
@@ -126,7 +154,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     fn swept_curve(
         &self,
         id: u64,
-        (center, radius): (Point, f64),
+        Reach { center, radius, .. }: Reach<'_>,
         depth: usize,
     ) -> Outcome<(Curve, Option<(Point, Vector)>)> {
         let e = self.entity(id)?;
@@ -162,23 +190,23 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok((if directed.reversed { curve.reversed() } else { curve }, None))
     }
 
-    fn revolution(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+    fn revolution(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: Reach<'_>, depth: usize) -> Outcome<Chart> {
         let axis = self.follow(e, a.id(1), "axis")?;
         let frame = self.placement(axis.id)?;
         let profile = self.follow(e, a.id(0), "swept curve")?;
         // The profile passes the same heights and radii as the face, at another azimuth.
-        let local = frame.local_point(reach.0);
-        let around = (reach.0, reach.1 + 2.0 * local.x.hypot(local.y));
+        let local = frame.local_point(reach.center);
+        let around = reach.grown(2.0 * local.x.hypot(local.y));
         let (curve, line) = self.swept_curve(profile.id, around, depth)?;
         if let Some((origin, direction)) = line
             && let Some(chart) = revolved_line(&frame, origin, direction)
         {
             return Ok(chart);
         }
-        Ok(Chart::revolution(frame, cut_at_axis(&frame, curve, reach.0)))
+        Ok(Chart::revolution(frame, super::meridian::cut_at_axis(&frame, curve, reach)))
     }
 
-    fn extrusion(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: (Point, f64), depth: usize) -> Outcome<Chart> {
+    fn extrusion(&self, e: Entity<'f, 'a>, a: Args<'f, 'a>, reach: Reach<'_>, depth: usize) -> Outcome<Chart> {
         let axis = self.follow(e, a.id(1), "extrusion axis")?;
         let direction = self.vector(axis.id)?;
         let profile = self.follow(e, a.id(0), "swept curve")?;
@@ -188,10 +216,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
             Shape::Ellipse { frame, .. } | Shape::Hyperbola { frame, .. } | Shape::Parabola { frame, .. } => {
                 frame.origin
             }
-            Shape::Spline { .. } => reach.0,
+            Shape::Spline { .. } => reach.center,
         });
-        let d = base_point.map_or(0.0, |b| (b - reach.0).length());
-        let (base, _) = self.swept_curve(profile.id, (reach.0, reach.1 + d), depth)?;
+        let d = base_point.map_or(0.0, |b| (b - reach.center).length());
+        let (base, _) = self.swept_curve(profile.id, reach.grown(d), depth)?;
         Ok(Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion))
     }
 
@@ -260,48 +288,4 @@ fn revolved_line(frame: &Frame, origin: Point, direction: Vector) -> Option<Char
         return Some(chart);
     }
     None
-}
-
-/// A meridian that crosses the axis is cut there: the side nearer to the face stays.
-fn cut_at_axis(frame: &Frame, curve: Curve, near: Point) -> Curve {
-    let [a, b] = curve.domain();
-    let n = 256;
-    let at = |t: f64| frame.local_point(curve.evaluate(t));
-    let far = (0..=n).map(|i| at(a + (b - a) * f64::from(i) / f64::from(n)));
-    let Some(far) = far.max_by(|p, q| p.x.hypot(p.y).total_cmp(&q.x.hypot(q.y))) else { return curve };
-    let side = |t: f64| {
-        let p = at(t);
-        far.x * p.x + far.y * p.y
-    };
-    let size = far.x.hypot(far.y);
-    let sample = |i: i32| a + (b - a) * f64::from(i) / f64::from(n);
-    let mut cuts = vec![a];
-    for i in 0..n {
-        let (mut lo, mut hi) = (sample(i), sample(i + 1));
-        let (s_lo, s_hi) = (side(lo), side(hi));
-        if s_lo.abs().max(s_hi.abs()) > 1e-9 * size * size && s_lo * s_hi < 0.0 {
-            for _ in 0..100 {
-                let middle = 0.5 * (lo + hi);
-                if side(middle) * s_lo > 0.0 { lo = middle } else { hi = middle }
-            }
-            cuts.push(0.5 * (lo + hi));
-        }
-    }
-    cuts.push(b);
-    if cuts.len() == 2 {
-        return curve;
-    }
-    let target = frame.local_point(near);
-    let target = Vector::new(target.x.hypot(target.y), 0.0, target.z);
-    let distance = |lo: f64, hi: f64| {
-        (0..=32).fold(f64::INFINITY, |m: f64, i| {
-            let p = at(lo + (hi - lo) * f64::from(i) / 32.0);
-            m.min((Vector::new(p.x.hypot(p.y), 0.0, p.z) - target).length())
-        })
-    };
-    let pair = cuts
-        .windows(2)
-        .filter(|w| w[1] - w[0] > 1e-9 * (b - a))
-        .min_by(|x, y| distance(x[0], x[1]).total_cmp(&distance(y[0], y[1])));
-    pair.map_or(curve.clone(), |w| curve.restricted(w[0], w[1]))
 }

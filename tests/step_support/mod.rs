@@ -55,6 +55,15 @@ pub(crate) fn measure(face: &Face) -> Measure {
     } else {
         face.loops.iter().map(|l| polygon(&l.uses)).collect()
     };
+    let sign = if face.reversed { -1.0 } else { 1.0 };
+    if matches!(face.analytic, lampyris::model::Analytic::Plane { .. }) {
+        // The outline alone: rows would miss what small round holes cut away.
+        let outline = |p: &Vec<Uv>| (1..p.len() - 1).map(|i| (p[i] - p[0]).perp_dot(p[i + 1] - p[0])).sum::<f64>();
+        let d = s.derivatives(Uv::new(u0, v0));
+        let n = d.du.cross(d.dv);
+        let inside = 0.5 * polygons.iter().map(outline).sum::<f64>();
+        return Measure { area: inside.abs() * n.length(), volume: sign * inside.abs() * d.point.dot(n) / 3.0 };
+    }
     let knots_u: Vec<f64> = s.knots[0].clone();
     let mut rows = s.knots[1].clone();
     for l in &face.loops {
@@ -63,7 +72,6 @@ pub(crate) fn measure(face: &Face) -> Measure {
     let extent = v1 - v0;
     rows.extend((1..16).map(|k| v0 + extent * f64::from(k) / 16.0));
     let rows = cuts([v0, v1], rows);
-    let sign = if face.reversed { -1.0 } else { 1.0 };
     let mut m = Measure::default();
     for pair in rows.windows(2) {
         for (x, w) in NODES {

@@ -15,6 +15,7 @@ use crate::nurbs::{Curve, Derivatives, Surface, conic};
 use std::f64::consts::PI;
 
 pub(super) use spline::SplineChart;
+pub(super) use swept::profile_distance;
 
 /// A parameter value at which the surface contracts to a point.
 #[derive(Clone, Copy, Debug)]

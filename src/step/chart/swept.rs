@@ -53,6 +53,12 @@ fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
     0.5 * (lo + hi)
 }
 
+/// Distance of a target `(radius, height)` from a profile.
+pub(in crate::step) fn profile_distance(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
+    let m = frame.local_point(meridian.evaluate(nearest_profile(frame, meridian, target)));
+    (Vector::new(m.x.hypot(m.y), 0.0, m.z) - target).length()
+}
+
 /// The azimuth of a meridian that lies in a half plane through the axis.
 pub(super) fn azimuth(frame: &Frame, meridian: &Curve) -> Option<f64> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();

@@ -1,0 +1,98 @@
+//! Profiles of surfaces of revolution that cross their axis: the part that the face lies on.
+
+use super::chart::profile_distance;
+use super::curves::joined;
+use super::surfaces::Reach;
+use crate::math::{Frame, Point, Vector};
+use crate::nurbs::Curve;
+
+/// Samples that look for crossings of the axis.
+const SAMPLES: i32 = 256;
+
+/// A meridian that crosses the axis is cut there: the part on which the points of the face lie stays.
+pub(super) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curve {
+    let parts = parts(frame, &curve);
+    let center = [reach.center];
+    let points = if reach.points.is_empty() { &center[..] } else { reach.points };
+    let off = |part: &Curve| -> f64 {
+        let target = |p: &Point| {
+            let q = frame.local_point(*p);
+            Vector::new(q.x.hypot(q.y), 0.0, q.z)
+        };
+        points.iter().map(|p| profile_distance(frame, part, target(p))).sum()
+    };
+    let best = parts.into_iter().map(|part| (off(&part), part)).min_by(|x, y| x.0.total_cmp(&y.0));
+    best.map_or(curve, |b| b.1)
+}
+
+/// The parts between crossings of the axis; none when there is no crossing. A closed curve has no ends of its own.
+fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
+    let [a, b] = curve.domain();
+    let at = |t: f64| frame.local_point(curve.evaluate(t));
+    let sample = |i: i32| a + (b - a) * f64::from(i) / f64::from(SAMPLES);
+    let far = (0..=SAMPLES).map(|i| at(sample(i)));
+    let Some(far) = far.max_by(|p, q| p.x.hypot(p.y).total_cmp(&q.x.hypot(q.y))) else { return Vec::new() };
+    let side = |t: f64| {
+        let p = at(t);
+        far.x * p.x + far.y * p.y
+    };
+    let size = far.x.hypot(far.y);
+    let mut cuts = Vec::new();
+    for i in 0..SAMPLES {
+        let (mut lo, mut hi) = (sample(i), sample(i + 1));
+        let (s_lo, s_hi) = (side(lo), side(hi));
+        if s_lo.abs().max(s_hi.abs()) > 1e-9 * size * size && s_lo * s_hi < 0.0 {
+            for _ in 0..100 {
+                let middle = 0.5 * (lo + hi);
+                if side(middle) * s_lo > 0.0 { lo = middle } else { hi = middle }
+            }
+            cuts.push(0.5 * (lo + hi));
+        }
+    }
+    let (Some(&first), Some(&last)) = (cuts.first(), cuts.last()) else { return Vec::new() };
+    let near = 1e-9 * (b - a);
+    let inner = cuts.windows(2).filter(|w| w[1] - w[0] > near).map(|w| curve.restricted(w[0], w[1]));
+    let mut parts: Vec<Curve> = inner.collect();
+    let mut ends: Vec<Curve> = Vec::new();
+    if b - last > near {
+        ends.push(curve.restricted(last, b));
+    }
+    if first - a > near {
+        ends.push(curve.restricted(a, first));
+    }
+    let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
+    match &ends[..] {
+        [tail, head] if closed => parts.push(joined(tail, head)),
+        _ => parts.extend(ends),
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nurbs::conic;
+
+    /// A circle about (-306, 0, -29) of radius 328 crosses the z axis near its parameter 0, where it is cut open.
+    #[test]
+    fn a_circle_across_the_axis_keeps_the_part_of_the_face() {
+        // The circle's plane is xz, its start points along x.
+        let at = Frame::from_axis(Point::new(0.0, -306.0, -29.0), -Vector::Y, Some(Vector::X));
+        let circle = conic::arc(&at, 328.0, [0.0, 2.0 * std::f64::consts::PI]);
+        let axis = Frame::from_axis(Point::new(0.0, -306.0, 0.0), Vector::X, None);
+        let on = |z: f64| Point::new((328f64.powi(2) - (z + 29.0).powi(2)).sqrt(), -306.0, z);
+        for z in [[0.6, 3.15], [-0.6, -3.15]] {
+            let points = z.map(on);
+            // The middle of ring-shaped faces is on the axis and tells nothing.
+            let reach = Reach { center: Point::new(327.0, -306.0, 0.0), radius: 3.2, points: &points };
+            let part = cut_at_axis(&axis, circle.clone(), reach);
+            for p in points {
+                let (_, distance) = crate::nurbs::project::nearest(&part, p);
+                let mirrored = crate::nurbs::project::nearest(&part, Point::new(p.x, p.y, -p.z)).1;
+                assert!(distance.min(mirrored) < 1e-9, "{z:?}: {distance:e} {mirrored:e}");
+            }
+            let [a, b] = part.domain().map(|t| axis.local_point(part.evaluate(t)));
+            assert!(a.x.hypot(a.y) < 1e-9 && b.x.hypot(b.y) < 1e-9, "{a} {b}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Loops whose uses do not follow each other: wrong orientation flags and shuffled lists, put right by their ends.
+
+use crate::math::Point;
+
+/// An edge use with the points between which it runs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends<T> {
+    pub(super) edge: T,
+    pub(super) reversed: bool,
+    pub(super) from: Point,
+    pub(super) to: Point,
+}
+
+impl<T> Ends<T> {
+    fn turn(&mut self) {
+        self.reversed = !self.reversed;
+        std::mem::swap(&mut self.from, &mut self.to);
+    }
+}
+
+/// Largest step from one use to the next, mm.
+fn open<T>(uses: &[Ends<T>]) -> f64 {
+    let n = uses.len();
+    (0..n).map(|i| (uses[(i + 1) % n].from - uses[i].to).length()).fold(0.0, f64::max)
+}
+
+/// Makes each use begin where the one before ends, within `tolerance` mm; says what was changed. A loop that cannot be
+/// closed this way stays as it was.
+pub(super) fn follow<T: Copy>(uses: &mut Vec<Ends<T>>, tolerance: f64) -> Option<&'static str> {
+    if open(uses) <= tolerance {
+        return None;
+    }
+    for (mut tried, what) in [
+        (turned(uses, tolerance), "an edge of a loop ran against its neighbours"),
+        (sorted(uses, tolerance), "the edges of a loop were not in order"),
+    ] {
+        if let Some(found) = tried.take() {
+            *uses = found;
+            return Some(what);
+        }
+    }
+    None
+}
+
+/// Single uses turned around between neighbours that both fit the other way.
+fn turned<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
+    let n = uses.len();
+    let mut out = uses.to_vec();
+    for i in 0..n {
+        let (before, after) = (out[(i + n - 1) % n].to, out[(i + 1) % n].from);
+        let fits = |a: Point, b: Point| (a - b).length() <= tolerance;
+        if n > 1 && !fits(before, out[i].from) && fits(before, out[i].to) {
+            // The next one may be wrong too: then only the end before counts.
+            if fits(after, out[i].from) || !fits(after, out[i].to) {
+                out[i].turn();
+            }
+        }
+    }
+    (open(&out) <= tolerance).then_some(out)
+}
+
+/// The uses chained anew from the first, turned where only their far end fits.
+fn sorted<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
+    // Quadratic in the length: longer loops than this are left alone.
+    if uses.len() > 2000 {
+        return None;
+    }
+    let mut left = uses.to_vec();
+    let mut out = vec![left.remove(0)];
+    while !left.is_empty() {
+        let at = out[out.len() - 1].to;
+        let near = |p: Point| (p - at).length() <= tolerance;
+        let next = left.iter().position(|u| near(u.from)).or_else(|| left.iter().position(|u| near(u.to)))?;
+        let mut found = left.remove(next);
+        if !near(found.from) {
+            found.turn();
+        }
+        out.push(found);
+    }
+    (open(&out) <= tolerance).then_some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> Vec<Ends<usize>> {
+        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Point::new(x, y, 0.0));
+        (0..4).map(|i| Ends { edge: i, reversed: false, from: corners[i], to: corners[(i + 1) % 4] }).collect()
+    }
+
+    #[test]
+    fn a_closed_loop_stays() {
+        let mut uses = square();
+        assert_eq!(follow(&mut uses, 1e-6), None);
+    }
+
+    #[test]
+    fn wrong_flags_are_turned() {
+        for wrong in [vec![1], vec![0], vec![1, 2], vec![0, 3], vec![0, 2]] {
+            let mut uses = square();
+            wrong.iter().for_each(|&i| uses[i].turn());
+            assert!(follow(&mut uses, 1e-6).is_some(), "{wrong:?}");
+            assert_eq!(open(&uses), 0.0);
+        }
+    }
+
+    #[test]
+    fn shuffled_edges_are_sorted() {
+        let mut uses = square();
+        uses.swap(1, 2);
+        assert!(follow(&mut uses, 1e-6).is_some());
+        assert_eq!(uses.iter().map(|u| u.edge).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn what_cannot_close_is_left_alone() {
+        let mut uses = square();
+        uses.remove(2);
+        assert_eq!(follow(&mut uses, 1e-6), None);
+        assert_eq!(uses.iter().map(|u| u.edge).collect::<Vec<_>>(), [0, 1, 3]);
+    }
+}
