@@ -3,8 +3,8 @@
 use super::chart::Chart;
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::Entity;
-use super::units::Units;
 use super::surfaces::Reach;
+use super::units::Units;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::Curve;
 
