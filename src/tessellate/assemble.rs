@@ -56,7 +56,9 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
                 }
             }
         }
-        let (divisions, shared) = edges::divide(part, &sides, &denser);
+        let known: Vec<(&Face, &Sheet<'_>)> =
+            faces.iter().zip(&sheets).filter_map(|(f, s)| Some((*f, s.as_ref()?))).collect();
+        let (divisions, shared) = edges::divide(part, &known, &sides, &denser);
         let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| {
             one(part, face, sheet.as_ref()?, &divisions, &shared, settings)
         };

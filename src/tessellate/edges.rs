@@ -1,9 +1,10 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
 use super::bound::from_line;
+use super::opposite;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
-use crate::model::{EdgeUse, Part};
+use crate::model::{EdgeUse, Face, Part};
 use crate::nurbs::Curve;
 use rayon::prelude::*;
 
@@ -29,26 +30,32 @@ pub(super) struct Division {
 }
 
 /// Divides all edges of a part, and returns the shared positions: vertices, then inner points edge by edge.
-pub(super) fn divide(part: &Part, sides: &[Vec<Side<'_, '_>>], denser: &[u32]) -> (Vec<Division>, Vec<Point>) {
-    let mut divisions: Vec<Division> = part
+pub(super) fn divide(
+    part: &Part,
+    faces: &[(&Face, &Sheet<'_>)],
+    sides: &[Vec<Side<'_, '_>>],
+    denser: &[u32],
+) -> (Vec<Division>, Vec<Point>) {
+    let mut times: Vec<Vec<f64>> = part
         .edges
         .par_iter()
         .zip(sides)
         .zip(denser)
         .map(|((edge, sides), &denser)| {
-            let t = if sides.is_empty() {
+            if sides.is_empty() {
                 edge.curve.domain().to_vec()
             } else {
                 edge_parameters(&edge.curve, sides, denser)
-            };
-            Division { t, first: 0 }
+            }
         })
         .collect();
+    opposite::align(part, faces, sides, denser, &mut times);
+    let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();
-    for (edge, division) in part.edges.iter().zip(&mut divisions) {
-        division.first = positions.len() as u32;
-        let inner = &division.t[1..division.t.len() - 1];
-        positions.extend(inner.iter().map(|&t| edge.curve.evaluate(t)));
+    for (edge, t) in part.edges.iter().zip(times) {
+        let first = positions.len() as u32;
+        positions.extend(t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)));
+        divisions.push(Division { t, first });
     }
     (divisions, positions)
 }
@@ -71,15 +78,33 @@ fn chord_tolerance(sheet: &Sheet<'_>, uv: Uv, along: Vector) -> f64 {
     xi * (1.0 - (sag / xi).min(0.5))
 }
 
+/// Tolerance for chords of an edge on all of its faces.
+fn tightest(sides: &[Side<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
+    let each = sides.iter().map(|s| chord_tolerance(s.sheet, s.sheet.surface.clamp(s.side.uv.evaluate(t)), along));
+    SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
+}
+
 fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f64> {
+    let t = parameters(&breaks(curve), |t| curve.evaluate(t), |t, along| tightest(sides, denser, t, along));
+    let mut t = beside(curve, sides, denser, t);
+    let (first, last) = (curve.evaluate(t[0]), curve.evaluate(t[t.len() - 1]));
+    let closed = (first - last).length() <= 1e-9 + 1e-9 * curve.bounds().diagonal();
+    let fewest = if closed { 3 } else { 1 };
+    while t.len() <= fewest {
+        bisect_all(&mut t);
+    }
+    t
+}
+
+/// Divides further where a chord of given samples is too long.
+pub(super) fn hold(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
+    shorten(&mut t, |t| curve.evaluate(t), |t, along| tightest(sides, denser, t, along));
+    beside(curve, sides, denser, t)
+}
+
+/// In the parameter plane the chord must stay by its curve too, or loops would cross.
+fn beside(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     let at = |t: f64| curve.evaluate(t);
-    let tolerance = |t: f64, along: Vector| {
-        let each =
-            sides.iter().map(|s| chord_tolerance(s.sheet, s.sheet.surface.clamp(s.side.uv.evaluate(t)), along));
-        SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
-    };
-    let mut t = parameters(&breaks(curve), at, tolerance);
-    // In the parameter plane the chord must stay by its curve too, or loops would cross.
     let slack = |s: &Side<'_, '_>| 2.0 * s.sheet.field.tightest() / 4f64.powi(denser as i32);
     bisect(&mut t, |a, b| {
         let chord = [at(a), at(b)];
@@ -98,11 +123,6 @@ fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f6
             })
         })
     });
-    let closed = (at(t[0]) - at(t[t.len() - 1])).length() <= 1e-9 + 1e-9 * curve.bounds().diagonal();
-    let fewest = if closed { 3 } else { 1 };
-    while t.len() <= fewest {
-        bisect_all(&mut t);
-    }
     t
 }
 
@@ -211,13 +231,18 @@ pub(super) fn parameters(
         t.extend(inner);
         t.push(b);
     }
-    bisect(&mut t, |a, b| {
+    shorten(&mut t, at, tolerance);
+    t
+}
+
+/// Halves chords that stray too far from the curve.
+fn shorten(t: &mut Vec<f64>, at: impl Fn(f64) -> Point, tolerance: impl Fn(f64, Vector) -> f64) {
+    bisect(t, |a, b| {
         let chord = [at(a), at(b)];
         let along = chord[1] - chord[0];
         let xi = tolerance(0.5 * (a + b), along) * 1.03;
         [0.2, 0.35, 0.5, 0.65, 0.8].iter().any(|f| from_line(at(a + (b - a) * f), &chord) > xi)
     });
-    t
 }
 
 /// Halves intervals until `coarse` holds for none.

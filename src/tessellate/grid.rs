@@ -2,6 +2,7 @@
 
 use super::bound::{Prover, from_line};
 use super::cells::{Cell, Leaves};
+use super::lines::Lines;
 use super::look::facet_of;
 use super::sheet::Sheet;
 use super::strip::{Node, key, prove};
@@ -30,51 +31,6 @@ pub(super) struct Ground<'g> {
     pub(super) same: Uv,
     /// First free position.
     pub(super) next: u32,
-}
-
-/// The nodes on the lines that sides of cells lie on.
-struct Lines {
-    /// Parameters of the lines across u and v, ascending.
-    at: [Vec<f64>; 2],
-    /// On each of them, the nodes in order of the other parameter.
-    on: [Vec<Vec<(f64, u32)>>; 2],
-    same: Uv,
-}
-
-impl Lines {
-    fn new(leaves: &Leaves, same: Uv) -> Self {
-        let at = [0, 1].map(|d| {
-            let mut x: Vec<f64> = leaves.inside.iter().flat_map(|(c, _, _)| [c.lo[d], c.hi[d]]).collect();
-            x.sort_unstable_by(f64::total_cmp);
-            x.dedup();
-            x
-        });
-        let on = [0, 1].map(|d| vec![Vec::new(); at[d].len()]);
-        Self { at, on, same }
-    }
-
-    /// The line at a parameter.
-    fn find(&self, d: usize, x: f64) -> Option<usize> {
-        let l = &self.at[d];
-        let i = l.partition_point(|&y| y < x);
-        let near = |i: &usize| l.get(*i).is_some_and(|y| (y - x).abs() <= self.same[d]);
-        [Some(i), i.checked_sub(1)].into_iter().flatten().filter(near).min_by(|&i, &j| {
-            let off = |i: usize| (l[i] - x).abs();
-            off(i).total_cmp(&off(j))
-        })
-    }
-
-    /// Nodes on line `on` of direction `d` strictly between two parameters, in that order.
-    fn between(&self, d: usize, on: f64, a: f64, b: f64) -> Vec<u32> {
-        let Some(line) = self.find(d, on).map(|i| &self.on[d][i]) else { return Vec::new() };
-        let (lo, hi) = (a.min(b) + self.same[1 - d], a.max(b) - self.same[1 - d]);
-        let (i, j) = (line.partition_point(|x| x.0 <= lo), line.partition_point(|x| x.0 < hi));
-        let mut inner: Vec<u32> = line[i..j.max(i)].iter().map(|x| x.1).collect();
-        if a > b {
-            inner.reverse();
-        }
-        inner
-    }
 }
 
 /// Makes facets of the inside leaves; cells that cannot be resolved within their tolerance are left to the strip.
@@ -121,23 +77,36 @@ pub(super) fn build(
     for line in lines.on.iter_mut().flatten() {
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
+    let named: Vec<(Cell, [u32; 4])> = leaves.inside.iter().map(|l| l.0).zip(cells.iter().copied()).collect();
+    for (i, s, x) in lines.bridges(&named, ground.nodes) {
+        let (cell, _) = named[i];
+        let (d, e) = (s % 2, 1 - s % 2);
+        let level = if s == 0 || s == 3 { cell.lo[e] } else { cell.hi[e] };
+        let Some(line) = lines.find(e, level) else { continue };
+        let mut uv = Uv::splat(level);
+        uv[d] = x;
+        let on = &mut lines.on[e][line];
+        on.insert(on.partition_point(|n| n.0 < x), (x, ground.nodes.len() as u32));
+        ground.nodes.push(Node { uv, place: sheet.point(uv), position: ground.next });
+        ground.next += 1;
+    }
     let mut segments: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let mut order: Vec<[u32; 2]> = Vec::new();
     for ((cell, bound, xi), corners) in leaves.inside.iter().zip(&cells) {
-        let (lo, hi) = (cell.lo, cell.hi);
-        let inner = [
-            lines.between(1, lo.y, lo.x, hi.x),
-            lines.between(0, hi.x, lo.y, hi.y),
-            lines.between(1, hi.y, hi.x, lo.x),
-            lines.between(0, lo.x, hi.y, lo.y),
-        ];
+        let inner = lines.sides(cell);
         let polygon: Vec<u32> =
             (0..4).flat_map(|k| std::iter::once(corners[k]).chain(inner[k].iter().copied())).collect();
         let at_border = polygon.iter().any(|&n| n < border);
         let made = if polygon.len() > 4 {
-            resolve(sheet, prover, &polygon, ground).map(|t| grid.triangles.extend(t))
+            match lattice(sheet, prover, corners, &inner, ground) {
+                Some(pieces) => {
+                    grid.quads.extend(pieces);
+                    Some(())
+                }
+                None => resolve(sheet, prover, &polygon, ground).map(|t| grid.triangles.extend(t)),
+            }
         } else if at_border {
-            beside(sheet, prover, *cell, corners, ground).map(|q| grid.quads.push(q))
+            beside(sheet, prover, *corners, ground).map(|q| grid.quads.push(q))
         } else {
             let first = facet_of(sheet, *cell)[0].0;
             let r = (0..4).find(|&r| ground.nodes[corners[r] as usize].uv == first).unwrap_or(0);
@@ -160,20 +129,20 @@ pub(super) fn build(
     grid
 }
 
-/// A cell with corners on the border: its facet must hold with the border's own points, and follow its curve.
+/// A facet with corners on the border: it must hold with the border's own points, and follow its curve.
 fn beside(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
-    cell: Cell,
-    corners: &[u32; 4],
+    corners: [u32; 4],
     ground: &Ground<'_>,
 ) -> Option<([u32; 4], f64, f64)> {
-    let place = |k: usize| ground.nodes[corners[k % 4] as usize].position;
-    if (0..4).any(|k| place(k) == place(k + 1)) || place(0) == place(2) || place(1) == place(3) {
+    let n = corners.map(|c| ground.nodes[c as usize]);
+    if (0..4).any(|i| (0..i).any(|j| n[i].position == n[j].position)) {
         return None;
     }
-    let first = facet_of(sheet, cell)[0].0;
-    let better = (0..4).find(|&r| cell.corners()[r] == first).unwrap_or(0);
+    let middle = sheet.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
+    let off = |i: usize, j: usize| from_line(middle, &[n[i].place, n[j].place]);
+    let better = if off(1, 3) < off(0, 2) * (1.0 - 1e-9) { 1 } else { 0 };
     [better, better + 1].into_iter().find_map(|r| {
         let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
         let [x, y] =
@@ -181,6 +150,68 @@ fn beside(
         let (bound, xi) = (x.0.max(y.0), x.1.min(y.1));
         (bound <= xi).then_some((q, bound, xi))
     })
+}
+
+/// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
+const MOST_PIECES: usize = 16;
+
+/// Cuts a cell whose hanging vertices face each other from side to side; `None` when they do not.
+fn lattice(
+    sheet: &Sheet<'_>,
+    prover: &mut Prover<'_, '_>,
+    corners: &[u32; 4],
+    inner: &[Vec<u32>; 4],
+    ground: &mut Ground<'_>,
+) -> Option<Vec<([u32; 4], f64, f64)>> {
+    let (nx, ny) = (inner[0].len() + 1, inner[1].len() + 1);
+    if inner[2].len() + 1 != nx || inner[3].len() + 1 != ny || nx * ny > MOST_PIECES {
+        return None;
+    }
+    let row = |from: u32, between: Vec<u32>, to: u32| -> Vec<u32> {
+        std::iter::once(from).chain(between).chain(std::iter::once(to)).collect()
+    };
+    let turned = |x: &[u32]| x.iter().rev().copied().collect::<Vec<u32>>();
+    let bottom = row(corners[0], inner[0].clone(), corners[1]);
+    let top = row(corners[3], turned(&inner[2]), corners[2]);
+    let left = row(corners[0], turned(&inner[3]), corners[3]);
+    let right = row(corners[1], inner[1].clone(), corners[2]);
+    let uv = |n: u32| ground.nodes[n as usize].uv;
+    let size = uv(corners[2]) - uv(corners[0]);
+    let face = |a: &[u32], b: &[u32], d: usize| {
+        a.iter().zip(b).all(|(&x, &y)| (uv(x)[d] - uv(y)[d]).abs() <= 0.15 * size[d].abs())
+    };
+    if !face(&bottom, &top, 0) || !face(&left, &right, 1) {
+        return None;
+    }
+    let kept = (ground.nodes.len(), ground.next);
+    let mut at = vec![vec![0u32; ny + 1]; nx + 1];
+    for i in 0..=nx {
+        for j in 0..=ny {
+            at[i][j] = match (i, j) {
+                (_, 0) => bottom[i],
+                (_, j) if j == ny => top[i],
+                (0, _) => left[j],
+                (i, _) if i == nx => right[j],
+                _ => {
+                    let uv = |n: u32| ground.nodes[n as usize].uv;
+                    let c = Uv::new(0.5 * (uv(bottom[i]).x + uv(top[i]).x), 0.5 * (uv(left[j]).y + uv(right[j]).y));
+                    ground.nodes.push(Node { uv: c, place: sheet.point(c), position: ground.next });
+                    ground.next += 1;
+                    (ground.nodes.len() - 1) as u32
+                }
+            };
+        }
+    }
+    let pieces = (0..nx * ny).map(|k| {
+        let (i, j) = (k / ny, k % ny);
+        beside(sheet, prover, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]], ground)
+    });
+    let made: Option<Vec<_>> = pieces.collect();
+    if made.is_none() {
+        ground.nodes.truncate(kept.0);
+        ground.next = kept.1;
+    }
+    made
 }
 
 /// Largest polygon that is resolved by trying all triangulations.

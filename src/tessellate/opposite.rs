@@ -1,0 +1,137 @@
+//! Opposite sides of a face get the same samples, so that the rows of cells between them end in corners on both.
+//!
+//! Two edges are opposite when both run along parameter lines of one direction, from the same parameter to the same
+//! parameter. The one with more samples hands its own on, from face to face, as long as the next has at least half
+//! as many: a strip between unequal sides has as many facets as the longer one anyway.
+
+use super::edges::{Side, breaks, hold};
+use super::sheet::Sheet;
+use crate::model::{EdgeUse, Face, Part};
+use rustc_hash::FxHashMap;
+
+/// Uses of a face beyond which no opposite ones are looked for.
+const MOST_USES: usize = 400;
+/// Share by which a side may grow beyond the samples handed to it before it keeps its own.
+const GROWTH: f64 = 1.2;
+
+/// A use that runs along a parameter line.
+struct Along<'f> {
+    edge: usize,
+    side: &'f EdgeUse,
+    /// The parameter that changes.
+    direction: usize,
+    /// From where to where, ascending, in shares of the domain.
+    range: [f64; 2],
+    level: f64,
+}
+
+/// Two uses that face each other.
+type Pair<'f> = [(usize, &'f EdgeUse); 2];
+
+/// Makes samples of opposite edges equal. `times` are the parameters at which each edge is divided.
+pub(super) fn align(
+    part: &Part,
+    faces: &[(&Face, &Sheet<'_>)],
+    sides: &[Vec<Side<'_, '_>>],
+    denser: &[u32],
+    times: &mut [Vec<f64>],
+) {
+    let mut pairs: Vec<(Pair<'_>, usize)> = Vec::new();
+    for (face, sheet) in faces.iter().filter(|(_, s)| !s.affine) {
+        let uses: Vec<&EdgeUse> = face.loops.iter().flat_map(|l| &l.uses).collect();
+        if uses.len() > MOST_USES {
+            continue;
+        }
+        let along: Vec<Along<'_>> =
+            uses.iter().filter_map(|u| follow(u, sheet)).filter(|a| a.edge < times.len()).collect();
+        for (i, a) in along.iter().enumerate() {
+            for b in &along[i + 1..] {
+                let near = |x: f64, y: f64| (x - y).abs() <= 1e-6;
+                let same =
+                    a.direction == b.direction && near(a.range[0], b.range[0]) && near(a.range[1], b.range[1]);
+                if same && a.edge != b.edge && !near(a.level, b.level) {
+                    pairs.push(([(a.edge, a.side), (b.edge, b.side)], a.direction));
+                }
+            }
+        }
+    }
+    let mut of: FxHashMap<usize, Vec<usize>> = FxHashMap::default();
+    for (k, ([a, b], _)) in pairs.iter().enumerate() {
+        of.entry(a.0).or_default().push(k);
+        of.entry(b.0).or_default().push(k);
+    }
+    let mut order: Vec<usize> = of.keys().copied().collect();
+    order.sort_by_key(|&e| (std::cmp::Reverse(times[e].len()), e));
+    let mut done = vec![false; times.len()];
+    for first in order {
+        if done[first] {
+            continue;
+        }
+        done[first] = true;
+        let most = times[first].len();
+        let mut queue = vec![first];
+        while let Some(e) = queue.pop() {
+            for &k in &of[&e] {
+                let ([a, b], direction) = &pairs[k];
+                let (from, to) = if a.0 == e { (a, b) } else { (b, a) };
+                let curve = &part.edges[to.0].curve;
+                if done[to.0] || 2 * times[to.0].len() < most || breaks(curve).len() > 2 {
+                    continue;
+                }
+                let handed = hand(&times[e], from.1, to.1, *direction, curve.domain());
+                let Some(handed) = handed else { continue };
+                let kept = hold(curve, &sides[to.0], denser[to.0], handed.clone());
+                if kept.len() as f64 <= GROWTH * handed.len() as f64 {
+                    times[to.0] = kept;
+                    done[to.0] = true;
+                    queue.push(to.0);
+                }
+            }
+        }
+    }
+}
+
+/// A use as a run along a parameter line, if it is one.
+fn follow<'f>(side: &'f EdgeUse, sheet: &Sheet<'_>) -> Option<Along<'f>> {
+    let edge = side.edge?.0 as usize;
+    let [t0, t1] = side.uv.domain();
+    let domain = sheet.surface.domain();
+    let at = |i: u32| {
+        let uv = side.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / 8.0);
+        [0, 1].map(|d| (uv[d] - domain[d][0]) / (domain[d][1] - domain[d][0]))
+    };
+    let looks: Vec<[f64; 2]> = (0..=8).map(at).collect();
+    (0..2).find_map(|d| {
+        let flat = looks.iter().all(|p| (p[1 - d] - looks[0][1 - d]).abs() <= 1e-7);
+        let up = looks[8][d] > looks[0][d];
+        let steady = looks.windows(2).all(|w| (w[1][d] > w[0][d]) == up && w[1][d] != w[0][d]);
+        let (a, b) = (looks[0][d], looks[8][d]);
+        (flat && steady).then(|| Along {
+            edge,
+            side,
+            direction: d,
+            range: [a.min(b), a.max(b)],
+            level: looks[0][1 - d],
+        })
+    })
+}
+
+/// The samples of one use where the other has the same parameter; `None` when they do not ascend there.
+fn hand(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2]) -> Option<Vec<f64>> {
+    let x = |t: f64| to.uv.evaluate(t)[d];
+    let up = x(t1) > x(t0);
+    let invert = |goal: f64| {
+        let (mut lo, mut hi) = (t0, t1);
+        for _ in 0..60 {
+            let m = 0.5 * (lo + hi);
+            if (x(m) < goal) == up { lo = m } else { hi = m }
+        }
+        0.5 * (lo + hi)
+    };
+    let mut out: Vec<f64> = times[1..times.len() - 1].iter().map(|&t| invert(from.uv.evaluate(t)[d])).collect();
+    out.sort_by(f64::total_cmp);
+    out.insert(0, t0);
+    out.push(t1);
+    let least = 1e-9 * (t1 - t0);
+    out.windows(2).all(|w| w[1] - w[0] > least).then_some(out)
+}
