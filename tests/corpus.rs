@@ -18,6 +18,14 @@ fn corpus() -> Option<(PathBuf, Value)> {
     Some((folder, serde_json::from_str(&text?).expect("reference.json is JSON")))
 }
 
+/// Files in which the listed box is that of faces and wires together, with the box that OpenCASCADE 7.8.1 gives for the
+/// faces alone (the union of `BRepBndLib::AddOptimal` over them). In the first, a curve of a GEOMETRIC_CURVE_SET beside
+/// the one plane square of ±50 mm reaches to x = 85.2; in the second, free lines are 10⁶ mm long.
+const FACES_ALONE: [(&str, [[f64; 3]; 2]); 2] = [
+    ("trj9_c2-id-214.stp", [[-50.0, -50.0, -100.0], [50.0, 50.0, -100.0]]),
+    ("trj5_k1-ct-214.stp", [[0.0004355, -25.4, -6.35001], [127.0, 22.86, 6.35001]]),
+];
+
 struct Row {
     file: String,
     mb: f64,
@@ -44,11 +52,16 @@ fn row(folder: &Path, name: &str, reference: &Value, with_area: bool) -> Row {
     let r = &import.report;
     let count = |a: &str, b: &str| reference[a][b].as_u64().map(|n| n as usize).filter(|&n| n > 0);
     let corner = |k: usize, i: usize| reference["bbox_mm"][k][i].as_f64();
-    let bbox = r.bbox_mm.and_then(|b| {
-        let size = (0..3).map(|i| Some(corner(1, i)? - corner(0, i)?)).collect::<Option<Vec<f64>>>()?;
-        let allowed = 0.05 + 2e-4 * size.iter().map(|s| s * s).sum::<f64>().sqrt();
-        let worst = (0..6).map(|k| (b[k / 3][k % 3] - corner(k / 3, k % 3).unwrap_or(f64::NAN)).abs());
-        Some(worst.fold(0.0, f64::max) / allowed)
+    let own = FACES_ALONE.iter().find(|(file, _)| *file == name).map(|(_, b)| *b);
+    let listed = || {
+        let side = |k: usize| Some([corner(k, 0)?, corner(k, 1)?, corner(k, 2)?]);
+        Some([side(0)?, side(1)?])
+    };
+    let bbox = r.bbox_mm.zip(own.or_else(listed)).map(|(b, reference)| {
+        let size: f64 = (0..3).map(|i| (reference[1][i] - reference[0][i]).powi(2)).sum();
+        let allowed = 0.05 + 2e-4 * size.sqrt();
+        let worst = (0..6).map(|k| (b[k / 3][k % 3] - reference[k / 3][k % 3]).abs());
+        worst.fold(0.0, f64::max) / allowed
     });
     let violations = import.model.parts.iter().map(|p| {
         p.shells.iter().flat_map(|s| &s.faces).filter(|f| !step_support::violations(p, f).is_empty()).count()
@@ -136,10 +149,6 @@ fn areas_of_the_corpus() {
     assert!(good * 100 >= 97 * judged.len(), "areas of {good} of {} files are right", judged.len());
 }
 
-/// Files whose box in the reference is not that of their faces: it includes wires (`trj9`, and `trj5_k1-ct` with lines of
-/// 10⁶ mm).
-const WIRES_IN_THE_BOX: [&str; 2] = ["trj9_c2-id-214.stp", "trj5_k1-ct-214.stp"];
-
 #[test]
 fn every_file_gives_its_faces_where_they_belong() {
     let rows = rows(false);
@@ -151,9 +160,11 @@ fn every_file_gives_its_faces_where_they_belong() {
     assert!(converted * 1000 >= 995 * reference, "{converted} of {reference} faces");
     let placed: Vec<&Row> = rows.iter().filter(|r| r.placed_reference.is_some()).collect();
     let right = placed.iter().filter(|r| r.placed_reference == Some(r.placed)).count();
-    let boxes: Vec<&Row> =
-        rows.iter().filter(|r| r.bbox.is_some() && !WIRES_IN_THE_BOX.contains(&r.file.as_str())).collect();
+    let boxes: Vec<&Row> = rows.iter().filter(|r| r.bbox.is_some()).collect();
     let inside = boxes.iter().filter(|r| r.bbox.is_some_and(|b| b <= 1.0)).count();
     println!("faces {converted}/{reference}, placed {right}/{}, boxes {inside}/{}", placed.len(), boxes.len());
     assert!(right * 100 >= 98 * placed.len() && inside * 100 >= 98 * boxes.len());
+    // What the model promises holds for every face of every file.
+    let broken: Vec<&Row> = rows.iter().filter(|r| r.violations > 0).collect();
+    assert!(broken.is_empty(), "{:?}", broken.iter().map(|r| (&r.file, r.violations)).collect::<Vec<_>>());
 }

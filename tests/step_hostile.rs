@@ -1,7 +1,9 @@
 //! Damaged and malicious input: no panic, no hang, no file lost to one bad record.
 
 use lampyris::step::{ErrorKind, Settings, read_bytes};
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 fn import(text: &str) -> lampyris::step::Import {
@@ -126,6 +128,30 @@ fn an_assembly_that_doubles_at_every_level_is_cut_off() {
     assert!(start.elapsed() < Duration::from_secs(20));
 }
 
+/// Live and largest bytes on the heap: the allocator of this test counts.
+struct Counting;
+
+static LIVE: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call is handed to the system's allocator as it came; the counters are beside it.
+#[allow(unsafe_code)]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let live = LIVE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        PEAK.fetch_max(live, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        LIVE.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static HEAP: Counting = Counting;
+
 /// A small generator of our own, so that the damage is the same on every machine.
 fn next(state: &mut u64) -> usize {
     *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -178,7 +204,7 @@ fn damaged_fixtures_are_read_or_refused() {
 }
 
 #[test]
-#[ignore = "1,200 damaged reads of the whole corpus take minutes; run with --release -- --ignored damaged_corpus"]
+#[ignore = "2,280 damaged reads of the whole corpus take minutes; run with --release -- --ignored damaged_corpus"]
 fn damaged_corpus_is_read_or_refused() {
     let folder = std::env::var_os("LAMPYRIS_CORPUS")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/step-corpus"), PathBuf::from);
@@ -187,8 +213,10 @@ fn damaged_corpus_is_read_or_refused() {
         println!("no corpus in {}: nothing to damage", folder.display());
     }
     for path in files {
-        let worst = damage(&path, 20, 1);
-        println!("{:6.2} s {}", worst.as_secs_f64(), path.display());
-        assert!(worst < Duration::from_secs(10), "{}", path.display());
+        PEAK.store(LIVE.load(Ordering::Relaxed), Ordering::Relaxed);
+        let worst = damage(&path, 20, 20);
+        let peak = PEAK.load(Ordering::Relaxed) as f64 / 1e6;
+        println!("{:6.2} s {peak:7.1} MB {}", worst.as_secs_f64(), path.display());
+        assert!(worst < Duration::from_secs(10) && peak < 1000.0, "{}", path.display());
     }
 }

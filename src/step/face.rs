@@ -209,6 +209,8 @@ fn fit_edge(chart: &Chart, curve: &Curve, task: &Task<'_>, budget: &Budget) -> R
         locate: &|_, p, hint| chart.locate(p, hint),
         derivatives: &|uv| chart.derivatives(uv),
         poles: &chart.poles,
+        range: [0, 1]
+            .map(|d| if chart.period[d].is_some() { [f64::NEG_INFINITY, f64::INFINITY] } else { chart.range[d] }),
         pole_tolerance: task.accuracy,
         tolerance: task.tolerance,
         budget,
@@ -253,6 +255,7 @@ pub(super) fn refit(
         locate: &|t, p, _| chart.to_surface(domain, chart.locate(p, Some(piece.curve.evaluate(t)))),
         derivatives: &|uv| surface.derivatives(uv),
         poles: &poles,
+        range: surface.domain(),
         pole_tolerance: task.accuracy,
         tolerance: task.tolerance,
         budget,

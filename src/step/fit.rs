@@ -1,6 +1,6 @@
 //! Edges in the parameter plane: cubic Hermite curves over the edge's own parameter, to a stated error in space.
 //!
-//! Guarantee: at three interior points of every piece, `surface(uv(t))` lies within the tolerance of the foot point of
+//! Guarantee: at four interior points of every piece, `surface(uv(t))` lies within the tolerance of the foot point of
 //! `curve(t)`. Known weakness: what happens between those points is not bounded, only unlikely: the error of a cubic
 //! piece is symmetric, and pieces are halved until it is met.
 
@@ -11,6 +11,9 @@ use std::cell::Cell;
 
 /// Deepest halving of a Bézier span of the edge.
 const MAX_DEPTH: u32 = 12;
+
+/// How far a curve may swing over the border, as a fraction of the surface's range.
+const BEYOND: f64 = 1e-7;
 
 /// Counts work, so that no face takes for ever.
 #[derive(Debug)]
@@ -39,6 +42,8 @@ pub(super) struct Target<'t> {
     /// Position and first derivatives.
     pub(super) derivatives: &'t dyn Fn(Uv) -> Derivatives,
     pub(super) poles: &'t [Pole],
+    /// What the curve must not leave; infinite where the surface has no border.
+    pub(super) range: [[f64; 2]; 2],
     /// Nearer than this is at the pole, mm.
     pub(super) pole_tolerance: f64,
     /// Allowed error in space, mm.
@@ -60,6 +65,8 @@ struct Node {
     uv: Uv,
     /// d(uv)/dt inside the piece.
     slope: Uv,
+    /// Distance of the surface from the edge there, mm.
+    miss: f64,
 }
 
 impl Target<'_> {
@@ -80,25 +87,71 @@ impl Target<'_> {
             let first = (self.locate)(t1, piece.evaluate(t1), Some(second));
             let slope = (second - first) / step;
             let mut uv = first * 2.0 - second;
+            for d in 0..2 {
+                uv[d] = uv[d].max(self.range[d][0]).min(self.range[d][1]);
+            }
             uv[pole.fixed] = pole.at;
-            return Ok(Node { t, uv, slope });
+            return Ok(Node { t, uv, slope, miss });
         }
         let uv = (self.locate)(t, d.point, hint);
         let s = (self.derivatives)(uv);
         let (e, f, g) = (s.du.length_squared(), s.du.dot(s.dv), s.dv.length_squared());
+        let miss = (s.point - d.point).length();
         let det = e * g - f * f;
         if det > 1e-14 * e * g && det.is_normal() {
             let (x, y) = (s.du.dot(d.first), s.dv.dot(d.first));
-            return Ok(Node { t, uv, slope: Uv::new((x * g - y * f) / det, (y * e - x * f) / det) });
+            return Ok(Node { t, uv, slope: Uv::new((x * g - y * f) / det, (y * e - x * f) / det), miss });
         }
         let step = 1e-5 * (b - a) * inward;
         let beside = (self.locate)(t + step, piece.evaluate(t + step), Some(uv));
-        Ok(Node { t, uv, slope: (beside - uv) / step })
+        Ok(Node { t, uv, slope: (beside - uv) / step, miss })
+    }
+
+    /// How far a point lies beyond the border, as a fraction of the range.
+    fn beyond(&self, uv: Uv) -> f64 {
+        let over = |d: usize| {
+            let [lo, hi] = self.range[d];
+            if hi - lo < f64::INFINITY { (lo - uv[d]).max(uv[d] - hi) / (hi - lo) } else { 0.0 }
+        };
+        over(0).max(over(1))
+    }
+
+    /// The slope of a node on the border without what leads out of it: ahead (1), behind (-1) or to both sides (0).
+    fn held(&self, mut node: Node, ahead: f64) -> Node {
+        for d in 0..2 {
+            let [lo, hi] = self.range[d];
+            let near = 1e-12 * (hi - lo);
+            let out = ahead * node.slope[d];
+            let low = node.uv[d] <= lo + near && (ahead == 0.0 || out < 0.0);
+            let high = node.uv[d] >= hi - near && (ahead == 0.0 || out > 0.0);
+            if near < f64::INFINITY && (low || high) {
+                node.slope[d] = 0.0;
+            }
+        }
+        node
+    }
+
+    /// The same ends with control points inside the border.
+    fn inside(&self, mut a: Node, mut b: Node) -> (Node, Node) {
+        let third = (b.t - a.t) / 3.0;
+        if !(third > 0.0) {
+            return (a, b);
+        }
+        for d in 0..2 {
+            let [lo, hi] = self.range[d];
+            a.slope[d] = ((a.uv[d] + a.slope[d] * third).max(lo).min(hi) - a.uv[d]) / third;
+            b.slope[d] = (b.uv[d] - (b.uv[d] - b.slope[d] * third).max(lo).min(hi)) / third;
+        }
+        (a, b)
     }
 
     /// Whether the cubic between two nodes is good enough; and the gap seen.
     fn accepts(&self, piece: &Curve, a: Node, b: Node, gap: &mut f64) -> Result<bool, Overrun> {
-        for s in [0.5, 0.2, 0.8] {
+        // Where an edge runs along the border beside the surface, its foot points follow the border with corners.
+        if (1..10).any(|k| self.beyond(hermite(a, b, 0.1 * f64::from(k))) > BEYOND) {
+            return Ok(false);
+        }
+        for s in [0.5, 0.13, 0.87, 0.32] {
             self.budget.spend()?;
             let t = a.t + s * (b.t - a.t);
             let guess = hermite(a, b, s);
@@ -159,13 +212,15 @@ impl Target<'_> {
         gap: &mut f64,
     ) -> Result<(), Overrun> {
         let mut seen = *gap;
+        let (a, b) = (self.held(a, 1.0), self.held(b, -1.0));
         if depth >= MAX_DEPTH || self.accepts(piece, a, b, &mut seen)? {
-            *gap = seen;
-            nodes.push((a, b));
+            *gap = seen.max(a.miss).max(b.miss);
+            nodes.push(if depth >= MAX_DEPTH { self.inside(a, b) } else { (a, b) });
             return Ok(());
         }
         let t = 0.5 * (a.t + b.t);
         let middle = self.node(piece, t, 1.0, Some(hermite(a, b, 0.5)))?;
+        let middle = self.held(middle, 0.0);
         self.halve(piece, a, middle, depth + 1, nodes, gap)?;
         self.halve(piece, middle, b, depth + 1, nodes, gap)
     }

@@ -1,0 +1,129 @@
+//! Faces as real exporters write them, in the smallest file that shows the trait, against closed forms.
+
+mod step_support;
+
+use lampyris::step::{Import, Settings, read_bytes};
+use std::f64::consts::PI;
+
+/// A shell of face #900 in a file in millimetres and radians; `data` defines the face.
+fn import(data: &str) -> Import {
+    let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+                 #4=OPEN_SHELL('',(#900));\n#5=SHELL_BASED_SURFACE_MODEL('',(#4));\n\
+                 #6=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#5),#1);\n";
+    let text = format!(
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{frame}{data}ENDSEC;\nEND-ISO-10303-21;\n"
+    );
+    let import = read_bytes("face.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+    assert_eq!(import.report.problems, Vec::<String>::new());
+    for part in &import.model.parts {
+        for face in part.shells.iter().flat_map(|s| &s.faces) {
+            assert_eq!(step_support::violations(part, face), Vec::<String>::new());
+        }
+    }
+    import
+}
+
+/// The area of the only face.
+fn area(import: &Import) -> f64 {
+    let faces = import.report.faces;
+    assert_eq!((faces.converted, faces.refused), (1, 0), "{:?}", import.report.refusals);
+    step_support::measure_model(&import.model).area
+}
+
+fn close(a: f64, b: f64, relative: f64) {
+    assert!((a / b - 1.0).abs() < relative, "{a} for {b}");
+}
+
+/// Points by id.
+fn points(list: &[(u32, [f64; 3])]) -> String {
+    list.iter().map(|(id, [x, y, z])| format!("#{id}=CARTESIAN_POINT('',({x:?},{y:?},{z:?}));\n")).collect()
+}
+
+/// A quarter of a torus tube around a rim, as its exporter cuts it open: along one edge that the loop uses twice.
+fn rim(flag: &str) -> String {
+    points(&[(10, [0., 0., 3.]), (11, [7., 0., 3.]), (12, [0., 0., 0.]), (13, [10., 0., 3.]), (14, [7., 0., 0.])])
+        + &format!(
+            "#20=DIRECTION('',(0.,0.,-1.));\n#21=DIRECTION('',(1.,0.,0.));\n#22=DIRECTION('',(0.,1.,0.));\n#23=DIRECTION('',(0.,0.,1.));\n\
+             #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=TOROIDAL_SURFACE('',#30,7.,3.);\n\
+             #32=AXIS2_PLACEMENT_3D('',#11,#22,#21);\n#33=CIRCLE('',#32,3.);\n\
+             #34=AXIS2_PLACEMENT_3D('',#10,#23,#21);\n#35=CIRCLE('',#34,10.);\n\
+             #36=AXIS2_PLACEMENT_3D('',#12,#23,#21);\n#37=CIRCLE('',#36,7.);\n\
+             #40=VERTEX_POINT('',#13);\n#41=VERTEX_POINT('',#14);\n\
+             #50=EDGE_CURVE('',#40,#41,#33,.T.);\n#51=EDGE_CURVE('',#40,#40,#35,.T.);\n#52=EDGE_CURVE('',#41,#41,#37,.T.);\n\
+             #60=ORIENTED_EDGE('',*,*,#50,.F.);\n#61=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+             #62=ORIENTED_EDGE('',*,*,#50,.T.);\n#63=ORIENTED_EDGE('',*,*,#52,.T.);\n\
+             #70=EDGE_LOOP('',(#60,#61,#62,#63));\n#71=FACE_BOUND('',#70,{flag});\n#900=ADVANCED_FACE('',(#71),#31,.T.);\n"
+        )
+}
+
+#[test]
+fn a_loop_that_runs_along_its_seam_bounds_the_face_whichever_way_it_runs() {
+    // Pappus: the quarter circle of length 3π/2 has its centroid at 7 + 6/π.
+    let expected = 2.0 * PI * (7.0 * 1.5 * PI + 9.0);
+    for (flag, repaired) in [(".T.", 0), (".F.", 1)] {
+        let import = import(&rim(flag));
+        close(area(&import), expected, 1e-4);
+        assert_eq!(import.report.faces.repaired, repaired, "{:?}", import.report.repairs);
+    }
+}
+
+/// A unit square in the plane z = 0; orientation flags of the four uses and their order.
+fn square(flags: [&str; 4], order: [usize; 4]) -> String {
+    let mut d = points(&[(10, [0., 0., 0.]), (11, [1., 0., 0.]), (12, [1., 1., 0.]), (13, [0., 1., 0.])]);
+    d += "#20=AXIS2_PLACEMENT_3D('',#10,$,$);\n#21=PLANE('',#20);\n";
+    for k in 0..4 {
+        d += &format!("#3{k}=VERTEX_POINT('',#1{k});\n#4{k}=EDGE_CURVE('',#3{k},#3{},$,.T.);\n", (k + 1) % 4);
+        d += &format!("#5{k}=ORIENTED_EDGE('',*,*,#4{k},{});\n", flags[k]);
+    }
+    let list = order.map(|k| format!("#5{k}")).join(",");
+    d + &format!(
+        "#60=EDGE_LOOP('',({list}));\n#61=FACE_OUTER_BOUND('',#60,.T.);\n#900=ADVANCED_FACE('',(#61),#21,.T.);\n"
+    )
+}
+
+#[test]
+fn edges_against_their_neighbours_and_out_of_order_are_put_right() {
+    let (t, f) = (".T.", ".F.");
+    let order = [0, 1, 2, 3];
+    for (flags, order, repaired) in [
+        ([t; 4], order, 0),
+        ([t, t, f, t], order, 1),
+        ([f, t, t, t], order, 1),
+        ([t; 4], [0, 2, 1, 3], 1),
+        ([t, f, t, t], [2, 0, 1, 3], 1),
+    ] {
+        let import = import(&square(flags, order));
+        close(area(&import), 1.0, 1e-12);
+        assert_eq!(import.report.faces.repaired, repaired, "{flags:?} {order:?} {:?}", import.report.repairs);
+        let uses = &import.model.parts[0].shells[0].faces[0].loops[0].uses;
+        assert_eq!(uses.len(), 4, "steps between edges: {uses:?}");
+    }
+}
+
+/// A bilinear patch over the unit square whose face has an edge that bulges over the border of the patch.
+#[test]
+fn an_edge_beside_the_border_of_its_surface_stays_in_the_domain() {
+    let corners = [(10, [0., 0., 0.]), (11, [1., 0., 0.]), (12, [1., 1., 0.]), (13, [0., 1., 0.])];
+    let mut d = points(&corners) + &points(&[(14, [0.3, -0.004, 0.]), (15, [0.7, 0.004, 0.])]);
+    d += "#20=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#10,#13),(#11,#12)),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);\n\
+          #21=B_SPLINE_CURVE_WITH_KNOTS('',3,(#10,#14,#15,#11),.UNSPECIFIED.,.F.,.F.,(4,4),(0.,1.),.UNSPECIFIED.);\n";
+    for k in 0..4 {
+        let curve = if k == 0 { "#21" } else { "$" };
+        d += &format!("#3{k}=VERTEX_POINT('',#1{k});\n#4{k}=EDGE_CURVE('',#3{k},#3{},{curve},.T.);\n", (k + 1) % 4);
+        d += &format!("#5{k}=ORIENTED_EDGE('',*,*,#4{k},.T.);\n");
+    }
+    d += "#60=EDGE_LOOP('',(#50,#51,#52,#53));\n#61=FACE_OUTER_BOUND('',#60,.T.);\n#900=ADVANCED_FACE('',(#61),#20,.T.);\n";
+    let import = import(&d);
+    close(area(&import), 1.0, 1e-3);
+    let face = &import.model.parts[0].shells[0].faces[0];
+    // The cubic swings 4·10⁻³·√3/6 to the side.
+    assert!((face.gap - 4e-3 * 3f64.sqrt() / 6.0).abs() < 2e-5, "{:e}", face.gap);
+    for u in &face.loops[0].uses {
+        let [a, b] = u.uv.domain();
+        for k in 0..=400 {
+            let uv = u.uv.evaluate(a + (b - a) * f64::from(k) / 400.0);
+            assert!(uv.min_element() >= -2e-7 && uv.max_element() <= 1.0 + 2e-7, "{uv}");
+        }
+    }
+}
