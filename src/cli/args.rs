@@ -86,8 +86,11 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         rays_out: Option<PathBuf>,
         /// Use the rays of a file
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, value_name = "FILE", visible_alias = "replay")]
         rays_in: Option<PathBuf>,
+        /// Write the rays that were answered differently, to be asked again with --replay
+        #[arg(long, value_name = "FILE")]
+        disagreements: Option<PathBuf>,
         #[command(flatten)]
         limits: Refusals,
     },

@@ -31,6 +31,7 @@ pub(super) struct Asked<'a> {
     pub(super) accuracy: Option<&'a str>,
     pub(super) rays_out: Option<&'a PathBuf>,
     pub(super) rays_in: Option<&'a PathBuf>,
+    pub(super) disagreements: Option<&'a PathBuf>,
     pub(super) limits: Refusals,
 }
 
@@ -119,6 +120,11 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         })?;
         context.say(format_args!("wrote {}", path.display()));
     }
+    if let Some(path) = asked.disagreements {
+        let kept = found.disagreements.iter().map(|d| (d.ray, d.octree.map(|h| h.t)));
+        write_atomic(path, |mut w| records::write(&mut w, kept.clone()))?;
+        context.say(format_args!("wrote {}", path.display()));
+    }
     if context.json {
         let text = serde_json::to_string_pretty(&found).map_err(|e| Failure::running(e.to_string()))?;
         print(&(text + "\n"))?;
@@ -191,12 +197,13 @@ fn described(c: &Check) -> String {
     line(
         "explained",
         format!(
-            "{} within sag, {} silhouette, {} trim edge, {} coincident, {} tangent, {} without facets or surface",
+            "{} within sag, {} silhouette, {} trim edge, {} coincident, {} tangent, {} unproved facet, {} without facets or surface",
             e.within_sag,
             e.silhouette,
             e.trim_edge,
             e.coincident,
             e.tangent,
+            e.unproved,
             e.unmeshed + e.no_surface
         ),
     );

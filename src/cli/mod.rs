@@ -76,7 +76,7 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
         Command::Trace { scene, output, meshing, tracing, extra } => {
             trace::run(&scene, &output, &meshing, &tracing, &extra, context)
         }
-        Command::Check { file, meshing, tracing, accuracy, rays_out, rays_in, limits } => {
+        Command::Check { file, meshing, tracing, accuracy, rays_out, rays_in, disagreements, limits } => {
             let asked = check::Asked {
                 file: &file,
                 meshing: &meshing,
@@ -84,6 +84,7 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
                 accuracy: accuracy.as_deref(),
                 rays_out: rays_out.as_ref(),
                 rays_in: rays_in.as_ref(),
+                disagreements: disagreements.as_ref(),
                 limits,
             };
             check::run(&asked, context)

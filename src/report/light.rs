@@ -236,6 +236,7 @@ impl Light<'_> {
             ("explained: trim edge", e.trim_edge),
             ("explained: coincident faces", e.coincident),
             ("explained: tangent", e.tangent),
+            ("explained: a facet whose distance was not proved", e.unproved),
             ("explained: a face that has no facets or no surface", e.unmeshed + e.no_surface),
             ("unexplained", f.unexplained),
             ("spline hits proved to be the first", check.exact.certified),

@@ -11,8 +11,8 @@ pub(super) struct Judge<'a> {
     mesh: &'a FacetMesh,
     placed: Vec<PlacedFace<'a>>,
     sheets: Vec<OnceLock<Option<Sheet>>>,
-    /// Largest finite sag of each face's facets, mm; `None` for a face without facets.
-    bands: Vec<Option<f64>>,
+    /// The facets of each face.
+    facets: Vec<Vec<u32>>,
     fallback: f64,
     /// Differences below this are rounding, mm.
     pub(super) rounding: f64,
@@ -21,18 +21,17 @@ pub(super) struct Judge<'a> {
 impl<'a> Judge<'a> {
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
         let placed: Vec<_> = model.placed_faces().collect();
-        let mut bands = vec![None; placed.len()];
-        for (i, facet) in mesh.facets.iter().enumerate() {
-            let sag = mesh.sag.get(i).copied().filter(|s| s.is_finite()).unwrap_or(fallback);
-            if let Some(band) = bands.get_mut(facet.face.index()) {
-                *band = Some(f64::max(band.unwrap_or(0.0), sag));
+        let mut facets = vec![Vec::new(); placed.len()];
+        for (i, facet) in (0u32..).zip(&mesh.facets) {
+            if let Some(own) = facets.get_mut(facet.face.index()) {
+                own.push(i);
             }
         }
         let sheets = placed.iter().map(|_| OnceLock::new()).collect();
         let bounds = mesh.bounds();
         let reach = Aabb::around([bounds.min.abs(), bounds.max.abs()]).max;
         let size = if bounds.is_empty() { 1.0 } else { reach.length() + bounds.diagonal() };
-        Self { mesh, placed, sheets, bands, fallback, rounding: 1e-11 * size }
+        Self { mesh, placed, sheets, facets, fallback, rounding: 1e-11 * size }
     }
 
     fn sheet(&self, face: FaceId) -> Option<&Sheet> {
@@ -40,14 +39,34 @@ impl<'a> Judge<'a> {
         self.sheets[face.index()].get_or_init(|| Sheet::of(placed)).as_ref()
     }
 
-    fn band(&self, face: FaceId) -> f64 {
-        let face = self.bands.get(face.index()).copied().flatten();
-        face.unwrap_or(self.fallback)
+    /// Sag of a facet, mm: proved, or what was asked of the mesher.
+    fn sag(&self, facet: u32) -> f64 {
+        self.proved(facet).unwrap_or(self.fallback)
     }
 
-    fn facet_sag(&self, hit: &Hit) -> f64 {
-        let own = self.mesh.sag.get(hit.primitive as usize).copied().filter(|s| s.is_finite());
-        own.unwrap_or_else(|| self.band(hit.face))
+    fn proved(&self, facet: u32) -> Option<f64> {
+        self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite())
+    }
+
+    /// Largest sag of those facets of a face that the ray passes within their own sag; `None` when it passes none.
+    fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> Option<f64> {
+        let near = |&i: &u32| {
+            let sag = self.sag(i);
+            let bounds = Aabb::around(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
+            let everywhere = ray.within(f64::NEG_INFINITY, f64::INFINITY);
+            bounds.clip(&everywhere).map(|_| sag)
+        };
+        self.facets.get(face.index())?.iter().filter_map(near).reduce(f64::max)
+    }
+
+    /// How far a facet that nobody proved strays from the spline: the farthest of 25 of its points.
+    fn measured(&self, hit: &Hit, sheet: &Sheet, ray: &Ray) -> f64 {
+        let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
+        let points = (0..25).map(|k| {
+            let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
+            if u >= v { a + (b - a) * (u - v) + (c - a) * v } else { a + (d - a) * (v - u) + (c - a) * u }
+        });
+        points.map(|p| sheet.foot(p, hit.uv, ray.direction).offset.abs()).fold(0.0, f64::max)
     }
 
     /// `None` when the answers agree to rounding.
@@ -58,7 +77,7 @@ impl<'a> Judge<'a> {
             _ => return Some(self.explain(ray, facet, exact)),
         };
         let apart = (f.t - e.t).abs();
-        if apart > self.rounding + self.facet_sag(f) {
+        if apart > self.rounding + self.sag(f.primitive) {
             return Some(self.explain(ray, facet, exact));
         }
         // The spline passes within `apart` of the facet's hit, so the hit lies within the sag.
@@ -80,11 +99,28 @@ impl<'a> Judge<'a> {
         };
         let (first, other) = if facet_first { (facet, exact) } else { (exact, facet) };
         let Some(first) = first else { return Cause::Unexplained(Defect::Inconclusive) };
-        if self.bands.get(first.face.index()).copied().flatten().is_none() {
+        if self.facets.get(first.face.index()).is_none_or(|f| f.is_empty()) {
             return Cause::Unmeshed;
         }
         let Some(sheet) = self.sheet(first.face) else { return Cause::NoSurface };
-        let band = self.band(first.face) + sheet.gap + self.rounding + 1e-9 * sheet.size();
+        let sag = self.band(first.face, ray, sheet.gap).unwrap_or(0.0);
+        let cause = self.cause(ray, first, other, sheet, sag);
+        // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
+        if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved(f.primitive).is_none()))
+            && let Some(its) = self.sheet(f.face)
+        {
+            let measured = self.measured(f, its, ray);
+            let again = if measured > sag { self.cause(ray, first, other, sheet, measured) } else { cause };
+            if !matches!(again, Cause::Unexplained(_)) {
+                return Cause::Unproved;
+            }
+        }
+        cause
+    }
+
+    /// The cause when facets may stray from the first hit's face by `sag`.
+    fn cause(&self, ray: &Ray, first: &Hit, other: Option<&Hit>, sheet: &Sheet, sag: f64) -> Cause {
+        let band = sag + sheet.gap + self.rounding + 1e-9 * sheet.size();
         let Some(stretch) = sheet.stretch(ray, first.t, first.uv, band) else {
             return Cause::Unexplained(Defect::OffTheSurface);
         };
@@ -103,7 +139,7 @@ impl<'a> Judge<'a> {
             return Cause::Silhouette;
         }
         if let Some(o) = other.filter(|o| o.face != first.face) {
-            let both = band + self.band(o.face);
+            let both = band + self.band(o.face, ray, sheet.gap).unwrap_or(0.0);
             if sheet.foot(ray.at(o.t), first.uv, ray.direction).offset.abs() <= both {
                 return Cause::Coincident;
             }

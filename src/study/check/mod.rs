@@ -7,8 +7,8 @@
 //! difference is *unexplained*, a defect.
 //!
 //! Guarantee: every ray is judged, none is sampled, and counts do not depend on the number of threads.
-//! Known weakness: the band is the largest proved sag of the face, so on a face with very uneven facets a defect smaller
-//! than that passes as explained; a facet without a proved sag counts with [`Settings::fallback_band_mm`].
+//! The band is the largest proved sag of those facets of the face that the ray passes within their own sag.
+//! Known weakness: a facet without a proved sag counts with [`Settings::fallback_band_mm`].
 
 mod judge;
 mod measure;
@@ -176,6 +176,7 @@ impl Tally {
             Some(Cause::TrimEdge) => &mut explained.trim_edge,
             Some(Cause::Coincident) => &mut explained.coincident,
             Some(Cause::Tangent) => &mut explained.tangent,
+            Some(Cause::Unproved) => &mut explained.unproved,
             Some(Cause::Unmeshed) => &mut explained.unmeshed,
             Some(Cause::NoSurface) => &mut explained.no_surface,
             Some(Cause::Unexplained(_)) => &mut found.unexplained,
@@ -201,6 +202,7 @@ impl Tally {
         p.trim_edge += q.trim_edge;
         p.coincident += q.coincident;
         p.tangent += q.tangent;
+        p.unproved += q.unproved;
         p.unmeshed += q.unmeshed;
         p.no_surface += q.no_surface;
         self.t_errors.merge(&other.t_errors);

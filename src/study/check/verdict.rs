@@ -18,6 +18,8 @@ pub enum Cause {
     Coincident,
     /// The spline's hit is a touch within 1e-9 mm.
     Tangent,
+    /// The facet has no proved sag, and the court's own measure of it is more than was asked and explains the difference.
+    Unproved,
     /// The face was not meshed, so the facets cannot answer.
     Unmeshed,
     /// The face is a ready mesh without a surface, so the spline cannot answer.
@@ -50,6 +52,7 @@ impl Cause {
             Self::TrimEdge => "trim edge",
             Self::Coincident => "coincident",
             Self::Tangent => "tangent",
+            Self::Unproved => "unproved facet",
             Self::Unmeshed => "unmeshed",
             Self::NoSurface => "no surface",
             Self::Unexplained(Defect::OffTheSurface) => "unexplained: off the surface",
@@ -154,6 +157,8 @@ pub struct Explained {
     pub coincident: u64,
     /// [`Cause::Tangent`].
     pub tangent: u64,
+    /// [`Cause::Unproved`].
+    pub unproved: u64,
     /// [`Cause::Unmeshed`].
     pub unmeshed: u64,
     /// [`Cause::NoSurface`].

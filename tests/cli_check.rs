@@ -1,0 +1,44 @@
+//! `check` with the real binary: rays that were answered differently can be written out and asked again.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+fn check(arguments: &[&str]) -> Value {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/reflector_freeform_trimmed.stp");
+    let mut command = Command::cargo_bin("lampyris").unwrap();
+    let output =
+        command.arg("check").arg(file).arg("--json").args(arguments).env("NO_COLOR", "1").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn count(document: &Value, path: &str) -> u64 {
+    document.pointer(path).and_then(Value::as_u64).unwrap_or_else(|| panic!("{path} is missing"))
+}
+
+#[test]
+fn what_was_answered_differently_is_so_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("odd.rays").display().to_string();
+    let first = check(&["--rays", "9000", "--disagreements", &file]);
+    assert_eq!(count(&first, "/rays"), 9000);
+    assert_eq!(count(&first, "/facets_vs_exact/unexplained"), 0);
+    assert_eq!(count(&first, "/octree_vs_bvh/disagree"), 0);
+    // Seven little-endian numbers a ray.
+    let written = std::fs::metadata(&file).unwrap().len() / 56;
+    assert!(written > 0, "facets and spline must differ somewhere at silhouettes and trims");
+    let again = check(&["--replay", &file]);
+    assert_eq!(count(&again, "/rays"), written);
+    for path in [
+        "/facets_vs_exact/hit_miss",
+        "/facets_vs_exact/other_face",
+        "/facets_vs_exact/explained/silhouette",
+        "/facets_vs_exact/explained/trim_edge",
+        "/facets_vs_exact/explained/coincident",
+    ] {
+        assert_eq!(count(&first, path), count(&again, path), "{path}");
+    }
+    let differ = count(&again, "/facets_vs_exact/hit_miss") + count(&again, "/facets_vs_exact/other_face");
+    assert!(differ > 0 && differ <= written, "{again}");
+}
