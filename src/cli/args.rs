@@ -138,17 +138,29 @@ pub(crate) struct TraceOptions {
     /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
     #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
     pub(crate) accuracy: Option<String>,
-    /// Trace only part I of N (I from 1)
+    /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<String>,
     /// Go on where an interrupted run stopped
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Trace until the statistical error of a receiver is below P percent
-    #[arg(long, value_name = "P%@RECEIVER")]
+    /// Save a long run every so many seconds, for --resume
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    pub(crate) checkpoint: f64,
+    /// Trace until the statistical error (1σ) of a receiver's power is below P percent, or, with :cells after its name, that of
+    /// its cells weighted by their light; --rays is then the most to trace
+    #[arg(long, value_name = "P%@RECEIVER", conflicts_with_all = ["shard", "resume", "verify_pruning", "paths"])]
     pub(crate) until_error: Option<String>,
+    /// Write every vertex of every ray path, in constant memory: arrays ray, branch, bounce, event, point (mm) and power (share
+    /// of an average ray), in no particular order; events from 0: emitted, split, reflected, transmitted, scattered, absorbed,
+    /// received, escaped, cut off, lost
+    #[arg(long, value_name = "FILE.npz", conflicts_with_all = ["resume", "verify_pruning"])]
+    pub(crate) paths: Option<PathBuf>,
+    /// Trace one ray again and show its path; a lost_rays.csv for all the rays in it; may be given several times
+    #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "verify_pruning", "paths"])]
+    pub(crate) replay: Vec<String>,
     /// Run the full kernel too and compare every tally bit by bit
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["shard", "resume"])]
     pub(crate) verify_pruning: bool,
     /// Read, check and tessellate, say what would be done, trace nothing
     #[arg(long)]

@@ -39,7 +39,7 @@ pub(super) fn run(
     let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
     step_of("tessellate", what, prepared.seconds);
     let start = std::time::Instant::now();
-    let mut outcome = prepared.trace(false, context);
+    let mut outcome = prepared.trace(job::Ways::default(), context);
     let both = start.elapsed().as_secs_f64();
     let (s, r) = (outcome.results.seconds, &outcome.results);
     step_of("build", format!("the {}", prepared.choice.intersector), s.build);

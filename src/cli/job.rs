@@ -2,8 +2,10 @@
 
 use super::context::Context;
 use super::engine::{self, Choice};
+use super::ledger;
 use super::load::Loaded;
 use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
+use super::paths::Paths;
 use super::witness::Witness;
 use super::{Failure, files, look};
 use crate::formats::{Polylines, write_facets, write_vtp};
@@ -13,7 +15,10 @@ use crate::intersect::exact::Exact;
 use crate::intersect::octree::Octree;
 use crate::math::Ray;
 use crate::report::{Cell, Light, Report, Table, file_stem, path_lines};
-use crate::simulate::{BoundScene, Results, RunSettings, Scene, Verification, simulate, verify_pruning};
+use crate::simulate::{
+    BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, Results, RunSettings, Scene, Traced, Verification,
+    replay, trace, verify_pruning,
+};
 use crate::study::check::{self, Check, Court, check};
 use crate::tessellate::{self, Tessellation};
 use std::path::{Path, PathBuf};
@@ -37,6 +42,23 @@ pub(super) struct Prepared<'a> {
     pub(super) seconds: f64,
     pub(super) choice: Choice,
     pub(super) threads: usize,
+    /// Rays to trace in place of what the options and the scene say.
+    pub(super) rays: Option<u64>,
+}
+
+/// How to trace beside the settings.
+#[derive(Clone, Default)]
+pub(super) struct Ways<'a> {
+    /// With the full kernel too.
+    pub(super) verify: bool,
+    /// What is done already.
+    pub(super) from: Option<Portion>,
+    /// Which part of how many, from 0.
+    pub(super) shard: Option<[u32; 2]>,
+    /// Told of all that is done after each replicate.
+    pub(super) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    /// Takes every path.
+    pub(super) paths: Option<&'a Paths>,
 }
 
 /// What came of it.
@@ -54,53 +76,97 @@ pub(super) fn prepare<'a>(job: Job<'a>, context: &Context) -> Result<Prepared<'a
     let bound = job.scene.bind(&job.loaded.model)?;
     let mesh_settings = engine::mesh_settings(job.meshing, Some(job.scene), &job.loaded.model)?;
     let (tessellation, seconds) = engine::facets(&job.loaded.model, &mesh_settings, context);
-    Ok(Prepared { job, bound, tessellation, mesh_settings, seconds, choice, threads })
+    Ok(Prepared { job, bound, tessellation, mesh_settings, seconds, choice, threads, rays: None })
 }
 
 impl Prepared<'_> {
     /// The run's settings: the scene's, with the options over them.
     pub(super) fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);
-        settings.rays = self.job.tracing.rays.unwrap_or(settings.rays);
+        settings.rays = self.rays.or(self.job.tracing.rays).unwrap_or(settings.rays);
         settings.seed = self.job.tracing.seed.unwrap_or(settings.seed);
         settings.threads = self.threads;
         settings.path_samples = 2000.min(settings.rays);
         settings
     }
 
-    /// Traces the scene (with the full kernel too, when `verify`), and asks a sample of its rays again.
-    pub(super) fn trace(&self, verify: bool, context: &Context) -> Outcome {
+    /// Number of independent parts that the run is divided into.
+    pub(super) fn replicates(&self) -> u32 {
+        crate::simulate::replicates(&self.bound, &self.run_settings())
+    }
+
+    /// Traces the scene, and asks a sample of its rays again.
+    pub(super) fn trace(&self, ways: Ways, context: &Context) -> Outcome {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let settings = self.run_settings();
         engine::with_intersector(self.choice, model, mesh, context, |intersector, footprint| {
+            let done = ways.from.as_ref().is_some_and(Portion::is_whole);
+            let traced = if done { settings.rays.min(self.job.recheck as u64) } else { settings.rays };
             // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
-            let witness = Witness::new(intersector, self.job.recheck as u64, 4 * settings.rays);
-            let bar = context.bar("tracing", "rays", settings.rays);
-            let progress = |p: crate::simulate::Progress| {
-                bar.set_length(p.total);
-                bar.set_position(p.rays);
-                true
-            };
+            let witness = Witness::new(intersector, self.job.recheck as u64, 4 * traced);
             let asked: &dyn Intersector = if self.job.recheck > 0 { &witness } else { intersector };
-            let (mut results, verification) = if verify {
-                let (results, verification) = verify_pruning(&self.bound, asked, &settings, &progress);
+            let (mut results, verification) = if ways.verify {
+                let (results, verification) = verify_pruning(&self.bound, asked, &settings, &|_| true);
                 (results, Some(verification))
             } else {
-                (simulate(&self.bound, asked, &settings, &progress), None)
+                (Results::of(&self.bound, &settings, self.run(asked, &settings, ways, context)), None)
             };
-            bar.finish_and_clear();
-            for absorbed in &mut results.absorbed {
-                if let Some(k) = model.instances.iter().position(|i| i.name == absorbed.name) {
-                    absorbed.name = look::shown_name(model, k);
-                }
+            self.stamp(&mut results, footprint.build_seconds);
+            if done {
+                // Nothing was left to trace: some rays of the run for the check alone.
+                let step = (settings.rays / traced.max(1)).max(1);
+                replay(&self.bound, &witness, &settings, &(0..traced).map(|k| k * step).collect::<Vec<_>>());
             }
-            results.seconds.read = self.job.loaded.seconds;
-            results.seconds.tessellate = self.seconds;
-            results.seconds.build = footprint.build_seconds;
             let rays = witness.rays(self.job.recheck, model, 4.0 * self.mesh_settings.tolerance[1]);
             let check = (!rays.is_empty()).then(|| self.court(intersector, &rays, context));
             Outcome { results, check, verification }
         })
+    }
+
+    /// Traces the replicates of a shard.
+    pub(super) fn portion(&self, ways: Ways, context: &Context) -> Portion {
+        let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
+        let settings = RunSettings { shard: ways.shard.unwrap_or([0, 1]), ..self.run_settings() };
+        engine::with_intersector(self.choice, model, mesh, context, |intersector, _| {
+            self.run(intersector, &settings, ways, context).portion
+        })
+    }
+
+    pub(super) fn run(
+        &self,
+        intersector: &dyn Intersector,
+        settings: &RunSettings,
+        ways: Ways,
+        context: &Context,
+    ) -> Traced {
+        let bar = context.bar("tracing", "rays", settings.rays);
+        let progress = |p: Progress| {
+            bar.set_length(p.total);
+            bar.set_position(p.rays);
+            ways.paths.is_none_or(|paths| !paths.failed())
+        };
+        let take = ways.paths.map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
+        let hooks = Hooks {
+            progress: &progress,
+            finished: ways.finished,
+            paths: take.as_ref().map(|take| take as PathSink<'_>),
+        };
+        let traced = trace(&self.bound, intersector, settings, ways.from, &hooks);
+        bar.finish_and_clear();
+        traced
+    }
+
+    /// Completes results by what was done before tracing.
+    fn stamp(&self, results: &mut Results, build_seconds: f64) {
+        let model = &self.job.loaded.model;
+        for absorbed in &mut results.absorbed {
+            if let Some(k) = model.instances.iter().position(|i| i.name == absorbed.name) {
+                absorbed.name = look::shown_name(model, k);
+            }
+        }
+        results.seconds.read = self.job.loaded.seconds;
+        results.seconds.tessellate = self.seconds;
+        results.seconds.build = build_seconds;
     }
 
     fn court(&self, octree: &dyn Intersector, rays: &Vec<Ray>, context: &Context) -> Check {
@@ -148,7 +214,11 @@ impl Prepared<'_> {
         facets.paths = Some(&near);
         write_facets(&folder.join("facets.glb"), &facets)?;
         facets.paths = None;
+        let ledger = ledger::write(folder, &outcome.results, self)?;
         let mut document = serde_json::to_value(&outcome.results).map_err(|e| Failure::running(e.to_string()))?;
+        if ledger {
+            document["ledger"] = ledger::LEDGER.into();
+        }
         if let Some(v) = &outcome.verification {
             document["pruning"] = serde_json::to_value(v).map_err(|e| Failure::running(e.to_string()))?;
         }
@@ -230,6 +300,12 @@ pub(super) fn highlights(folder: &Path, results: &Results) -> Vec<(PathBuf, Stri
         list.push((
             folder.join(format!("{stem}.csv")),
             format!("{} cell by cell (also .npz .png .vti and more)", r.name),
+        ));
+    }
+    if !results.ledger.is_empty() {
+        list.push((
+            folder.join(ledger::LEDGER),
+            "the lost rays; `lampyris trace` shows their paths with --replay".into(),
         ));
     }
     list.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));

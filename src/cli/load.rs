@@ -50,8 +50,12 @@ pub(super) fn scene_models(
 ) -> Result<Loaded, Failure> {
     let start = Instant::now();
     let (mut models, mut reports) = (Vec::new(), Vec::new());
-    for entry in &scene.models {
-        let Import { model, report } = read(entry)?;
+    for (i, entry) in scene.models.iter().enumerate() {
+        let shown = |failure: Failure| match scene.place_of_model(i) {
+            Some(e) => failure.shows(e.0, e.1, e.2, "named here"),
+            None => failure,
+        };
+        let Import { model, report } = read(entry).map_err(shown)?;
         models.push(model);
         reports.push(report);
     }

@@ -14,15 +14,19 @@ mod failure;
 mod files;
 mod info;
 mod job;
+mod ledger;
 mod load;
 mod look;
 mod machine;
 mod meta;
 mod options;
+mod paths;
+mod portion;
 mod race;
 mod study;
 mod suggest;
 mod trace;
+mod until;
 mod witness;
 
 use args::{Arguments, Command};
@@ -93,15 +97,9 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
             let (file, output) = (file.as_deref(), output.as_ref());
             study::run(&study::Asked { kind, file, output, meshing: &meshing, tracing: &tracing }, context)
         }
-        Command::Merge { .. } => Err(reserved("merge")),
+        Command::Merge { parts, output } => portion::merge(&parts, &output, context),
         Command::Schema => meta::schema(),
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), context),
     }
-}
-
-/// A name of the contract that waits for its work.
-fn reserved(name: &str) -> Failure {
-    Failure::arguments(format!("'{name}' is a reserved name: it does nothing in this version"))
-        .help("leave it out; see `lampyris --help` for what works today")
 }

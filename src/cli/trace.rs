@@ -2,15 +2,18 @@
 
 use super::args::TraceOptions;
 use super::context::{Context, print};
-use super::job::{self, Job, Prepared};
+use super::job::{self, Job, Prepared, Ways};
 use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, aim, load};
+use super::paths::Paths;
+use super::portion::{self, Checkpoint};
+use super::{Failure, Outcome, aim, ledger, load, until};
 use crate::report::{bytes, figures, grouped, seconds};
+use crate::simulate::Portion;
 use serde_json::json;
 use std::path::Path;
 
 /// Rays of a run that are asked again of BVH and spline.
-const RECHECKED: usize = 10_000;
+pub(super) const RECHECKED: usize = 10_000;
 
 pub(super) fn run(
     path: &Path,
@@ -20,24 +23,65 @@ pub(super) fn run(
     extra: &TraceOptions,
     context: &Context,
 ) -> Result<Outcome, Failure> {
-    for (given, name) in [
-        (extra.shard.is_some(), "--shard"),
-        (extra.resume, "--resume"),
-        (extra.until_error.is_some(), "--until-error"),
-    ] {
-        if given {
-            return Err(super::reserved(name));
-        }
+    let shard = extra.shard.as_deref().map(portion::shard).transpose()?;
+    let replay = ledger::asked(&extra.replay)?;
+    if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
+        return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     let (scene, loaded) = load::scene_file(path, context)?;
     let (meshing, tracing) = aim::meshing(extra.accuracy.as_deref(), meshing, tracing, &loaded.model, context)?;
     let job = Job { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, recheck: RECHECKED };
-    let prepared = job::prepare(job, context)?;
+    let mut prepared = job::prepare(job, context)?;
+    let until = extra.until_error.as_deref().map(|text| until::Until::new(text, &scene)).transpose()?;
     if extra.dry_run {
         return dry_run(&prepared, folder, context);
     }
     let refused = load::account(&loaded.reports, extra.limits.max_refused, context);
-    let mut outcome = prepared.trace(extra.verify_pruning, context);
+    if !replay.is_empty() {
+        ledger::run(&prepared, &replay, folder, context)?;
+        return Ok(refused);
+    }
+    if let Some(shard @ [_, n]) = shard {
+        let replicates = prepared.replicates();
+        if n > replicates {
+            let message =
+                format!("--shard: the run has {replicates} replicates and so at most as many shards, not {n}");
+            return Err(Failure::arguments(message).help("raise `replicates` in [run] of the scene"));
+        }
+        let file = portion::shard_file(folder, shard);
+        let checkpoint = Checkpoint::new(&prepared, path, file, Some(shard), extra.checkpoint, context);
+        let from = if extra.resume { checkpoint.read()? } else { None };
+        portion::trace_shard(&prepared, &checkpoint, from, shard, context)?;
+        return Ok(refused);
+    }
+    let (mut traced, mut reached) = (None, None);
+    if let Some(until) = &until {
+        let (portion, answer) = until.trace(&mut prepared, context);
+        (traced, reached) = (Some(portion), Some(answer));
+    }
+    let checkpoint =
+        Checkpoint::new(&prepared, path, folder.join(portion::CHECKPOINT), None, extra.checkpoint, context);
+    let from = if extra.resume { checkpoint.read()? } else { None };
+    if extra.resume {
+        context.say(match &from {
+            Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
+            None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
+        });
+    }
+    let paths = extra.paths.as_deref().map(Paths::create).transpose()?;
+    let finished = |p: &Portion| checkpoint.finished(p);
+    let ways = Ways {
+        verify: extra.verify_pruning,
+        from: traced.or(from),
+        finished: until.is_none().then_some(&finished),
+        paths: paths.as_ref(),
+        ..Ways::default()
+    };
+    let mut outcome = prepared.trace(ways, context);
+    if let (Some(paths), Some(file)) = (paths, &extra.paths) {
+        let vertices = paths.finish()?;
+        context.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
+    }
     if let Some(v) = &outcome.verification {
         if !v.identical {
             let message = format!(
@@ -55,11 +99,15 @@ pub(super) fn run(
             seconds(v.seconds_pruned)
         ));
     }
-    let (document, report) = prepared.write(folder, &mut outcome, Vec::new(), context)?;
-    if context.json {
-        print(&(serde_json::to_string_pretty(&document).map_err(|e| Failure::running(e.to_string()))? + "\n"))?;
-    } else {
-        closing(&report.answer, folder, &outcome.results, context);
+    let said = until.iter().zip(&reached).map(|(u, answer)| u.sentence(answer)).collect();
+    let (mut document, report) = prepared.write(folder, &mut outcome, said, context)?;
+    if let Some(answer) = &reached {
+        document["until_error"] = serde_json::to_value(answer).map_err(|e| Failure::running(e.to_string()))?;
+    }
+    tell(&document, &report.answer, folder, &outcome.results, context)?;
+    checkpoint.remove();
+    if reached.is_some_and(|answer| !answer.reached) {
+        return Ok(Outcome::Incomplete);
     }
     let p = &outcome.results.power;
     let share = p.lost / p.emitted;
@@ -71,6 +119,22 @@ pub(super) fn run(
         return Ok(Outcome::Incomplete);
     }
     Ok(refused)
+}
+
+/// The results on stdout as JSON, or the closing lines.
+pub(super) fn tell(
+    document: &serde_json::Value,
+    answer: &str,
+    folder: &Path,
+    results: &crate::simulate::Results,
+    context: &Context,
+) -> Result<(), Failure> {
+    if context.json {
+        let text = serde_json::to_string_pretty(document).map_err(|e| Failure::running(e.to_string()))?;
+        return Ok(print(&(text + "\n"))?);
+    }
+    closing(answer, folder, results, context);
+    Ok(())
 }
 
 /// The last lines of a traced scene: what was found, which file to open.

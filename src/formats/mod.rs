@@ -27,6 +27,7 @@ mod png;
 mod polylines;
 mod rays;
 mod stl;
+mod stream;
 mod vtk;
 
 pub use atomic::write_atomic;
@@ -44,4 +45,5 @@ pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
 pub use rays::{LightRay, read_rays, write_rays};
+pub use stream::{Column, NpzStream};
 pub use vtk::{write_vti, write_vtp};

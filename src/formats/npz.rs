@@ -30,7 +30,7 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
         let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
         for array in arrays {
             zip.start_file(format!("{}.npy", array.name), options)?;
-            zip.write_all(&header(&array.shape))?;
+            zip.write_all(&header("<f8", &array.shape))?;
             let mut bytes = Vec::with_capacity(8 * array.data.len());
             array.data.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
             zip.write_all(&bytes)?;
@@ -41,10 +41,11 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
     write_atomic(path, |w| w.write_all(&bytes))
 }
 
-fn header(shape: &[usize]) -> Vec<u8> {
+/// The head of an array of these numbers.
+pub(super) fn header(numbers: &str, shape: &[usize]) -> Vec<u8> {
     // A tuple of one number needs its comma.
     let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();
-    let mut text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
+    let mut text = format!("{{'descr': '{numbers}', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
     while (10 + text.len() + 1) % 64 != 0 {
         text.push(' ');
     }

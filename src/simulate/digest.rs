@@ -4,9 +4,21 @@ use super::kernel::Tallies;
 use super::tally::Sum;
 
 /// FNV-1a with 128 bits (Fowler, Noll, Vo): not meant against forgery, only to show that two results are the same.
-struct Fnv(u128);
+pub(crate) struct Fnv(u128);
 
 impl Fnv {
+    const START: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+
+    /// The hash of these pieces; where one ends and the next begins counts.
+    pub(crate) fn of(pieces: &[&[u8]]) -> u128 {
+        let mut h = Self(Self::START);
+        for piece in pieces {
+            h.eat(&(piece.len() as u64).to_le_bytes());
+            h.eat(piece);
+        }
+        h.0
+    }
+
     fn eat(&mut self, bytes: &[u8]) {
         for &b in bytes {
             self.0 = (self.0 ^ u128::from(b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013B);
@@ -25,7 +37,7 @@ impl Fnv {
 
 /// The hash of all sums and counts, as 32 hexadecimal digits.
 pub(crate) fn of(t: &Tallies) -> String {
-    let mut h = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+    let mut h = Fnv(Fnv::START);
     t.cells.iter().for_each(|c| h.sums(c));
     h.sums(&t.receivers);
     h.sums(&t.faces);
@@ -48,7 +60,7 @@ mod tests {
     #[test]
     fn the_hash_is_fnv_1a() {
         // Published test vector of the 128-bit variant.
-        let mut h = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+        let mut h = Fnv(Fnv::START);
         h.eat(b"a");
         assert_eq!(h.0, 0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
     }

@@ -1,10 +1,10 @@
 //! What a simulation found out, in the units of the scene; it serialises to the `trace --json` object.
 
 use super::bind::BoundScene;
-use super::effects::{Because, KernelKind, Required};
+use super::effects::Because;
 use super::kernel::{Counts, LostRay, PathVertex, Tallies};
 use super::receiver::{Receiver, Shape};
-use super::run::Plan;
+use super::run::{Plan, RunSettings, Traced};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tally::Sum;
 use crate::intersect::Cost;
@@ -53,6 +53,9 @@ pub struct Results {
     /// The raw sums, to be merged with those of other shards.
     #[serde(skip)]
     pub tallies: Tallies,
+    /// Power of a quantum, in the unit of the sources.
+    #[serde(skip)]
+    pub quantum: f64,
     /// Hash of all tallies: equal if and only if all of them are, bit by bit.
     pub digest: String,
 }
@@ -183,17 +186,12 @@ fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S:
 }
 
 impl Results {
-    #[expect(clippy::too_many_arguments, reason = "called once, with everything a run leaves behind")]
-    pub(super) fn new(
-        bound: &BoundScene,
-        plan: &Plan,
-        required: &Required,
-        kernel: KernelKind,
-        mut tallies: Tallies,
-        cost: Cost,
-        trace: f64,
-        threads: usize,
-    ) -> Self {
+    /// The results of a run, or of the part of it that was traced.
+    pub fn of(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
+        let plan = Plan::new(bound, settings);
+        let (required, kernel) = (super::effects::required(bound), super::run::kernel_of(bound, settings));
+        let Traced { portion, cost, threads } = traced;
+        let (mut tallies, trace) = (portion.tallies, portion.seconds);
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
@@ -228,24 +226,20 @@ impl Results {
             paths: std::mem::take(&mut tallies.paths),
             cost,
             tallies,
+            quantum,
             digest,
         }
     }
 }
 
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
-    let mut by_instance = vec![Sum::default(); bound.instances.len()];
-    for (sum, &instance) in tallies.faces.iter().zip(&bound.instance_of_face) {
-        // Squares add up as if faces were independent, which overstates the error of an instance hit by split light.
-        by_instance[instance as usize].merge(sum);
-    }
     let result = |name: &str, r#in: &str, s: &Sum| Absorbed {
         name: name.into(),
         r#in: r#in.into(),
         power: s.total as f64 * quantum,
         error: s.error(tallies.replicates) * quantum,
     };
-    let faces = bound.instances.iter().zip(&by_instance).map(|(name, s)| result(name, "faces", s));
+    let faces = bound.instances.iter().zip(&tallies.instances).map(|(name, s)| result(name, "faces", s));
     let bulk = bound.bodies.iter().zip(&tallies.bulk).map(|(b, s)| result(&b.name, &b.medium, s));
     faces.chain(bulk).filter(|a| a.power > 0.0).collect()
 }

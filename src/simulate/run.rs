@@ -1,6 +1,7 @@
 use super::bind::BoundScene;
 use super::effects::{self, KernelKind};
-use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, Stack, Tallies};
+use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, PathSink, Stack, Which};
+use super::portion::Portion;
 use super::receiver::Shape;
 use super::results::Results;
 use super::scene::{Interfaces, Run, Sampling};
@@ -8,7 +9,7 @@ use super::tally::QUANTA;
 use crate::intersect::{Cost, Intersector};
 use crate::optics::Effects;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// What a simulation is run with: the scene's own settings, which the command may override, and how to spread the work.
@@ -121,12 +122,14 @@ pub(crate) struct Plan {
     pub(crate) emitted: f64,
     /// Every 2ᵏ-th ray is recorded; none when absent.
     record_mask: Option<u64>,
+    /// Every 2ᵏ-th ray is kept where all are recorded.
+    sample_mask: Option<u64>,
     /// How far an escaping ray is drawn, mm.
     pub(crate) reach: f64,
 }
 
 impl Plan {
-    fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
+    pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
         // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
         let (mut share, mut given) = (0.0, 0);
@@ -155,18 +158,61 @@ impl Plan {
                 share
             })
             .collect();
-        // At least 16 rays of the run in each replicate, so that a small run still has an error to state.
+        // At least 16 rays of the run in each replicate, so that a small run still has an error to state, and at most some
+        // 2²², whose quanta a word of 64 bits can hold.
         let replicates = settings.replicates.clamp(2, (rays / 16).clamp(2, 1 << 16) as u32);
+        let replicates = replicates.max((rays >> 21) as u32);
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
         let quantum = emitted / (rays as f64 * QUANTA);
-        Self { shares, replicates, rays, quantum, emitted, record_mask, reach: 100.0 }
+        Self { shares, replicates, rays, quantum, emitted, record_mask, sample_mask: record_mask, reach: 100.0 }
     }
 
     #[inline]
     pub(crate) fn records(&self, ray: u64) -> bool {
         self.record_mask.is_some_and(|m| ray & m == 0)
     }
+
+    /// Whether the path of a ray belongs to the sample that is kept.
+    pub(crate) fn samples(&self, ray: u64) -> bool {
+        self.sample_mask.is_some_and(|m| ray & m == 0)
+    }
+
+    /// The source and the replicate of a ray; `None` when the run has no such ray.
+    pub(crate) fn place(&self, ray: u64) -> Option<(usize, u32)> {
+        let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
+        let share = &self.shares[source];
+        let guess = u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays);
+        let holds = |r: &u32| {
+            let [from, to] = share.range(*r, self.replicates);
+            (from..to).contains(&ray)
+        };
+        // Rounding puts the replicate next to the guess.
+        let near = (guess as u32).saturating_sub(1)..=(guess as u32).saturating_add(1).min(self.replicates - 1);
+        near.into_iter().find(holds).map(|r| (source, r))
+    }
+}
+
+/// What a run tells while it runs.
+#[derive(Clone, Copy)]
+pub struct Hooks<'a> {
+    /// Called from the worker threads after each replicate; it ends the run early by returning `false`.
+    pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
+    /// Called with all that is done so far after each replicate, one call at a time.
+    pub finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    /// Takes the vertices of every path, in pieces and in no particular order, from any thread.
+    pub paths: Option<PathSink<'a>>,
+}
+
+/// A run, or the part of it that was asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Traced {
+    /// The replicates that are done, and their sums.
+    pub portion: Portion,
+    /// Work of the intersector.
+    pub cost: Cost,
+    /// Threads used.
+    pub threads: usize,
 }
 
 /// Simulates a bound scene on any intersector.
@@ -179,84 +225,136 @@ pub fn simulate(
     settings: &RunSettings,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Results {
-    let required = effects::required(bound);
-    let kind = match settings.kernel {
-        KernelChoice::Pruned => required.kernel,
-        KernelChoice::With(effects) => required.kernel.max(KernelKind::of(effects)),
-        KernelChoice::Full => KernelKind::Full,
-    };
-    let (tallies, plan, cost, seconds, threads) = run(bound, intersector, settings, kind, progress);
-    Results::new(bound, &plan, &required, kind, tallies, cost, seconds, threads)
+    let hooks = Hooks { progress, finished: None, paths: None };
+    Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks))
 }
 
-fn run(
+/// Traces the replicates of a run (those of its shard) that are not done yet, and adds them to what is.
+pub fn trace(
     bound: &BoundScene,
     intersector: &dyn Intersector,
     settings: &RunSettings,
-    kind: KernelKind,
-    progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> (Tallies, Plan, Cost, f64, usize) {
+    from: Option<Portion>,
+    hooks: &Hooks<'_>,
+) -> Traced {
     let start = Instant::now();
-    let select = |wanted: &dyn Fn(&super::receiver::Receiver) -> bool| -> Vec<u32> {
-        (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
-    };
-    let region = bound.region;
-    let stands = |r: &super::receiver::Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
-    let outside = select(&|r| r.absorbs && stands(r) && !r.meets(&region));
-    let context = Context {
-        bound,
-        intersector,
-        settings,
-        plan: Plan::new(bound, settings),
-        blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
-        outside,
-        region,
-        passing: select(&|r| !r.absorbs && stands(r)),
-        far: select(&|r| matches!(r.shape, Shape::FarField { .. })),
-    };
+    let mut context = Context::new(bound, intersector, settings);
+    context.paths = hooks.paths;
+    if hooks.paths.is_some() {
+        context.plan.record_mask = Some(0);
+    }
     let replicates = context.plan.replicates;
     let [shard, shards] = settings.shard;
     let mine = |k: u32| (u64::from(replicates) * u64::from(k) / u64::from(shards.max(1))) as u32;
-    let (first, last) = (mine(shard), mine(shard + 1).min(replicates));
+    let (first, last) = (mine(shard), mine(shard.saturating_add(1)).min(replicates));
+    let before = from.unwrap_or_else(|| Portion::none(bound, replicates));
+    let todo: Vec<u32> = (first..last).filter(|r| before.done.binary_search(r).is_err()).collect();
     let threads = match settings.threads {
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
         n => n,
     };
-    let next = AtomicU32::new(first);
-    let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let total = Mutex::new((Tallies::new(bound), Cost::default()));
+    let kind = kernel_of(bound, settings);
+    let next = AtomicUsize::new(0);
+    let stop = AtomicBool::new(false);
     let share = context.plan.rays * u64::from(last.saturating_sub(first)) / u64::from(replicates);
+    let spent = before.seconds;
+    let total = Mutex::new((before, Cost::default()));
     let work = || {
         let mut local = Local::new(bound);
         while !stop.load(Ordering::Relaxed) {
-            let replicate = next.fetch_add(1, Ordering::Relaxed);
-            if replicate >= last {
-                break;
-            }
-            let cost = match kind {
-                KernelKind::Opaque => kernel::trace::<Nothing>(&context, replicate, &mut local),
-                KernelKind::Clear => kernel::trace::<OneBody>(&context, replicate, &mut local),
-                KernelKind::Nested => kernel::trace::<Stack>(&context, replicate, &mut local),
-                KernelKind::Coloured => kernel::trace::<Coloured>(&context, replicate, &mut local),
-                KernelKind::Full => kernel::trace::<Everything>(&context, replicate, &mut local),
-            };
-            let rays = done.fetch_add(local.counts.rays, Ordering::Relaxed) + local.counts.rays;
+            let Some(&replicate) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let cost = dispatch(kind, &context, Which::Replicate(replicate), &mut local);
             let mut sums = total.lock().unwrap_or_else(|e| e.into_inner());
-            sums.0.take(&mut local, &context);
+            sums.0.take(replicate, &mut local, &context);
+            sums.0.seconds = spent + start.elapsed().as_secs_f64();
             sums.1 += cost;
+            let rays = sums.0.tallies.counts.rays;
+            if let Some(finished) = hooks.finished {
+                finished(&sums.0);
+            }
             drop(sums);
-            if !progress(Progress { rays, total: share, seconds: start.elapsed().as_secs_f64() }) {
+            let so_far = Progress { rays, total: share, seconds: start.elapsed().as_secs_f64() };
+            if !(hooks.progress)(so_far) {
                 stop.store(true, Ordering::Relaxed);
             }
         }
     };
     std::thread::scope(|scope| {
-        for _ in 1..threads {
+        for _ in 1..threads.min(todo.len()) {
             scope.spawn(work);
         }
         work();
     });
-    let (mut tallies, cost) = total.into_inner().unwrap_or_else(|e| e.into_inner());
-    tallies.sort();
-    (tallies, context.plan, cost, start.elapsed().as_secs_f64(), threads)
+    let (mut portion, cost) = total.into_inner().unwrap_or_else(|e| e.into_inner());
+    portion.tallies.sort();
+    portion.seconds = spent + start.elapsed().as_secs_f64();
+    Traced { portion, cost, threads }
+}
+
+/// Traces some rays of a run once more, by their number, and records their whole paths; `paths` and `ledger` of the results
+/// are theirs.
+pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings, rays: &[u64]) -> Results {
+    let start = Instant::now();
+    let mut context = Context::new(bound, intersector, settings);
+    context.plan.record_mask = Some(0);
+    let kind = kernel_of(bound, settings);
+    let mut portion = Portion::none(bound, context.plan.replicates);
+    let mut cost = Cost::default();
+    let mut local = Local::new(bound);
+    for &ray in rays {
+        cost += dispatch(kind, &context, Which::Ray(ray), &mut local);
+    }
+    portion.tallies.take(&mut local, &context);
+    portion.tallies.sort();
+    portion.seconds = start.elapsed().as_secs_f64();
+    Results::of(bound, settings, Traced { portion, cost, threads: 1 })
+}
+
+/// Number of replicates that a run is divided into.
+pub fn replicates(bound: &BoundScene, settings: &RunSettings) -> u32 {
+    Plan::new(bound, settings).replicates
+}
+
+pub(crate) fn kernel_of(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
+    let required = effects::required(bound).kernel;
+    match settings.kernel {
+        KernelChoice::Pruned => required,
+        KernelChoice::With(effects) => required.max(KernelKind::of(effects)),
+        KernelChoice::Full => KernelKind::Full,
+    }
+}
+
+fn dispatch(kind: KernelKind, context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
+    match kind {
+        KernelKind::Opaque => kernel::trace::<Nothing>(context, which, local),
+        KernelKind::Clear => kernel::trace::<OneBody>(context, which, local),
+        KernelKind::Nested => kernel::trace::<Stack>(context, which, local),
+        KernelKind::Coloured => kernel::trace::<Coloured>(context, which, local),
+        KernelKind::Full => kernel::trace::<Everything>(context, which, local),
+    }
+}
+
+impl<'a> Context<'a> {
+    fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
+        let select = |wanted: &dyn Fn(&super::receiver::Receiver) -> bool| -> Vec<u32> {
+            (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
+        };
+        let region = bound.region;
+        let stands = |r: &super::receiver::Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
+        let mut context = Self {
+            bound,
+            intersector,
+            settings,
+            around: Vec::new(),
+            plan: Plan::new(bound, settings),
+            blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
+            outside: select(&|r| r.absorbs && stands(r) && !r.meets(&region)),
+            region,
+            passing: select(&|r| !r.absorbs && stands(r)),
+            far: select(&|r| matches!(r.shape, Shape::FarField { .. })),
+            paths: None,
+        };
+        context.around = kernel::around_sources(&context);
+        context
+    }
 }

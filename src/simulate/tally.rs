@@ -83,6 +83,11 @@ impl Grid {
         *c += quanta;
     }
 
+    /// Every cell that was touched, with what it holds.
+    pub(crate) fn touched(&self) -> impl Iterator<Item = (usize, u64)> {
+        self.touched.iter().map(|&c| (c as usize, self.cells[c as usize]))
+    }
+
     pub(crate) fn get(&self, cell: usize) -> u64 {
         self.cells[cell]
     }

@@ -5,9 +5,12 @@
 //! would be comes from the spread over the run's replicates.
 
 use super::workshop::{Tree, Workshop, normals_name, with_all};
-use crate::intersect::NormalMode;
-use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
+use crate::intersect::{Intersector, NormalMode};
+use crate::simulate::{
+    BoundScene, Hooks, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
+};
 use serde::Serialize;
+use std::sync::Mutex;
 
 /// One receiver under one combination.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -40,6 +43,75 @@ pub struct Row {
     pub spot_geometric: [f64; 2],
     /// `geometry`, `statistics` or `balanced`: what to spend on next.
     pub limited_by: String,
+}
+
+/// What facets change of a receiver's power, from the same rays on both.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Paired {
+    /// Name of the receiver.
+    pub name: String,
+    /// Power on facets.
+    pub power_facets: f64,
+    /// Power on the spline.
+    pub power_exact: f64,
+    /// The first less the second.
+    pub difference: f64,
+    /// Standard error of the difference: most of the noise is common to both and cancels.
+    pub difference_error: f64,
+    /// Standard error of the power itself, for comparison.
+    pub power_error: f64,
+}
+
+/// Traces the same rays on facets and on the spline, replicate by replicate.
+pub fn paired(
+    bound: &BoundScene,
+    facets: &dyn Intersector,
+    exact: &dyn Intersector,
+    settings: &RunSettings,
+) -> Vec<Paired> {
+    let [(found, ours), (truth, theirs)] = [facets, exact].map(|i| by_replicate(bound, i, settings));
+    (found.receivers.iter().zip(&truth.receivers).enumerate())
+        .map(|(k, (f, e))| {
+            let differences = ours.iter().zip(&theirs).map(|(a, b)| a[k] as f64 - b[k] as f64);
+            let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
+            let n = differences.len().max(2) as f64;
+            let mean = differences.iter().sum::<f64>() / n;
+            let spread: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
+            Paired {
+                name: f.name.clone(),
+                power_facets: f.power,
+                power_exact: e.power,
+                difference: differences.iter().sum(),
+                difference_error: (spread * n / (n - 1.0)).sqrt(),
+                power_error: e.power_error,
+            }
+        })
+        .collect()
+}
+
+/// Results of a run, and the quanta that each replicate brought to each receiver.
+fn by_replicate(
+    bound: &BoundScene,
+    intersector: &dyn Intersector,
+    settings: &RunSettings,
+) -> (Results, Vec<Vec<u128>>) {
+    let count = replicates(bound, settings) as usize;
+    let parts = Mutex::new((Vec::<u32>::new(), Vec::<u128>::new(), vec![Vec::new(); count]));
+    let finished = |p: &Portion| {
+        let mut parts = parts.lock().unwrap_or_else(|e| e.into_inner());
+        let (done, sums, by) = &mut *parts;
+        let now: Vec<u128> = p.tallies.receivers.iter().map(|s| s.total).collect();
+        sums.resize(now.len(), 0);
+        if let Some(&new) = p.done.iter().find(|r| done.binary_search(r).is_err()) {
+            by[new as usize] = now.iter().zip(sums.iter()).map(|(a, b)| a - b).collect();
+        }
+        done.clone_from(&p.done);
+        *sums = now;
+    };
+    let hooks = Hooks { progress: &|_| true, finished: Some(&finished), paths: None };
+    let results = Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks));
+    let (_, _, by) = parts.into_inner().unwrap_or_else(|e| e.into_inner());
+    (results, by)
 }
 
 /// Traces a scene on the spline once and on facets for every combination.

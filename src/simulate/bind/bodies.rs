@@ -1,7 +1,7 @@
-use super::nearest::bounds;
+use super::nearest::{Nearest, bounds};
 use super::{AMBIENT, Chosen, Light};
-use crate::math::Aabb;
-use crate::model::Model;
+use crate::math::{Aabb, Point, Uv};
+use crate::model::{Model, PlacedFace};
 use crate::optics::{self, Absorption, BulkScatter, Index};
 use crate::simulate::scene::{Key, Scene, medium};
 use crate::simulate::{Error, ErrorKind};
@@ -137,4 +137,64 @@ pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<boo
         }
     }
     touching
+}
+
+/// Questions of distance after which faces whose boxes meet are taken to touch: some seconds of work.
+const MOST_ASKED: usize = 50_000;
+/// Samples across a face in each parameter.
+const SAMPLES: usize = 5;
+
+/// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
+pub(super) fn against(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[bool]) -> Vec<bool> {
+    let mut against = vec![false; of_face.len()];
+    if of_face.iter().all(|b| *b == AMBIENT) || !opaque.contains(&true) {
+        return against;
+    }
+    let placed: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    let glue = scene.run.glue_mm;
+    let box_of = |f: &PlacedFace<'_>| bounds(f).grown(0.5 * glue);
+    let mut faces: Vec<(usize, Aabb)> = (placed.iter())
+        .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
+        .map(|f| (f.id.index(), box_of(f)))
+        .collect();
+    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let mut nearest = Nearest::new(model);
+    let mut samples: Vec<Option<Vec<Point>>> = vec![None; placed.len()];
+    let mut asked = 0;
+    for (i, (a, box_a)) in faces.iter().enumerate() {
+        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
+            let mixed = (of_face[*a] == AMBIENT) != (of_face[*b] == AMBIENT);
+            if !mixed || (against[*a] && against[*b]) || box_a.intersection(*box_b).is_empty() {
+                continue;
+            }
+            let mut touch = false;
+            for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
+                let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
+                for p in points.iter().filter(|p| around.contains(**p)) {
+                    asked += 1;
+                    touch |= asked > MOST_ASKED || nearest.distance(other, *p) <= glue;
+                    if touch {
+                        break;
+                    }
+                }
+            }
+            if touch {
+                (against[*a], against[*b]) = (true, true);
+            }
+        }
+    }
+    against
+}
+
+/// Points inside the loops of a face, mm.
+fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
+    let Some(face) = f.face else { return Vec::new() };
+    let loops = super::polygons(face);
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
+    (0..SAMPLES * SAMPLES)
+        .map(|k| Uv::new(at(k / SAMPLES, u0, u1), at(k % SAMPLES, v0, v1)))
+        .filter(|&uv| super::inside(&loops, uv))
+        .map(|uv| f.placement.point(face.surface.evaluate(uv)))
+        .collect()
 }

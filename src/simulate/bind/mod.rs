@@ -6,15 +6,16 @@ mod select;
 
 use super::emitter::{self, Area, Emitter, Loaded};
 use super::receiver::Receiver;
-use super::scene::{Material, OneOrMany, ReceiverKind, Scene, SurfaceKind};
+use super::scene::{FaceSelector, Material, OneOrMany, ReceiverKind, Scene, SurfaceKind};
 use super::{Error, ErrorKind};
 use crate::math::Aabb;
-use crate::model::Model;
+use crate::model::{Model, PlacedFace};
 use crate::optics::{Coating, Scatter};
 use crate::simulate::scene::Key;
 pub(crate) use bodies::Body;
 use nearest::Nearest;
 pub(crate) use nearest::{inside, polygons};
+use std::collections::HashMap;
 
 /// What a placed face is to light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,8 @@ pub(crate) struct FaceOptics {
     pub(crate) sealed: bool,
     /// Whether it may lie on a face of another body.
     pub(crate) touching: bool,
+    /// Whether a medium and an opaque solid touch here, and this is a face of one of both.
+    pub(crate) against: bool,
 }
 
 /// The body around everything.
@@ -95,9 +98,11 @@ impl Scene {
         let mut surfaces = vec![Surface::Absorber, Surface::Interface];
         let default = Material { surface: Some(self.default_surface), ..Material::default() };
         let (bodies, body_of_face, nested) = bodies::find(self, model, &chosen, &light)?;
+        bare_interfaces(self, model, &chosen, &body_of_face)?;
+        check_indices(self, &loaded, &bodies)?;
         let touching =
             if nested { bodies::touching(self, model, &body_of_face) } else { vec![false; chosen.len()] };
-        let mut faces = Vec::with_capacity(chosen.len());
+        let (mut faces, mut opaques) = (Vec::with_capacity(chosen.len()), Vec::with_capacity(chosen.len()));
         for ((f, (rule, _)), &body) in model.placed_faces().zip(&chosen).zip(&body_of_face) {
             let surface = match rule.map(|r| &self.materials[r]) {
                 Some(rule) => surface(self, rule)?,
@@ -112,8 +117,12 @@ impl Scene {
             };
             let sealed = closed && body == AMBIENT && opaque;
             let touching = touching[f.id.index()];
-            faces.push(FaceOptics { surface: surface_index(&mut surfaces, surface), body, sealed, touching });
+            let surface = surface_index(&mut surfaces, surface);
+            opaques.push(opaque && body == AMBIENT);
+            faces.push(FaceOptics { surface, body, sealed, touching, against: false });
         }
+        let against = bodies::against(self, model, &body_of_face, &opaques);
+        faces.iter_mut().zip(against).for_each(|(f, against): (&mut FaceOptics, bool)| f.against = against);
         let mut emitters = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
             let area = shining(self, i, model)?;
@@ -146,6 +155,19 @@ impl Scene {
     }
 }
 
+impl BoundScene {
+    /// The instance and the medium of a body, as lost rays name it.
+    pub fn body(&self, body: u16) -> Option<[&str; 2]> {
+        self.bodies.get(usize::from(body)).map(|b| [b.name.as_str(), b.medium.as_str()])
+    }
+
+    /// The instance of a face, by the face's index in the model.
+    pub fn instance(&self, face: u32) -> Option<&str> {
+        let instance = *self.instance_of_face.get(face as usize)?;
+        self.instances.get(instance as usize).map(String::as_str)
+    }
+}
+
 /// For each face the last rule that gives its surface, and the last that gives its medium.
 type Chosen = Vec<(Option<usize>, Option<usize>)>;
 
@@ -163,7 +185,70 @@ fn chosen_rules(scene: &Scene, model: &Model) -> Result<Chosen, Error> {
             }
         }
     }
+    fill_solids(scene, model, &mut chosen);
     Ok(chosen)
+}
+
+/// A medium that was given to some faces of a solid is that of the whole solid, unless others of its faces have another.
+fn fill_solids(scene: &Scene, model: &Model, chosen: &mut Chosen) {
+    let medium = |rule: Option<usize>| rule.and_then(|r| scene.materials[r].medium.as_deref());
+    let mut solids: HashMap<(usize, usize), Option<usize>> = HashMap::new();
+    let key = |f: &PlacedFace<'_>| Some((f.instance, f.shell?));
+    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter()) {
+        let (Some(key), Some(rule)) = (key(&f), *rule) else { continue };
+        let one = solids.entry(key).or_insert(Some(rule));
+        if medium(*one) != medium(Some(rule)) {
+            *one = None;
+        }
+    }
+    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter_mut()) {
+        if let (Some(key), None) = (key(&f), *rule) {
+            *rule = solids.get(&key).copied().flatten();
+        }
+    }
+}
+
+/// Faces that a rule calls interfaces need a medium behind them.
+fn bare_interfaces(scene: &Scene, model: &Model, chosen: &Chosen, bodies: &[u16]) -> Result<(), Error> {
+    for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(bodies) {
+        let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceKind::Interface)) else {
+            continue;
+        };
+        if body == AMBIENT {
+            let at = [Key::Name("material"), Key::Index(i), Key::Name("surface")];
+            let part = &model.part(f.part).name;
+            let error =
+                scene.error(ErrorKind::Value, &at, format!("an interface of '{part}', which has no medium"));
+            return Err(error.help("add `medium` to this rule, or to another one for the part"));
+        }
+    }
+    Ok(())
+}
+
+/// Every medium must have an index at every wavelength of the sources.
+fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[Body]) -> Result<(), Error> {
+    for (i, (source, loaded)) in scene.sources.iter().zip(loaded).enumerate() {
+        let mut wavelengths: Vec<f64> = match (&source.spectrum, loaded) {
+            (Some(key), _) => {
+                let sampler = key.optics().ok().and_then(|s| s.sampler().ok());
+                sampler.map(|s| (0..=64).map(|k| s.sample(f64::from(k) / 64.001)).collect()).unwrap_or_default()
+            }
+            (None, Some(Loaded::Rays(list))) => list.rays.iter().filter_map(|r| r.wavelength_nm).collect(),
+            _ => vec![scene.run.wavelength_nm],
+        };
+        wavelengths.sort_by(f64::total_cmp);
+        wavelengths.dedup();
+        for nm in wavelengths {
+            let wrong = bodies.iter().find(|b| !(0.1..=10.0).contains(&b.index(Some(nm))));
+            if let Some(body) = wrong {
+                let message = format!("'{}' has no index at {nm} nm, a wavelength of this source", body.medium);
+                let at = [Key::Name("source"), Key::Index(i), Key::Name("spectrum")];
+                let error = scene.error(ErrorKind::Value, &at, message);
+                return Err(error.help("give the medium an index there, or cut the spectrum"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The faces that a source shines from.
@@ -229,6 +314,14 @@ fn absorbing_faces(
     model: &Model,
 ) -> Result<Vec<u32>, Error> {
     let rule = Material { part: part.clone(), instance: instance.clone(), ..Material::default() };
+    let part_and_instance =
+        FaceSelector { part: part.clone(), instance: instance.clone(), ..FaceSelector::default() };
+    select::each_name_means_something(
+        scene,
+        &[Key::Name("receiver"), Key::Index(index)],
+        &part_and_instance,
+        model,
+    )?;
     let fits = |patterns: &Option<OneOrMany<String>>, name: &str| {
         patterns.as_ref().is_none_or(|p| p.as_slice().iter().any(|p| select::fits(p, name)))
     };

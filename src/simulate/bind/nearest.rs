@@ -22,6 +22,11 @@ impl<'a> Nearest<'a> {
         Self { faces, bounds, loops }
     }
 
+    /// A box around these faces.
+    pub(super) fn bounds(&self, faces: &[usize]) -> Aabb {
+        faces.iter().fold(Aabb::EMPTY, |b, &f| b.union(self.bounds[f]))
+    }
+
     /// Index of the nearest of the candidate faces; the first of equals.
     pub(super) fn face(&mut self, p: Point, candidates: &[usize]) -> Option<usize> {
         let away = |b: &Aabb| (b.min - p).max(p - b.max).max(Point::ZERO).length();
@@ -42,7 +47,7 @@ impl<'a> Nearest<'a> {
     }
 
     /// Distance from a point to a placed face, mm; infinite for a face without extent.
-    fn distance(&mut self, index: usize, p: Point) -> f64 {
+    pub(super) fn distance(&mut self, index: usize, p: Point) -> f64 {
         let placed = self.faces[index];
         let local = placed.placement.local_point(p);
         let in_part = match (placed.face, placed.tessellated) {

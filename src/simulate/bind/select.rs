@@ -56,12 +56,21 @@ pub(super) fn faces(
             let message = format!("no face is near to {p:?}");
             return Err(scene.error(ErrorKind::NoMatch, &path("at"), message).help("give a point on a face, mm"));
         };
+        let bounds = nearest.bounds(&candidates);
+        let distance = nearest.distance(face, Point::from_array(*p));
+        if distance > bounds.diagonal() {
+            let message =
+                format!("{p:?} is {distance:.4} mm from the nearest face, farther away than the model is large");
+            let error = scene.error(ErrorKind::NoMatch, &path("at"), message);
+            let [a, b] = [bounds.min, bounds.max].map(|p| p.to_array().map(|x| (x * 1e3).round() / 1e3));
+            return Err(error.help(format!("the faces that are meant lie between {a:?} and {b:?}, mm")));
+        }
         chosen.push(face);
     }
     Ok(chosen)
 }
 
-fn each_name_means_something(
+pub(super) fn each_name_means_something(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,

@@ -23,6 +23,8 @@ pub(crate) struct Emitter {
     pub(crate) rays: Option<u64>,
     /// Bodies around it, outermost first.
     pub(crate) inside: SmallVec<[u16; 4]>,
+    /// Whether the scene says so; geometry tells otherwise.
+    pub(crate) stated: bool,
     /// Its spectrum, when the scene has several wavelengths.
     wavelengths: Option<Wavelengths>,
     /// Direction of the electric field of polarised light.
@@ -111,7 +113,12 @@ impl Emitter {
             let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
                 let at = [scene::Key::Name("source"), scene::Key::Index(i), scene::Key::Name("inside")];
                 let message = format!("no instance called '{instance}' has a medium");
-                return Err(scene.error(ErrorKind::NoMatch, &at, message).help("name an instance with a `medium`"));
+                let names: Vec<&str> = bodies.iter().skip(1).map(|b| b.name.as_str()).collect();
+                let advice = match names.is_empty() {
+                    true => "no instance has a `medium`; leave `inside` out".into(),
+                    false => scene::suggest::any(instance, &names),
+                };
+                return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
             };
             inside.push(body as u16 + 1);
         }
@@ -123,7 +130,17 @@ impl Emitter {
         };
         let polarised = s.polarised.map(Vector::from_array);
         let power = s.power.unwrap_or(own_power);
-        Ok(Self { wavelengths, polarised, power, rays: s.rays, inside, frame, shape, lobe })
+        Ok(Self {
+            wavelengths,
+            polarised,
+            power,
+            rays: s.rays,
+            inside,
+            stated: s.inside.is_some(),
+            frame,
+            shape,
+            lobe,
+        })
     }
 
     /// Which pairs of numbers it asks for.

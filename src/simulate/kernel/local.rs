@@ -40,6 +40,8 @@ pub struct LostRay {
     pub direction: Vector,
     /// The face where it happened, if it was at one.
     pub face: Option<u32>,
+    /// The body it was in, as [`BoundScene::body`](crate::simulate::BoundScene::body) names it; 0 for the surroundings.
+    pub body: u16,
 }
 
 /// A vertex of a recorded path.
@@ -59,7 +61,10 @@ pub struct PathVertex {
     pub event: Event,
 }
 
-/// What happens at a vertex of a path.
+/// Takes vertices of paths as they come, from any thread.
+pub type PathSink<'a> = &'a (dyn Fn(&[PathVertex]) + Sync);
+
+/// What happens at a vertex of a path. Files of numbers count from 0 in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -101,6 +106,8 @@ pub(crate) struct Local {
     pub(crate) counts: Counts,
     pub(crate) ledger: Vec<LostRay>,
     pub(crate) paths: Vec<PathVertex>,
+    /// What is kept of the paths when all of them are streamed.
+    pub(crate) sample: Vec<PathVertex>,
 }
 
 /// Power by how it ended, quanta of one replicate.
@@ -151,6 +158,15 @@ impl Local {
             counts: Counts::default(),
             ledger: Vec::new(),
             paths: Vec::new(),
+            sample: Vec::new(),
+        }
+    }
+
+    /// Hands the vertices gathered so far to whoever wants them all, and keeps the sample.
+    pub(crate) fn stream(&mut self, context: &Context<'_>) {
+        if let Some(sink) = context.paths {
+            sink(&self.paths);
+            self.sample.extend(self.paths.drain(..).filter(|v| context.plan.samples(v.ray)));
         }
     }
 
@@ -189,6 +205,8 @@ pub struct Tallies {
     pub moments: Vec<Moments>,
     /// Power absorbed on each placed face.
     pub faces: Vec<Sum>,
+    /// Power absorbed on each instance: its faces share the replicates' ups and downs, so their errors do not simply add up.
+    pub instances: Vec<Sum>,
     /// Power absorbed inside each body, the surroundings first.
     pub bulk: Vec<Sum>,
     /// Emitted, received, absorbed, escaped, cut off, lost.
@@ -208,6 +226,7 @@ impl Tallies {
             receivers: vec![Sum::default(); bound.receivers.len()],
             moments: vec![Moments::default(); bound.receivers.len()],
             faces: vec![Sum::default(); bound.faces.len()],
+            instances: vec![Sum::default(); bound.instances.len()],
             bulk: vec![Sum::default(); bound.bodies.len()],
             ..Self::default()
         }
@@ -226,6 +245,12 @@ impl Tallies {
             self.receivers[i].add_replicate(std::mem::take(&mut local.receiver_totals[i]));
             self.moments[i].merge(&std::mem::take(&mut local.moments[i]));
         }
+        let mut instances = vec![0; self.instances.len()];
+        local.absorbed.touched().for_each(|(face, quanta)| {
+            instances[context.bound.instance_of_face[face] as usize] += quanta;
+        });
+        let filled = self.instances.iter_mut().zip(instances).filter(|(_, quanta)| *quanta > 0);
+        filled.for_each(|(sum, quanta)| sum.add_replicate(quanta));
         local.absorbed.flush(&mut self.faces);
         local.bulk.flush(&mut self.bulk);
         let e = std::mem::take(&mut local.ends);
@@ -234,6 +259,8 @@ impl Tallies {
         self.counts.add(&std::mem::take(&mut local.counts));
         self.ledger.append(&mut local.ledger);
         trim(&mut self.ledger);
+        local.stream(context);
+        self.paths.append(&mut local.sample);
         self.paths.append(&mut local.paths);
     }
 
@@ -245,6 +272,7 @@ impl Tallies {
         pairs(&mut self.receivers, &o.receivers);
         self.moments.iter_mut().zip(&o.moments).for_each(|(a, b)| a.merge(b));
         pairs(&mut self.faces, &o.faces);
+        pairs(&mut self.instances, &o.instances);
         pairs(&mut self.bulk, &o.bulk);
         self.ends.iter_mut().zip(&o.ends).for_each(|(a, b)| a.merge(b));
         self.counts.add(&o.counts);

@@ -4,15 +4,17 @@
 //! rays to interleave. What a ray carries is a type parameter ([`Carry`]): a scene without media does not pay for
 //! them. Everything else is arithmetic behind the `match`.
 
+mod around;
 mod carry;
 mod local;
 mod step;
 mod surface;
 mod wide;
 
+pub(crate) use around::{Around, sources as around_sources};
 pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Stack};
 pub(crate) use local::Local;
-pub use local::{Cause, Counts, Event, LostRay, PathVertex, Tallies};
+pub use local::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
@@ -22,6 +24,7 @@ use super::tally::count;
 use crate::intersect::{Cost, Hit, Intersector};
 use crate::math::{Aabb, Departure, FaceId, Ray, Vector};
 use crate::optics::polarised::Stokes;
+use crate::optics::reflect;
 
 /// What all replicates share.
 pub(crate) struct Context<'a> {
@@ -38,6 +41,19 @@ pub(crate) struct Context<'a> {
     /// Receivers that count light passing through.
     pub(crate) passing: Vec<u32>,
     pub(crate) far: Vec<u32>,
+    /// What the rays of each source start in.
+    pub(crate) around: Vec<Around>,
+    /// Takes the vertices of all paths as they come; without, a sample is kept.
+    pub(crate) paths: Option<PathSink<'a>>,
+}
+
+/// Which rays to trace.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Which {
+    /// All rays of a replicate.
+    Replicate(u32),
+    /// One ray of the run.
+    Ray(u64),
 }
 
 /// A path under way; its ray is kept apart, in the slice that the intersector reads.
@@ -70,13 +86,13 @@ impl Context<'_> {
     }
 }
 
-/// Traces the rays of one replicate and adds them to `local`. Returns the intersector's work.
+/// Traces these rays and adds them to `local`. Returns the intersector's work.
 #[inline(always)]
-fn trace_rays<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
+fn trace_rays<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
     let batch = context.settings.batch.max(1);
     let mut cost = Cost::default();
     let mut wave = Wave::<C>::with_capacity(batch);
-    let mut sources = Sources::new(context, replicate);
+    let mut sources = Sources::new(context, which);
     while wave.paths.len() < batch
         && let Some((path, ray)) = sources.begin(context, local)
     {
@@ -112,9 +128,15 @@ fn trace_rays<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local
         if wave.hits.len() < wave.rays.len() {
             wave.hits.resize(wave.rays.len(), None);
         }
+        if local.paths.len() >= STREAMED {
+            local.stream(context);
+        }
     }
     cost
 }
+
+/// Vertices that are gathered before they are streamed: 1.3 MB.
+const STREAMED: usize = 1 << 14;
 
 /// Rays under way in one batch.
 struct Wave<C> {
@@ -147,12 +169,29 @@ struct Sources {
     next: u64,
     range: [u64; 2],
     stream: Option<Stream>,
+    /// Number of sources to go through.
+    last: usize,
 }
 
 impl Sources {
-    fn new(context: &Context<'_>, replicate: u32) -> Self {
-        let mut sources = Self { replicate, source: 0, next: 0, range: [0, 0], stream: None };
-        sources.enter(context, 0);
+    fn new(context: &Context<'_>, which: Which) -> Self {
+        let last = context.plan.shares.len();
+        let mut sources = Self { replicate: 0, source: 0, next: 0, range: [0, 0], stream: None, last };
+        match which {
+            Which::Replicate(replicate) => {
+                sources.replicate = replicate;
+                sources.enter(context, 0);
+            }
+            Which::Ray(ray) => {
+                let place = context.plan.place(ray);
+                sources.last = 0;
+                if let Some((source, replicate)) = place {
+                    sources.replicate = replicate;
+                    sources.enter(context, source);
+                    (sources.next, sources.range[1]) = (ray, ray + 1);
+                }
+            }
+        }
         sources
     }
 
@@ -173,7 +212,7 @@ impl Sources {
     fn begin<C: Carry>(&mut self, context: &Context<'_>, local: &mut Local) -> Option<(Path<C>, Ray)> {
         loop {
             while self.next >= self.range[1] {
-                if self.source >= context.plan.shares.len() {
+                if self.source >= self.last {
                     return None;
                 }
                 self.enter(context, self.source + 1);
@@ -205,11 +244,16 @@ fn start<C: Carry>(
     let emission = emitter.emit(stream, ticket);
     let mut ray = emission.ray;
     if let Some((face, normal)) = emission.from {
-        settle(context, face, normal, &mut ray);
+        local.counts.corrected_normals += u64::from(settle(context, face, normal, &mut ray));
     }
     local.counts.rays += 1;
     local.ends.emitted += count(quanta);
-    let Some(mut carry) = C::inside(&emitter.inside) else {
+    let inside = match context.around.get(source) {
+        Some(Around::Same(bodies)) => C::inside(bodies),
+        _ if C::MEDIA => C::inside(&around::bodies(context, &ray)),
+        _ => C::inside(&[]),
+    };
+    let Some(mut carry) = inside else {
         local.lose(LostRay {
             ray: ticket.ray,
             branch: 0,
@@ -219,6 +263,7 @@ fn start<C: Carry>(
             origin: ray.origin,
             direction: ray.direction,
             face: None,
+            body: 0,
         });
         return None;
     };
@@ -240,14 +285,19 @@ fn start<C: Carry>(
 ///
 /// Facets lie up to their sag off the spline: a ray that started there could hit its own facet. Looked for within 1 mm, less
 /// where another face is in between; a ray whose face is not found starts on the spline.
-fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) {
+///
+/// A ray that would go below the facet is turned to above it; tells whether it was.
+fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in [1.0, 0.1, 0.01, 1e-3] {
         let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
         let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         if hit.face == face {
             let from = Departure { face, primitive: hit.primitive, uv: hit.uv };
-            *ray = Ray::new(probe.at(hit.t), ray.direction).leaving(from);
-            return;
+            let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
+            let going = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
+            *ray = Ray::new(probe.at(hit.t), going).leaving(from);
+            return below;
         }
     }
+    false
 }

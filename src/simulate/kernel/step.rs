@@ -101,12 +101,24 @@ pub(super) fn step<C: Carry>(
         return false;
     }
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
+    let contact = match C::MEDIA && !entering && (face.sealed || face.against && face.body != AMBIENT) {
+        true => surface::contact(context, ray, hit, face, point),
+        false => None,
+    };
+    let (hit, face, entering, point) = match &contact {
+        Some((hit, face, point)) => (hit, *face, true, *point),
+        None => (hit, face, entering, point),
+    };
     if face.sealed && !entering {
         record(context, path, point, Event::Lost, local);
         lose(path, ray, Cause::InsideSolid, Some(hit.face), local);
         return false;
     }
     let meeting = Meeting { hit, face, entering, point, skip: Cell::new(0.0) };
+    if C::MEDIA && face.against && face.body == AMBIENT && path.carry.body() != AMBIENT {
+        // Light that comes back from an opaque face does not meet the face of its own body on it once more.
+        meeting.skip.set(context.bound.scene.run.glue_mm);
+    }
     let going = match &context.bound.surfaces[face.surface as usize] {
         Surface::Absorber => {
             record(context, path, point, Event::Absorbed, local);
@@ -291,7 +303,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
 }
 
 #[cold]
-pub(super) fn lose<C>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<FaceId>, local: &mut Local) {
+pub(super) fn lose<C: Carry>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<FaceId>, local: &mut Local) {
     local.lose(LostRay {
         ray: path.ray,
         branch: path.branch,
@@ -301,5 +313,6 @@ pub(super) fn lose<C>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<Face
         origin: ray.origin,
         direction: ray.direction,
         face: face.map(|f| f.0),
+        body: path.carry.body(),
     });
 }

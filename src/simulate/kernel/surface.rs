@@ -2,11 +2,11 @@
 
 use super::step::{Meeting, key, lose, onward, record};
 use super::{Carry, Cause, Context, Event, Local, Path};
-use crate::intersect::Cost;
-use crate::math::{Departure, Ray, Vector};
+use crate::intersect::{Cost, Hit};
+use crate::math::{Departure, Point, Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
 use crate::optics::{Coating, Split, fresnel, reflect, refract_with_cosine};
-use crate::simulate::bind::{AMBIENT, Coated};
+use crate::simulate::bind::{AMBIENT, Coated, FaceOptics};
 use crate::simulate::random::Purpose;
 use crate::simulate::scene::Interfaces;
 use crate::simulate::tally::whole;
@@ -223,6 +223,33 @@ fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
     let other = context.bound.faces.get(hit.face.index())?;
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
     (other.touching && other.body != at.face.body && entering != at.entering).then_some(other.body)
+}
+
+/// How far back the front of a solid is looked for, mm, that a ray has slipped into between the facets of two touching faces.
+const SLIP: f64 = 1.0;
+
+/// The face of an opaque solid in front of light that leaves a body there, within the glue distance; or in front of light that
+/// is in a solid where none can be. With its optics and the place.
+#[cold]
+pub(super) fn contact(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<(Hit, FaceOptics, Point)> {
+    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
+    let reach = context.bound.scene.run.glue_mm / cos;
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+    let probe = match face.sealed {
+        // Only light that has just left another face can have slipped in.
+        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction).within(0.0, SLIP).leaving(ray.from?),
+        false => Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from),
+    };
+    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+    let other = *context.bound.faces.get(found.face.index())?;
+    let entering = ray.direction.dot(found.geometric_normal) < 0.0;
+    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.at(found.t)))
 }
 
 /// The normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these

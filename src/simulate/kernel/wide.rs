@@ -4,16 +4,16 @@
 //! Sound because the second is entered only where its instructions were found at run time.
 #![allow(unsafe_code)]
 
-use super::{Carry, Context, Local, trace_rays};
+use super::{Carry, Context, Local, Which, trace_rays};
 use crate::intersect::Cost;
 
-/// Traces the rays of one replicate and adds them to `local`. Returns the intersector's work.
-pub(crate) fn trace<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
+/// Traces these rays and adds them to `local`. Returns the intersector's work.
+pub(crate) fn trace<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt")]
-        fn avx2<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut Local) -> Cost {
-            trace_rays::<C>(context, replicate, local)
+        fn avx2<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
+            trace_rays::<C>(context, which, local)
         }
         let found = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("fma")
@@ -22,8 +22,8 @@ pub(crate) fn trace<C: Carry>(context: &Context<'_>, replicate: u32, local: &mut
             && is_x86_feature_detected!("lzcnt");
         if found {
             // SAFETY: all features were just found.
-            return unsafe { avx2::<C>(context, replicate, local) };
+            return unsafe { avx2::<C>(context, which, local) };
         }
     }
-    trace_rays::<C>(context, replicate, local)
+    trace_rays::<C>(context, which, local)
 }

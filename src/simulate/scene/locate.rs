@@ -34,6 +34,45 @@ pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
     span
 }
 
+/// What stands where a table belongs.
+const TABLES: [(&str, &str); 8] = [
+    ("struct SpectrumKey", "spectrum = { kind = \"d65\" }"),
+    ("struct Placement", "placement = { at = [0, 0, 10] }"),
+    ("struct ScatterKey", "scatter = { lobe = \"gaussian\", sigma_deg = 2 }"),
+    ("struct FaceSelector", "on = { part = \"led\" }"),
+    ("struct Run", "[run]"),
+    ("struct Accuracy", "[accuracy]"),
+    ("struct Scene", "[[source]]"),
+    ("a sequence", "[[source]], with both brackets doubled, for an entry of a list"),
+];
+
+/// A value of the wrong type, in words that do not speak of the program's own types.
+fn typed(message: &str) -> Error {
+    let message = message.trim();
+    if let Some((form, example)) = TABLES.iter().find(|(form, _)| message.ends_with(&format!("expected {form}"))) {
+        let what = if form.starts_with("struct") { "a table" } else { "a list" };
+        let message = message.replace(form, what).replace("invalid type: map", "a single table");
+        return Error::new(ErrorKind::Syntax, message).help(format!("write it as in {example}"));
+    }
+    for (form, plain) in [
+        ("did not match any variant of untagged enum OneOrMany", "neither one value nor a list of them"),
+        ("did not match any variant of untagged enum ColourKey", "neither \"#rrggbb\" nor [r, g, b]"),
+        (
+            "did not match any variant of untagged enum Reflectance",
+            "neither a share nor rows [angle_deg, share] or [angle_deg, nm, share]",
+        ),
+        ("did not match any variant of untagged enum ByWavelength", "neither a number nor rows [nm, value]"),
+    ] {
+        if message.contains(form) {
+            return Error::new(ErrorKind::Syntax, format!("this is {plain}"));
+        }
+    }
+    Error::new(
+        ErrorKind::Syntax,
+        message.replace("expected f64", "expected a number").replace("expected u64", "expected a whole number"),
+    )
+}
+
 /// An error of the TOML reader with its place, and the key that was probably meant.
 pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
     let message = e.message();
@@ -65,7 +104,7 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
             }
         }
     } else {
-        Error::new(ErrorKind::Syntax, message.trim())
+        typed(message)
     };
     error.at(file, text, e.span())
 }

@@ -24,7 +24,16 @@ impl ModelUse {
             Err(scene.error(ErrorKind::Value, &at, message.to_owned()))
         };
         let positive = |x: f64| x > 0.0 && x.is_finite();
+        let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
+        let direction = |x: &[f64; 3]| finite(x) && x.iter().any(|x| *x != 0.0);
+        let p = &self.placement;
         match self {
+            m if m.file.is_empty() => {
+                fail(&["file"], "this model has no `file`: give the STEP file, relative to the scene")
+            }
+            _ if !finite(&p.at) => fail(&["placement", "at"], "`at` must be a point"),
+            _ if !direction(&p.z) => fail(&["placement", "z"], "`z` must be a direction"),
+            _ if p.x.is_some_and(|x| !direction(&x)) => fail(&["placement", "x"], "`x` must be a direction"),
             m if m.unit_mm.is_some_and(|u| !positive(u)) => fail(&["unit_mm"], "`unit_mm` must be positive"),
             m if !positive(m.placement.scale) => fail(&["placement", "scale"], "`scale` must be positive"),
             _ => Ok(()),

@@ -41,35 +41,43 @@ pub enum ByWavelength {
 }
 
 impl Medium {
-    /// The medium in the form the laws of light read.
-    pub(crate) fn optics(&self) -> Result<optics::Medium, String> {
+    /// The medium in the form the laws of light read; otherwise what is wrong, and at which key.
+    pub(crate) fn optics(&self) -> Result<optics::Medium, (&'static str, String)> {
         let points = |t: &[[f64; 2]]| t.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
         let mut ways = Vec::new();
         ways.extend(self.index.map(Index::Constant));
         if let Some(name) = &self.catalogue {
-            ways.push(catalogued(name)?.index);
+            ways.push(catalogued(name).map_err(|e| ("catalogue", e))?.index);
         }
         ways.extend(self.sellmeier.clone().map(Index::Sellmeier));
         ways.extend(self.cauchy.clone().map(Index::Cauchy));
         ways.extend(self.schott.map(Index::Schott));
         if let Some(t) = &self.index_table {
-            ways.push(Index::Table(Table::new("index", points(t)).map_err(|e| e.to_string())?));
+            ways.push(Index::Table(Table::new("index", points(t)).map_err(|e| ("index_table", e.to_string()))?));
         }
         if ways.len() != 1 {
             let given = if ways.is_empty() { "has no index".into() } else { format!("has {} indices", ways.len()) };
-            return Err(format!("'{}' {given}; give exactly one", self.name));
+            return Err(("name", format!("'{}' {given}; give exactly one", self.name)));
         }
         let mut medium = optics::Medium::clear(self.name.clone(), ways.remove(0));
         medium.absorption = match &self.absorption_per_mm {
             None => Absorption::None,
-            Some(ByWavelength::Constant(a)) => Absorption::per_mm(*a).map_err(|e| e.to_string())?,
-            Some(ByWavelength::Table(t)) => Absorption::table(points(t)).map_err(|e| e.to_string())?,
+            Some(ByWavelength::Constant(a)) => {
+                Absorption::per_mm(*a).map_err(|e| ("absorption_per_mm", e.to_string()))?
+            }
+            Some(ByWavelength::Table(t)) => {
+                Absorption::table(points(t)).map_err(|e| ("absorption_per_mm", e.to_string()))?
+            }
         };
         if self.anisotropy.is_some() && self.scatter_per_mm.is_none() {
-            return Err("`anisotropy` needs `scatter_per_mm`".into());
+            return Err(("anisotropy", "`anisotropy` needs `scatter_per_mm`".into()));
         }
         if let Some(s) = self.scatter_per_mm.filter(|s| *s != 0.0) {
-            medium.scatter = Some(BulkScatter::new(s, self.anisotropy.unwrap_or(0.0)).map_err(|e| e.to_string())?);
+            let g = self.anisotropy.unwrap_or(0.0);
+            if !(g > -1.0 && g < 1.0) {
+                return Err(("anisotropy", format!("an `anisotropy` of {g} is not above -1 and below 1")));
+            }
+            medium.scatter = Some(BulkScatter::new(s, g).map_err(|e| ("scatter_per_mm", e.to_string()))?);
         }
         Ok(medium)
     }
@@ -88,7 +96,7 @@ fn catalogued(name: &str) -> Result<optics::Medium, String> {
 /// Finds a medium by name: one of the scene, or one of the catalogue.
 pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
     if let Some(m) = scene.media.iter().find(|m| m.name == name) {
-        return m.optics().map_err(|e| scene.error(ErrorKind::Value, at, e));
+        return m.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, at, e));
     }
     if let Ok(m) = catalogued(name) {
         return Ok(m);
@@ -114,7 +122,13 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
         if m.index.is_some_and(|n| !(0.1..=10.0).contains(&n)) {
             return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
         }
-        m.optics().map_err(|e| scene.error(ErrorKind::Value, &at("name"), e))?;
+        let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
+        let n = medium.index.at(scene.run.wavelength_nm);
+        if !(0.1..=10.0).contains(&n) {
+            let message =
+                format!("the index of '{}' at {} nm is {n}, not from 0.1 to 10", m.name, scene.run.wavelength_nm);
+            return Err(scene.error(ErrorKind::Value, &at("name"), message));
+        }
     }
     Ok(())
 }

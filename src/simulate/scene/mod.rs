@@ -4,6 +4,7 @@
 //! [`Scene::bind`](crate::simulate::BoundScene) then finds the faces of a model that each rule means. Lengths are mm, angles degrees
 //! where the key says `_deg`, wavelengths nm, powers watts (or lumens: the receivers answer in the unit of the sources).
 
+mod lenient;
 mod locate;
 mod material;
 pub(crate) mod medium;
@@ -136,6 +137,12 @@ impl Scene {
         }
     }
 
+    /// The scene file, its text, and where it names the file of a model.
+    pub fn place_of_model(&self, index: usize) -> Option<(&str, &str, Range<usize>)> {
+        let span = self.span(&[Key::Name("model"), Key::Index(index), Key::Name("file")])?;
+        Some((&self.origin.file, self.origin.text.as_deref()?, span))
+    }
+
     fn span(&self, path: &[Key<'_>]) -> Option<Range<usize>> {
         locate::span(self.origin.text.as_deref()?, path)
     }
@@ -157,9 +164,19 @@ impl Scene {
             }
             names.push(&receiver.name);
         }
+        let sums: u64 = self.receivers.iter().map(Receiver::sums).sum();
+        if sums > MOST_SUMS {
+            let largest = (0..self.receivers.len()).max_by_key(|&i| self.receivers[i].sums()).unwrap_or(0);
+            let at = [Key::Name("receiver"), Key::Index(largest), Key::Name("cells")];
+            let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
+            return Err(self.error(ErrorKind::Value, &at, message).help("use fewer `cells` or fewer `bins_nm`"));
+        }
         Ok(())
     }
 }
+
+/// Most sums of all receivers of a scene: a gigabyte.
+const MOST_SUMS: u64 = 1 << 25;
 
 /// One step of a path into a scene file.
 #[derive(Clone, Copy, Debug)]

@@ -128,6 +128,38 @@ impl Receiver {
         }
     }
 
+    /// Sums that it keeps: a cell for power and one for every channel.
+    pub(super) fn sums(&self) -> u64 {
+        let channels = match (self.channels, &self.bins_nm) {
+            (_, Some(edges)) => edges.len() as u64,
+            (Some(Channels::Xyz), None) => 4,
+            (Some(Channels::Photometric), None) => 2,
+            (None, None) => 1,
+        };
+        u64::from(self.cells[0]) * u64::from(self.cells[1]) * channels
+    }
+
+    /// A key that is given and means nothing for this kind, and the kinds it belongs to.
+    fn misplaced(&self) -> Option<(&'static str, &'static str)> {
+        use ReceiverKind::{Absorbed, FarField, Plane, Sphere};
+        let unset = Self::default();
+        let keys: [(&str, bool, &[ReceiverKind], &str); 12] = [
+            ("at", self.at != unset.at, &[Plane, Sphere], "plane or sphere"),
+            ("normal", self.normal != unset.normal, &[Plane, Sphere, FarField], "plane, sphere or far_field"),
+            ("x", self.x.is_some(), &[Plane], "plane"),
+            ("up", self.up != unset.up, &[Sphere, FarField], "sphere or far_field"),
+            ("size", self.size.is_some(), &[Plane], "plane"),
+            ("radius", self.radius.is_some(), &[Sphere], "sphere"),
+            ("one_sided", self.one_sided, &[Plane], "plane"),
+            ("angles", self.angles != unset.angles, &[FarField], "far_field"),
+            ("h_deg", self.h_deg != unset.h_deg, &[FarField], "far_field"),
+            ("v_deg", self.v_deg != unset.v_deg, &[FarField], "far_field"),
+            ("part", self.part.is_some(), &[Absorbed], "absorbed"),
+            ("instance", self.instance.is_some(), &[Absorbed], "absorbed"),
+        ];
+        keys.into_iter().find(|(_, given, kinds, _)| *given && !kinds.contains(&self.kind)).map(|k| (k.0, k.3))
+    }
+
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("receiver"), Key::Index(index), Key::Name(key)];
@@ -136,11 +168,16 @@ impl Receiver {
         if self.name.is_empty() {
             return fail("name", "this receiver has no `name`");
         }
+        if let Some((key, whose)) = self.misplaced() {
+            return fail(key, &format!("`{key}` belongs to a receiver of kind {whose}"));
+        }
         if self.cells.contains(&0) || u64::from(self.cells[0]) * u64::from(self.cells[1]) > 1 << 24 {
             return fail("cells", "`cells` must be at least 1 and at most 16 million in all");
         }
-        if !self.at.iter().chain(&self.normal).all(|x| x.is_finite()) || self.normal.iter().all(|x| *x == 0.0) {
-            return fail("normal", "`at` must be a point and `normal` a direction");
+        if !self.at.iter().chain(&self.normal).chain(&self.up).chain(self.x.iter().flatten()).all(|x| x.is_finite())
+            || self.normal.iter().all(|x| *x == 0.0)
+        {
+            return fail("normal", "`at` must be a point, `normal`, `up` and `x` directions");
         }
         if self.channels.is_some() && self.bins_nm.is_some() {
             return fail("bins_nm", "a receiver has `channels` or `bins_nm`, not both");

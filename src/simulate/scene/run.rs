@@ -1,4 +1,4 @@
-use super::{Key, Scene};
+use super::{Key, Scene, lenient, suggest};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Run {
-    /// Number of rays that leave the sources.
+    /// Number of rays that leave the sources, such as 1_000_000 or 1e6.
+    #[serde(deserialize_with = "lenient::count")]
     pub rays: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -23,7 +24,7 @@ pub struct Run {
     pub wavelength_nm: f64,
     /// Unit of the sources' powers, and so of all results.
     pub unit: PowerUnit,
-    /// Hits after which a path ends and counts as cut off.
+    /// Hits after which a path ends and counts as cut off: what is caught in a clear block goes round for ever.
     pub max_bounces: u32,
     /// Length after which a path ends and counts as cut off, mm.
     pub max_length_mm: f64,
@@ -46,7 +47,7 @@ impl Default for Run {
             polarisation: false,
             wavelength_nm: 587.5618,
             unit: PowerUnit::Watt,
-            max_bounces: 100_000,
+            max_bounces: 20_000,
             max_length_mm: 1e9,
             power_floor: 1e-6,
             glue_mm: 1e-3,
@@ -93,7 +94,8 @@ pub enum Interfaces {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Accuracy {
-    /// Smallest and largest sag of a facet, mm.
+    /// Smallest and largest sag of a facet, mm; one number for both.
+    #[serde(deserialize_with = "lenient::range")]
     pub tolerance_mm: Option<[f64; 2]>,
     /// Largest angle between the normals of a facet's corners, degrees.
     pub angle_deg: Option<f64>,
@@ -109,6 +111,21 @@ impl Accuracy {
             let at = [Key::Name("accuracy"), Key::Name(key)];
             Err(scene.error(ErrorKind::Value, &at, format!("`{key}` {message}")))
         };
+        let names: [(&str, &Option<String>, &[&str]); 2] = [
+            ("intersector", &self.intersector, &["octree", "bvh2", "cwbvh", "exact"]),
+            ("normals", &self.normals, &["flat", "nearest", "bilinear", "cubic", "exact"]),
+        ];
+        for (key, name, known) in names {
+            let Some(name) = name.as_ref().filter(|n| !known.iter().any(|k| k.eq_ignore_ascii_case(n))) else {
+                continue;
+            };
+            let at = [Key::Name("accuracy"), Key::Name(key)];
+            let error = scene.error(ErrorKind::Value, &at, format!("'{name}' is none of {}", known.join(", ")));
+            return Err(match suggest::nearest(name, known.iter().copied()) {
+                Some(near) => error.help(format!("did you mean '{near}'?")),
+                None => error,
+            });
+        }
         match (self.tolerance_mm, self.angle_deg) {
             (Some([low, high]), _) if !(low > 0.0 && low <= high && high.is_finite()) => {
                 fail("tolerance_mm", "must be two positive lengths, the tighter one first, as in [0.05, 0.2]")
@@ -131,7 +148,10 @@ impl Run {
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
             r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
             r if !(1.0..=1e6).contains(&r.wavelength_nm) => fail("wavelength_nm", "must be from 1 to 1e6"),
-            r if !(0.0..=1.0).contains(&r.glue_mm) => fail("glue_mm", "must be from 0 to 1"),
+            r if !(1e-9..=1.0).contains(&r.glue_mm) => {
+                fail("glue_mm", "must be from 1e-9 to 1: faces at the same place are always one interface")
+            }
+            r if r.max_bounces == 0 => fail("max_bounces", "must be at least 1"),
             _ => Ok(()),
         }
     }

@@ -1,4 +1,4 @@
-use super::{FaceSelector, Key, OneOrMany, Scene, SpectrumKey};
+use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,13 +36,14 @@ pub struct Source {
     pub half_angle_deg: Option<f64>,
     /// Exponent n of a cosⁿ lobe.
     pub exponent: Option<f64>,
-    /// Names of the instances that the source lies inside of, outermost first, when it lies in a medium.
+    /// Names of the instances that the source lies inside of, outermost first; without, geometry tells. `[]` for none.
     pub inside: Option<OneOrMany<String>>,
     /// Spectrum; the line `wavelength_nm` of the run unless said otherwise.
     pub spectrum: Option<SpectrumKey>,
     /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays; by its share of the power otherwise.
+    #[serde(deserialize_with = "lenient::count_if_any")]
     pub rays: Option<u64>,
 }
 
@@ -103,9 +104,13 @@ impl Source {
         };
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         if let Some(power) = self.power
-            && !(power > 0.0 && power.is_finite())
+            && !(1e-30..=1e30).contains(&power)
         {
-            return fail("power", format!("a power of {power} is not positive"));
+            let message = match power > 0.0 {
+                true => format!("a power of {power} is not within 1e-30 and 1e30"),
+                false => format!("a power of {power} is not positive"),
+            };
+            return fail("power", message);
         }
         let from_file =
             matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat | SourceKind::Rays | SourceKind::Data1);
@@ -119,6 +124,26 @@ impl Source {
         }
         if self.on.is_some() && (self.radius.is_some() || self.size.is_some()) {
             return fail("on", "faces that shine have neither `radius` nor `size`".into());
+        }
+        let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
+        if list && (self.radius.is_some() || self.size.is_some()) {
+            let key = if self.radius.is_some() { "radius" } else { "size" };
+            return fail(key, format!("a ray list has its own places: `{key}` belongs to another kind of source"));
+        }
+        let photometric = matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
+        if photometric && self.power.is_none() && scene.run.unit != PowerUnit::Lumen {
+            let error = scene.error(
+                ErrorKind::Value,
+                &[Key::Name("source"), Key::Index(index), Key::Name("file")],
+                "this file gives lumens, but the run counts watts",
+            );
+            return Err(error.help("set `unit = \"lm\"` in [run], or give the source's `power` in watts"));
+        }
+        if self.polarised.is_some_and(|p| !finite(&p) || p.iter().all(|x| *x == 0.0)) {
+            return fail("polarised", "`polarised` must be the direction of the electric field".into());
+        }
+        if self.x.is_some_and(|x| !finite(&x) || x.iter().all(|x| *x == 0.0)) {
+            return fail("x", "`x` must be a direction".into());
         }
         if !finite(&self.at) {
             return fail("at", "not a point".into());

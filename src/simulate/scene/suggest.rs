@@ -9,6 +9,14 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
         .map(|(_, c)| c)
 }
 
+/// The nearest name, or all of them.
+pub(crate) fn any(word: &str, names: &[&str]) -> String {
+    match nearest(word, names.iter().copied()) {
+        Some(near) => format!("did you mean '{near}'?"),
+        None => format!("there are: {}", names[..names.len().min(12)].join(", ")),
+    }
+}
+
 /// Levenshtein's distance. Quadratic; words are cut at 64 characters so that no input makes it long.
 fn distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());

@@ -1,0 +1,62 @@
+//! `--paths FILE.npz`: every vertex of every path of a run.
+
+use super::Failure;
+use crate::formats::{Column, Error, NpzStream};
+use crate::simulate::PathVertex;
+use std::path::Path;
+use std::sync::Mutex;
+
+const COLUMNS: [Column; 6] = [
+    Column { name: "ray", numbers: "<u8", bytes: 8, width: 1 },
+    Column { name: "branch", numbers: "<u4", bytes: 4, width: 1 },
+    Column { name: "bounce", numbers: "<u4", bytes: 4, width: 1 },
+    Column { name: "event", numbers: "|u1", bytes: 1, width: 1 },
+    Column { name: "point", numbers: "<f8", bytes: 8, width: 3 },
+    Column { name: "power", numbers: "<f8", bytes: 8, width: 1 },
+];
+
+/// The file in the making, and what went wrong with it.
+pub(super) struct Paths {
+    state: Mutex<(NpzStream, Option<Error>)>,
+}
+
+impl Paths {
+    pub(super) fn create(path: &Path) -> Result<Self, Failure> {
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
+            let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
+            return Err(Failure::arguments(message).help("write --paths paths.npz"));
+        }
+        Ok(Self { state: Mutex::new((NpzStream::create(path, &COLUMNS)?, None)) })
+    }
+
+    /// Takes some vertices; after a failure no more.
+    pub(super) fn take(&self, vertices: &[PathVertex]) {
+        let mut columns: [Vec<u8>; 6] = Default::default();
+        for v in vertices {
+            columns[0].extend(v.ray.to_le_bytes());
+            columns[1].extend(v.branch.to_le_bytes());
+            columns[2].extend(v.bounce.to_le_bytes());
+            columns[3].push(v.event as u8);
+            v.point.to_array().iter().for_each(|x| columns[4].extend(x.to_le_bytes()));
+            columns[5].extend(v.power.to_le_bytes());
+        }
+        let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
+        if state.1.is_none() {
+            let slices: Vec<&[u8]> = columns.iter().map(Vec::as_slice).collect();
+            state.1 = state.0.write(vertices.len() as u64, &slices).err();
+        }
+    }
+
+    /// Whether writing has failed, so that tracing on is of no use.
+    pub(super) fn failed(&self) -> bool {
+        self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
+    }
+
+    /// Completes the file and gives the number of vertices.
+    pub(super) fn finish(self) -> Result<u64, Failure> {
+        match self.state.into_inner().unwrap_or_else(|e| e.into_inner()) {
+            (stream, None) => Ok(stream.finish()?),
+            (_, Some(e)) => Err(e.into()),
+        }
+    }
+}

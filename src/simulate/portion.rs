@@ -1,0 +1,256 @@
+//! A part of a run: which of its replicates are done, and their sums, kept in a file so that shards, interrupted runs and
+//! runs on several machines come together to the bits of a single run.
+//!
+//! The file holds a line that names it, a header of whoever writes it, the replicates, the sums without their empty
+//! cells, and a checksum. Whole numbers are little-endian.
+
+use super::bind::BoundScene;
+use super::digest::Fnv;
+use super::kernel::{Context, Counts, Local, LostRay, PathVertex, Tallies};
+use super::tally::{Moments, Sum};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::io::{self, Write};
+
+/// The replicates of a run that are done.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Portion {
+    /// Replicates of the whole run.
+    pub replicates: u32,
+    /// Those that are done, rising.
+    pub done: Vec<u32>,
+    /// Their sums.
+    pub tallies: Tallies,
+    /// Seconds that it took.
+    pub seconds: f64,
+}
+
+const MAGIC: &[u8] = b"lampyris tally 1\n";
+
+impl Portion {
+    pub(crate) fn none(bound: &BoundScene, replicates: u32) -> Self {
+        Self { replicates, tallies: Tallies::new(bound), ..Self::default() }
+    }
+
+    pub(crate) fn take(&mut self, replicate: u32, local: &mut Local, context: &Context<'_>) {
+        let place = self.done.binary_search(&replicate).unwrap_or_else(|place| place);
+        self.done.insert(place, replicate);
+        self.tallies.take(local, context);
+    }
+
+    /// Whether every replicate of the run is done.
+    pub fn is_whole(&self) -> bool {
+        self.done.len() == self.replicates as usize
+    }
+
+    /// Adds another part of the same run.
+    ///
+    /// # Errors
+    /// When both have a replicate in common, or are parts of different runs.
+    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+        if self.replicates != other.replicates || !same_shape(&self.tallies, &other.tallies) {
+            return Err("it is part of another run".into());
+        }
+        if let Some(twice) = other.done.iter().find(|r| self.done.binary_search(r).is_ok()) {
+            return Err(format!("its replicate {twice} is in an earlier part already; each part counts once"));
+        }
+        self.done.extend(&other.done);
+        self.done.sort_unstable();
+        self.tallies.merge(&other.tallies);
+        self.seconds += other.seconds;
+        Ok(())
+    }
+
+    /// Writes the file, with a header of the caller's.
+    ///
+    /// # Errors
+    /// When `to` cannot be written.
+    pub fn write(&self, header: &impl Serialize, to: &mut dyn Write) -> io::Result<()> {
+        let mut out = Vec::from(MAGIC);
+        let t = &self.tallies;
+        block(&mut out, &serde_json::to_vec(header)?);
+        out.extend(self.replicates.to_le_bytes());
+        out.extend((self.done.len() as u32).to_le_bytes());
+        self.done.iter().for_each(|r| out.extend(r.to_le_bytes()));
+        out.extend(self.seconds.to_le_bytes());
+        out.extend((t.cells.len() as u32).to_le_bytes());
+        t.cells.iter().for_each(|c| sums(&mut out, c));
+        [&t.receivers[..], &t.faces, &t.instances, &t.bulk, &t.ends].into_iter().for_each(|s| sums(&mut out, s));
+        for m in &t.moments {
+            m.first.iter().for_each(|x| out.extend(x.to_le_bytes()));
+            m.second.iter().for_each(|x| out.extend(x.to_le_bytes()));
+            out.extend(m.farthest.to_le_bytes());
+        }
+        let c = &t.counts;
+        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off]
+            .iter()
+            .for_each(|x| out.extend(x.to_le_bytes()));
+        // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
+        let zero = crate::math::Point::ZERO;
+        let bare = |l: &LostRay| LostRay { origin: zero, direction: zero, ..l.clone() };
+        let ledger: Vec<_> = t.ledger.iter().map(|l| (bare(l), bits(&[l.origin, l.direction]))).collect();
+        block(&mut out, &serde_json::to_vec(&ledger)?);
+        let bare = |v: &PathVertex| PathVertex { point: zero, power: 0.0, ..v.clone() };
+        let paths: Vec<_> = t.paths.iter().map(|v| (bare(v), bits(&[v.point]), v.power.to_bits())).collect();
+        block(&mut out, &serde_json::to_vec(&paths)?);
+        to.write_all(&out)?;
+        to.write_all(&Fnv::of(&[&out]).to_le_bytes())
+    }
+
+    /// Reads the file for a scene, after `check` has found the header good.
+    ///
+    /// # Errors
+    /// When the bytes are no such file, are damaged, or belong to another scene.
+    pub fn read<H: DeserializeOwned>(
+        bytes: &[u8],
+        check: impl FnOnce(&H) -> Result<(), String>,
+        bound: &BoundScene,
+    ) -> Result<Self, String> {
+        let (header, mut r) = open::<H>(bytes)?;
+        check(&header)?;
+        let mut p = Self::none(bound, r.u32()?);
+        let done = r.u32()?;
+        if done > p.replicates {
+            return Err("it has more replicates than its run".into());
+        }
+        p.done = (0..done).map(|_| r.u32()).collect::<Result<_, _>>()?;
+        if p.done.windows(2).any(|w| w[0] >= w[1]) || p.done.last().is_some_and(|&r| r >= p.replicates) {
+            return Err("its replicates are out of order".into());
+        }
+        p.seconds = f64::from_le_bytes(r.array()?);
+        let t = &mut p.tallies;
+        t.replicates = done;
+        if r.u32()? as usize != t.cells.len() {
+            return Err("it has other receivers than the scene".into());
+        }
+        for cells in &mut t.cells {
+            r.sums(cells)?;
+        }
+        r.sums(&mut t.receivers)?;
+        r.sums(&mut t.faces)?;
+        r.sums(&mut t.instances)?;
+        r.sums(&mut t.bulk)?;
+        r.sums(&mut t.ends)?;
+        for m in &mut t.moments {
+            *m = Moments {
+                first: [i128::from_le_bytes(r.array()?), i128::from_le_bytes(r.array()?)],
+                second: [u128::from_le_bytes(r.array()?), u128::from_le_bytes(r.array()?)],
+                farthest: r.u64()?,
+            };
+        }
+        let [rays, segments, corrected_normals, lost, cut_off] = [r.u64()?, r.u64()?, r.u64()?, r.u64()?, r.u64()?];
+        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off };
+        let ledger: Vec<(LostRay, Vec<[u64; 3]>)> = r.json()?;
+        let paths: Vec<(PathVertex, Vec<[u64; 3]>, u64)> = r.json()?;
+        let place = |b: &[[u64; 3]], k: usize| b.get(k).map(|b| b.map(f64::from_bits).into()).unwrap_or_default();
+        t.ledger = ledger
+            .into_iter()
+            .map(|(l, b)| LostRay { origin: place(&b, 0), direction: place(&b, 1), ..l })
+            .collect();
+        t.paths = paths
+            .into_iter()
+            .map(|(v, b, power)| PathVertex { point: place(&b, 0), power: f64::from_bits(power), ..v })
+            .collect();
+        Ok(p)
+    }
+
+    /// The header of a file alone.
+    ///
+    /// # Errors
+    /// When the bytes are no such file or are damaged.
+    pub fn header<H: DeserializeOwned>(bytes: &[u8]) -> Result<H, String> {
+        open(bytes).map(|(header, _)| header)
+    }
+}
+
+/// A hash of whatever decides the bits of a run, as 32 hexadecimal digits.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Fingerprint(pub String);
+
+impl Fingerprint {
+    /// Of these pieces, in this order.
+    pub fn of(pieces: &[&[u8]]) -> Self {
+        Self(format!("{:032x}", Fnv::of(pieces)))
+    }
+}
+
+fn same_shape(a: &Tallies, b: &Tallies) -> bool {
+    let cells = a.cells.len() == b.cells.len() && a.cells.iter().zip(&b.cells).all(|(a, b)| a.len() == b.len());
+    cells
+        && a.receivers.len() == b.receivers.len()
+        && a.faces.len() == b.faces.len()
+        && a.bulk.len() == b.bulk.len()
+}
+
+fn bits(points: &[crate::math::Point]) -> Vec<[u64; 3]> {
+    points.iter().map(|p| p.to_array().map(f64::to_bits)).collect()
+}
+
+fn block(out: &mut Vec<u8>, bytes: &[u8]) {
+    out.extend((bytes.len() as u64).to_le_bytes());
+    out.extend(bytes);
+}
+
+/// Length, number of cells that are not empty, and these with their index.
+fn sums(out: &mut Vec<u8>, sums: &[Sum]) {
+    out.extend((sums.len() as u64).to_le_bytes());
+    let filled = sums.iter().enumerate().filter(|(_, s)| **s != Sum::default());
+    out.extend((filled.clone().count() as u64).to_le_bytes());
+    for (i, s) in filled {
+        out.extend((i as u32).to_le_bytes());
+        out.extend(s.total.to_le_bytes());
+        out.extend(s.squares.to_le_bytes());
+    }
+}
+
+fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
+    let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
+    let (rest, sum) = rest.split_last_chunk::<16>().ok_or("the file is cut short")?;
+    if Fnv::of(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
+        return Err("the file is damaged or cut short: its checksum is wrong".into());
+    }
+    let mut reader = Reader(rest);
+    let header = reader.json()?;
+    Ok((header, reader))
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: u64) -> Result<&'a [u8], String> {
+        let n = usize::try_from(n).ok().filter(|n| *n <= self.0.len()).ok_or("the file is cut short")?;
+        let (taken, rest) = self.0.split_at(n);
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        self.take(N as u64)?.try_into().map_err(|_| "the file is cut short".into())
+    }
+
+    fn u32(&mut self) -> Result<u32, String> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Result<u64, String> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    fn json<T: DeserializeOwned>(&mut self) -> Result<T, String> {
+        let n = self.u64()?;
+        serde_json::from_slice(self.take(n)?).map_err(|e| format!("not a tally file of this version: {e}"))
+    }
+
+    fn sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
+        if self.u64()? != into.len() as u64 {
+            return Err("it has other receivers or faces than the scene".into());
+        }
+        for _ in 0..self.u64()? {
+            let i = self.u32()? as usize;
+            let sum =
+                Sum { total: u128::from_le_bytes(self.array()?), squares: u128::from_le_bytes(self.array()?) };
+            *into.get_mut(i).ok_or("a cell lies outside its receiver")? = sum;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,63 @@
+//! Numbers as people write them: `1e6` rays, one length where two may stand.
+
+use serde::Deserializer;
+use serde::de::{Error, SeqAccess, Unexpected, Visitor};
+use std::fmt;
+
+/// A whole number, which may be written as `1e6`.
+pub(super) fn count<'de, D: Deserializer<'de>>(d: D) -> Result<u64, D::Error> {
+    d.deserialize_any(Count)
+}
+
+/// The same where the key may be missing.
+pub(super) fn count_if_any<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u64>, D::Error> {
+    d.deserialize_any(Count).map(Some)
+}
+
+/// Two numbers, or one for both.
+pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
+    d.deserialize_any(Range).map(Some)
+}
+
+struct Count;
+
+impl Visitor<'_> for Count {
+    type Value = u64;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a whole positive number, such as 1_000_000 or 1e6")
+    }
+    fn visit_i64<E: Error>(self, n: i64) -> Result<u64, E> {
+        u64::try_from(n).map_err(|_| E::invalid_value(Unexpected::Signed(n), &self))
+    }
+    fn visit_u64<E: Error>(self, n: u64) -> Result<u64, E> {
+        Ok(n)
+    }
+    fn visit_f64<E: Error>(self, x: f64) -> Result<u64, E> {
+        match x.fract() == 0.0 && (0.0..9e15).contains(&x) {
+            true => Ok(x as u64),
+            false => Err(E::invalid_value(Unexpected::Float(x), &self)),
+        }
+    }
+}
+
+struct Range;
+
+impl<'de> Visitor<'de> for Range {
+    type Value = [f64; 2];
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("two lengths, as in [0.05, 0.2], or one")
+    }
+    fn visit_i64<E: Error>(self, n: i64) -> Result<[f64; 2], E> {
+        Ok([n as f64; 2])
+    }
+    fn visit_f64<E: Error>(self, x: f64) -> Result<[f64; 2], E> {
+        Ok([x; 2])
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<[f64; 2], A::Error> {
+        let mut next = || seq.next_element::<f64>();
+        match (next()?, next()?, next()?) {
+            (Some(low), Some(high), None) => Ok([low, high]),
+            _ => Err(A::Error::custom("expected two lengths, as in [0.05, 0.2], or one")),
+        }
+    }
+}
