@@ -113,7 +113,7 @@ fn a_fresnel_rhomb_makes_circular_light() {
         // Between the walls z = ±5: up, reflected, down, reflected, and out up again through a face across the light.
         let run = 10.0 * a.tan();
         let start = Point::new(-0.5 * run, 0.0, 0.0);
-        let exit = Point::new(2.0 * run, 0.0, 0.0);
+        let exit = Point::new(1.5 * run, 0.0, 0.0);
         let mut world = World::default();
         world.part(
             "glass",

@@ -64,38 +64,75 @@ pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
 
 /// The bodies that a ray leaves on its straight way out without having entered them.
 pub(crate) fn bodies(context: &Context<'_>, ray: &Ray) -> Bodies {
-    let (mut left, mut entered) = (Bodies::new(), Bodies::new());
+    let mut crossed = Crossed::default();
     let mut at = Ray { t_max: f64::INFINITY, ..*ray };
-    // Where faces of two bodies lie in one place, only the last one met is left out of the next question: what was met there before
-    // does not count again, and then the place is passed over.
-    let mut here: SmallVec<[u32; 4]> = SmallVec::new();
     for _ in 0..DEEP {
         let Some(hit) = context.intersector.intersect(&at, &mut Cost::default()) else { break };
-        let same = context.bound.scene.run.glue_mm / at.direction.dot(hit.geometric_normal).abs().max(1e-3);
-        if hit.t > same {
-            here.clear();
-        }
-        if here.contains(&hit.primitive) {
-            at.t_min = same;
-            here.clear();
+        let (point, d) = (at.at(hit.t), at.direction);
+        let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+        at = Ray::new(point, d).leaving(from);
+        let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
+        let along = d.dot(hit.geometric_normal);
+        crossed.cross(face.body, along < 0.0);
+        if !face.touching {
             continue;
         }
-        here.push(hit.primitive);
-        let body = context.bound.faces.get(hit.face.index()).map_or(AMBIENT, |f| f.body);
-        if body != AMBIENT {
-            if at.direction.dot(hit.geometric_normal) < 0.0 {
-                entered.push(body);
-            } else if let Some(k) = entered.iter().rposition(|b| *b == body) {
-                entered.remove(k);
-            } else {
-                left.push(body);
-            }
+        // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
+        let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
+        let probe = Ray::new(point - d * reach, d).within(0.0, 2.0 * reach).leaving(from);
+        let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        let entering = d.dot(second.geometric_normal) < 0.0;
+        let other = context.bound.faces.get(second.face.index());
+        if let Some(other) = other.filter(|o| o.touching && o.body != face.body && entering == (along >= 0.0)) {
+            crossed.cross(other.body, entering);
+            at.t_min = reach;
         }
-        let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-        at = Ray::new(at.at(hit.t), at.direction).leaving(from);
     }
-    // A solid that is turned inside out is left before it is entered.
-    left.retain(|b| !entered.contains(b));
-    left.reverse();
-    left
+    crossed.around()
+}
+
+#[derive(Default)]
+struct Crossed {
+    left: Bodies,
+    entered: Bodies,
+}
+
+impl Crossed {
+    fn cross(&mut self, body: u16, entering: bool) {
+        if body == AMBIENT {
+            return;
+        }
+        match self.entered.iter().rposition(|b| *b == body) {
+            Some(k) if !entering => drop(self.entered.remove(k)),
+            None if !entering => self.left.push(body),
+            _ => self.entered.push(body),
+        }
+    }
+
+    fn around(mut self) -> Bodies {
+        // A solid that is turned inside out is left before it is entered.
+        self.left.retain(|b| !self.entered.contains(b));
+        self.left.reverse();
+        self.left
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_and_was_not_entered_is_around() {
+        let around = |crossings: &[(u16, bool)]| {
+            let mut c = Crossed::default();
+            crossings.iter().for_each(|&(body, entering)| c.cross(body, entering));
+            c.around().to_vec()
+        };
+        assert_eq!(around(&[(1, true), (1, false)]), Vec::<u16>::new());
+        assert_eq!(around(&[(2, false), (3, true), (3, false), (1, false)]), [1, 2]);
+        assert_eq!(around(&[(1, true), (2, true), (1, false), (2, false)]), Vec::<u16>::new());
+        // Inside out.
+        assert_eq!(around(&[(1, false), (1, true)]), Vec::<u16>::new());
+        assert_eq!(around(&[(AMBIENT, false)]), Vec::<u16>::new());
+    }
 }
