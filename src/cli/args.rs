@@ -51,6 +51,9 @@ pub(crate) enum Command {
         /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
         #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
         accuracy: Option<String>,
+        /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
+        #[arg(long)]
+        baseline: bool,
         /// Number of threads; all cores by default
         #[arg(long, value_name = "N")]
         threads: Option<usize>,

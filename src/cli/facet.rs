@@ -5,10 +5,12 @@ use super::context::{Context, print};
 use super::options::{Meshing, Tracing};
 use super::{Failure, Outcome, aim, engine, load, look, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
+use crate::kernel::baseline;
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::report::{bytes, figures, grouped, seconds};
-use crate::tessellate::Report;
+use crate::tessellate::{Report, sampled_sag};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What `facet` was asked for.
@@ -17,6 +19,8 @@ pub(super) struct Asked<'a> {
     pub(super) output: &'a [PathBuf],
     pub(super) meshing: &'a Meshing,
     pub(super) accuracy: Option<&'a str>,
+    /// Whether truck's mesher runs too.
+    pub(super) baseline: bool,
     pub(super) threads: Option<usize>,
     pub(super) limits: Refusals,
 }
@@ -47,11 +51,23 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         spinner.finish_and_clear();
         context.say(format_args!("wrote {}", path.display()));
     }
+    let baseline = asked.baseline.then(|| Baseline::run(&loaded.model, made.report.tolerance_mm.min));
     if context.json {
-        let text = serde_json::to_string_pretty(&made.report).map_err(|e| Failure::running(e.to_string()))?;
+        #[derive(Serialize)]
+        struct Both<'r> {
+            #[serde(flatten)]
+            report: &'r Report,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            baseline: Option<Baseline>,
+        }
+        let both = Both { report: &made.report, baseline };
+        let text = serde_json::to_string_pretty(&both).map_err(|e| Failure::running(e.to_string()))?;
         print(&(text + "\n"))?;
     } else {
         print(&described(&made.report))?;
+        if let Some(b) = baseline {
+            print(&b.described(&made.report))?;
+        }
     }
     let refused = load::account(&loaded.reports, asked.limits.max_refused, context);
     let placed = made.report.faces.meshed + made.report.faces.failed;
@@ -60,6 +76,64 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     }
     let over = made.report.faces.failed as f64 > asked.limits.max_refused * placed as f64;
     Ok(if over { Outcome::Incomplete } else { refused })
+}
+
+/// What truck-meshalgo makes of the same model; `facet --json` has it under `baseline`.
+#[derive(Serialize)]
+struct Baseline {
+    mesher: &'static str,
+    tolerance_mm: f64,
+    facets: usize,
+    sampled_max_mm: f64,
+    sampled_mean_mm: f64,
+    failed_faces: usize,
+    seconds: f64,
+}
+
+impl Baseline {
+    fn run(model: &Model, tolerance_mm: f64) -> Self {
+        let made = baseline::mesh(model, tolerance_mm);
+        let [sampled_max_mm, sampled_mean_mm] = sampled_sag(&made.mesh, model);
+        Self {
+            mesher: "truck-meshalgo",
+            tolerance_mm,
+            facets: made.mesh.facets.len(),
+            sampled_max_mm,
+            sampled_mean_mm,
+            failed_faces: made.failed.len(),
+            seconds: made.seconds,
+        }
+    }
+
+    /// Both meshers, one below the other.
+    fn described(&self, r: &Report) -> String {
+        let sag = |max: f64, mean: f64| format!("{} ({})", figures(max, 4), figures(mean, 3));
+        let rows = [
+            (
+                "lampyris",
+                r.facets,
+                sag(r.sag_mm.sampled_max.unwrap_or(0.0), r.sag_mm.sampled_mean.unwrap_or(0.0)),
+                r.faces.failed,
+                r.seconds.tessellate,
+            ),
+            (
+                self.mesher,
+                self.facets,
+                sag(self.sampled_max_mm, self.sampled_mean_mm),
+                self.failed_faces,
+                self.seconds,
+            ),
+        ];
+        let mut text = format!(
+            "\n  {:<15} {:>10} {:>24} {:>14} {:>10}\n",
+            "mesher", "facets", "sag mm (mean)", "faces without", "time"
+        );
+        for (name, facets, sag, failed, time) in rows {
+            let facets = grouped(facets as u64);
+            text += &format!("  {name:<15} {facets:>10} {sag:>24} {failed:>14} {:>10}\n", seconds(time));
+        }
+        text
+    }
 }
 
 fn described(r: &Report) -> String {

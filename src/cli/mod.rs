@@ -72,9 +72,16 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
     match command {
         Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, context),
         Command::Info { file, limits } => info::run(&file, limits, context),
-        Command::Facet { file, output, meshing, accuracy, threads, limits } => {
-            let accuracy = accuracy.as_deref();
-            let asked = facet::Asked { file: &file, output: &output, meshing: &meshing, accuracy, threads, limits };
+        Command::Facet { file, output, meshing, accuracy, baseline, threads, limits } => {
+            let asked = facet::Asked {
+                file: &file,
+                output: &output,
+                meshing: &meshing,
+                accuracy: accuracy.as_deref(),
+                baseline,
+                threads,
+                limits,
+            };
             facet::run(&asked, context)
         }
         Command::Trace { scene, output, meshing, tracing, extra } => {

@@ -2,7 +2,7 @@
 
 use super::{Settings, Tessellation, sample};
 use crate::math::FaceId;
-use crate::mesh::Topology;
+use crate::mesh::{FacetMesh, Topology};
 use crate::model::Model;
 use serde::Serialize;
 
@@ -194,7 +194,7 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
 }
 
 fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
-    let sampled = sample::all(made, model);
+    let sampled = sample::all(&made.mesh, model);
     let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
     let mean = sampled.iter().zip(areas).map(|(s, a)| s.mean * a).sum::<f64>() / report.area_mm2.max(1e-300);
     report.sag_mm.sampled_max = Some(max);
@@ -209,4 +209,14 @@ fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64
         errors.get(i).map_or(0.0, |&e| f64::from(e).to_degrees())
     };
     report.normal_error_deg = Some(Percentiles { p50: at(0.5), p99: at(0.99), max: at(1.0) });
+}
+
+/// Samples how far any mesh of a model lies from its splines: the largest distance and the mean weighted by area, mm.
+///
+/// Vertices need their `uv`. This is how [`Report::sag_mm`] is sampled, for meshes of others.
+pub fn sampled_sag(mesh: &FacetMesh, model: &Model) -> [f64; 2] {
+    let sampled = sample::all(mesh, model);
+    let areas = (0..mesh.facets.len()).map(|f| mesh.facet_area(f));
+    let (sum, area) = sampled.iter().zip(areas).fold((0.0, 0.0), |(s, t), (x, a)| (s + x.mean * a, t + a));
+    [sampled.iter().map(|s| s.sag).fold(0.0, f64::max), sum / area.max(1e-300)]
 }

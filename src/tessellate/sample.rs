@@ -1,7 +1,6 @@
 //! Sag and normal error by dense sampling: evaluates splines by their definition and measures distances its own way, so
 //! that it can judge the bound.
 
-use super::Tessellation;
 use crate::math::{Point, Uv, Vector};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
@@ -23,20 +22,20 @@ pub(super) struct Sampled {
 const GRID: usize = 8;
 
 /// Samples every facet; facets of ready meshes give zeros.
-pub(super) fn all(made: &Tessellation, model: &Model) -> Vec<Sampled> {
+pub(super) fn all(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
     let faces: Vec<_> = model.placed_faces().collect();
-    (0..made.mesh.facets.len())
+    (0..mesh.facets.len())
         .into_par_iter()
         .map(|f| {
-            let placed = &faces[made.mesh.facets[f].face.index()];
+            let placed = &faces[mesh.facets[f].face.index()];
             let Some(face) = placed.face else { return Sampled::default() };
             let scale = placed.placement.scale;
-            let corners = made.mesh.corners(f).map(|p| placed.placement.local_point(p));
+            let corners = mesh.corners(f).map(|p| placed.placement.local_point(p));
             let sign = if face.reversed { -1.0 } else { 1.0 };
-            let normals = made.mesh.facets[f]
+            let normals = mesh.facets[f]
                 .vertices
-                .map(|v| sign * placed.placement.local_direction(made.mesh.vertices[v as usize].normal));
-            let mut s = facet(&face.surface, &made.mesh, f, corners, normals);
+                .map(|v| sign * placed.placement.local_direction(mesh.vertices[v as usize].normal));
+            let mut s = facet(&face.surface, mesh, f, corners, normals);
             s.sag *= scale;
             s.mean *= scale;
             s
