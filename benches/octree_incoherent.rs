@@ -7,33 +7,10 @@
 mod intersector_common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use intersector_common::{Random, lamp};
+use intersector_common::{lamp, paths};
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{Octree, Settings};
 use lampyris::intersect::{Cost, Hit, Intersector};
-use lampyris::math::{Departure, Point, Ray};
-
-/// Paths from the sources: each ray leaves the hit before it to a random side.
-fn paths(tree: &dyn Intersector, sources: &[Point], count: usize) -> Vec<Ray> {
-    let mut r = Random(0x9E37_79B9_7F4A_7C15);
-    let mut rays = Vec::with_capacity(count);
-    let mut path = 0;
-    while rays.len() < count {
-        let mut ray = Ray::new(sources[path % sources.len()] + r.direction() * 0.3, r.direction());
-        path += 1;
-        for _ in 0..3 + r.below(6) {
-            rays.push(ray);
-            let Some(hit) = tree.intersect(&ray, &mut Cost::default()) else { break };
-            let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
-            let n = hit.geometric_normal * if r.unit() < 0.6 { side } else { -side };
-            let direction = (n + r.direction() * 0.999).normalize();
-            let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-            ray = Ray::new(ray.at(hit.t), direction).leaving(from);
-        }
-    }
-    rays.truncate(count);
-    rays
-}
 
 fn incoherent(c: &mut Criterion) {
     for facets in [20_000, 200_000] {

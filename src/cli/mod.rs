@@ -5,6 +5,7 @@
 
 mod aim;
 mod args;
+mod cells;
 mod check;
 mod context;
 mod demo;

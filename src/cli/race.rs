@@ -1,32 +1,45 @@
-//! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, in alternating rounds.
+//! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, in alternating rounds, on one
+//! thread and on all; answers that differ are judged with twice the digits.
 
+use super::cells::Shape;
 use super::context::Context;
-use super::options::Tracing;
-use super::{Failure, demo, load};
+use super::options::{Meshing, Tracing};
+use super::{Failure, demo, engine, load};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::octree::{self, Octree};
-use crate::intersect::{Cost, Hit, Intersector};
+use crate::intersect::{Cost, Footprint, Hit, Intersector};
 use crate::math::Ray;
+use crate::mesh::FacetMesh;
 use crate::report::{figures, grouped};
 use crate::study::Progress;
 use crate::study::check::{Competitor, measure};
+use crate::study::judge::{Verdict, judge, same_distance};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
 use crate::tessellate::{self, tessellate};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Tolerances, mm: some thousand, ten thousand and hundred thousand facets on a lamp.
-const TOLERANCES: [f64; 3] = [0.1, 0.01, 0.001];
+/// Tolerances, mm: about 20 thousand, 200 thousand and 1.5 million facets on the lamp.
+const TOLERANCES: [f64; 3] = [0.02, 0.0018, 0.000125];
 /// Rays of a round, and rounds.
 const RAYS: u64 = 50_000;
 const ROUNDS: usize = 5;
 
+/// Rows, the sentence that answers, and what the octrees look like.
+pub(super) struct Race {
+    pub(super) rows: Vec<Value>,
+    pub(super) answer: String,
+    pub(super) shapes: Vec<Shape>,
+}
+
 pub(super) fn run(
     file: Option<&Path>,
+    meshing: &Meshing,
     tracing: &Tracing,
     context: &Context,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<(Vec<Value>, String), Failure> {
+) -> Result<Race, Failure> {
     let loaded = match file {
         None => demo::lamp()?.1,
         Some(path) => match load::either(path, context)? {
@@ -34,20 +47,29 @@ pub(super) fn run(
         },
     };
     let name = file.map_or("three-cavity lamp".into(), |p| p.display().to_string());
-    let count = tracing.rays.unwrap_or(RAYS);
-    let seed = tracing.seed.unwrap_or(1);
-    let mut rows = Vec::new();
-    for (k, tolerance) in TOLERANCES.into_iter().enumerate() {
-        let done = k as f64 / TOLERANCES.len() as f64;
+    let threads = engine::threads(tracing.threads)?;
+    let tolerances = meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
+    let mut race = Race { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
+    for (k, &tolerance) in tolerances.iter().enumerate() {
+        let done = k as f64 / tolerances.len() as f64;
         progress(Progress { stage: format!("{tolerance} mm"), done, remaining_seconds: None });
         let mesh = tessellate(&loaded.model, &tessellate::Settings::uniform(tolerance)).mesh;
-        let octree = Octree::build(&mesh, &octree::Settings::default());
-        let textbook = Octree::build(&mesh, &octree::Settings::textbook());
-        let binary = Bvh::build(&mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..Default::default() });
-        let cured = Bvh::build(&mesh, &bvh::Settings::default());
-        let shipped = Bvh::build(&mesh, &bvh::Settings { cured: false, ..Default::default() });
-        let slow = bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() };
-        let slow = Bvh::build(&mesh, &slow);
+        race.at(&name, &mesh, tolerance, tracing, threads);
+    }
+    race.answer = sentence(&race.rows);
+    Ok(race)
+}
+
+impl Race {
+    fn at(&mut self, name: &str, mesh: &FacetMesh, tolerance: f64, tracing: &Tracing, threads: usize) {
+        let count = tracing.rays.unwrap_or(RAYS);
+        let seed = tracing.seed.unwrap_or(1);
+        let octree = Octree::build(mesh, &octree::Settings::default());
+        let textbook = Octree::build(mesh, &octree::Settings::textbook());
+        let binary = Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..Default::default() });
+        let cured = Bvh::build(mesh, &bvh::Settings::default());
+        let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..Default::default() });
+        let slow = Bvh::build(mesh, &bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() });
         let entrants: [(&str, &str, &dyn Intersector); 6] = [
             ("octree", "T = 128", &octree),
             ("octree, textbook", "T = 8", &textbook),
@@ -61,36 +83,82 @@ pub(super) fn run(
         let kinds: [(&str, Vec<Ray>); 3] = [
             ("coherent", Camera::new(&bounds, count).rays(0..count)),
             ("incoherent", bounces.rays(0..count)),
-            ("adversarial", edges(&mesh, &bounds, seed, count)),
+            ("adversarial", edges(mesh, &bounds, seed, count)),
         ];
+        let mut shape = Shape::of(&octree);
         for (kind, rays) in &kinds {
-            let truth = answers(&octree, rays);
-            for (call, batch) in [("batch", true), ("single", false)] {
-                let competitors: Vec<Competitor> =
-                    entrants.iter().map(|(name, _, who)| Competitor { name, who: *who, batch }).collect();
-                let timings = measure(&competitors, rays, ROUNDS);
-                for ((name_of, build, who), (_, t)) in entrants.iter().zip(timings) {
-                    let mut cost = Cost::default();
-                    let mut hits = vec![None; rays.len()];
-                    who.intersect_batch(rays, &mut hits, &mut cost);
-                    let footprint = who.footprint();
+            let truth = answers(&octree, rays).0;
+            let judged: Vec<(Judgement, Cost)> = (entrants.iter())
+                .map(|(_, _, who)| {
+                    let (hits, cost) = answers(*who, rays);
+                    (Judgement::of(mesh, rays, &truth, &hits), cost)
+                })
+                .collect();
+            // The octree errs where any other is right against it.
+            let octree_wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
+            shape.costs.push(((*kind).into(), judged[0].1));
+            for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
+                if call == "batch" && threads == 1 && self.has(mesh, kind, call, 1) {
+                    continue;
+                }
+                let shared: Vec<Shared> = entrants.iter().map(|(_, _, who)| Shared(*who)).collect();
+                let competitors: Vec<Competitor> = (entrants.iter().zip(&shared))
+                    .map(|((name, _, who), shared)| {
+                        let who: &dyn Intersector = if threads > 1 { shared } else { *who };
+                        Competitor { name, who, batch }
+                    })
+                    .collect();
+                for (((who, build, structure), (_, t)), (judgement, cost)) in
+                    entrants.iter().zip(measure(&competitors, rays, ROUNDS)).zip(&judged)
+                {
+                    let footprint = structure.footprint();
                     let rate = |seconds: f64| rays.len() as f64 / seconds.max(1e-12) / 1e6;
-                    rows.push(json!({
-                        "model": name, "facets": mesh.facets.len(), "intersector": name_of, "build": build,
-                        "rays_kind": kind, "call": call, "threads": 1,
+                    let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
+                    let wrong = if *who == "octree" { octree_wrong } else { judgement.wrong };
+                    self.rows.push(json!({
+                        "model": name, "facets": mesh.facets.len(), "intersector": who, "build": build,
+                        "rays_kind": kind, "call": call, "threads": threads,
                         "mrays_per_s_min": rate(t.p90), "mrays_per_s_median": rate(t.median), "mrays_per_s_p90": rate(t.min),
                         "build_seconds": footprint.build_seconds,
                         "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
-                        "nodes_per_ray": cost.nodes as f64 / rays.len() as f64,
-                        "tests_per_ray": cost.tests as f64 / rays.len() as f64,
-                        "wrong": differing(&truth, &hits),
+                        "nodes_per_ray": per_ray(cost.nodes), "tests_per_ray": per_ray(cost.tests),
+                        "wrong": wrong, "differs": judgement.differs, "undecided": judgement.undecided,
                     }));
                 }
             }
         }
+        self.shapes.push(shape);
     }
-    let answer = sentence(&rows);
-    Ok((rows, answer))
+
+    fn has(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
+        self.rows.iter().any(|r| {
+            r["facets"] == mesh.facets.len()
+                && r["rays_kind"] == kind
+                && r["call"] == call
+                && r["threads"] == threads
+        })
+    }
+}
+
+/// An intersector whose batches all threads share.
+struct Shared<'a>(&'a dyn Intersector);
+
+/// Rays that a thread takes at a time.
+const PIECE: usize = 2048;
+
+impl Intersector for Shared<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.0.intersect(ray, cost)
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], _: &mut Cost) {
+        (rays.par_chunks(PIECE).zip(hits.par_chunks_mut(PIECE)))
+            .for_each(|(rays, hits)| self.0.intersect_batch(rays, hits, &mut Cost::default()));
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.0.footprint()
+    }
 }
 
 /// Random rays aimed at corners and at points of edges, where careless tests leak.
@@ -109,20 +177,40 @@ fn edges(mesh: &crate::mesh::FacetMesh, bounds: &crate::math::Aabb, seed: u64, c
         .collect()
 }
 
-fn answers(who: &dyn Intersector, rays: &[Ray]) -> Vec<Option<Hit>> {
+fn answers(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
     let mut hits = vec![None; rays.len()];
-    who.intersect_batch(rays, &mut hits, &mut Cost::default());
-    hits
+    let mut cost = Cost::default();
+    who.intersect_batch(rays, &mut hits, &mut cost);
+    (hits, cost)
 }
 
-/// Rays that hit only one of the two, or at distances that differ by more than single precision explains.
-fn differing(truth: &[Option<Hit>], hits: &[Option<Hit>]) -> usize {
-    let same = |(a, b): &(&Option<Hit>, &Option<Hit>)| match (a, b) {
-        (None, None) => true,
-        (Some(a), Some(b)) => (a.t - b.t).abs() <= 1e-4 * (1.0 + a.t.abs()),
-        _ => false,
-    };
-    truth.iter().zip(hits).filter(|pair| !same(pair)).count()
+/// How the answers of one structure stand to those of the octree.
+struct Judgement {
+    /// Rays that hit only one of the two, or at distances that differ by more than single precision explains.
+    differs: usize,
+    wrong: usize,
+    octree_wrong: usize,
+    undecided: usize,
+}
+
+impl Judgement {
+    fn of(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
+        let same = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
+            (None, None) => true,
+            (Some(a), Some(b)) => same_distance(a.t, b.t),
+            _ => false,
+        };
+        let differing: Vec<usize> = (0..rays.len()).filter(|&i| !same(&octree[i], &hits[i])).collect();
+        let verdicts: Vec<Verdict> =
+            (differing.par_iter()).map(|&i| judge(mesh, &rays[i], octree[i].as_ref(), hits[i].as_ref())).collect();
+        let count = |which: Verdict| verdicts.iter().filter(|v| **v == which).count();
+        Self {
+            differs: differing.len(),
+            wrong: count(Verdict::First),
+            octree_wrong: count(Verdict::Second),
+            undecided: count(Verdict::Undecided),
+        }
+    }
 }
 
 fn sentence(rows: &[Value]) -> String {
@@ -134,6 +222,7 @@ fn sentence(rows: &[Value]) -> String {
                 && r["build"] == build
                 && r["call"] == call
                 && r["rays_kind"] == "incoherent"
+                && r["threads"] == 1
         };
         rows.iter().find(fits).and_then(|r| r["mrays_per_s_median"].as_f64()).unwrap_or(f64::NAN)
     };

@@ -5,7 +5,7 @@ use super::context::{Context, print};
 use super::engine::{self, Choice};
 use super::load::{self, Input, Loaded};
 use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, demo};
+use super::{Failure, Outcome, cells, demo};
 use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{
@@ -51,13 +51,17 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let seed = asked.tracing.seed.unwrap_or(1);
     let bar = context.bar(asked.kind.name(), "‰", 1000);
     let progress = |p: Progress| show(&bar, &p);
+    let mut shapes = Vec::new();
     let found = match asked.kind {
         StudyKind::Accuracy => accuracy_of(asked, seed, context, &progress)?,
         StudyKind::Interpolation => interpolation_of(asked, seed, context, &progress)?,
         StudyKind::Complexity => complexity_of(asked, seed, threads, &progress)?,
         StudyKind::Stability => stability_of(&progress)?,
-        StudyKind::Bvh => super::race::run(asked.file, asked.tracing, context, &progress)
-            .and_then(|(rows, answer)| Found::new(&rows, answer))?,
+        StudyKind::Bvh => {
+            let race = super::race::run(asked.file, asked.meshing, asked.tracing, context, &progress)?;
+            shapes = race.shapes;
+            Found::new(&race.rows, race.answer)?
+        }
         StudyKind::Effects => effects_of(asked, threads, context)?,
     };
     bar.finish_and_clear();
@@ -80,6 +84,10 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let mut report = study_report(&document, provenance);
     if asked.kind == StudyKind::Accuracy {
         report.sections.insert(1, error_view(asked, context)?);
+    }
+    if asked.kind == StudyKind::Bvh {
+        report.sections.insert(1, cells::section(&shapes));
+        cells::write(&folder, &shapes)?;
     }
     report.write(&folder)?;
     if context.json {

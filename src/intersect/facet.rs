@@ -180,6 +180,8 @@ impl FacetRay {
     fn quad(&self, facet: u32, triangles: u32, corners: [&Point; 4], origin: [f64; 3], best: &mut Nearest) {
         let [kx, ky, kz] = self.axes();
         let [sx, sy, _] = self.shear;
+        // As arrays, since the index of a glam vector is a match.
+        let corners: [&[f64; 3]; 4] = corners.map(|p| p.as_ref());
         let z: [f64; 4] = std::array::from_fn(|k| corners[k][kz] - origin[kz]);
         let x: [f64; 4] = std::array::from_fn(|k| (corners[k][kx] - origin[kx]) - sx * z[k]);
         let y: [f64; 4] = std::array::from_fn(|k| (corners[k][ky] - origin[ky]) - sy * z[k]);

@@ -16,6 +16,7 @@ pub mod complexity;
 pub mod effects;
 mod errors;
 pub mod interpolation;
+pub mod judge;
 pub mod lamp;
 mod product;
 mod quantiles;

@@ -1,7 +1,8 @@
 //! Meshes, rays and a reference for the contract of intersectors.
 #![allow(dead_code, unreachable_pub)]
 
-use lampyris::math::{FaceId, Point, Ray, Uv, Vector};
+use lampyris::intersect::{Cost, Intersector};
+use lampyris::math::{Departure, FaceId, Point, Ray, Uv, Vector};
 use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -236,4 +237,118 @@ pub fn by_hand(mesh: &FacetMesh, ray: &Ray) -> (Option<f64>, bool) {
         }
     }
     (nearest, doubtful)
+}
+
+/// Paths from the sources: each ray leaves the hit before it to a random side.
+pub fn paths(tree: &dyn Intersector, sources: &[Point], count: usize) -> Vec<Ray> {
+    let mut r = Random(0x9E37_79B9_7F4A_7C15);
+    let mut rays = Vec::with_capacity(count);
+    let mut path = 0;
+    while rays.len() < count {
+        let mut ray = Ray::new(sources[path % sources.len()] + r.direction() * 0.3, r.direction());
+        path += 1;
+        for _ in 0..3 + r.below(6) {
+            rays.push(ray);
+            let Some(hit) = tree.intersect(&ray, &mut Cost::default()) else { break };
+            let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+            let n = hit.geometric_normal * if r.unit() < 0.6 { side } else { -side };
+            let direction = (n + r.direction() * 0.999).normalize();
+            let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+            ray = Ray::new(ray.at(hit.t), direction).leaving(from);
+        }
+    }
+    rays.truncate(count);
+    rays
+}
+
+/// Every quad cut into `cuts` by `cuts` of the same shape, corners shared within what was one quad.
+pub fn refined(coarse: &FacetMesh, cuts: usize) -> FacetMesh {
+    let mut mesh = FacetMesh::default();
+    for (f, facet) in coarse.facets.iter().enumerate() {
+        let c = coarse.corners(f);
+        let first = mesh.positions.len() as u32;
+        for j in 0..=cuts {
+            for i in 0..=cuts {
+                let (a, b) = (i as f64 / cuts as f64, j as f64 / cuts as f64);
+                let near = c[0] * (1.0 - a) + c[1] * a;
+                let far = c[3] * (1.0 - a) + c[2] * a;
+                let position = mesh.positions.len() as u32;
+                let normal = coarse.vertices[facet.vertices[0] as usize].normal;
+                mesh.positions.push(near * (1.0 - b) + far * b);
+                mesh.vertices.push(MeshVertex { position, normal, uv: Uv::new(a, b) });
+            }
+        }
+        let w = cuts as u32 + 1;
+        for j in 0..cuts as u32 {
+            for i in 0..cuts as u32 {
+                let a = first + j * w + i;
+                mesh.facets.push(Facet { vertices: [a, a + 1, a + 1 + w, a + w], face: facet.face });
+            }
+        }
+    }
+    mesh
+}
+
+/// A pot on the ground of a stadium with rows of seats, thin rings along the rows and long cables across; about `n` facets, with
+/// places of light around the pot and over the rows.
+pub fn stadium(n: usize) -> (FacetMesh, Vec<Point>) {
+    let mut mesh = FacetMesh::default();
+    let share = |part: f64| (n as f64 * part) as usize;
+    add_grid(&mut mesh, 1, 1, 0, |a, b| Point::new(2e5 * a - 1e5, 2e5 * b - 1e5, -1.0));
+    let seats = share(0.15) / 6;
+    for i in 0..seats {
+        let row = (i % 40) as f64;
+        let p = TAU * (i / 40) as f64 / (seats / 40 + 1) as f64;
+        let r = 60_000.0 + 800.0 * row;
+        let at = Point::new(r * p.cos(), r * p.sin(), 400.0 * row + 200.0);
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                add_grid(&mut mesh, 1, 1, 1, |a, b| {
+                    let mut q = Point::ZERO;
+                    q[axis] = side;
+                    q[(axis + 1) % 3] = 2.0 * a - 1.0;
+                    q[(axis + 2) % 3] = 2.0 * b - 1.0;
+                    at + q * Point::new(220.0, 220.0, 200.0)
+                });
+            }
+        }
+    }
+    for row in 0..40 {
+        let r = 59_600.0 + 800.0 * f64::from(row);
+        add_grid(&mut mesh, (share(0.05) / 40).max(16), 1, 2, |a, b| {
+            Point::new(r * (TAU * a).cos(), r * (TAU * a).sin(), 400.0 * f64::from(row) + 20.0 * b)
+        });
+    }
+    let mut random = Random(88_172_645_463_325_252);
+    for _ in 0..share(0.1) / 6 {
+        let mut end = |low: f64, high: f64| {
+            let p = TAU * random.unit();
+            Point::new(9e4 * p.cos(), 9e4 * p.sin(), random.within(low, high))
+        };
+        let (from, to) = (end(2e4, 3e4), end(5e3, 3e4));
+        let (u, v) = (to - from).normalize().any_orthonormal_pair();
+        add_grid(&mut mesh, 6, 1, 3, |a, b| {
+            from + (to - from) * b + (u * (TAU * a).cos() + v * (TAU * a).sin()) * 8.0
+        });
+    }
+    // A knotted tube as handle and spout, and the body.
+    let k = share(0.4) as f64;
+    add_grid(&mut mesh, (k * 0.1).sqrt() as usize, (k * 10.0).sqrt() as usize, 4, |a, b| {
+        let (p, t) = (TAU * a, TAU * b);
+        let out = Vector::new((2.0 * t).cos(), (2.0 * t).sin(), 0.0);
+        let middle = out * (100.0 + 40.0 * (3.0 * t).cos()) + Vector::Z * (150.0 + 60.0 * (3.0 * t).sin());
+        middle + (out * p.cos() + Vector::Z * p.sin()) * (14.0 + 0.5 * (40.0 * t).sin())
+    });
+    let k = (share(0.3) as f64).sqrt() as usize;
+    add_grid(&mut mesh, k, k, 5, |a, b| {
+        let (p, t) = (TAU * a, 0.5 * TAU * b);
+        Point::new(60.0 * t.sin() * p.cos(), 60.0 * t.sin() * p.sin(), 140.0 + 60.0 * t.cos())
+    });
+    let ring = |count: u32, r: f64, z: f64| {
+        (0..count).map(move |i| {
+            let p = TAU * f64::from(i) / f64::from(count);
+            Point::new(r * p.cos(), r * p.sin(), z)
+        })
+    };
+    (mesh, ring(8, 200.0, 260.0).chain(ring(4, 5e4, 18_000.0)).collect())
 }

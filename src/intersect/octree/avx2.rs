@@ -79,13 +79,20 @@ unsafe fn layer<const LESS: i32>(keys: __m256i, partner: __m256i) -> __m256i {
 /// A key is a distance that is not negative with the child in its lowest three bits; children that are not met have
 /// the key −1 and come last.
 #[inline(always)]
-pub(super) unsafe fn sort(
+pub(super) unsafe fn sort<const ALONE: bool>(
     met: u32,
     keys: __m256i,
     node: &Node,
     enters: &mut [f32; 8],
     links: &mut [u32; 8],
 ) -> usize {
+    if ALONE && met & met.wrapping_sub(1) == 0 {
+        if met != 0 {
+            // It is taken at once, so that its distance is of no interest.
+            links[0] = node.children[(met.trailing_zeros() & 7) as usize];
+        }
+        return usize::from(met != 0);
+    }
     unsafe {
         let k = layer::<0xCC>(keys, _mm256_shuffle_epi32::<0x4E>(keys));
         let k = layer::<0xF0>(k, _mm256_permute4x64_epi64::<0x4E>(k));
@@ -102,7 +109,7 @@ pub(super) unsafe fn sort(
 
 impl Lanes for Avx2 {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.
         unsafe {
             let inverse = _mm_load_ps(ray.inverse.as_ptr());
@@ -136,7 +143,7 @@ impl Lanes for Avx2 {
             );
             let none = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
             let keys = _mm256_castps_si256(_mm256_blendv_ps(none, _mm256_castsi256_ps(keys), met));
-            sort(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
+            sort::<ALONE>(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
         }
     }
 

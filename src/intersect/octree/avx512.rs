@@ -90,7 +90,7 @@ unsafe fn coarse(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512
 
 impl Lanes for Avx512 {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         // SAFETY: see the head of the file.
         unsafe {
             // Leaving is computed negated, so that the greatest is wanted of both.
@@ -119,7 +119,7 @@ impl Lanes for Avx512 {
             let distance = _mm256_set1_epi32(0x7FFF_FFF8);
             let keys = _mm256_ternarylogic_epi32::<0xF8>(lanes, _mm256_castps_si256(enter), distance);
             let keys = _mm256_mask_blend_epi32(met, _mm256_set1_epi32(-1), keys);
-            avx2::sort(u32::from(met), keys, node, enters, links)
+            avx2::sort::<ALONE>(u32::from(met), keys, node, enters, links)
         }
     }
 

@@ -20,8 +20,9 @@ pub(super) const WIDTH: usize = 32;
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
     /// Where the ray enters the children that it may meet before `t_max`, and their links, the farthest first; gives
-    /// their number. What lies beyond it is of no meaning.
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
+    /// their number. What lies beyond it is of no meaning. `ALONE` is for a ray that nothing else is done beside: it
+    /// rather guesses that one child is met than wait for a network to sort it.
+    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
     /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
     fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32;
     /// Which distances do not lie beyond `t_max`, one bit each.
@@ -101,7 +102,7 @@ fn alone<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) {
             Target::Node(index) => {
                 cost.nodes += 1;
                 let t_max = s.boxes.t_max;
-                let count = s.enter::<L>(&tree.nodes[index]);
+                let count = s.enter::<L, true>(&tree.nodes[index]);
                 s.at = if count > 0 { s.nearest(count) } else { s.pop(t_max) };
             }
             Target::Block(index, count) => {
@@ -140,7 +141,7 @@ fn together<L: Lanes>(
         cost.nodes += n as u64;
         for &ray in &list[..n] {
             let s = &mut states[usize::from(ray) % WIDTH];
-            let count = s.enter::<L>(&tree.nodes[s.at.as_node()]);
+            let count = s.enter::<L, false>(&tree.nodes[s.at.as_node()]);
             s.at = s.next::<L>(count);
             fetch(tree, s.at);
             agenda.put(s.at.kind(), ray);

@@ -213,12 +213,12 @@ impl State {
 
     /// Writes the children of a node that the ray may meet above the top of the stack; gives their number.
     #[inline(always)]
-    pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> usize {
+    pub(super) fn enter<L: Lanes, const ALONE: bool>(&mut self, node: &Node) -> usize {
         let base = self.top.min(STACK - 8);
         let enters = self.enters[base..base + 8].first_chunk_mut();
         let links = self.links[base..base + 8].first_chunk_mut();
         match (enters, links) {
-            (Some(enters), Some(links)) => L::enter(node, &self.boxes, enters, links),
+            (Some(enters), Some(links)) => L::enter::<ALONE>(node, &self.boxes, enters, links),
             _ => unreachable!("eight places"),
         }
     }

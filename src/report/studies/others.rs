@@ -181,7 +181,12 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
             .map(|r| {
                 let mut row = (*r).clone();
                 if row.is_object() {
-                    row["size"] = Value::from(format!("{} facets, {}", facets(r), text(r, "call")));
+                    let threads = r["threads"].as_u64().unwrap_or(1);
+                    let call = if threads > 1 { format!("{threads} threads") } else { text(r, "call").to_owned() };
+                    row["size"] = Value::from(format!("{} facets, {call}", facets(r)));
+                    if text(r, "build") == "very slow" {
+                        row["intersector"] = Value::from(format!("{}, slow build", text(r, "intersector")));
+                    }
                 }
                 row
             })

@@ -1,0 +1,159 @@
+//! What an octree looks like, for people: its statistics as text and in the report, its boxes as files to turn around.
+
+use super::Failure;
+use crate::formats::{Facets, Group, write_atomic, write_facets};
+use crate::intersect::octree::{Octree, Statistics};
+use crate::intersect::{Cost, Intersector};
+use crate::math::{Aabb, FaceId, Point, Uv, Vector};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::report::{AxisStyle, Chart, Content, Section, Table, figures, grouped};
+use std::path::Path;
+
+/// Most boxes written to files; deeper levels are left out beyond it.
+const MOST_BOXES: usize = 50_000;
+
+/// An octree after its race.
+pub(super) struct Shape {
+    facets: usize,
+    bytes: usize,
+    statistics: Statistics,
+    boxes: Vec<(usize, Aabb)>,
+    /// Kind of rays, and what the octree did for them.
+    pub(super) costs: Vec<(String, Cost)>,
+}
+
+impl Shape {
+    pub(super) fn of(octree: &Octree) -> Self {
+        let footprint = octree.footprint();
+        Self {
+            facets: footprint.primitives,
+            bytes: footprint.bytes,
+            statistics: octree.statistics().clone(),
+            boxes: octree.boxes(),
+            costs: Vec::new(),
+        }
+    }
+
+    fn duplicates(&self) -> f64 {
+        self.statistics.references as f64 / self.facets.max(1) as f64
+    }
+
+    /// Everything in words and bars.
+    fn described(&self) -> String {
+        let mut text = format!(
+            "{} facets, each listed {} times, {} bytes a facet\n",
+            grouped(self.facets as u64),
+            figures(self.duplicates(), 3),
+            figures(self.bytes as f64 / self.facets.max(1) as f64, 3)
+        );
+        text += &self.statistics.to_string();
+        for (kind, cost) in &self.costs {
+            let per_ray = |n: u64| figures(n as f64 / cost.rays.max(1) as f64, 3);
+            text +=
+                &format!("{kind} rays: {} nodes and {} tests a ray\n", per_ray(cost.nodes), per_ray(cost.tests));
+        }
+        text
+    }
+}
+
+/// Writes `octree.txt` for all trees, `octree.vtu` and `octree.glb` for the first.
+pub(super) fn write(folder: &Path, shapes: &[Shape]) -> Result<(), Failure> {
+    let text: Vec<String> = shapes.iter().map(Shape::described).collect();
+    write_atomic(&folder.join("octree.txt"), |w| w.write_all(text.join("\n").as_bytes()))?;
+    let Some(first) = shapes.first() else { return Ok(()) };
+    let mut boxes = first.boxes.clone();
+    boxes.sort_by_key(|(depth, _)| *depth);
+    boxes.truncate(MOST_BOXES);
+    let mesh = walls(&boxes);
+    let depths = boxes.last().map_or(0, |(depth, _)| *depth);
+    let groups = (0..=depths)
+        .map(|depth| Group { opacity: 0.15, ..Group::solid(&format!("depth {depth}"), shade(depth, depths)) })
+        .collect();
+    let facets = Facets { groups, group_of_face: (0..=depths as u32).collect(), ..Facets::plain(&mesh, "octree") };
+    write_facets(&folder.join("octree.vtu"), &facets)?;
+    write_facets(&folder.join("octree.glb"), &facets)?;
+    Ok(())
+}
+
+/// From blue at the root to orange at the leaves.
+fn shade(depth: usize, deepest: usize) -> [f64; 3] {
+    let s = depth as f64 / deepest.max(1) as f64;
+    [0.20 + 0.70 * s, 0.45 + 0.10 * s, 0.85 - 0.65 * s]
+}
+
+/// Six quads a box, outward; the face of a quad is the depth of its box.
+fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
+    let mut mesh = FacetMesh::default();
+    for (depth, b) in boxes {
+        let first = mesh.positions.len() as u32;
+        let ends = [b.min, b.max];
+        for k in 0..8 {
+            mesh.positions.push(Point::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z));
+        }
+        for axis in 0..3 {
+            let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            for side in [0, 1] {
+                let base = side << axis;
+                let ring = if side == 1 { [0, u, u | v, v] } else { [0, v, u | v, u] };
+                let mut normal = Vector::ZERO;
+                normal[axis] = if side == 1 { 1.0 } else { -1.0 };
+                let corner = mesh.vertices.len() as u32;
+                let vertex = |k: u32| MeshVertex { position: first + (base | k), normal, uv: Uv::ZERO };
+                mesh.vertices.extend(ring.map(vertex));
+                let vertices = [0, 1, 2, 3].map(|k| corner + k);
+                mesh.facets.push(Facet { vertices, face: FaceId(*depth as u32) });
+            }
+        }
+    }
+    mesh
+}
+
+/// The section of the report.
+pub(super) fn section(shapes: &[Shape]) -> Section {
+    let deepest = shapes.iter().map(|s| s.statistics.depths.len()).max().unwrap_or(0);
+    let layer = |s: &Shape| {
+        let share = |depth: usize| {
+            let blocks = s.statistics.depths.get(depth).copied().unwrap_or(0);
+            100.0 * blocks as f64 / s.statistics.blocks.max(1) as f64
+        };
+        (format!("{} facets", grouped(s.facets as u64)), (0..deepest).map(share).collect())
+    };
+    let content = Content::Bars {
+        categories: (0..deepest).map(|d| d.to_string()).collect(),
+        layers: shapes.iter().map(layer).collect(),
+        stacked: false,
+    };
+    let axes = [AxisStyle::linear("depth in nodes", ""), AxisStyle::linear("blocks", "%")];
+    let caption = "At which depth the blocks of up to four facets lie.";
+    let chart =
+        Chart { content, ..Chart::series("octree-depths", "Depth of the octree", caption, axes, Vec::new()) };
+    let columns = [
+        ("facets", ""),
+        ("nodes", ""),
+        ("blocks", ""),
+        ("listed a facet", "×"),
+        ("facets a block", ""),
+        ("bytes a facet", "B"),
+        ("rays", ""),
+        ("nodes a ray", ""),
+        ("tests a ray", ""),
+    ];
+    let mut table = Table::new("octree", "Shape of the octree", &columns);
+    for s in shapes {
+        for (kind, cost) in &s.costs {
+            let rays = cost.rays.max(1) as f64;
+            table.row([
+                (s.facets as u64).into(),
+                (s.statistics.nodes as u64).into(),
+                (s.statistics.blocks as u64).into(),
+                s.duplicates().into(),
+                (s.statistics.references as f64 / s.statistics.blocks.max(1) as f64).into(),
+                (s.bytes as f64 / s.facets.max(1) as f64).into(),
+                kind.as_str().into(),
+                (cost.nodes as f64 / rays).into(),
+                (cost.tests as f64 / rays).into(),
+            ]);
+        }
+    }
+    Section::new("The octree").with(chart).with(table)
+}
