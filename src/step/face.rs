@@ -10,6 +10,9 @@ use crate::model::{Analytic, EdgeUse, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve, Surface};
 use rustc_hash::FxHashMap;
 
+/// Most periods that a face may span.
+const MAX_TURNS: f64 = 4.0;
+
 /// What a face needs to know of an edge.
 pub(super) struct EdgeShape<'e> {
     pub(super) curve: &'e Curve,
@@ -284,6 +287,10 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
         let natural = chart.range[d];
         match chart.period[d] {
             Some(period) => {
+                // Not even a loop on a seam comes near; slopes beside a pole that no longer mean anything do.
+                if !(b - a <= MAX_TURNS * period) {
+                    return None;
+                }
                 let base = if natural[0].is_finite() { natural[0] } else { 0.0 };
                 shift[d] = -((a - base) / period + 1e-6).floor() * period;
                 a += shift[d];

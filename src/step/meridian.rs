@@ -11,7 +11,9 @@ const SAMPLES: i32 = 256;
 
 /// A meridian that crosses the axis is cut there: the part on which the points of the face lie stays.
 pub(super) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curve {
-    let parts = parts(frame, &curve);
+    let mut parts = parts(frame, &curve);
+    // A tube bent more tightly than its own radius passes through the axis.
+    parts.push(curve.clone());
     let center = [reach.center];
     let points = if reach.points.is_empty() { &center[..] } else { reach.points };
     let off = |part: &Curve| -> f64 {
@@ -21,11 +23,16 @@ pub(super) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curv
         };
         points.iter().map(|p| profile_distance(frame, part, target(p))).sum()
     };
-    let best = parts.into_iter().map(|part| (off(&part), part)).min_by(|x, y| x.0.total_cmp(&y.0));
-    best.map_or(curve, |b| b.1)
+    let off: Vec<f64> = parts.iter().map(off).collect();
+    let least = off.iter().copied().fold(f64::INFINITY, f64::min);
+    // A circle about a point of the axis fits on both sides: its own start decides, which comes first.
+    let even = 1e-6 * points.len() as f64 * (1e-3 * curve.bounds().diagonal()).clamp(1e-3, 1.0);
+    let first = off.iter().position(|&o| o <= least + even);
+    first.and_then(|i| parts.get(i).cloned()).unwrap_or(curve)
 }
 
-/// The parts between crossings of the axis; none when there is no crossing. A closed curve has no ends of its own.
+/// The parts between crossings of the axis, that of the curve's start first; none when there is no crossing. A closed
+/// curve has no ends of its own.
 fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     let [a, b] = curve.domain();
     let at = |t: f64| frame.local_point(curve.evaluate(t));
@@ -51,20 +58,21 @@ fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     }
     let (Some(&first), Some(&last)) = (cuts.first(), cuts.last()) else { return Vec::new() };
     let near = 1e-9 * (b - a);
-    let inner = cuts.windows(2).filter(|w| w[1] - w[0] > near).map(|w| curve.restricted(w[0], w[1]));
-    let mut parts: Vec<Curve> = inner.collect();
-    let mut ends: Vec<Curve> = Vec::new();
-    if b - last > near {
-        ends.push(curve.restricted(last, b));
-    }
+    let mut parts: Vec<Curve> = Vec::new();
     if first - a > near {
-        ends.push(curve.restricted(a, first));
+        parts.push(curve.restricted(a, first));
     }
-    let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
-    match &ends[..] {
-        [tail, head] if closed => parts.push(joined(tail, head)),
-        _ => parts.extend(ends),
+    if b - last > near {
+        let tail = curve.restricted(last, b);
+        let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
+        match parts.pop() {
+            Some(head) if closed => parts.push(joined(&tail, &head)),
+            Some(head) => parts.extend([head, tail]),
+            None => parts.push(tail),
+        }
     }
+    let inner = cuts.windows(2).filter(|w| w[1] - w[0] > near).map(|w| curve.restricted(w[0], w[1]));
+    parts.extend(inner);
     parts
 }
 

@@ -174,14 +174,14 @@ fn build_face(
             loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
         }
     }
-    let points: Vec<Point> = shapes
-        .values()
-        .flat_map(|s| {
-            let [a, b] = s.curve.domain();
-            [0.0, 0.4, 0.8].map(|f| s.curve.evaluate(a + f * (b - a)))
-        })
-        .take(60)
-        .collect();
+    // Only what may touch its own axis asks where the edges run.
+    let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
+    let asks = !geometry.entity(plan.surface)?.keywords().any(|k| simple.iter().any(|s| k.starts_with(s)));
+    let along = |s: &EdgeShape<'_>| {
+        let [a, b] = s.curve.domain();
+        [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| s.curve.evaluate(a + f * (b - a)))
+    };
+    let points: Vec<Point> = shapes.values().take(if asks { 64 } else { 0 }).flat_map(along).collect();
     let reach = Reach::around(bounds, &points);
     let chart = geometry.chart(plan.surface, reach, 0).map_err(|r| Refusal {
         id,

@@ -1,12 +1,12 @@
 //! Surfaces of the file as charts.
 
 use super::chart::{Chart, Kind, SplineChart};
-use super::curves::{Shape, explicit_knots, knot_form};
+use super::curves::{Directed, Shape, explicit_knots, knot_form};
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::{Args, Entity};
 use crate::math::{Aabb, Frame, Point, Vector};
 use crate::model::Analytic;
-use crate::nurbs::{Curve, sanitise};
+use crate::nurbs::{Curve, conic, sanitise};
 use std::f64::consts::PI;
 
 /// Where a face is, for surfaces whose curves have no ends or cross their axis.
@@ -107,8 +107,17 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 if !(major.abs() > 0.0 && major > -minor) {
                     return Err(Refusal::of(e, "major radius leaves no surface"));
                 }
-                let inner =
-                    name.starts_with("DEG") && a.flag(skip + 2) == Some(false) && major > 0.0 && major < minor;
+                let degenerate = name.starts_with("DEG").then(|| a.flag(skip + 2) == Some(false));
+                // A plain torus may touch itself too; then the edges say on which part the face lies.
+                let inner = if major > 0.0 && major < minor {
+                    let part = torus_part(&frame, major, minor, reach.points);
+                    match degenerate.map(|lemon| if lemon { Part::Lemon } else { Part::Apple }).unwrap_or(part) {
+                        Part::Both => return Ok(Chart::revolution(frame, meridian_of(&frame, major, minor))),
+                        part => part == Part::Lemon,
+                    }
+                } else {
+                    false
+                };
                 let signed = if inner { -major } else { major };
                 let mut chart = Chart::new(
                     Kind::Torus { frame, major: signed, minor },
@@ -197,6 +206,14 @@ impl<'f, 'a> Geometry<'f, 'a> {
         // The profile passes the same heights and radii as the face, at another azimuth.
         let local = frame.local_point(reach.center);
         let around = reach.grown(2.0 * local.x.hypot(local.y));
+        // Without edges the parameters of the surface matter, which a closed form would change.
+        if let (Ok(Directed { shape: Shape::Ellipse { frame: circle, a, b }, reversed: false }), false) =
+            (self.curve(profile.id, depth + 1), reach.points.is_empty())
+            && a == b
+            && let Some(chart) = revolved_circle(&frame, &circle, a)
+        {
+            return Ok(chart);
+        }
         let (curve, line) = self.swept_curve(profile.id, around, depth)?;
         if let Some((origin, direction)) = line
             && let Some(chart) = revolved_line(&frame, origin, direction)
@@ -268,6 +285,71 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let analytic = if rational { Analytic::Rational } else { Analytic::Bspline };
         Ok(Chart::new(Kind::Spline(SplineChart::new(surface)), analytic))
     }
+}
+
+/// The parts of a torus that touches itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Apple,
+    Lemon,
+    /// Bent tubes pass through the axis.
+    Both,
+}
+
+/// On which part of a self-touching torus points lie.
+fn torus_part(frame: &Frame, major: f64, minor: f64, points: &[Point]) -> Part {
+    let off = |center: f64, p: &Point| {
+        let q = frame.local_point(*p);
+        ((q.x.hypot(q.y) - center).hypot(q.z) - minor).abs()
+    };
+    let near = 1e-3 * minor;
+    let only = |a: f64, b: f64| points.iter().any(|p| off(a, p) < near && off(b, p) > near);
+    match (only(major, -major), only(-major, major)) {
+        (true, true) => Part::Both,
+        (false, true) => Part::Lemon,
+        _ => Part::Apple,
+    }
+}
+
+/// The circle that a torus turns about its axis.
+fn meridian_of(frame: &Frame, major: f64, minor: f64) -> Curve {
+    let circle = Frame::from_axis(frame.point(Point::new(major, 0.0, 0.0)), -frame.y, Some(frame.x));
+    conic::arc(&circle, minor, [0.0, 2.0 * PI])
+}
+
+/// A circle turned about an axis in its plane: a sphere, or a torus that does not touch itself.
+fn revolved_circle(frame: &Frame, circle: &Frame, radius: f64) -> Option<Chart> {
+    let (o, n) = (frame.local_point(circle.origin), frame.local_direction(circle.z.try_normalize()?));
+    let major = o.x.hypot(o.y);
+    let near = 1e-9 * (1.0 + radius);
+    // The plane of the circle holds the axis: its normal is across the axis and across the way to the center.
+    if n.z.abs() > 1e-9 || (o.x * n.x + o.y * n.y).abs() > near {
+        return None;
+    }
+    let at = Frame { origin: frame.point(Point::new(0.0, 0.0, o.z)), ..*frame };
+    let mut chart = if major <= near {
+        let (kind, analytic) =
+            (Kind::Torus { frame: at, major: 0.0, minor: radius }, Analytic::Sphere { frame: at, radius });
+        Chart::new(kind, analytic)
+    } else if major > radius {
+        Chart::new(
+            Kind::Torus { frame: at, major, minor: radius },
+            Analytic::Torus { frame: at, major, minor: radius },
+        )
+    } else {
+        return None;
+    };
+    // Around the circle from outside towards the axis direction is the sense of the torus. A circle about a point of
+    // the axis runs in both senses on its two sides; its parameter 0 says which side is meant.
+    let across = |d: Vector| Vector::new(d.x, d.y, 0.0).try_normalize();
+    let outward = if major > near {
+        across(o)?
+    } else {
+        let x = frame.local_direction(circle.x.try_normalize()?);
+        if x.x.hypot(x.y) > 1e-6 { across(x)? } else { across(n.cross(x))? }
+    };
+    chart.flipped = n.cross(outward).z < 0.0;
+    Some(chart)
 }
 
 /// A line turned about an axis in its plane: a plane, cylinder or cone, with the orientation of the revolution.

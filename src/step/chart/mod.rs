@@ -46,11 +46,11 @@ pub(super) enum Kind {
         major: f64,
         minor: f64,
     },
-    /// `meridian(v)` turned about z by u; the azimuth of the meridian when it lies in a half plane through the axis.
+    /// `meridian(v)` turned about z by u; the plane of the meridian when it lies in one through the axis.
     Revolution {
         frame: Frame,
         meridian: Curve,
-        azimuth: Option<f64>,
+        plane: Option<swept::Plane>,
     },
     /// `base(u) + v·direction`.
     Extrusion {
@@ -80,8 +80,8 @@ pub(super) struct Chart {
 impl Chart {
     /// The surface of revolution of a meridian.
     pub(super) fn revolution(frame: Frame, meridian: Curve) -> Self {
-        let azimuth = swept::azimuth(&frame, &meridian);
-        Self::new(Kind::Revolution { frame, meridian, azimuth }, Analytic::Revolution)
+        let plane = swept::plane(&frame, &meridian);
+        Self::new(Kind::Revolution { frame, meridian, plane }, Analytic::Revolution)
     }
 
     pub(super) fn new(kind: Kind, analytic: Analytic) -> Self {
@@ -176,9 +176,9 @@ impl Chart {
             Kind::Plane { frame } => analytic::locate_plane(frame, p),
             Kind::Cone { frame, radius, half_angle } => analytic::locate_cone(frame, *radius, *half_angle, p),
             Kind::Torus { frame, major, .. } => analytic::locate_torus(frame, *major, self.range[1], p),
-            Kind::Revolution { frame, meridian, azimuth } => {
+            Kind::Revolution { frame, meridian, plane } => {
                 let hint = hint.map(|h| self.wrap(h));
-                swept::locate_revolution((frame, meridian, *azimuth), p, hint, self.size)
+                swept::locate_revolution((frame, meridian, *plane), p, hint, self.size)
             }
             Kind::Extrusion { base, direction } => swept::locate_extrusion(base, *direction, p, hint, self),
             Kind::Spline(s) => s.locate(p, hint),

@@ -3,12 +3,20 @@
 use super::Chart;
 use crate::math::{Frame, Point, Uv, Vector};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, project};
+use std::f64::consts::{PI, TAU};
 
-/// u from the azimuth, v from the projection to the meridian in the half plane of radius and height.
-///
-/// `azimuth` is that of a meridian in a half plane through the axis.
+/// The plane of a meridian that lies in one with the axis.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::step) struct Plane {
+    /// Its azimuth.
+    azimuth: f64,
+    /// Whether the meridian is on both sides of the axis.
+    crosses: bool,
+}
+
+/// u from the azimuth, v from the projection to the meridian in its plane, or in the half plane of radius and height.
 pub(super) fn locate_revolution(
-    (frame, meridian, azimuth): (&Frame, &Curve, Option<f64>),
+    (frame, meridian, plane): (&Frame, &Curve, Option<Plane>),
     p: Point,
     hint: Option<Uv>,
     size: f64,
@@ -16,22 +24,30 @@ pub(super) fn locate_revolution(
     let q = frame.local_point(p);
     let target = Vector::new(q.x.hypot(q.y), 0.0, q.z);
     let expected = 1e-6 * size + 1e-6;
-    match azimuth {
-        Some(azimuth) => {
-            let (s, c) = azimuth.sin_cos();
-            let turned = frame.point(Point::new(target.x * c, target.x * s, target.z));
-            let v = match hint {
-                Some(h) => project::nearest_from(meridian, turned, h.y, expected).0,
-                None => project::nearest(meridian, turned).0,
-            };
-            Uv::new(q.y.atan2(q.x) - azimuth, v)
+    let Some(Plane { azimuth, crosses }) = plane else {
+        let v = nearest_profile(frame, meridian, target);
+        let m = frame.local_point(meridian.evaluate(v));
+        return Uv::new(q.y.atan2(q.x) - m.y.atan2(m.x), v);
+    };
+    let (s, c) = azimuth.sin_cos();
+    let foot = |radius: f64| {
+        let turned = frame.point(Point::new(radius * c, radius * s, target.z));
+        match hint {
+            Some(h) => project::nearest_from(meridian, turned, h.y, expected),
+            None => project::nearest(meridian, turned),
         }
-        None => {
-            let v = nearest_profile(frame, meridian, target);
-            let m = frame.local_point(meridian.evaluate(v));
-            Uv::new(q.y.atan2(q.x) - m.y.atan2(m.x), v)
-        }
+    };
+    let ahead = foot(target.x);
+    let u = q.y.atan2(q.x) - azimuth;
+    if !crosses {
+        return Uv::new(u, ahead.0);
     }
+    // On the other side of the axis half a turn on; where both fit, near the axis, what is expected decides.
+    let behind = foot(-target.x);
+    let turn = |u: f64| hint.map_or(0.0, |h| ((u - h.x) / TAU - ((u - h.x) / TAU).round()).abs());
+    let both = ahead.1.max(behind.1) <= expected.max(1e-3 * target.x);
+    let back = if both { turn(u + PI) < turn(u) } else { behind.1 < ahead.1 };
+    if back { Uv::new(u + PI, behind.0) } else { Uv::new(u, ahead.0) }
 }
 
 /// The parameter of the profile `(radius, height)` nearest to a target, for a meridian that leaves every plane through
@@ -59,15 +75,15 @@ pub(in crate::step) fn profile_distance(frame: &Frame, meridian: &Curve, target:
     (Vector::new(m.x.hypot(m.y), 0.0, m.z) - target).length()
 }
 
-/// The azimuth of a meridian that lies in a half plane through the axis.
-pub(super) fn azimuth(frame: &Frame, meridian: &Curve) -> Option<f64> {
+/// The plane of a meridian, if it has one with the axis.
+pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
     let far = local.iter().copied().max_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))?;
     let r = far.x.hypot(far.y);
     let near = 1e-9 * r * r;
-    let flat =
-        local.iter().all(|p| (far.x * p.y - far.y * p.x).abs() <= near && far.x * p.x + far.y * p.y >= -near);
-    (flat && r > 0.0).then(|| far.y.atan2(far.x))
+    let flat = local.iter().all(|p| (far.x * p.y - far.y * p.x).abs() <= near);
+    let crosses = local.iter().any(|p| far.x * p.x + far.y * p.y < -near);
+    (flat && r > 0.0).then(|| Plane { azimuth: far.y.atan2(far.x), crosses })
 }
 
 pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives {
