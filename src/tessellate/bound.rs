@@ -17,7 +17,7 @@
 use super::net::Nets;
 use super::settings::Judge;
 use super::sheet::{Sheet, local};
-use crate::math::{Point, Uv};
+use crate::math::{Point, Uv, Vector};
 use smallvec::SmallVec;
 
 /// How often a piece is cut into four before the bound is taken as it is.
@@ -45,27 +45,34 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// Stops refining as soon as the answer is at most `limit`, or clearly is not.
     pub(super) fn piece(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
         if self.sheet.affine {
-            let off = [0, 1, 2].map(|i| distance(self.sheet.point(uv[i]), &xyz));
+            let off = [0, 1, 2].map(|i| Flat::new(&xyz).distance(self.sheet.point(uv[i])));
             return off[0].max(off[1]).max(off[2]) + self.margin;
         }
+        let flat = Flat::new(&xyz);
         let third = 1.0 / 3.0;
         let probes = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [third; 3]];
         let mut sampled = 0f64;
         for [a, b, c] in probes {
-            sampled = sampled.max(distance(self.sheet.point(uv[0] * a + uv[1] * b + uv[2] * c), &xyz));
+            sampled = sampled.max(flat.distance(self.sheet.point(uv[0] * a + uv[1] * b + uv[2] * c)));
             if sampled > limit {
                 return sampled;
             }
         }
         if self.judge == Judge::Sampled {
-            return self.sampled(uv, &xyz).max(sampled);
+            return self.sampled(uv, &flat).max(sampled);
         }
         self.pieces(&uv, |this, a, b, polygon| {
             let patch = this.sheet.patch(a, b);
             let mut worst = 0f64;
+            if whole(polygon, patch.domain) {
+                let hull = patch.points.iter().map(|p| flat.distance(p.project())).fold(0.0, f64::max);
+                if hull <= limit {
+                    return hull;
+                }
+            }
             for k in 1..polygon.len() - 1 {
                 let tri = [polygon[0], polygon[k], polygon[k + 1]].map(|x| local(patch, x));
-                let bound = refine(&mut this.nets, patch, tri, limit, LEVELS, &|p| distance(p, &xyz));
+                let bound = refine(&mut this.nets, patch, tri, limit, LEVELS, &|p| flat.distance(p));
                 worst = worst.max(bound);
                 if worst > limit {
                     break;
@@ -125,14 +132,14 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// The largest sampled distance of a triangle's surface to it: what no bound can be below.
-    fn sampled(&self, uv: [Uv; 3], xyz: &[Point; 3]) -> f64 {
+    fn sampled(&self, uv: [Uv; 3], flat: &Flat) -> f64 {
         let n = 9;
         let mut worst = 0f64;
         for i in 0..=n {
             for j in 0..=n - i {
                 let (a, b) = (i as f64 / n as f64, j as f64 / n as f64);
                 let at = uv[0] * a + uv[1] * b + uv[2] * (1.0 - a - b);
-                worst = worst.max(distance(self.sheet.point(at), xyz));
+                worst = worst.max(flat.distance(self.sheet.point(at)));
             }
         }
         worst
@@ -203,6 +210,11 @@ fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
     now
 }
 
+/// Whether a clipped triangle is the whole rectangle.
+fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
+    polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
+}
+
 /// Distance of a point to the line through two points (to the point, when they coincide).
 pub(super) fn from_line(p: Point, [a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (*b - *a, p - *a);
@@ -218,14 +230,34 @@ fn from_segment(p: Point, a: Point, b: Point) -> f64 {
     (x - d * t).length()
 }
 
-/// Distance of a point to a triangle, which may be degenerate.
-pub(super) fn distance(p: Point, [a, b, c]: &[Point; 3]) -> f64 {
-    let n = (*b - *a).cross(*c - *a);
-    let inside = |x: Point, y: Point| (y - x).cross(p - x).dot(n) >= 0.0;
-    if n.length_squared() > 0.0 && inside(*a, *b) && inside(*b, *c) && inside(*c, *a) {
-        return ((p - *a).dot(n) / n.length()).abs();
+/// A triangle, which may be degenerate, ready to measure distances.
+pub(super) struct Flat {
+    corners: [Point; 3],
+    /// Unit normal, and across each side into the triangle; `None` without area.
+    frame: Option<(Vector, [Vector; 3])>,
+}
+
+impl Flat {
+    pub(super) fn new(corners: &[Point; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let n = (b - a).cross(c - a);
+        let frame =
+            (n.length_squared() > 0.0).then(|| (n / n.length(), [n.cross(b - a), n.cross(c - b), n.cross(a - c)]));
+        Self { corners: *corners, frame }
     }
-    from_segment(p, *a, *b).min(from_segment(p, *b, *c)).min(from_segment(p, *c, *a))
+
+    /// Distance of a point.
+    pub(super) fn distance(&self, p: Point) -> f64 {
+        let [a, b, c] = self.corners;
+        if let Some((n, [x, y, z])) = self.frame
+            && x.dot(p - a) >= 0.0
+            && y.dot(p - b) >= 0.0
+            && z.dot(p - c) >= 0.0
+        {
+            return (p - a).dot(n).abs();
+        }
+        from_segment(p, a, b).min(from_segment(p, b, c)).min(from_segment(p, c, a))
+    }
 }
 
 #[cfg(test)]

@@ -106,7 +106,9 @@ pub(super) fn build(
                 None => resolve(sheet, prover, &polygon, ground).map(|t| grid.triangles.extend(t)),
             }
         } else if at_border {
-            beside(sheet, prover, *corners, ground).map(|q| grid.quads.push(q))
+            as_proved(sheet, prover, (cell, [*bound, *xi]), corners, ground)
+                .or_else(|| beside(sheet, prover, *corners, ground))
+                .map(|q| grid.quads.push(q))
         } else {
             let first = facet_of(sheet, *cell)[0].0;
             let r = (0..4).find(|&r| ground.nodes[corners[r] as usize].uv == first).unwrap_or(0);
@@ -150,6 +152,43 @@ fn beside(
         let (bound, xi) = (x.0.max(y.0), x.1.min(y.1));
         (bound <= xi).then_some((q, bound, xi))
     })
+}
+
+/// The facet of a cell whose corners are the border's points already: what is proved of the cell holds for it but for the curves
+/// that its border sides follow. `None` when the border's points lie elsewhere.
+fn as_proved(
+    sheet: &Sheet<'_>,
+    prover: &mut Prover<'_, '_>,
+    (cell, [bound, xi]): (&Cell, [f64; 2]),
+    corners: &[u32; 4],
+    ground: &Ground<'_>,
+) -> Option<([u32; 4], f64, f64)> {
+    let n = corners.map(|c| ground.nodes[c as usize]);
+    let look = facet_of(sheet, *cell);
+    let r = (0..4).find(|&r| cell.corners()[r] == look[0].0)?;
+    let mut moved = 0f64;
+    for k in 0..4 {
+        let (uv, place) = look[(k + 4 - r) % 4];
+        if (n[k].uv - uv).abs().cmpgt(1e-4 * ground.same).any() || (0..k).any(|j| n[j].position == n[k].position) {
+            return None;
+        }
+        moved = moved.max((n[k].place - place).length());
+    }
+    // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
+    if moved > 1e-6 * xi {
+        return None;
+    }
+    let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
+    let mut worst = bound + 4.0 * moved + 1e-10 * sheet.size;
+    for t in [[q[0], q[1], q[2]], [q[0], q[2], q[3]]] {
+        let xyz = t.map(|i| ground.nodes[i as usize].place);
+        for k in 0..3 {
+            if let Some(trim) = ground.trims.get(&key(t[k], t[(k + 1) % 3])) {
+                worst = worst.max(trim.bound(prover, xyz, xi));
+            }
+        }
+    }
+    (worst <= xi).then_some((q, worst, xi))
 }
 
 /// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
