@@ -135,3 +135,51 @@ fn stated_errors_are_honest() {
         assert!((182..=200).contains(&two), "{sampling}: {two} of 200 within two standard errors");
     }
 }
+
+/// Solid angle of a triangle seen from the origin (Van Oosterom and Strackee 1983).
+fn solid_angle([a, b, c]: [Vector; 3]) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let below = la * lb * lc + a.dot(b) * lc + a.dot(c) * lb + b.dot(c) * la;
+    2.0 * a.dot(b.cross(c)).abs().atan2(below)
+}
+
+/// The error of what a box absorbs on three faces together, whose ups and downs are not independent.
+#[test]
+fn errors_of_absorbed_flux_are_honest() {
+    let mut world = World::default();
+    world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
+    let from = Vector::new(3.0, 2.5, 2.0);
+    let truth = {
+        let side = |axis: usize| {
+            let corner = |u: f64, v: f64| {
+                let mut p = [0.0; 3];
+                (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (1.0, u, v);
+                Vector::from_array(p) - from
+            };
+            let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            solid_angle([a, b, c]) + solid_angle([a, c, d])
+        };
+        (0..3).map(side).sum::<f64>() / (4.0 * PI)
+    };
+    for sampling in ["random", "sobol"] {
+        let text =
+            format!("[run]\nrays = 4096\nsampling = '{sampling}'\n[[source]]\nkind = 'point'\nat = [3, 2.5, 2]\n");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let (mut one, mut two, mut sum) = (0, 0, 0.0);
+        for seed in 0..200 {
+            let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
+            let r = simulate(&bound, &world, &settings, &|_| true);
+            let absorbed = &r.absorbed[0];
+            assert_eq!(absorbed.power, r.power.absorbed);
+            let away = (absorbed.power - truth).abs() / absorbed.error;
+            sum += absorbed.power / 200.0;
+            one += i32::from(away < 1.0);
+            two += i32::from(away < 2.0);
+        }
+        assert!((sum / truth - 1.0).abs() < 5e-3, "{sampling}: {sum}, not {truth}");
+        // Binomial of 200: 136.5 ± 6.6 within one and 190.9 ± 2.9 within two standard errors; 3 sigma allowed.
+        assert!((117..=156).contains(&one), "{sampling}: {one} of 200 within one standard error");
+        assert!((182..=200).contains(&two), "{sampling}: {two} of 200 within two standard errors");
+    }
+}

@@ -170,7 +170,8 @@ pub(super) fn against(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[b
             let mut touch = false;
             for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
                 let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
-                for p in points.iter().filter(|p| around.contains(**p)) {
+                let near = around.grown(glue);
+                for p in points.iter().filter(|p| near.contains(**p)) {
                     asked += 1;
                     touch |= asked > MOST_ASKED || nearest.distance(other, *p) <= glue;
                     if touch {

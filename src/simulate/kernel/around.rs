@@ -3,7 +3,7 @@
 use super::{Context, settle};
 use crate::intersect::Cost;
 use crate::math::{Departure, Ray};
-use crate::simulate::bind::AMBIENT;
+use crate::simulate::bind::{AMBIENT, FaceOptics};
 use crate::simulate::emitter::{Stream, Ticket};
 use smallvec::SmallVec;
 
@@ -74,7 +74,7 @@ pub(crate) fn bodies(context: &Context<'_>, ray: &Ray) -> Bodies {
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         crossed.cross(face.body, along < 0.0);
-        if !face.touching {
+        if !(face.touching || face.against) {
             continue;
         }
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
@@ -83,7 +83,9 @@ pub(crate) fn bodies(context: &Context<'_>, ray: &Ray) -> Bodies {
         let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let entering = d.dot(second.geometric_normal) < 0.0;
         let other = context.bound.faces.get(second.face.index());
-        if let Some(other) = other.filter(|o| o.touching && o.body != face.body && entering == (along >= 0.0)) {
+        let meets =
+            |o: &&FaceOptics| o.body != face.body && (o.touching && face.touching || o.against && face.against);
+        if let Some(other) = other.filter(meets).filter(|_| entering == (along >= 0.0)) {
             crossed.cross(other.body, entering);
             at.t_min = reach;
         }
