@@ -145,8 +145,8 @@ impl Emitter {
 
     /// Which pairs of numbers it asks for.
     pub(crate) fn pairs(&self) -> [bool; 3] {
-        let place = !matches!(self.shape, Shape::Point | Shape::List(_));
-        [place, !matches!(self.lobe, Lobe::Collimated), self.wavelengths.is_some()]
+        let (list, point) = (matches!(self.shape, Shape::List(_)), matches!(self.shape, Shape::Point));
+        [!(list || point), !(list || matches!(self.lobe, Lobe::Collimated)), self.wavelengths.is_some()]
     }
 
     /// Points around the places it shines from, faces and lists of rays left out.
@@ -160,7 +160,7 @@ impl Emitter {
     }
 
     /// A ray of this source.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn emit(&self, stream: &Stream, ticket: Ticket) -> Emission {
         let f = &self.frame;
         let wavelength = self.wavelengths.as_ref().map(|w| w.sample(stream.pair(ticket, 2)[0]));

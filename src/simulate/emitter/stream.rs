@@ -1,5 +1,17 @@
+use super::Emitter;
 use crate::simulate::random::{self, Key, Purpose};
 use crate::simulate::scene::Sampling;
+
+/// Bits of a cell along each side of the square in which rays are put in order, and rays in a chunk: one for each cell.
+const CELL_BITS: u32 = 6;
+const CHUNK: usize = 1 << (2 * CELL_BITS);
+
+/// The lowest bits of a number with a gap after each.
+fn spread(x: u32) -> u32 {
+    let x = (x | x << 4) & 0x0f0f;
+    let x = (x | x << 2) & 0x3333;
+    (x | x << 1) & 0x5555
+}
 
 /// Where the numbers of one source in one replicate come from.
 #[derive(Clone, Debug)]
@@ -12,10 +24,11 @@ pub(crate) struct Stream {
     replicates: u32,
     /// Rays of this source in this replicate.
     rays: u32,
-    /// Which numbers of the net are at hand: those of the block that holds the last ticket, of pairs that the source asks for.
-    block: Option<u32>,
+    /// The rays of a chunk in the order in which they start, and the numbers of the net for each, of the pairs that the source asks
+    /// for.
+    order: Vec<u32>,
     pairs: [bool; 3],
-    numbers: Box<[[f64; random::BLOCK]; random::DIMENSIONS]>,
+    numbers: [Vec<u32>; random::DIMENSIONS],
 }
 
 /// A ray of a source: its number in the run, and in its source and replicate.
@@ -32,26 +45,71 @@ impl Stream {
         [replicate, replicates]: [u32; 2],
         source: u32,
         rays: u64,
-        pairs: [bool; 3],
     ) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
         let rays = rays.min(u64::from(u32::MAX)) as u32;
-        let numbers = Box::new([[0.0; random::BLOCK]; random::DIMENSIONS]);
-        Self { seed, sampling, scrambles, replicate, replicates, rays, block: None, pairs, numbers }
+        let (order, pairs, numbers) = (Vec::new(), [true; 3], Default::default());
+        Self { seed, sampling, scrambles, replicate, replicates, rays, order, pairs, numbers }
     }
 
-    /// Makes the numbers of a ticket, with those of the tickets around it.
-    #[inline]
-    pub(crate) fn prepare(&mut self, ticket: Ticket) {
-        let block = ticket.index / random::BLOCK as u32;
-        if self.sampling == Sampling::Sobol && self.block != Some(block) {
-            for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
-                let first = block * random::BLOCK as u32;
-                random::scrambled_block(first, d, self.scrambles[d], &mut self.numbers[d]);
+    /// The same stream with the numbers of a source alone.
+    pub(crate) fn of(self, emitter: &Emitter) -> Self {
+        Self { pairs: emitter.pairs(), ..self }
+    }
+
+    /// The ray to start after `started` others of this source and replicate, its numbers made ready.
+    ///
+    /// Rays of a net start in chunks, each along a Z-curve through their directions, or places if all have one direction: rays that
+    /// follow each other meet the same nodes and facets.
+    #[inline(always)]
+    pub(crate) fn prepare(&mut self, started: u32) -> u32 {
+        if self.sampling == Sampling::Random || self.pairs == [false; 3] {
+            return started;
+        }
+        let k = started as usize % CHUNK;
+        if k == 0 {
+            self.chunk(started);
+        }
+        started - k as u32 + self.order[k]
+    }
+
+    /// Makes ready the numbers of one ray, which is the one to start.
+    pub(crate) fn prepare_alone(&mut self, index: u32) -> u32 {
+        if self.sampling == Sampling::Sobol {
+            self.chunk(index - index % CHUNK as u32);
+        }
+        index
+    }
+
+    #[inline(never)]
+    fn chunk(&mut self, first: u32) {
+        for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
+            self.numbers[d].resize(CHUNK, 0);
+            for (block, numbers) in self.numbers[d].chunks_mut(random::BLOCK).enumerate() {
+                random::scrambled_block(first + (block * random::BLOCK) as u32, d, self.scrambles[d], numbers);
             }
-            self.block = Some(block);
+        }
+        let n = CHUNK.min((self.rays - first) as usize);
+        let along = if self.pairs[1] { 2 } else { 0 };
+        let cell = |k: usize| {
+            let [x, y] = [along, along + 1].map(|d| self.numbers[d].get(k).map_or(0, |n| n >> (32 - CELL_BITS)));
+            (spread(x) | spread(y) << 1) as usize
+        };
+        // Counting sort: most cells hold one ray of a chunk.
+        let mut ends = vec![0u32; CHUNK];
+        (0..n).for_each(|k| ends[cell(k)] += 1);
+        let mut sum = 0;
+        for end in &mut ends {
+            sum += *end;
+            *end = sum;
+        }
+        self.order.resize(CHUNK, 0);
+        for k in (0..n).rev() {
+            let end = &mut ends[cell(k)];
+            *end -= 1;
+            self.order[*end as usize] = k as u32;
         }
     }
 
@@ -61,8 +119,9 @@ impl Stream {
         match self.sampling {
             Sampling::Random => self.random(ticket, pair),
             Sampling::Sobol => {
-                let (d, k) = (2 * pair as usize, ticket.index as usize % random::BLOCK);
-                [self.numbers[d][k], self.numbers[d + 1][k]]
+                let k = ticket.index as usize % CHUNK;
+                let number = |d: usize| (f64::from(self.numbers[d][k]) + 0.5) * (1.0 / 4_294_967_296.0);
+                [number(2 * pair as usize), number(2 * pair as usize + 1)]
             }
         }
     }

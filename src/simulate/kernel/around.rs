@@ -43,10 +43,9 @@ pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
                 }
                 let which = [replicate, replicates];
                 let s = context.settings;
-                let mut stream = Stream::new(s.seed, s.sampling, which, source as u32, to - from, emitter.pairs());
+                let mut stream = Stream::new(s.seed, s.sampling, which, source as u32, to - from).of(emitter);
                 let index = (to - from) * k / ASKED;
-                let ticket = Ticket { ray: from + index, index: index as u32 };
-                stream.prepare(ticket);
+                let ticket = Ticket { ray: from + index, index: stream.prepare_alone(index as u32) };
                 let emission = emitter.emit(&stream, ticket);
                 let mut ray = emission.ray;
                 if let Some((face, normal)) = emission.from {

@@ -18,11 +18,11 @@ pub use local::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
-use super::emitter::{Stream, Ticket};
+use super::emitter::{Emission, Stream, Ticket};
 use super::run::{Plan, RunSettings};
 use super::tally::count;
 use crate::intersect::{Cost, Hit, Intersector};
-use crate::math::{Aabb, Departure, FaceId, Ray, Vector};
+use crate::math::{Aabb, Departure, FaceId, Point, Ray, Vector};
 use crate::optics::polarised::Stokes;
 use crate::optics::reflect;
 
@@ -89,50 +89,25 @@ impl Context<'_> {
 /// Traces these rays and adds them to `local`. Returns the intersector's work.
 #[inline(always)]
 fn trace_rays<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
-    let batch = context.settings.batch.max(1);
     let mut cost = Cost::default();
-    let mut wave = Wave::<C>::with_capacity(batch);
     let mut sources = Sources::new(context, which);
-    while wave.paths.len() < batch
-        && let Some((path, ray)) = sources.begin(context, local)
-    {
-        wave.paths.push(path);
-        wave.rays.push(ray);
-    }
-    wave.hits.resize(wave.rays.len(), None);
-    while !wave.paths.is_empty() {
-        let n = wave.rays.len();
-        context.intersector.intersect_batch(&wave.rays, &mut wave.hits[..n], &mut cost);
-        local.counts.segments += n as u64;
-        let mut i = 0;
-        while i < wave.paths.len() {
-            let (path, ray) = (&mut wave.paths[i], &mut wave.rays[i]);
+    let Some(mut wave) = Wave::<C>::idle(context.settings.batch.max(1)) else { return cost };
+    loop {
+        wave.fill(context, &mut sources, local);
+        if wave.paths.is_empty() {
+            return cost;
+        }
+        context.intersector.intersect_batch(&wave.rays, &mut wave.hits, &mut cost);
+        local.counts.segments += wave.rays.len() as u64;
+        for (i, (path, ray)) in wave.paths.iter_mut().zip(&mut wave.rays).enumerate() {
             if !step::step(context, path, ray, wave.hits[i].as_ref(), local, &mut wave.pending) {
-                // A path that ends leaves its place to another.
-                match wave.pending.pop().or_else(|| sources.begin(context, local)) {
-                    Some(next) => (*path, *ray) = next,
-                    None => {
-                        wave.drop(i);
-                        continue;
-                    }
-                }
+                wave.ended.push(i as u32);
             }
-            i += 1;
-        }
-        while wave.paths.len() < batch
-            && let Some((path, ray)) = wave.pending.pop()
-        {
-            wave.paths.push(path);
-            wave.rays.push(ray);
-        }
-        if wave.hits.len() < wave.rays.len() {
-            wave.hits.resize(wave.rays.len(), None);
         }
         if local.paths.len() >= STREAMED {
             local.stream(context);
         }
     }
-    cost
 }
 
 /// Vertices that are gathered before they are streamed: 1.3 MB.
@@ -142,23 +117,56 @@ const STREAMED: usize = 1 << 14;
 struct Wave<C> {
     paths: Vec<Path<C>>,
     rays: Vec<Ray>,
-    /// As long as `rays` or longer.
     hits: Vec<Option<Hit>>,
+    /// Places of paths that have ended, ascending.
+    ended: Vec<u32>,
     /// Paths that split off and wait for room.
     pending: Vec<(Path<C>, Ray)>,
 }
 
 impl<C: Carry> Wave<C> {
-    fn with_capacity(batch: usize) -> Self {
-        let (paths, rays, hits) = (Vec::with_capacity(batch), Vec::with_capacity(batch), Vec::with_capacity(batch));
-        Self { paths, rays, hits, pending: Vec::new() }
+    /// Places for `batch` paths, all of them free.
+    fn idle(batch: usize) -> Option<Self> {
+        let carry = C::inside(&[])?;
+        let receiver = NO_RECEIVER;
+        let path = Path { ray: 0, branch: 0, bounce: 0, quanta: 0.0, first: 0.0, length: 0.0, receiver, carry };
+        let ray = Ray::new(Point::ZERO, Vector::Z);
+        Some(Self {
+            paths: vec![path; batch],
+            rays: vec![ray; batch],
+            hits: vec![None; batch],
+            ended: (0..batch as u32).collect(),
+            pending: Vec::new(),
+        })
     }
 
-    /// Takes out a path that has ended; the last one of the wave, with the hit it has not been through yet, takes its place.
-    fn drop(&mut self, i: usize) {
-        self.hits.swap(i, self.paths.len() - 1);
-        self.paths.swap_remove(i);
-        self.rays.swap_remove(i);
+    /// Puts paths that wait, then new ones, into the places of those that have ended; places without a taker go.
+    #[inline(always)]
+    fn fill(&mut self, context: &Context<'_>, sources: &mut Sources, local: &mut Local) {
+        let mut taken = 0;
+        for &i in &self.ended {
+            let (path, ray) = (&mut self.paths[i as usize], &mut self.rays[i as usize]);
+            if let Some(next) = self.pending.pop() {
+                (*path, *ray) = next;
+            } else if !sources.begin(context, path, ray, local) {
+                break;
+            }
+            taken += 1;
+        }
+        for &i in self.ended[taken..].iter().rev() {
+            self.paths.swap_remove(i as usize);
+            self.rays.swap_remove(i as usize);
+            self.hits.pop();
+        }
+        self.ended.clear();
+        // Near the end paths that split off find the wave short.
+        while self.paths.len() < context.settings.batch
+            && let Some((path, ray)) = self.pending.pop()
+        {
+            self.paths.push(path);
+            self.rays.push(ray);
+            self.hits.push(None);
+        }
     }
 }
 
@@ -171,12 +179,15 @@ struct Sources {
     stream: Option<Stream>,
     /// Number of sources to go through.
     last: usize,
+    /// Whether one ray alone is asked for, by its number.
+    alone: bool,
 }
 
 impl Sources {
     fn new(context: &Context<'_>, which: Which) -> Self {
         let last = context.plan.shares.len();
-        let mut sources = Self { replicate: 0, source: 0, next: 0, range: [0, 0], stream: None, last };
+        let alone = matches!(which, Which::Ray(_));
+        let mut sources = Self { replicate: 0, source: 0, next: 0, range: [0, 0], stream: None, last, alone };
         match which {
             Which::Replicate(replicate) => {
                 sources.replicate = replicate;
@@ -203,54 +214,61 @@ impl Sources {
         let s = context.settings;
         let which = [self.replicate, context.plan.replicates];
         let rays = self.range[1] - self.range[0];
-        let pairs = context.bound.emitters[source].pairs();
-        self.stream = Some(Stream::new(s.seed, s.sampling, which, source as u32, rays, pairs));
+        let stream = Stream::new(s.seed, s.sampling, which, source as u32, rays);
+        self.stream = Some(stream.of(&context.bound.emitters[source]));
     }
 
-    /// Starts the next ray that can start; `None` at the end of the replicate.
-    #[inline]
-    fn begin<C: Carry>(&mut self, context: &Context<'_>, local: &mut Local) -> Option<(Path<C>, Ray)> {
+    /// Starts the next ray that can start; `false` at the end of the replicate.
+    #[inline(always)]
+    fn begin<C: Carry>(
+        &mut self,
+        context: &Context<'_>,
+        path: &mut Path<C>,
+        ray: &mut Ray,
+        local: &mut Local,
+    ) -> bool {
         loop {
             while self.next >= self.range[1] {
                 if self.source >= self.last {
-                    return None;
+                    return false;
                 }
                 self.enter(context, self.source + 1);
             }
-            let ray = self.next;
+            let Some(stream) = &mut self.stream else { return false };
+            let place = (self.next - self.range[0]) as u32;
+            let index = if self.alone { stream.prepare_alone(place) } else { stream.prepare(place) };
             self.next += 1;
-            let ticket = Ticket { ray, index: (ray - self.range[0]) as u32 };
+            let ticket = Ticket { ray: self.range[0] + u64::from(index), index };
+            let emitter = &context.bound.emitters[self.source];
+            let emission = emitter.emit(stream, ticket);
             let quanta = context.plan.shares[self.source].quanta;
-            let stream = self.stream.as_mut()?;
-            stream.prepare(ticket);
-            if let Some(started) = start(context, self.source, stream, ticket, quanta, local) {
-                return Some(started);
+            if start(context, self.source, &emission, (ticket, quanta), path, ray, local) {
+                return true;
             }
         }
     }
 }
 
-/// A ray as it leaves its source; `None` when it cannot start.
-#[inline]
+/// Puts a ray that leaves its source on its way; `false` when it cannot start.
+#[inline(always)]
 fn start<C: Carry>(
     context: &Context<'_>,
     source: usize,
-    stream: &Stream,
-    ticket: Ticket,
-    quanta: f64,
+    emission: &Emission,
+    (ticket, quanta): (Ticket, f64),
+    path: &mut Path<C>,
+    ray: &mut Ray,
     local: &mut Local,
-) -> Option<(Path<C>, Ray)> {
-    let emitter = &context.bound.emitters[source];
-    let emission = emitter.emit(stream, ticket);
-    let mut ray = emission.ray;
+) -> bool {
+    *ray = emission.ray;
     if let Some((face, normal)) = emission.from {
-        local.counts.corrected_normals += u64::from(settle(context, face, normal, &mut ray));
+        local.counts.corrected_normals += u64::from(settle(context, face, normal, ray));
     }
     local.counts.rays += 1;
     local.ends.emitted += count(quanta);
     let inside = match context.around.get(source) {
         Some(Around::Same(bodies)) => C::inside(bodies),
-        _ if C::MEDIA => C::inside(&around::bodies(context, &ray)),
+        _ if C::MEDIA => C::inside(&around::bodies(context, ray)),
         _ => C::inside(&[]),
     };
     let Some(mut carry) = inside else {
@@ -265,20 +283,19 @@ fn start<C: Carry>(
             face: None,
             body: 0,
         });
-        return None;
+        return false;
     };
     if C::COLOURED {
-        carry.light(emission.wavelength, || match emitter.polarised {
+        carry.light(emission.wavelength, || match context.bound.emitters[source].polarised {
             Some(field) => Stokes::linear(1.0, ray.direction, field),
             None => Stokes::unpolarised(1.0, ray.direction),
         });
     }
     let receiver = NO_RECEIVER;
-    let mut path =
-        Path { ray: ticket.ray, branch: 0, bounce: 0, quanta, first: quanta, length: 0.0, receiver, carry };
-    step::record(context, &path, ray.origin, Event::Emitted, local);
-    step::aim(context, &mut path, &mut ray);
-    Some((path, ray))
+    *path = Path { ray: ticket.ray, branch: 0, bounce: 0, quanta, first: quanta, length: 0.0, receiver, carry };
+    step::record(context, path, ray.origin, Event::Emitted, local);
+    step::aim(context, path, ray);
+    true
 }
 
 /// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it.
@@ -287,6 +304,7 @@ fn start<C: Carry>(
 /// where another face is in between; a ray whose face is not found starts on the spline.
 ///
 /// A ray that would go below the facet is turned to above it; tells whether it was.
+#[inline(never)]
 fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in [1.0, 0.1, 0.01, 1e-3] {
         let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);

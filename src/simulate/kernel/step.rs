@@ -11,7 +11,7 @@ use std::cell::Cell;
 
 /// Ends the ray at its next scattering or at the nearest receiver that stops light and stands among the faces, unless a face comes
 /// first.
-#[inline]
+#[inline(always)]
 pub(super) fn aim<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray) {
     path.receiver = NO_RECEIVER;
     if C::MEDIA
@@ -33,7 +33,7 @@ pub(super) fn aim<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut
 ///
 /// A segment inside the box cannot meet one, so that rays from face to face are not asked: 1 test in place of 3 for each ray of a
 /// lens.
-#[inline]
+#[inline(always)]
 fn late<'h, C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -57,7 +57,7 @@ fn late<'h, C: Carry>(
 }
 
 /// Notes a vertex of a path that is recorded.
-#[inline]
+#[inline(always)]
 pub(super) fn record<C>(context: &Context<'_>, path: &Path<C>, point: Point, event: Event, local: &mut Local) {
     if context.plan.records(path.ray) {
         let (ray, branch, bounce) = (path.ray, path.branch, path.bounce);
@@ -66,7 +66,7 @@ pub(super) fn record<C>(context: &Context<'_>, path: &Path<C>, point: Point, eve
 }
 
 /// Carries a path over its segment and through what it meets; false when the path ends.
-#[inline]
+#[inline(always)]
 pub(super) fn step<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -147,7 +147,7 @@ pub(super) struct Meeting<'a> {
 }
 
 /// Starts the next segment; false when a limit cuts the path off.
-#[inline]
+#[inline(always)]
 pub(super) fn onward<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -167,7 +167,7 @@ pub(super) fn onward<C: Carry>(
 }
 
 /// Takes the next ray of a path, unless a limit cuts the path off.
-#[inline]
+#[inline(always)]
 fn proceed<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -194,7 +194,7 @@ fn proceed<C: Carry>(
 }
 
 /// Beer's law over the segment, for bodies that absorb.
-#[inline]
+#[inline(always)]
 fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, local: &mut Local) {
     let body = path.carry.body();
     let alpha = context.bound.bodies[body as usize].absorption(path.carry.wavelength());
@@ -208,6 +208,7 @@ fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, l
 }
 
 /// Scattering inside a body.
+#[inline(never)]
 fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
     let Some(scatter) = &context.bound.bodies[path.carry.body() as usize].scatter else { return false };
     let point = ray.at(ray.t_max);
@@ -223,7 +224,7 @@ fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, l
 }
 
 /// The key of the random numbers of a path at its present vertex.
-#[inline]
+#[inline(always)]
 pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
     Key { seed: context.settings.seed, ray: path.ray, branch: path.branch, bounce: path.bounce }
 }
@@ -241,6 +242,7 @@ fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, lo
     }
 }
 
+#[inline(always)]
 fn receive<C: Carry>(context: &Context<'_>, path: &Path<C>, r: u32, point: Point, local: &mut Local) {
     let receiver = &context.bound.receivers[r as usize];
     if receiver.interactions.is_some_and(|n| n != path.bounce) {
@@ -251,7 +253,7 @@ fn receive<C: Carry>(context: &Context<'_>, path: &Path<C>, r: u32, point: Point
     }
 }
 
-#[inline]
+#[inline(always)]
 fn deposit<C: Carry>(
     context: &Context<'_>,
     receiver: &Receiver,
@@ -274,7 +276,7 @@ fn deposit<C: Carry>(
 }
 
 /// The end of a path that meets no face: on a receiver, in the far field, or lost inside a body.
-#[inline]
+#[inline(always)]
 fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: &mut Local) {
     if path.receiver != NO_RECEIVER {
         let point = ray.at(ray.t_max);

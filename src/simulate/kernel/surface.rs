@@ -15,7 +15,7 @@ use crate::simulate::tally::whole;
 const CONDUCTOR: Mueller = Mueller { a: 1.0, b: 0.0, c: -1.0, e: 0.0 };
 
 /// The normal to shade with and the cosine of incidence. A normal that looks away from the ray is replaced by the facet's.
-#[inline]
+#[inline(always)]
 fn shading(direction: Vector, at: &Meeting<'_>, local: &mut Local) -> (Vector, f64) {
     let (shaded, flat) = (direction.dot(at.hit.normal), direction.dot(at.hit.geometric_normal));
     if shaded * flat > 0.0 {
@@ -27,7 +27,7 @@ fn shading(direction: Vector, at: &Meeting<'_>, local: &mut Local) -> (Vector, f
 }
 
 /// The reflected direction, on the side of the facet the ray came from.
-#[inline]
+#[inline(always)]
 fn mirrored(direction: Vector, normal: Vector, at: &Meeting<'_>, local: &mut Local) -> Vector {
     let flat = at.hit.geometric_normal;
     let r = reflect(direction, normal);
@@ -39,7 +39,7 @@ fn mirrored(direction: Vector, normal: Vector, at: &Meeting<'_>, local: &mut Loc
 }
 
 /// Reflects a constant share and absorbs the rest; the direction to go on in.
-#[inline]
+#[inline(always)]
 pub(super) fn mirror<C: Carry>(
     context: &Context<'_>,
     share: f64,
@@ -58,7 +58,7 @@ pub(super) fn mirror<C: Carry>(
 }
 
 /// Passes the polarisation of a path through an interface; its power stays 1.
-#[inline]
+#[inline(always)]
 fn turn<C: Carry>(context: &Context<'_>, path: &mut Path<C>, m: &Mueller, d: Vector, n: Vector) {
     if let Some(stokes) = path.carry.stokes() {
         let after = stokes.through(m, d, n);
@@ -84,7 +84,7 @@ fn polarised_share<C: Carry>(
 }
 
 /// Reflection or refraction at the bare boundary of a body; the direction to go on in, `None` when the path is lost.
-#[inline]
+#[inline(always)]
 pub(super) fn interface<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -179,7 +179,7 @@ fn divide<C: Carry>(
 }
 
 /// The path on the other side of the boundary; lost when it cannot be there.
-#[inline]
+#[inline(always)]
 fn cross<C: Carry>(
     context: &Context<'_>,
     path: &Path<C>,
@@ -254,7 +254,7 @@ pub(super) fn contact(
 
 /// The normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these
 /// at total reflection.
-#[inline]
+#[inline(always)]
 fn refracted(d: Vector, eta: f64, at: &Meeting<'_>, local: &mut Local) -> (Vector, f64, Option<(Vector, f64)>) {
     let flat = at.hit.geometric_normal;
     let (normal, cos_i) = shading(d, at, local);

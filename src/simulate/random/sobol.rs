@@ -66,20 +66,16 @@ fn scramble(reversed: u32, seed: u32) -> u32 {
 /// Numbers made at a time.
 pub const BLOCK: usize = 64;
 
-/// The same for the [`BLOCK`] indices from a multiple of it on, as numbers in `(0, 1)`: the middles of their intervals of 2⁻³². The
-/// indices differ in their lowest byte alone, and the loop runs in vectors.
+/// The same for the indices from `first`, a multiple of [`BLOCK`], on. At most [`BLOCK`] indices differ in their lowest byte alone,
+/// so the loop runs in vectors.
 #[inline]
-pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [f64; BLOCK]) {
+pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [u32]) {
     let t = &TABLES[dimension];
     let b = first.to_le_bytes();
     let common = t[1][b[1] as usize] ^ t[2][b[2] as usize] ^ t[3][b[3] as usize];
     let low = b[0] as usize & !(BLOCK - 1);
-    let mut whole = [0; BLOCK];
-    for (w, x) in whole.iter_mut().zip(&t[0][low..low + BLOCK]) {
-        *w = scramble(common ^ x, seed);
-    }
-    for (n, w) in numbers.iter_mut().zip(whole) {
-        *n = (f64::from(w) + 0.5) * (1.0 / 4_294_967_296.0);
+    for (n, x) in numbers.iter_mut().zip(&t[0][low..low + BLOCK]) {
+        *n = scramble(common ^ x, seed);
     }
 }
 
@@ -108,10 +104,10 @@ mod tests {
     #[test]
     fn blocks_hold_the_numbers_of_their_indices() {
         for (first, dimension, seed) in [(0, 0, 1), (64, 1, 2), (0x0123_45c0, 5, 0xfeed_beef)] {
-            let mut numbers = [0.0; BLOCK];
+            let mut numbers = [0; BLOCK];
             scrambled_block(first, dimension, seed, &mut numbers);
             for (index, number) in (first..).zip(numbers) {
-                assert_eq!(number * 4_294_967_296.0 - 0.5, f64::from(scrambled(index, dimension, seed)));
+                assert_eq!(number, scrambled(index, dimension, seed));
             }
         }
     }
