@@ -209,3 +209,71 @@ fn a_plain_torus_may_mean_the_inner_part_of_one_that_touches_itself() {
     close(area(&import), 0.5 * PI * 5.0 * (5.0 * v0.sin() - 3.0 * v0), 1e-4);
     assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
 }
+
+/// The unit square with other geometry for its first edge.
+fn square_along(curve: &str) -> String {
+    square([".T."; 4], [0, 1, 2, 3])
+        .replace("#40=EDGE_CURVE('',#30,#31,$,.T.)", "#40=EDGE_CURVE('',#30,#31,#80,.T.)")
+        + curve
+}
+
+#[test]
+fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
+    let plane = "#81=PCURVE('',#21,#82);\n#82=DEFINITIONAL_REPRESENTATION('',(#83),$);\n#83=LINE('',#84,#85);\n\
+                 #84=CARTESIAN_POINT('',(0.,0.));\n#85=VECTOR('',#86,1.);\n#86=DIRECTION('',(1.,0.));\n";
+    let arc = "#81=PCURVE('',#21,#82);\n#82=DEFINITIONAL_REPRESENTATION('',(#83),$);\n\
+               #83=B_SPLINE_CURVE_WITH_KNOTS('',2,(#84,#85,#86),.UNSPECIFIED.,.F.,.F.,(3,3),(0.,1.),.UNSPECIFIED.);\n\
+               #84=CARTESIAN_POINT('',(0.,0.));\n#85=CARTESIAN_POINT('',(0.5,-0.3));\n#86=CARTESIAN_POINT('',(1.,0.));\n";
+    // A parabola of sagitta 0.15 adds two thirds of its box.
+    for (curve, expected) in [
+        (format!("#80=SURFACE_CURVE('',$,(#81),.PCURVE_S1.);\n{arc}"), 1.1),
+        (arc.replace("#81=", "#80="), 1.1),
+        (format!("#80=TRIMMED_CURVE('',#89,(0.),(1.),.T.,.PARAMETER.);\n#89=SURFACE_CURVE('',#87,(#81),.CURVE_3D.);\n#87=LINE('',#10,#88);\n#88=VECTOR('',#90,1.);\n#90=DIRECTION('',(1.,0.,0.));\n{plane}"), 1.0),
+        // A line 2 mm aside, moved back along reference direction × tangent = z × x = y.
+        ("#80=OFFSET_CURVE_3D('',#81,2.,.F.,#82);\n#81=LINE('',#83,#84);\n#82=DIRECTION('',(0.,0.,1.));\n#83=CARTESIAN_POINT('',(0.,-2.,0.));\n\
+          #84=VECTOR('',#85,1.);\n#85=DIRECTION('',(1.,0.,0.));\n".into(), 1.0),
+        // A circle of radius 1.5 about (0.5, 0, 0), 1 mm towards its center: half a disc of radius 0.5 more.
+        ("#80=OFFSET_CURVE_3D('',#81,1.,.F.,#82);\n#81=CIRCLE('',#83,1.5);\n#82=DIRECTION('',(0.,0.,1.));\n#83=AXIS2_PLACEMENT_3D('',#84,#82,#85);\n\
+          #84=CARTESIAN_POINT('',(0.5,0.,0.));\n#85=DIRECTION('',(1.,0.,0.));\n".into(), 1.0 + PI / 8.0),
+        // The same circle as a spline would have it: a composite of one segment.
+        ("#80=OFFSET_CURVE_3D('',#86,1.,.F.,#82);\n#86=COMPOSITE_CURVE('',(#87),.F.);\n#87=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#88);\n\
+          #88=TRIMMED_CURVE('',#81,(3.141592653589793),(6.283185307179586),.T.,.PARAMETER.);\n#81=CIRCLE('',#83,1.5);\n#82=DIRECTION('',(0.,0.,1.));\n\
+          #83=AXIS2_PLACEMENT_3D('',#84,#82,#85);\n#84=CARTESIAN_POINT('',(0.5,0.,0.));\n#85=DIRECTION('',(1.,0.,0.));\n".into(), 1.0 + PI / 8.0),
+    ] {
+        close(area(&import(&square_along(&curve))), expected, 1e-4);
+    }
+}
+
+#[test]
+fn every_context_has_its_own_units() {
+    let own = |k: u32, unit: &str| {
+        square([".T."; 4], [0, 1, 2, 3]).replace('#', &format!("#{k}"))
+            + &format!(
+                "#{k}01=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#{k}02))REPRESENTATION_CONTEXT('',''));\n{}\n\
+                 #{k}04=OPEN_SHELL('',(#{k}900));\n#{k}05=SHELL_BASED_SURFACE_MODEL('',(#{k}04));\n\
+                 #{k}06=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#{k}05),#{k}01);\n",
+                unit.replace("@", &format!("#{k}0"))
+            )
+    };
+    let units = [
+        ("@2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MICRO.,.METRE.));", 1e-3),
+        ("@2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));", 1e3),
+        (
+            "@2=(CONVERSION_BASED_UNIT('FOOT',@3)LENGTH_UNIT()NAMED_UNIT(@9));@3=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(12.),@7);\
+          @7=(CONVERSION_BASED_UNIT('INCH',@8)LENGTH_UNIT()NAMED_UNIT(@9));@8=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),@10);\
+          @10=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));@9=DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);",
+            304.8,
+        ),
+        ("@2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.));", 10.0),
+    ];
+    let data: String = units.iter().enumerate().map(|(k, (u, _))| own(k as u32 + 1, u)).collect();
+    let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+    let import = read_bytes("units.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+    assert_eq!(import.report.faces.converted, 4, "{:?} {:?}", import.report.refusals, import.report.problems);
+    let mut sides: Vec<f64> =
+        import.model.parts.iter().map(|p| step_support::measure(&p.shells[0].faces[0]).area.sqrt()).collect();
+    sides.sort_by(f64::total_cmp);
+    for (side, expected) in sides.into_iter().zip([1e-3, 10.0, 304.8, 1e3]) {
+        close(side, expected, 1e-9);
+    }
+}

@@ -3,6 +3,7 @@
 use super::curves::{Directed, MAX_DEPTH, Shape, joined};
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::{Args, Entity};
+use super::pcurves::associated;
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
 use std::f64::consts::PI;
@@ -22,7 +23,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
             let curve = e.own("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
-            let basis = self.follow(e, curve, "curve_3d of the surface curve")?;
+            let basis = self.follow(e, curve.or_else(|| associated(e)), "curve_3d of the surface curve")?;
             return self.bounded(basis.id, depth + 1);
         }
         if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {

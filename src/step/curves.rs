@@ -2,6 +2,7 @@
 
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::part21::Entity;
+use super::pcurves::associated;
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
 use std::f64::consts::PI;
@@ -173,8 +174,14 @@ impl<'f, 'a> Geometry<'f, 'a> {
         if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
             let own = e.own("SURFACE_CURVE", 1).or_else(|| Some(e.args()).filter(|a| a.id(1).is_some()).and(None));
             let curve = own.and_then(|a| a.id(0)).or_else(|| e.args().id(1));
-            let basis = self.follow(e, curve, "curve_3d of the surface curve")?;
+            let basis = self.follow(e, curve.or_else(|| associated(e)), "curve_3d of the surface curve")?;
             return self.curve(basis.id, depth + 1);
+        }
+        if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {
+            return ahead(Shape::spline(self.pcurve(e, depth + 1)?));
+        }
+        if let Some(own) = e.own("OFFSET_CURVE_3D", 1) {
+            return self.offset_curve(e, own, depth);
         }
         if let Some(trimmed) = e.own("TRIMMED_CURVE", 1) {
             let basis = self.follow(e, trimmed.id(0), "basis curve")?;

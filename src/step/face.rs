@@ -4,6 +4,7 @@ use super::arrange::{Arranged, arrange};
 use super::chart::{Chart, Kind, Pole};
 use super::fit::{Budget, Fit, Overrun, Target, project};
 use super::loops::{Chain, Piece, Source, chain};
+use super::offset;
 use super::seams::{Seam, Seams};
 use crate::math::{Uv, Vector};
 use crate::model::{Analytic, EdgeUse, TrimLoop};
@@ -85,6 +86,9 @@ pub(super) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
     }
     let tolerance = task.accuracy.max(2.0 * gap).max(1e-6);
     let mut repairs: Vec<String> = Vec::new();
+    if chart.error > offset::TOLERANCE {
+        repairs.push(format!("its offset surface is fitted to {:.1e} mm", chart.error));
+    }
     let chains: Vec<Chain> = task
         .loops
         .iter()

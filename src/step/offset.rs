@@ -47,8 +47,8 @@ pub(super) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         }
         _ => {
             let domain = basis_domain(basis)?;
-            let surface = fit(&basis.surface(domain), distance)?;
-            Chart::new(Kind::Spline(SplineChart::new(surface)), Analytic::Offset)
+            let (surface, error) = fit(&basis.surface(domain), distance)?;
+            Chart { error, ..Chart::new(Kind::Spline(SplineChart::new(surface)), Analytic::Offset) }
         }
     };
     chart.flipped = basis.flipped;
@@ -106,8 +106,8 @@ fn jet(basis: &Surface, distance: f64, uv: Uv, [[u0, u1], [v0, v1]]: [[f64; 2]; 
     Some(Jet { point, du, dv, duv: (above - below) / (hi - lo) })
 }
 
-/// The bicubic Hermite spline of the offset.
-fn fit(basis: &Surface, distance: f64) -> Option<Surface> {
+/// The bicubic Hermite spline of the offset, and its error.
+fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     let domain = basis.domain();
     // Knots of the basis stay grid lines, so that its breaks stay breaks.
     let breaks = |d: usize| {
@@ -137,7 +137,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<Surface> {
         }
         let full = lines.iter().any(|l| 2 * l.len() > MAX_CELLS.max(2 * base[0].len().max(base[1].len())));
         if error <= TOLERANCE || full {
-            return (error <= 1e-2).then_some(surface);
+            return (error <= 1e-2).then_some((surface, error));
         }
         per_span *= 2;
     }

@@ -1,8 +1,9 @@
-//! Curves given only in the parameter plane of a surface, and cubic curves through what can be evaluated.
+//! Curves given only in the parameter plane of a surface, offset curves, and cubic curves through what can be evaluated.
 
 use super::chart::Chart;
+use super::curves::{Directed, Shape};
 use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::Entity;
+use super::part21::{Args, Entity};
 use super::surfaces::Reach;
 use super::units::Units;
 use crate::math::{Point, Uv, Vector};
@@ -29,7 +30,61 @@ pub(super) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), toler
     }
 }
 
+/// The first curve in a parameter plane of a surface curve that has none in space.
+pub(super) fn associated(e: Entity<'_, '_>) -> Option<u64> {
+    let list = e.own("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
+    let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
+    curves.find(|c| c.is_any(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
+}
+
 impl<'f, 'a> Geometry<'f, 'a> {
+    /// An OFFSET_CURVE_3D: the basis moved along the reference direction × its tangent.
+    pub(super) fn offset_curve(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>, depth: usize) -> Outcome<Directed> {
+        let basis = self.follow(e, own.id(0), "basis curve")?;
+        let distance = own.real(1).map(|d| d * self.units.length).filter(|d| d.is_finite());
+        let distance = distance.ok_or_else(|| Refusal::of(e, "its distance is missing"))?;
+        let across = self.direction(own.id(3)).and_then(|d| d.try_normalize());
+        let across = across.ok_or_else(|| Refusal::of(e, "its reference direction is missing"))?;
+        let Directed { shape, reversed } = self.curve(basis.id, depth + 1)?;
+        let sign = if reversed { -distance } else { distance };
+        let shape = match shape {
+            Shape::Line { origin, direction } => {
+                let aside = across.cross(direction).try_normalize();
+                let aside = aside.ok_or_else(|| Refusal::of(e, "its reference direction runs along its line"))?;
+                Shape::Line { origin: origin + sign * aside, direction }
+            }
+            Shape::Ellipse { frame, a, b } if a == b && across.cross(frame.z).length() < 1e-9 => {
+                // The tangent turned by a right angle about the axis points to the center.
+                let radius = a - sign * across.dot(frame.z).signum();
+                if !(radius > 0.0) {
+                    return Err(Refusal::of(e, "the offset leaves nothing of its circle"));
+                }
+                Shape::Ellipse { frame, a: radius, b: radius }
+            }
+            Shape::Hyperbola { .. } | Shape::Parabola { .. } => {
+                return Err(Refusal::of(e, "an offset of an unbounded conic is not supported"));
+            }
+            shape => {
+                let curve = match shape {
+                    Shape::Spline { curve, .. } => curve,
+                    other => other.segment(0.0, 2.0 * std::f64::consts::PI),
+                };
+                let moved = |t: f64| {
+                    let d = curve.derivatives(t);
+                    d.point + sign * across.cross(d.first).try_normalize().unwrap_or_default()
+                };
+                let [a, b] = curve.domain();
+                let at = |t: f64| {
+                    let h = 1e-5 * (b - a);
+                    let (lo, hi) = ((t - h).max(a), (t + h).min(b));
+                    (moved(t), (moved(hi) - moved(lo)) / (hi - lo))
+                };
+                Shape::spline(cubic([a, b], at, 1e-6).0)
+            }
+        };
+        Ok(Directed { shape, reversed })
+    }
+
     /// A PCURVE as a curve in space.
     pub(super) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let own = e.own("PCURVE", 1).unwrap_or_else(|| e.args());

@@ -75,6 +75,8 @@ pub(super) struct Chart {
     pub(super) size: f64,
     /// Whether `Su × Sv` is opposite to that of the file's surface.
     pub(super) flipped: bool,
+    /// Distance from what the file means, where that had to be fitted, mm.
+    pub(super) error: f64,
 }
 
 impl Chart {
@@ -94,6 +96,7 @@ impl Chart {
             poles: Vec::new(),
             size: 1.0,
             flipped: false,
+            error: 0.0,
         };
         chart.measure();
         chart
