@@ -98,19 +98,22 @@ fn every_degree_and_mixed_ones() {
 }
 
 #[test]
-#[ignore = "several minutes: 6,000 random surfaces, ten rays each"]
+#[ignore = "minutes: LAMPYRIS_SURFACES random surfaces, 60,000 by default, ten rays each"]
 fn fuzz_surfaces() {
-    let mut s = Stream(41);
-    let (mut flagged, mut rays) = (0, 0);
-    for k in 0..6_000 {
-        let degree = [1 + (s.next() * 6.0) as usize, 1 + (s.next() * 6.0) as usize];
-        let weights = 10f64.powf(s.within(0.0, 2.0));
-        let surface = random_surface(&mut s, degree, weights);
-        let aims = aimed(&surface, k, 10);
-        let tally = compare(&format!("fuzz {k} degree {degree:?}"), &model([surface]), aims.into_iter());
-        flagged += tally.flagged;
-        rays += tally.rays;
-    }
-    println!("{flagged} of {rays} flagged");
+    use rayon::prelude::*;
+    let surfaces = std::env::var("LAMPYRIS_SURFACES").ok().and_then(|x| x.parse().ok()).unwrap_or(60_000u64);
+    let (rays, flagged) = (0..surfaces)
+        .into_par_iter()
+        .map(|k| {
+            let mut s = Stream(41 + 1000 * k);
+            let degree = [1 + (s.next() * 6.0) as usize, 1 + (s.next() * 6.0) as usize];
+            let weights = 10f64.powf(s.within(0.0, 2.0));
+            let surface = random_surface(&mut s, degree, weights);
+            let aims = aimed(&surface, k, 10);
+            let tally = compare(&format!("fuzz {k} degree {degree:?}"), &model([surface]), aims.into_iter());
+            (tally.rays, tally.flagged)
+        })
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    println!("{surfaces} surfaces, {rays} rays: {flagged} flagged, none wrong");
     assert!(flagged <= rays / 5000 + 1, "{flagged} of {rays} flagged");
 }

@@ -68,6 +68,25 @@ fn fixtures_against_clipping() {
     }
 }
 
+#[test]
+#[ignore = "hours for 1e8: LAMPYRIS_RAYS rays over the fixtures, 100,000 by default, from LAMPYRIS_SEED on"]
+fn fixtures_against_clipping_at_length() {
+    use rayon::prelude::*;
+    let number = |name: &str, or: u64| std::env::var(name).ok().and_then(|x| x.parse().ok()).unwrap_or(or);
+    let models: Vec<_> = fixtures().iter().map(|p| (p.file_name().unwrap().to_owned(), read(p))).collect();
+    let (chunk, seed) = (500, number("LAMPYRIS_SEED", 1000));
+    let chunks = number("LAMPYRIS_RAYS", 100_000) / chunk;
+    let (hits, flagged) = (0..chunks)
+        .into_par_iter()
+        .map(|k| {
+            let (name, model) = &models[(k % models.len() as u64) as usize];
+            against_audit(&name.to_string_lossy(), model, chunk as usize, seed + k)
+        })
+        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    println!("{} rays from seed {seed}: {hits} hits, {flagged} flagged, none wrong", chunks * chunk);
+    assert!(flagged as u64 * 1000 <= chunks * chunk, "{flagged} flagged");
+}
+
 /// Rays through random points of edges of closed shells, and through their vertices.
 fn through_edges(name: &str, model: &Model, n: usize) -> (usize, usize, usize) {
     let exact = Exact::build(model, &Settings::default());
