@@ -47,3 +47,77 @@ fn a_unit_given_by_the_user_replaces_that_of_the_file() {
         }
     }
 }
+
+const PLANE: &str = "[[receiver]]\nname = 'r'\nsize = [1, 1]\n";
+
+/// Whatever is written must mean something, or be refused by its name and line.
+#[test]
+fn what_means_nothing_is_refused_by_name() {
+    for (head, key, line) in [
+        (format!("{PLANE}radius = 3"), "radius", 4),
+        (format!("{PLANE}h_deg = [-5, 5]"), "h_deg", 4),
+        (format!("{PLANE}instance = 'x'"), "instance", 4),
+        ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nsize = [1, 1]".into(), "size", 4),
+        (format!("{PLANE}cells = [4000, 4000]\nbins_nm = [400, 500, 600, 700]"), "cells", 4),
+        ("[[model]]\nname = 'x'".into(), "file", 1),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { z = [0, 0, 0] }".into(), "z", 3),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { at = [nan, 0, 0] }".into(), "at", 3),
+        ("[run]\nrays = 1.5".into(), "1e6", 2),
+        ("[run]\nglue_mm = 0".into(), "glue_mm", 2),
+        ("[run]\nmax_bounces = 0".into(), "max_bounces", 2),
+        ("[accuracy]\nintersector = 'otree'".into(), "octree", 2),
+        ("[accuracy]\nnormals = 'smooth'".into(), "bilinear", 2),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nscatter_per_mm = 1\nanisotropy = 1.5".into(), "anisotropy", 5),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nabsorption_per_mm = -1".into(), "absorption", 4),
+        ("[[source]]\nkind = 'point'\npower = 1e-300".into(), "power", 3),
+        ("[[source]]\nkind = 'point'\nspectrum = 'd65'".into(), "spectrum = { kind", 3),
+        ("[[source]]\nkind = 'point'\nx = [0, 0, 0]".into(), "x", 3),
+        ("[[source]]\nkind = 'ies'\nfile = 'a.ies'".into(), "lumens", 3),
+        ("[[source]]\nkind = 'rays'\nfile = 'a.csv'\nradius = 3".into(), "radius", 4),
+        ("[source]\nkind = 'point'".into(), "[[source]]", 1),
+    ] {
+        let text = if head.contains("[source]") && !head.contains("[[") {
+            head.clone()
+        } else {
+            format!("{head}\n{REST}")
+        };
+        let e = Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(&head);
+        let said = e.to_string();
+        assert!(said.contains(key), "{head}: {said}");
+        assert_eq!(e.line().map(|l| l.0), Some(line), "{head}: {said}");
+    }
+    let text = "[run]\npolarisation = true\n[[source]]\nkind = 'point'\npolarised = [0, 0, 0]";
+    let said = Scene::parse(text, "scene.toml", Path::new(".")).unwrap_err().to_string();
+    assert!(said.contains("scene.toml:5"), "{said}");
+}
+
+#[test]
+fn numbers_may_be_written_as_people_write_them() {
+    let text = format!("[run]\nrays = 1e6\n[accuracy]\ntolerance_mm = 0.1\n{REST}");
+    let scene = Scene::parse(&text, "scene.toml", Path::new(".")).unwrap();
+    assert_eq!((scene.run.rays, scene.accuracy.tolerance_mm), (1_000_000, Some([0.1, 0.1])));
+}
+
+#[test]
+fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
+    let model = step::read(&file, &step::Settings::default()).unwrap().model;
+    let part = model.parts[0].name.clone();
+    let glass = format!("[[material]]\npart = '{part}'\nmedium = 'N-BK7'\n");
+    for (text, says) in [
+        (format!("[[material]]\npart = '{part}'\nsurface = 'interface'\n{REST}"), "no medium"),
+        (format!("[[material]]\nat = [1e5, 0, 0]\nmedium = 'N-BK7'\n{REST}"), "mm from the nearest face"),
+        (format!("{glass}{REST}    inside = 'no such'\n"), "there are:"),
+        (format!("{glass}[[receiver]]\nname = 'a'\nkind = 'absorbed'\npart = 'housing'\n{REST}"), "'housing'"),
+        (
+            format!(
+                "[[medium]]\nname = 'g'\nsellmeier = [[1.2, 0.16]]\n[[material]]\npart = '{part}'\nmedium = 'g'\n{REST}    spectrum = {{ values = [[395, 1], [600, 1]] }}\n"
+            ),
+            "has no index at 395 nm",
+        ),
+    ] {
+        let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
+        let e = scene.bind(&model).expect_err(&text);
+        assert!(e.to_string().contains(says) && e.line().is_some(), "{text}: {e}");
+    }
+}

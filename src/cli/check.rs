@@ -6,7 +6,7 @@ use super::engine::Choice;
 use super::load::Input;
 use super::options::{Meshing, NormalKind, Tracing};
 use super::witness::Witness;
-use super::{Failure, Outcome, aim, engine, load};
+use super::{Failure, Outcome, aim, engine, load, pairs};
 use crate::formats::write_atomic;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::Exact;
@@ -125,11 +125,19 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         write_atomic(path, |mut w| records::write(&mut w, kept.clone()))?;
         context.say(format_args!("wrote {}", path.display()));
     }
+    let pairs = match scene {
+        Some(scene) => pairs::find(scene, &scene.bind(model)?, [&octree, &exact], &tracing, context),
+        None => Vec::new(),
+    };
     if context.json {
-        let text = serde_json::to_string_pretty(&found).map_err(|e| Failure::running(e.to_string()))?;
-        print(&(text + "\n"))?;
+        let wrong = |e: serde_json::Error| Failure::running(e.to_string());
+        let mut document = serde_json::to_value(&found).map_err(wrong)?;
+        if scene.is_some() {
+            document["receivers"] = serde_json::to_value(&pairs).map_err(wrong)?;
+        }
+        print(&(serde_json::to_string_pretty(&document).map_err(wrong)? + "\n"))?;
     } else {
-        print(&described(&found))?;
+        print(&(described(&found) + &pairs::described(&pairs)))?;
     }
     Ok(load::account(&loaded.reports, asked.limits.max_refused, context))
 }

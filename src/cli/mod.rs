@@ -21,6 +21,7 @@ mod look;
 mod machine;
 mod meta;
 mod options;
+mod pairs;
 mod paths;
 mod portion;
 mod race;

@@ -1,0 +1,47 @@
+//! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
+
+use super::context::Context;
+use super::options::Tracing;
+use crate::intersect::Intersector;
+use crate::report::figures;
+use crate::simulate::{BoundScene, RunSettings, Scene};
+use crate::study::receivers::{Paired, paired};
+
+/// Rays at most: a second or two on the spline of a lamp.
+const MOST: u64 = 100_000;
+
+/// Traces the scene on both.
+pub(super) fn find(
+    scene: &Scene,
+    bound: &BoundScene,
+    [facets, exact]: [&dyn Intersector; 2],
+    tracing: &Tracing,
+    context: &Context,
+) -> Vec<Paired> {
+    let settings = RunSettings {
+        rays: tracing.rays.unwrap_or(scene.run.rays).min(MOST),
+        seed: tracing.seed.unwrap_or(scene.run.seed),
+        threads: tracing.threads.unwrap_or(0),
+        ..RunSettings::from(&scene.run)
+    };
+    let spinner = context.spinner("tracing the scene on facets and on the spline");
+    let found = paired(bound, facets, exact, &settings);
+    spinner.finish_and_clear();
+    found
+}
+
+/// One line a receiver.
+pub(super) fn described(pairs: &[Paired]) -> String {
+    let mut text = String::new();
+    for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
+        let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);
+        text += &format!(
+            "  {:<12} facets change the power by {} ± {} % (same rays on both; alone it is known to {} %)\n",
+            p.name,
+            percent(p.difference),
+            percent(p.difference_error),
+            percent(p.power_error)
+        );
+    }
+    text
+}
