@@ -277,3 +277,32 @@ fn every_context_has_its_own_units() {
         close(side, expected, 1e-9);
     }
 }
+
+/// A bicubic sheet of 40 × 40 spans whose only dip is one control point in the middle of nowhere.
+#[test]
+fn the_box_finds_a_dip_between_coarse_samples() {
+    let n = 43;
+    let (mut data, mut rows) = (String::new(), Vec::new());
+    for i in 0..n {
+        let mut row = Vec::new();
+        for j in 0..n {
+            let id = 1000 + i * n + j;
+            let z = if (i, j) == (29, 18) { -9.0 } else { 0.0 };
+            data += &format!("#{id}=CARTESIAN_POINT('',({i}.,{j}.,{z:?}));\n");
+            row.push(format!("#{id}"));
+        }
+        rows.push(format!("({})", row.join(",")));
+    }
+    let knots: Vec<String> = (0..=40).map(|k| format!("{k}.")).collect();
+    let multiplicities = format!("(4,{}4)", "1,".repeat(39));
+    data += &format!(
+        "#900=B_SPLINE_SURFACE_WITH_KNOTS('',3,3,({}),.UNSPECIFIED.,.F.,.F.,.F.,{multiplicities},{multiplicities},({k}),({k}),.UNSPECIFIED.);\n\
+         #7=GEOMETRIC_SET('',(#900));\n#8=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#7),#1);\n",
+        rows.join(","),
+        k = knots.join(",")
+    );
+    let import = import(&data);
+    // A uniform cubic reaches 4/9 of a lone control point: (2/3)² of it.
+    let [lo, hi] = import.report.bbox_mm.expect("a face");
+    assert!((lo[2] + 4.0).abs() < 1e-6 && hi[2] == 0.0, "{lo:?} {hi:?}");
+}

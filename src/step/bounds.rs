@@ -4,8 +4,11 @@ use crate::math::{Aabb, Frame, Point, Uv};
 use crate::model::{Face, Model};
 use crate::nurbs::ControlPoint;
 
-/// Samples per direction that seed the search for extremes.
-const GRID: usize = 12;
+/// Fewest and most samples per direction that seed the search for extremes; between them two per span of the spline.
+/// A terrain of 77 × 80 spans has its lowest point 0.09 mm below the best of 13 × 13 samples.
+const GRID: [usize; 2] = [12, 256];
+/// Samples per direction that are followed uphill.
+const STARTS: usize = 3;
 
 /// A box around all placed faces; within about 1e-3 of a face's size.
 pub(super) fn of_model(model: &Model) -> Aabb {
@@ -46,14 +49,18 @@ fn of_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
         (lo, hi) = (Uv::new(u0, v0), Uv::new(u1, v1));
     }
     let contains = |p: Uv| polygons.is_empty() || polygons.iter().filter(|q| holds(q, p)).count() % 2 == 1;
-    let cell = (hi - lo) / GRID as f64;
+    let spans = |d: usize| {
+        let mut breaks = face.surface.knots[d].clone();
+        breaks.dedup();
+        (2 * breaks.len()).clamp(GRID[0], GRID[1])
+    };
+    let [nu, nv] = [spans(0), spans(1)];
+    let cell = (hi - lo) / Uv::new(nu as f64, nv as f64);
     let mut samples: Vec<(Uv, Point)> = Vec::new();
-    for i in 0..=GRID {
-        for j in 0..=GRID {
+    for i in 0..=nu {
+        for j in 0..=nv {
             let uv = lo + cell * Uv::new(i as f64, j as f64);
-            if contains(uv) {
-                samples.push((uv, at(uv)));
-            }
+            samples.push((uv, at(uv)));
         }
     }
     for axis in 0..3 {
@@ -64,25 +71,27 @@ fn of_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
             if limit <= known {
                 continue;
             }
-            let Some(&(mut uv, p)) = samples.iter().max_by(|a, b| value(a.1).total_cmp(&value(b.1))) else {
-                continue;
-            };
-            let mut best = value(p);
-            let mut step = 0.5 * cell;
-            for _ in 0..24 {
-                let mut moved = false;
-                for d in [Uv::X, -Uv::X, Uv::Y, -Uv::Y] {
-                    let next = uv + step * d;
-                    if contains(next) && value(at(next)) > best {
-                        (uv, best, moved) = (next, value(at(next)), true);
+            // The highest samples inside the trims, each followed uphill.
+            samples.sort_unstable_by(|a, b| value(b.1).total_cmp(&value(a.1)));
+            let starts: Vec<(Uv, Point)> = samples.iter().filter(|s| contains(s.0)).take(STARTS).copied().collect();
+            for (mut uv, p) in starts {
+                let mut best = value(p);
+                let mut step = 0.5 * cell;
+                for _ in 0..24 {
+                    let mut moved = false;
+                    for d in [Uv::X, -Uv::X, Uv::Y, -Uv::Y] {
+                        let next = uv + step * d;
+                        if contains(next) && value(at(next)) > best {
+                            (uv, best, moved) = (next, value(at(next)), true);
+                        }
+                    }
+                    if !moved {
+                        step *= 0.5;
                     }
                 }
-                if !moved {
-                    step *= 0.5;
-                }
+                let q = at(uv);
+                bounds = Aabb { min: bounds.min.min(q), max: bounds.max.max(q) };
             }
-            let q = at(uv);
-            bounds = Aabb { min: bounds.min.min(q), max: bounds.max.max(q) };
         }
     }
     bounds

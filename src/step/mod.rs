@@ -8,8 +8,8 @@
 //!
 //! Guarantee: what [`crate::model`] promises, with uv curves within [`Settings::uv_tolerance`] of the foot points of
 //! their edges wherever they were checked; each face is converted, repaired (said how) or refused (said why). Known
-//! weakness: parameter curves of the file are not used, edges are always located anew; mirrored placements are taken
-//! as they are.
+//! weakness: curves that the file gives in a parameter plane are used only where the one in space is missing, other
+//! edges are always located anew; mirrored placements are taken as they are.
 //!
 //! ```no_run
 //! use lampyris::step::{Settings, read};
