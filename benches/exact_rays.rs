@@ -84,17 +84,17 @@ fn main() {
         case.seconds.sort_by(f64::total_cmp);
         let rate = |s: f64| RAYS as f64 / s / 1e6;
         let (mut cost, mut flagged, mut hit) = (Cost::default(), 0, 0);
-        let mut each: Vec<f64> = case
-            .rays
-            .iter()
-            .map(|ray| {
+        // The shortest of three: a ray takes microseconds, and being interrupted by other work milliseconds.
+        let mut each = vec![f64::INFINITY; RAYS];
+        for pass in 0..3 {
+            for (ray, shortest) in case.rays.iter().zip(&mut each) {
                 let start = Instant::now();
                 let answer = case.exact.first(ray, &mut cost);
-                flagged += usize::from(answer.certainty != Certainty::Certified);
-                hit += usize::from(answer.hit.is_some());
-                start.elapsed().as_secs_f64() * 1e6
-            })
-            .collect();
+                *shortest = shortest.min(start.elapsed().as_secs_f64() * 1e6);
+                flagged += usize::from(pass == 0 && answer.certainty != Certainty::Certified);
+                hit += usize::from(pass == 0 && answer.hit.is_some());
+            }
+        }
         each.sort_by(f64::total_cmp);
         println!(
             "{:32} {:7} {:8} {:6.1} {:7.2} {:7.2} {:9} {:8.1} {:8.1} {:6.2} {:8.3}",
@@ -107,7 +107,7 @@ fn main() {
             flagged,
             each[RAYS * 99 / 100],
             each[RAYS - 1],
-            cost.tests as f64 / RAYS as f64,
+            cost.tests as f64 / cost.rays as f64,
             case.exact.footprint().build_seconds
         );
     }

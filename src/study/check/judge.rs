@@ -48,15 +48,18 @@ impl<'a> Judge<'a> {
         self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite())
     }
 
-    /// Largest sag of those facets of a face that the ray passes within their own sag; `None` when it passes none.
-    fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> Option<f64> {
+    /// Largest sag of those facets of a face that the ray passes within their own sag; of all when it passes none, as beside
+    /// a border or over a hole.
+    fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
         let near = |&i: &u32| {
             let sag = self.sag(i);
             let bounds = Aabb::around(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
             let everywhere = ray.within(f64::NEG_INFINITY, f64::INFINITY);
             bounds.clip(&everywhere).map(|_| sag)
         };
-        self.facets.get(face.index())?.iter().filter_map(near).reduce(f64::max)
+        let Some(all) = self.facets.get(face.index()) else { return self.fallback };
+        let passed = all.iter().filter_map(near).reduce(f64::max);
+        passed.unwrap_or_else(|| all.iter().map(|&i| self.sag(i)).fold(0.0, f64::max))
     }
 
     /// How far a facet that nobody proved strays from the spline: the farthest of 25 of its points.
@@ -103,7 +106,7 @@ impl<'a> Judge<'a> {
             return Cause::Unmeshed;
         }
         let Some(sheet) = self.sheet(first.face) else { return Cause::NoSurface };
-        let sag = self.band(first.face, ray, sheet.gap).unwrap_or(0.0);
+        let sag = self.band(first.face, ray, sheet.gap);
         let cause = self.cause(ray, first, other, sheet, sag);
         // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
         if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved(f.primitive).is_none()))
@@ -139,7 +142,7 @@ impl<'a> Judge<'a> {
             return Cause::Silhouette;
         }
         if let Some(o) = other.filter(|o| o.face != first.face) {
-            let both = band + self.band(o.face, ray, sheet.gap).unwrap_or(0.0);
+            let both = band + self.band(o.face, ray, sheet.gap);
             if sheet.foot(ray.at(o.t), first.uv, ray.direction).offset.abs() <= both {
                 return Cause::Coincident;
             }
