@@ -306,3 +306,25 @@ fn the_box_finds_a_dip_between_coarse_samples() {
     let [lo, hi] = import.report.bbox_mm.expect("a face");
     assert!((lo[2] + 4.0).abs() < 1e-6 && hi[2] == 0.0, "{lo:?} {hi:?}");
 }
+
+#[test]
+fn rectangles_of_parameters_are_in_the_units_of_their_context() {
+    // A belt of a sphere from 0° to 90° around and from 30° up to the pole, in degrees and centimetres.
+    let data = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+        #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.));\n\
+        #3=(CONVERSION_BASED_UNIT('DEGREE',#4)NAMED_UNIT(*)PLANE_ANGLE_UNIT());\n\
+        #4=PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.0174532925199433),#5);\n\
+        #5=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+        #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=AXIS2_PLACEMENT_3D('',#10,$,$);\n#12=SPHERICAL_SURFACE('',#11,2.);\n\
+        #13=RECTANGULAR_TRIMMED_SURFACE('',#12,0.,90.,30.,90.,.T.,.T.);\n#14=GEOMETRIC_SET('',(#13));\n\
+        #15=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#14),#1);\n";
+    let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+    let import = read_bytes("belt.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+    // A zone's area is that of the cylinder around it: a quarter of 2π·20·(20 − 10) mm².
+    close(area(&import), 100.0 * PI, 1e-4);
+    let [lo, hi] = import.report.bbox_mm.expect("a face");
+    let side = 20.0 * 30f64.to_radians().cos();
+    for (got, expected) in lo.into_iter().chain(hi).zip([0.0, 0.0, 10.0, side, side, 20.0]) {
+        assert!((got - expected).abs() < 1e-6, "{lo:?} {hi:?}");
+    }
+}
