@@ -11,6 +11,8 @@
 //!   curve has a point on x's side line farther out, and x is no farther from it than it is from the line of its edge. So
 //!   the distance is at most the larger of P to T and the distance of the boundary curves to the lines of their edges.
 //!
+//! Both are tried by second derivatives first (`bend.rs`): the piece and its boundary are near the linear map onto the triangle.
+//!
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
 
@@ -47,6 +49,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         if self.sheet.affine {
             let off = [0, 1, 2].map(|i| Flat::new(&xyz).distance(self.sheet.point(uv[i])));
             return off[0].max(off[1]).max(off[2]) + self.margin;
+        }
+        if self.judge == Judge::Bound
+            && let Some(quick) = self.quick(&uv, &xyz, limit)
+        {
+            return quick;
         }
         let flat = Flat::new(&xyz);
         let third = 1.0 / 3.0;
@@ -91,6 +98,9 @@ impl<'s, 'a> Prover<'s, 'a> {
             let at = |k: i32| from_line(self.sheet.point(uv[0].lerp(uv[1], k as f64 / 16.0)), &xyz);
             return (1..16).map(at).fold(0.0, f64::max);
         }
+        if let Some(quick) = self.quick(&uv, &xyz, limit) {
+            return quick;
+        }
         self.pieces(&uv, |this, a, b, polygon| {
             let patch = this.sheet.patch(a, b);
             if polygon.len() < 2 {
@@ -101,14 +111,30 @@ impl<'s, 'a> Prover<'s, 'a> {
         }) + self.margin
     }
 
+    /// Bound of the distance of a piece of surface from the triangle or chord between places near its corners, by second
+    /// derivatives; `None` above the limit.
+    fn quick(&self, uv: &[Uv], xyz: &[Point], limit: f64) -> Option<f64> {
+        let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
+        let bound = self.sheet.bends.bound(a, b, hi - lo).filter(|&x| x <= limit)?;
+        let off = uv.iter().zip(xyz).map(|(&x, &p)| (self.sheet.point(x) - p).length()).fold(0.0, f64::max);
+        Some(bound + off + self.margin).filter(|&x| x <= limit)
+    }
+
+    /// First and last knot interval that `[x, y]` meets.
+    fn range(&self, d: usize, x: f64, y: f64) -> [usize; 2] {
+        let (a, mut b) = (self.sheet.interval(d, x), self.sheet.interval(d, y));
+        if b > a && self.sheet.breaks[d][b] >= y {
+            b -= 1;
+        }
+        [a, b]
+    }
+
     /// Largest result over the knot rectangles that a segment or triangle meets.
     fn pieces(&mut self, uv: &[Uv], mut each: impl FnMut(&mut Self, usize, usize, &[Uv]) -> f64) -> f64 {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let range = |d: usize, x: f64, y: f64| {
-            let (a, mut b) = (self.sheet.interval(d, x), self.sheet.interval(d, y));
-            if b > a && self.sheet.breaks[d][b] >= y {
-                b -= 1;
-            }
+            let [a, b] = self.range(d, x, y);
             a..=b
         };
         let (ra, rb) = (range(0, lo.x, hi.x), range(1, lo.y, hi.y));

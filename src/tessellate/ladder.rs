@@ -51,7 +51,8 @@ pub(super) fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> 
         steps = even(sheet, root, d);
     }
     steps.sort_by(f64::total_cmp);
-    steps.dedup_by(|b, a| *b - *a <= 1e-9 * (hi - lo));
+    // Where a uv curve jumps, the edge has hundreds of samples in one place; columns of cells between them would cross the face.
+    steps.dedup_by(|b, a| *b - *a <= 1e-4 * (hi - lo));
     steps.retain(|&x| x > lo && x < hi);
     steps
 }

@@ -14,6 +14,7 @@
 //! its surface than the tolerance keeps that gap.
 
 mod assemble;
+mod bend;
 mod bound;
 mod cells;
 mod edges;

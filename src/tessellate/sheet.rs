@@ -1,3 +1,4 @@
+use super::bend::Bends;
 use super::settings::Field;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, Surface};
@@ -11,6 +12,7 @@ pub(super) struct Sheet<'a> {
     /// Whether the surface is an affine image of its parameters, so that any facet lies in it.
     pub(super) affine: bool,
     patches: Vec<BezierPatch>,
+    pub(super) bends: Bends,
     /// Distinct knots in u and v.
     pub(super) breaks: [Vec<f64>; 2],
     /// Parameters with a crease or corner of the surface, in u and v.
@@ -29,7 +31,8 @@ impl<'a> Sheet<'a> {
         });
         let creases = [creases(surface, 0, &breaks), creases(surface, 1, &breaks)];
         let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
-        Self { surface, field, flip, affine: is_affine(surface, size), patches, breaks, creases, size }
+        let bends = Bends::new(surface, &patches, &breaks);
+        Self { surface, field, flip, affine: is_affine(surface, size), patches, bends, breaks, creases, size }
     }
 
     /// Index of the knot interval that holds `x`.
