@@ -50,12 +50,12 @@ impl<'s, 'a> Prover<'s, 'a> {
             let off = [0, 1, 2].map(|i| Flat::new(&xyz).distance(self.sheet.point(uv[i])));
             return off[0].max(off[1]).max(off[2]) + self.margin;
         }
+        let flat = Flat::new(&xyz);
         if self.judge == Judge::Bound
-            && let Some(quick) = self.quick(&uv, &xyz, limit)
+            && let Some(quick) = self.quick(&uv, limit, |p| flat.distance(p))
         {
             return quick;
         }
-        let flat = Flat::new(&xyz);
         let third = 1.0 / 3.0;
         let probes = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [third; 3]];
         let mut sampled = 0f64;
@@ -98,7 +98,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             let at = |k: i32| from_line(self.sheet.point(uv[0].lerp(uv[1], k as f64 / 16.0)), &xyz);
             return (1..16).map(at).fold(0.0, f64::max);
         }
-        if let Some(quick) = self.quick(&uv, &xyz, limit) {
+        if let Some(quick) = self.quick(&uv, limit, |p| from_line(p, &xyz)) {
             return quick;
         }
         self.pieces(&uv, |this, a, b, polygon| {
@@ -111,13 +111,13 @@ impl<'s, 'a> Prover<'s, 'a> {
         }) + self.margin
     }
 
-    /// Bound of the distance of a piece of surface from the triangle or chord between places near its corners, by second
-    /// derivatives; `None` above the limit.
-    fn quick(&self, uv: &[Uv], xyz: &[Point], limit: f64) -> Option<f64> {
+    /// Bound of a convex distance over a piece of surface: the largest at its corners, which holds for the flat triangle between
+    /// them, and the deviation from that by second derivatives; `None` above the limit.
+    fn quick(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
         let bound = self.sheet.bends.bound(a, b, hi - lo).filter(|&x| x <= limit)?;
-        let off = uv.iter().zip(xyz).map(|(&x, &p)| (self.sheet.point(x) - p).length()).fold(0.0, f64::max);
+        let off = uv.iter().map(|&x| away(self.sheet.point(x))).fold(0.0, f64::max);
         Some(bound + off + self.margin).filter(|&x| x <= limit)
     }
 
