@@ -14,8 +14,9 @@ impl Box32 {
 
     pub(super) fn union(&mut self, other: &Self) {
         for a in 0..3 {
-            self.low[a] = self.low[a].min(other.low[a]);
-            self.high[a] = self.high[a].max(other.high[a]);
+            // One instruction each: `f32::min` takes three for the sake of NaN, which boxes never hold.
+            self.low[a] = if other.low[a] < self.low[a] { other.low[a] } else { self.low[a] };
+            self.high[a] = if other.high[a] > self.high[a] { other.high[a] } else { self.high[a] };
         }
     }
 

@@ -4,14 +4,14 @@
 //! against the cells they meet. Under a leaf cell facets are packed by the surface-area heuristic into blocks of four
 //! quads; sparse octants are merged until a node has up to eight children, whose boxes are eight-bit, relative to the
 //! node, tight to the clipped geometry and rounded outward. Blocks hold corners in 16 bits and only *sort out*, with
-//! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of the room. Rays of a
-//! batch are walked sixteen at a time, each prefetching while the others compute.
+//! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of the room. Thirty-two rays of
+//! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
 //!
 //! Sources: the octree after Revelles, Ureña, Lastra, *An Efficient Parametric Algorithm for Octree Traversal*, WSCG
 //! 2000 (cells), and Ylitie, Karras, Laine, HPG 2017 (compressed wide nodes).
 //!
 //! Guarantee: the hit is the nearest of all facets, of equal ones that on the facet of lowest index; the same bits for a
-//! single ray and a batch, for any number of threads at build or query, with and without AVX2.
+//! single ray and a batch, for any number of threads at build or query, with AVX-512, AVX2 or neither.
 //! Weakness: facets with corners that are no finite numbers are left out; building takes longer than Embree's.
 
 #[cfg(target_arch = "x86_64")]
