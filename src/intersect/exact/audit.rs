@@ -78,6 +78,14 @@ impl Audit {
                 a.doubtful |= same && b.doubtful;
                 same
             });
+            // Crossings that come down to boxes side by side are one that rounding smears, or a grazing pair.
+            let smeared = |a: &AuditHit, b: &AuditHit| b.t - a.t < 1e-7;
+            for k in 1..own.len() {
+                if smeared(&own[k - 1], &own[k]) {
+                    own[k - 1].doubtful = true;
+                    own[k].doubtful = true;
+                }
+            }
             own.retain(|h| {
                 let leaving = ray.from.is_some_and(|f| f.face == h.face && h.t.abs() < 1e-7);
                 !leaving && h.t >= ray.t_min && h.t <= ray.t_max && face.holds(h.uv)
