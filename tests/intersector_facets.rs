@@ -350,7 +350,9 @@ fn normals_converge_with_the_mesh() {
     for (mode, order) in orders {
         let (coarse, fine) = (normal_error(20, mode), normal_error(40, mode));
         let reached = (coarse / fine).log2();
-        assert!((reached - order).abs() < 0.25, "{mode:?}: order {reached}, {coarse} to {fine}");
+        // The cubic patch is of a higher order still where the ray is followed to it.
+        let most = if mode == NormalMode::Cubic { 5.0 } else { order + 0.25 };
+        assert!(reached > order - 0.25 && reached < most, "{mode:?}: order {reached}, {coarse} to {fine}");
     }
 }
 

@@ -63,6 +63,7 @@ fn settings() -> Settings {
         rounds: 1,
         threads: vec![1],
         seed: 3,
+        seconds_after: 0.0,
     }
 }
 

@@ -80,7 +80,7 @@ fn overrides_hold_for_their_part_entity_or_role_alone() {
     let model = model("lamp_multicavity.stp");
     let plain = tessellate(&model, &Settings::uniform(0.2)).report.facets;
     let run = |place: Place| {
-        let overrides = vec![Override { place, tolerance: [0.03; 2] }];
+        let overrides = vec![Override { place, tolerance: [0.03; 2], radii: None }];
         tessellate(&model, &Settings { overrides, ..Settings::uniform(0.2) })
     };
     let faces: Vec<_> = model.placed_faces().collect();

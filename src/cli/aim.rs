@@ -2,42 +2,113 @@
 
 use super::Failure;
 use super::context::Context;
-use super::options::{self, Meshing, NormalKind, Tracing};
-use crate::intersect::NormalMode;
+use super::options::{self, IntersectorKind, Meshing, NormalKind, Tracing};
+use super::witness::Witness;
+use crate::intersect::{Intersector, NormalMode};
+use crate::math::Ray;
 use crate::model::Model;
-use crate::study::aim::{Ask, aim};
+use crate::simulate::{RunSettings, Scene, simulate};
+use crate::study::Product;
+use crate::study::aim::{Aim, Ask, aim, aim_at};
 
-/// The options with tolerance and normals put in that reach what was asked; unchanged when nothing was asked.
+/// The options with tolerances and normals put in that reach what was asked, and how that went; unchanged when nothing was asked.
+/// With a scene, its own rays are what the accuracy is about.
 pub(super) fn meshing(
     asked: Option<&str>,
-    meshing: &Meshing,
-    tracing: &Tracing,
+    (meshing, tracing): (&Meshing, &Tracing),
+    scene: Option<&Scene>,
     model: &Model,
     context: &Context,
-) -> Result<(Meshing, Tracing), Failure> {
+) -> Result<(Meshing, Tracing, Option<Aim>), Failure> {
+    let Some(mut ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), tracing.clone(), None)) };
     let (mut meshing, mut tracing) = (meshing.clone(), tracing.clone());
-    let Some(text) = asked else { return Ok((meshing, tracing)) };
-    let degrees = options::accuracy(text).map_err(|e| Failure::arguments(format!("--accuracy {text}: {e}")))?;
-    let mut ask = Ask::degrees(degrees);
-    if let Some(rays) = tracing.rays {
-        ask.job_rays = rays as f64;
+    let choice = super::engine::Choice::new(&tracing, scene)?;
+    if choice.intersector == IntersectorKind::Exact {
+        let failure = Failure::arguments("--accuracy with the exact intersector: there is nothing to choose");
+        return Err(failure.help("leave out --accuracy, or the intersector"));
     }
     ask.seed = tracing.seed.unwrap_or(ask.seed);
+    ask.job_rays = tracing.rays.or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
+    if let Some(normals) = tracing.normals {
+        ask.kinds = vec![mode(normals)];
+    }
+    let product = Product::new(model);
     let bar = context.bar("aiming", "%", 100);
-    let found = aim(model, &crate::study::Product::new(model), &ask, &|p| {
-        bar.set_position((100.0 * p.done) as u64);
-    });
+    let progress = |p: crate::study::Progress| bar.set_position((100.0 * p.done) as u64);
+    let found = match scene {
+        None => aim(model, &product, &ask, &progress),
+        Some(scene) => {
+            let bound = scene.bind(model)?;
+            let rays = |seed: u64, count: u64| {
+                let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
+                rays_of(&product, model, &settings, &bound)
+            };
+            aim_at(model, &product, &ask, &rays, &progress)
+        }
+    };
     bar.finish_and_clear();
     context.say(&found.answer);
-    meshing.tolerance = Some([found.tolerance_mm; 2]);
-    if tracing.normals.is_none() {
-        tracing.normals = Some(match found.normals {
-            NormalMode::Flat => NormalKind::Flat,
-            NormalMode::Nearest => NormalKind::Nearest,
-            NormalMode::Bilinear => NormalKind::Bilinear,
-            NormalMode::Cubic => NormalKind::Cubic,
-            NormalMode::Exact => NormalKind::Exact,
-        });
+    meshing.plan = Some(found.plan.clone());
+    tracing.normals = Some(kind(found.normals));
+    Ok((meshing, tracing, Some(found)))
+}
+
+/// The same for facets alone, whose readers interpolate the normals of their corners.
+pub(super) fn facets(
+    asked: Option<&str>,
+    meshing: &Meshing,
+    model: &Model,
+    context: &Context,
+) -> Result<(Meshing, Option<Aim>), Failure> {
+    let Some(ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), None)) };
+    let ask = Ask { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
+    let bar = context.bar("aiming", "%", 100);
+    let found = aim(model, &Product::new(model), &ask, &|p| bar.set_position((100.0 * p.done) as u64));
+    bar.finish_and_clear();
+    context.say(&found.answer);
+    Ok((Meshing { plan: Some(found.plan.clone()), ..meshing.clone() }, Some(found)))
+}
+
+fn ask(asked: Option<&str>, meshing: &Meshing) -> Result<Option<Ask>, Failure> {
+    let Some(text) = asked else { return Ok(None) };
+    let degrees = options::accuracy(text).map_err(|e| Failure::arguments(format!("--accuracy {text}: {e}")))?;
+    if meshing.tolerance.is_some() {
+        let failure = Failure::arguments("--accuracy and --tolerance both say how fine the facets are to be");
+        return Err(failure.help("leave one of them out; --part NAME=MIN..MAX may stand beside --accuracy"));
     }
-    Ok((meshing, tracing))
+    Ok(Some(Ask::degrees(degrees)))
+}
+
+/// Rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as asked.
+fn rays_of(
+    product: &Product<'_>,
+    model: &Model,
+    settings: &RunSettings,
+    bound: &crate::simulate::BoundScene,
+) -> Vec<Ray> {
+    let exact: &dyn Intersector = product.spline();
+    let witness = Witness::new(exact, settings.rays, settings.rays);
+    simulate(bound, &witness, settings, &|_| true);
+    // Facets lie at most 0.8 mm off the surface here.
+    witness.rays(settings.rays as usize, model, 1.0)
+}
+
+fn mode(kind: NormalKind) -> NormalMode {
+    match kind {
+        NormalKind::Flat => NormalMode::Flat,
+        NormalKind::Nearest => NormalMode::Nearest,
+        NormalKind::Bilinear => NormalMode::Bilinear,
+        NormalKind::Cubic => NormalMode::Cubic,
+        NormalKind::Exact => NormalMode::Exact,
+    }
+}
+
+fn kind(mode: NormalMode) -> NormalKind {
+    match mode {
+        NormalMode::Flat => NormalKind::Flat,
+        NormalMode::Nearest => NormalKind::Nearest,
+        NormalMode::Bilinear => NormalKind::Bilinear,
+        NormalMode::Cubic => NormalKind::Cubic,
+        NormalMode::Exact => NormalKind::Exact,
+    }
 }

@@ -49,7 +49,8 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
     let model = &loaded.model;
-    let (meshing, tracing) = aim::meshing(asked.accuracy, asked.meshing, asked.tracing, model, context)?;
+    let options = (asked.meshing, asked.tracing);
+    let (meshing, tracing, aimed) = aim::meshing(asked.accuracy, options, scene, model, context)?;
     let settings = engine::mesh_settings(&meshing, scene, model)?;
     let (made, _) = engine::facets(model, &settings, context);
     let mesh = &made.mesh;
@@ -68,14 +69,14 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let exact = Exact::build(model, &Default::default());
     let polish = Polished::new(&octree, mesh, &exact);
     spinner.finish_and_clear();
-    let lift = 4.0 * settings.tolerance[1];
+    let lift = 4.0 * settings.loosest();
     let rays = match given {
         Some(rays) => rays,
         None => own_rays(scene, model, mesh, &octree, &tracing, lift)?,
     };
     let bar = context.bar("judging", "rays", rays.len() as u64);
     let court = Court { model, mesh, octree: &octree, bvh: &cwbvh, exact: &exact };
-    let band = check::Settings { fallback_band_mm: settings.tolerance[1], ..Default::default() };
+    let band = check::Settings { fallback_band_mm: settings.loosest(), ..Default::default() };
     let total = rays.len() as f64;
     let mut found = check::check(&court, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
     bar.finish_and_clear();
@@ -134,6 +135,9 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         let mut document = serde_json::to_value(&found).map_err(wrong)?;
         if scene.is_some() {
             document["receivers"] = serde_json::to_value(&pairs).map_err(wrong)?;
+        }
+        if let Some(aimed) = &aimed {
+            document["accuracy"] = serde_json::to_value(aimed).map_err(wrong)?;
         }
         print(&(serde_json::to_string_pretty(&document).map_err(wrong)? + "\n"))?;
     } else {

@@ -32,7 +32,7 @@ pub(super) fn run(
         context.say(format_args!("  {name:<12} {what:<58} {:>9}", seconds(time)));
     };
     step_of("read", format!("{faces} faces of {} parts", loaded.model.parts.len()), loaded.seconds);
-    let job = Job { scene: &scene, loaded: &loaded, meshing, tracing, recheck: 10_000 };
+    let job = Job { scene: &scene, loaded: &loaded, meshing, tracing, recheck: 10_000, aimed: None };
     let prepared = job::prepare(job, context)?;
     let mesh = &prepared.tessellation.mesh;
     let [low, high] = prepared.mesh_settings.tolerance;

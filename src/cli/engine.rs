@@ -72,13 +72,17 @@ pub(super) fn mesh_settings(
         settings.tolerance = range;
     }
     settings.angle_deg = meshing.angle.or(accuracy.and_then(|a| a.angle_deg));
+    if let Some(plan) = &meshing.plan {
+        plan.apply(&mut settings);
+    }
     for (name, tolerance) in &meshing.part {
         if !model.parts.iter().any(|p| p.name == *name) {
             let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
             return Err(Failure::arguments(format!("--part {name}: the model has no part of this name"))
                 .help(super::suggest::names("its parts are", name, &known)));
         }
-        settings.overrides.push(Override { place: Place::Part(name.clone()), tolerance: *tolerance });
+        let place = Place::Part(name.clone());
+        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
     }
     Ok(settings)
 }

@@ -2,7 +2,7 @@
 
 use super::args::Refusals;
 use super::context::{Context, print};
-use super::options::{Meshing, Tracing};
+use super::options::Meshing;
 use super::{Failure, Outcome, aim, engine, load, look, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
 use crate::kernel::baseline;
@@ -35,7 +35,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     }
     engine::threads(asked.threads)?;
     let loaded = load::model_file(asked.file, context)?;
-    let (meshing, _) = aim::meshing(asked.accuracy, asked.meshing, &Tracing::default(), &loaded.model, context)?;
+    let (meshing, aimed) = aim::facets(asked.accuracy, asked.meshing, &loaded.model, context)?;
     let mut settings = engine::mesh_settings(&meshing, None, &loaded.model)?;
     settings.measure = true;
     let (mut made, _) = engine::facets(&loaded.model, &settings, context);
@@ -59,8 +59,10 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
             report: &'r Report,
             #[serde(skip_serializing_if = "Option::is_none")]
             baseline: Option<Baseline>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            accuracy: Option<crate::study::aim::Aim>,
         }
-        let both = Both { report: &made.report, baseline };
+        let both = Both { report: &made.report, baseline, accuracy: aimed };
         let text = serde_json::to_string_pretty(&both).map_err(|e| Failure::running(e.to_string()))?;
         print(&(text + "\n"))?;
     } else {

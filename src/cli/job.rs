@@ -19,6 +19,7 @@ use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, Results, RunSettings, Scene, Traced, Verification,
     replay, trace, verify_pruning,
 };
+use crate::study::aim::Aim;
 use crate::study::check::{self, Check, Court, check};
 use crate::tessellate::{self, Tessellation};
 use std::path::{Path, PathBuf};
@@ -31,6 +32,8 @@ pub(super) struct Job<'a> {
     pub(super) tracing: &'a Tracing,
     /// Rays of the run to ask again of BVH and spline; 0 for none.
     pub(super) recheck: usize,
+    /// How an accuracy that was asked for was reached.
+    pub(super) aimed: Option<&'a Aim>,
 }
 
 /// A job whose scene fits its model and whose facets are made.
@@ -117,7 +120,7 @@ impl Prepared<'_> {
                 let step = (settings.rays / traced.max(1)).max(1);
                 replay(&self.bound, &witness, &settings, &(0..traced).map(|k| k * step).collect::<Vec<_>>());
             }
-            let rays = witness.rays(self.job.recheck, model, 4.0 * self.mesh_settings.tolerance[1]);
+            let rays = witness.rays(self.job.recheck, model, 4.0 * self.mesh_settings.loosest());
             let check = (!rays.is_empty()).then(|| self.court(intersector, &rays, context));
             Outcome { results, check, verification }
         })
@@ -182,7 +185,7 @@ impl Prepared<'_> {
         let bar = context.bar("checking", "rays", rays.len() as u64);
         let court = Court { model, mesh, octree, bvh: &bvh, exact: &exact };
         let settings =
-            check::Settings { fallback_band_mm: self.mesh_settings.tolerance[1], ..check::Settings::default() };
+            check::Settings { fallback_band_mm: self.mesh_settings.loosest(), ..check::Settings::default() };
         let total = rays.len() as f64;
         let found = check(&court, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
         bar.finish_and_clear();
@@ -224,6 +227,9 @@ impl Prepared<'_> {
         }
         if let Some(check) = &outcome.check {
             document["check"] = serde_json::to_value(check).map_err(|e| Failure::running(e.to_string()))?;
+        }
+        if let Some(aimed) = self.job.aimed {
+            document["accuracy"] = serde_json::to_value(aimed).map_err(|e| Failure::running(e.to_string()))?;
         }
         let provenance = context.provenance(Some(self.run_settings().seed), self.threads);
         document["provenance"] = serde_json::to_value(&provenance).map_err(|e| Failure::running(e.to_string()))?;

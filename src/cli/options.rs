@@ -15,6 +15,9 @@ pub(crate) struct Meshing {
     /// Tolerance of one part, by name; may be given several times
     #[arg(long, value_name = "NAME=MIN..MAX", value_parser = part)]
     pub(crate) part: Vec<(String, [f64; 2])>,
+    /// Local tolerances that an accuracy came to.
+    #[arg(skip)]
+    pub(crate) plan: Option<crate::study::aim::Plan>,
 }
 
 /// Options of everything that traces.

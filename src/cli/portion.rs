@@ -59,6 +59,8 @@ impl Header {
             tolerance: self.tolerance.map(back),
             angle: self.angle.map(f64::from_bits),
             part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            // Parts are not traced with an accuracy asked for.
+            plan: None,
         }
     }
 
@@ -235,6 +237,7 @@ pub(super) fn merge(parts: &[PathBuf], folder: &Path, context: &Context) -> Resu
             meshing: &meshing,
             tracing: &tracing,
             recheck: super::trace::RECHECKED,
+            aimed: None,
         },
         context,
     )?;

@@ -33,16 +33,26 @@ pub(super) struct Asked<'a> {
     pub(super) tracing: &'a Tracing,
 }
 
+/// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
+const LIT_RAYS: u64 = 200_000;
+
 /// Rows with the sentence that the study made of them.
 struct Found {
     rows: Value,
     answer: String,
+    /// More rows, by name.
+    beside: Vec<(&'static str, Value)>,
 }
 
 impl Found {
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
         let rows = serde_json::to_value(rows).map_err(|e| Failure::running(e.to_string()))?;
-        Ok(Self { rows, answer: answer.into() })
+        Ok(Self { rows, answer: answer.into(), beside: Vec::new() })
+    }
+
+    fn beside(mut self, name: &'static str, rows: &impl Serialize) -> Result<Self, Failure> {
+        self.beside.push((name, serde_json::to_value(rows).map_err(|e| Failure::running(e.to_string()))?));
+        Ok(self)
     }
 }
 
@@ -66,7 +76,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     };
     bar.finish_and_clear();
     let provenance = context.provenance(Some(seed), threads);
-    let document = json!({
+    let mut document = json!({
         "study": asked.kind.name(),
         "command": provenance.command,
         "version": provenance.version,
@@ -76,6 +86,9 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         "answer": found.answer,
         "rows": found.rows,
     });
+    for (name, rows) in found.beside {
+        document[name] = rows;
+    }
     let folder = asked.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", asked.kind.name()).into());
     std::fs::create_dir_all(&folder)
         .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
@@ -123,15 +136,22 @@ fn model_of(file: Option<&Path>, context: &Context) -> Result<(Option<Scene>, Lo
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
-    let (_, loaded, name) = model_of(asked.file, context)?;
+    let (scene, loaded, name) = model_of(asked.file, context)?;
     let product = Product::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = asked.meshing.tolerance {
         settings.tolerances = vec![range];
     }
     settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
-    let study = accuracy::accuracy(&name, &product, &settings, progress);
-    Found::new(&study.rows, study.answer)
+    let Some(scene) = scene else {
+        let study = accuracy::accuracy(&name, &product, &settings, progress);
+        return Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes);
+    };
+    let bound = scene.bind(&loaded.model)?;
+    let own = RunSettings::from(&scene.run);
+    let run = RunSettings { rays: own.rays.min(LIT_RAYS), seed, threads: 0, path_samples: 0, ..own };
+    let (study, light) = study::accuracy_of_scene(&name, &product, (&bound, &run), &settings, progress);
+    Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes)?.beside("receivers", &light)
 }
 
 /// Where on the surface the normals err, on facets of the tolerance asked for.

@@ -263,7 +263,7 @@ impl<'m> Bvh<'m> {
 
 impl Intersector for Bvh<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
-        self.nearest(ray, cost).map(|hit| normals::describe(self.around.mesh, &hit, self.normals))
+        self.nearest(ray, cost).map(|hit| normals::describe(self.around.mesh, ray, &hit, self.normals))
     }
 
     fn footprint(&self) -> Footprint {

@@ -18,6 +18,7 @@ mod errors;
 pub mod interpolation;
 pub mod judge;
 pub mod lamp;
+mod lit;
 mod product;
 mod quantiles;
 mod random;
@@ -29,6 +30,7 @@ pub mod stability;
 mod timing;
 mod workshop;
 
+pub use lit::accuracy_of_scene;
 pub use product::Product;
 pub use quantiles::{Quantiles, Summary};
 pub use random::Random;

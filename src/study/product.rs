@@ -1,3 +1,4 @@
+use super::aim::Plan;
 use super::workshop::{Meshed, Tree, Workshop};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
@@ -29,6 +30,17 @@ impl<'a> Product<'a> {
         Self { mesher: tessellate::Settings { measure: true, ..product.mesher }, ..product }
     }
 
+    fn made(&self, settings: &tessellate::Settings) -> Meshed {
+        let made = tessellate(self.model, settings);
+        let sag = made.report.sag_mm;
+        Meshed {
+            mesh: made.mesh,
+            seconds: made.report.seconds.tessellate,
+            sag_mean: sag.sampled_mean.unwrap_or(sag.bound_max),
+            sag_max: sag.sampled_max.unwrap_or(sag.bound_max),
+        }
+    }
+
     /// The model.
     pub fn model(&self) -> &'a Model {
         self.model
@@ -42,16 +54,14 @@ impl<'a> Product<'a> {
 
 impl Workshop for Product<'_> {
     fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
-        let made = tessellate(self.model, &tessellate::Settings { tolerance, ..self.mesher.clone() });
-        let sag = made.report.sag_mm;
-        Meshed {
-            mesh: made.mesh,
-            seconds: made.report.seconds.tessellate,
-            sag_mean: sag.sampled_mean.unwrap_or(sag.bound_max),
-            sag_max: sag.sampled_max.unwrap_or(sag.bound_max),
-        }
+        self.made(&tessellate::Settings { tolerance, ..self.mesher.clone() })
     }
 
+    fn mesh_plan(&self, plan: &Plan) -> Meshed {
+        let mut settings = self.mesher.clone();
+        plan.apply(&mut settings);
+        self.made(&settings)
+    }
     fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
         match tree {
             Tree::Octree => Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() })),

@@ -4,6 +4,8 @@
 //! facets turn them away: the difference of the two maps is the facets' doing, and most of the noise cancels. What the noise
 //! would be comes from the spread over the run's replicates.
 
+use super::Progress;
+use super::timing::Countdown;
 use super::workshop::{Tree, Workshop, normals_name, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{
@@ -11,6 +13,7 @@ use crate::simulate::{
 };
 use serde::Serialize;
 use std::sync::Mutex;
+use std::time::Instant;
 
 /// One receiver under one combination.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -114,33 +117,49 @@ fn by_replicate(
     (results, by)
 }
 
-/// Traces a scene on the spline once and on facets for every combination.
+/// Traces a scene on the spline once and on facets for every combination. `begun` is when the whole study began.
 pub fn receivers(
     name: &str,
     bound: &BoundScene,
     workshop: &dyn Workshop,
     combinations: &[(f64, NormalMode)],
     settings: &RunSettings,
+    (begun, progress): (Instant, &(dyn Fn(Progress) + Sync)),
 ) -> Vec<Row> {
+    let mut countdown = Countdown::since(begun, progress);
+    let start = Instant::now();
     let truth = simulate(bound, workshop.exact(), settings, &|_| true);
     let mut rows = Vec::new();
-    for &(tolerance, normals) in combinations {
+    for of_one in combinations.chunk_by(|a, b| a.0 == b.0) {
+        let tolerance = of_one[0].0;
+        // The last tolerances take longer; those so far are all that is known.
+        let left = combinations.len() - rows.len() / truth.receivers.len().max(1);
+        let each = start.elapsed().as_secs_f64() / (combinations.len() - left + 1) as f64;
+        countdown.stage(&format!("receivers at {tolerance} mm"), Some(each * left as f64));
         let meshed = workshop.mesh([tolerance; 2]);
-        let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &[normals], |trees| {
-            simulate(bound, trees[0].2, settings, &|_| true)
+        let normals: Vec<NormalMode> = of_one.iter().map(|c| c.1).collect();
+        let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &normals, |trees| {
+            let run = |tree: &(Tree, NormalMode, &dyn Intersector)| {
+                countdown.tick();
+                simulate(bound, tree.2, settings, &|_| true)
+            };
+            trees.iter().map(run).collect::<Vec<_>>()
         });
-        for (f, e) in found.receivers.iter().zip(&truth.receivers) {
-            rows.push(Row {
-                scene: name.into(),
-                tolerance_mm: tolerance,
-                normals: normals_name(normals).into(),
-                rays: found.rays,
-                seconds_trace: found.seconds.trace,
-                seconds_trace_exact: truth.seconds.trace,
-                ..split(f, e)
-            });
+        for (found, normals) in found.iter().zip(&normals) {
+            for (f, e) in found.receivers.iter().zip(&truth.receivers) {
+                rows.push(Row {
+                    scene: name.into(),
+                    tolerance_mm: tolerance,
+                    normals: normals_name(*normals).into(),
+                    rays: found.rays,
+                    seconds_trace: found.seconds.trace,
+                    seconds_trace_exact: truth.seconds.trace,
+                    ..split(f, e)
+                });
+            }
         }
     }
+    countdown.stage("done", Some(0.0));
     rows
 }
 

@@ -94,13 +94,39 @@ impl<'a> Clock<'a> {
         let remaining_seconds = (done > 0.01).then(|| elapsed * (1.0 - done).max(0.0) / done);
         (self.report)(Progress { stage: stage.into(), done, remaining_seconds });
     }
+}
 
-    /// Reports a stage with a forecast of the seconds still to come; 0 stands for "not known yet".
-    pub(super) fn forecast(&self, stage: &str, ahead: f64) {
+/// Reports progress from a forecast that is renewed stage by stage and runs down in between.
+pub(super) struct Countdown<'a> {
+    start: Instant,
+    report: &'a (dyn Fn(Progress) + Sync),
+    stage: String,
+    since: Instant,
+    ahead: Option<f64>,
+}
+
+impl<'a> Countdown<'a> {
+    pub(super) fn new(report: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        Self::since(Instant::now(), report)
+    }
+
+    /// Of work that began earlier.
+    pub(super) fn since(start: Instant, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
+        Self { start, report, stage: String::new(), since: start, ahead: None }
+    }
+
+    /// A stage begins, with the seconds of it and all after it; `None` for "not known yet".
+    pub(super) fn stage(&mut self, stage: &str, ahead: Option<f64>) {
+        (self.stage, self.since, self.ahead) = (stage.into(), Instant::now(), ahead);
+        self.tick();
+    }
+
+    /// Some time has passed.
+    pub(super) fn tick(&self) {
         let elapsed = self.start.elapsed().as_secs_f64();
-        let known = ahead > 0.0;
-        let done = if known { elapsed / (elapsed + ahead) } else { 0.0 };
-        (self.report)(Progress { stage: stage.into(), done, remaining_seconds: known.then_some(ahead) });
+        let left = self.ahead.map(|a| (a - self.since.elapsed().as_secs_f64()).max(0.0));
+        let done = left.map_or(0.0, |left| if left > 0.0 { elapsed / (elapsed + left) } else { 1.0 });
+        (self.report)(Progress { stage: self.stage.clone(), done, remaining_seconds: left });
     }
 }
 

@@ -1,3 +1,4 @@
+use super::aim::Plan;
 use crate::intersect::{Cost, Hit, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::mesh::FacetMesh;
@@ -41,6 +42,10 @@ impl Tree {
 pub trait Workshop: Sync {
     /// Facets within a tolerance `[min, max]`, mm.
     fn mesh(&self, tolerance: [f64; 2]) -> Meshed;
+    /// Facets within the local tolerances of a plan; without a mesher that can do so, within the least of them everywhere.
+    fn mesh_plan(&self, plan: &Plan) -> Meshed {
+        self.mesh([plan.tolerance_mm()[0]; 2])
+    }
     /// A structure over facets whose hits carry normals of that kind (`Exact` is [`Workshop::polish`]'s).
     fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
     /// A structure over facets with its hits moved to the spline.

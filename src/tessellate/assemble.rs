@@ -40,8 +40,11 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         .enumerate()
         .map(|(k, f)| {
             let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
-            let tolerance = tolerance(settings, part, f, &placed);
-            usable(f).then(|| Sheet::new(&f.surface, f.reversed, Field::new(tolerance, settings.radii, scale)))
+            let (tolerance, radii) = tolerance(settings, part, f, &placed);
+            usable(f).then(|| {
+                let field = Field::new(tolerance, radii, settings.law, scale);
+                Sheet::new(&f.surface, f.reversed, field)
+            })
         })
         .collect();
     let mut denser = vec![0u32; part.edges.len()];
@@ -96,14 +99,15 @@ fn usable(face: &Face) -> bool {
     points && u0 < u1 && v0 < v1 && (u1 - u0).is_finite() && (v1 - v0).is_finite()
 }
 
-fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> [f64; 2] {
+fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> ([f64; 2], [f64; 2]) {
     let matches = |place: &Place| match place {
         Place::Part(name) => *name == part.name,
         Place::Face(name) => *name == face.name,
         Place::Entity(id) => face.entity == Some(*id),
         Place::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
     };
-    settings.overrides.iter().rev().find(|o| matches(&o.place)).map_or(settings.tolerance, |o| o.tolerance)
+    let found = settings.overrides.iter().rev().find(|o| matches(&o.place));
+    found.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
 }
 
 /// Puts every instance's facets where they belong.

@@ -296,7 +296,7 @@ mod tests {
     #[test]
     fn a_strip_of_a_cylinder_has_its_closed_form_sag() {
         let s = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 40.0]);
-        let sheet = Sheet::new(&s, false, Field::new([0.1; 2], [1.0, 10.0], 1.0));
+        let sheet = Sheet::new(&s, false, Field::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
         let [a, b] = [0.4, 0.9].map(|phi| crate::nurbs::conic::parameter_of_angle([0.0, 3.0], phi));
         let uv = [Uv::new(a, 0.0), Uv::new(b, 0.0), Uv::new(b, 40.0)];
         let xyz = uv.map(|x| s.evaluate(x));

@@ -38,7 +38,7 @@ mod trim;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 pub use report::{FaceCounts, Percentiles, Report, Sag, ShellCounts, ToleranceRange, sampled_sag};
-pub use settings::{Judge, Override, Place, Settings};
+pub use settings::{Judge, Law, Override, Place, Settings};
 
 /// What [`tessellate`] makes.
 #[derive(Clone, Debug, Default)]

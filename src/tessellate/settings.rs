@@ -10,6 +10,8 @@ pub struct Settings {
     /// deviation of every fixture under 0.08 mm with half the facets of a uniform 0.05 mm; with 5 and 100 mm the shallow freeform
     /// reflector has 0.096 mm.
     pub radii: [f64; 2],
+    /// How the tolerance runs between the two radii.
+    pub law: Law,
     /// Largest angle between a facet and the surface normals at its corners, degrees; `None` for no such condition.
     pub angle_deg: Option<f64>,
     /// Other tolerances for some places; of several that match a face, the last counts.
@@ -29,6 +31,19 @@ pub struct Override {
     pub place: Place,
     /// As [`Settings::tolerance`].
     pub tolerance: [f64; 2],
+    /// As [`Settings::radii`], where the place needs its own.
+    pub radii: Option<[f64; 2]>,
+}
+
+/// How the tolerance runs between the radii of [`Settings::radii`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Law {
+    /// Smoothly with the logarithm of the radius.
+    #[default]
+    Smooth,
+    /// As a power of the radius; in proportion to it where the tolerances stand to each other as the radii do. A mirror of
+    /// radius R with interpolated normals misdirects light by sag over R, so that such a tolerance means the same angle everywhere.
+    Power,
 }
 
 /// Selects faces.
@@ -61,6 +76,7 @@ impl Default for Settings {
         Self {
             tolerance: [0.05, 0.2],
             radii: [5.0, 300.0],
+            law: Law::Smooth,
             angle_deg: None,
             overrides: Vec::new(),
             budget: 400_000,
@@ -75,6 +91,12 @@ impl Settings {
     pub fn uniform(tolerance: f64) -> Self {
         Self { tolerance: [tolerance; 2], ..Self::default() }
     }
+
+    /// The largest tolerance anywhere, mm.
+    pub fn loosest(&self) -> f64 {
+        let all = self.overrides.iter().map(|o| o.tolerance).chain([self.tolerance]);
+        all.flatten().fold(0.0, f64::max)
+    }
 }
 
 /// The tolerance as a function of curvature, for one face in its part's own lengths.
@@ -82,15 +104,16 @@ impl Settings {
 pub(super) struct Field {
     range: [f64; 2],
     radii: [f64; 2],
+    law: Law,
 }
 
 impl Field {
     /// `scale` is that of the placement: tolerances hold for the placed part.
-    pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], scale: f64) -> Self {
+    pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: Law, scale: f64) -> Self {
         let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { 1e-9 };
         let [a, b] = tolerance.map(clean);
         let [r, s] = radii.map(clean);
-        Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)] }
+        Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)], law }
     }
 
     /// Tolerance where the sharpest normal curvature is `k`.
@@ -103,7 +126,10 @@ impl Field {
             return tight;
         }
         let x = (1.0 / (k * sharp)).ln() / (flat / sharp).ln();
-        tight + (loose - tight) * x * x * (3.0 - 2.0 * x)
+        match self.law {
+            Law::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
+            Law::Power => tight * (loose / tight).powf(x),
+        }
     }
 
     pub(super) fn tightest(&self) -> f64 {

@@ -213,7 +213,7 @@ impl Intersector for Octree<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let mut hit = [None];
         self.walk(std::slice::from_ref(ray), &mut hit, cost);
-        hit[0].map(|hit| normals::describe(self.around.mesh, &hit, self.settings.normals))
+        hit[0].map(|hit| normals::describe(self.around.mesh, ray, &hit, self.settings.normals))
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
@@ -223,7 +223,8 @@ impl Intersector for Octree<'_> {
             self.walk(rays, found, cost);
             for (i, hit) in hits.iter_mut().enumerate() {
                 self.fetch_description(found, i);
-                *hit = found[i].map(|found| normals::describe(self.around.mesh, &found, self.settings.normals));
+                *hit =
+                    found[i].map(|hit| normals::describe(self.around.mesh, &rays[i], &hit, self.settings.normals));
             }
         }
     }

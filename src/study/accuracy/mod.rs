@@ -3,16 +3,14 @@
 //! Theory for a mirror of radius R met at incidence i by a facet of sag s: flat normals err by up to 2·acos(1 − s/R), order
 //! ½ in s; bilinear ones by 2·s·tan i/R, order 1. In facet length that is order 1 and 2.
 
-use super::errors::{Errors, slope};
-use super::rays::{RaySource, Uniform};
-use super::timing::Clock;
-use super::workshop::{Meshed, Tree, Workshop, answer, normals_name, with_all};
-use super::{Progress, Rounds, Timing};
-use crate::intersect::{Hit, Intersector, NormalMode};
-use crate::math::Ray;
+mod sweep;
+
+pub use sweep::accuracy;
+
+use super::errors::slope;
+use super::workshop::Tree;
+use crate::intersect::NormalMode;
 use serde::Serialize;
-use std::sync::Mutex;
-use std::time::Instant;
 
 /// What is swept and how long.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +29,8 @@ pub struct Settings {
     pub threads: Vec<usize>,
     /// Of the rays.
     pub seed: u64,
+    /// Seconds of work that the caller does after the sweep, for the time left.
+    pub seconds_after: f64,
 }
 
 impl Default for Settings {
@@ -51,6 +51,7 @@ impl Default for Settings {
             rounds: 3,
             threads: if all == 1 { vec![1] } else { vec![1, all] },
             seed: 1,
+            seconds_after: 0.0,
         }
     }
 }
@@ -143,166 +144,6 @@ pub struct Accuracy {
     pub front: Vec<usize>,
     /// The answer in one sentence.
     pub answer: String,
-}
-
-/// Sweeps a model. Runs on the current rayon pool.
-pub fn accuracy(
-    name: &str,
-    workshop: &dyn Workshop,
-    settings: &Settings,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Accuracy {
-    let clock = Clock::new(progress);
-    let coarse = workshop.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
-    let source = Uniform::new(&coarse.mesh.bounds(), settings.seed, settings.rays);
-    let rays = source.rays(0..source.len());
-    let mut study = Sweep { name, workshop, settings, rays: &rays, truth: Vec::new(), rows: Vec::new() };
-    study.exact();
-    let mut ahead = Forecast::default();
-    for (i, &tolerance) in settings.tolerances.iter().enumerate() {
-        let stage = format!("tolerance {} mm", tolerance[0]);
-        clock.forecast(&stage, ahead.seconds(&settings.tolerances[i..]));
-        ahead.learn(tolerance, study.tolerance(tolerance));
-    }
-    clock.at("done", 1.0);
-    let rows = study.rows;
-    let answer = sentence(&rows, 0.05);
-    Accuracy { slopes: slopes(&rows), front: front(&rows), answer, rows }
-}
-
-/// Time left: preparing grows with the number of facets, 1/tolerance; tracing hardly grows.
-#[derive(Default)]
-struct Forecast {
-    prepare: f64,
-    trace: f64,
-}
-
-impl Forecast {
-    fn learn(&mut self, tolerance: [f64; 2], (prepare, trace): (f64, f64)) {
-        (self.prepare, self.trace) = (prepare * tolerance[0], trace);
-    }
-    fn seconds(&self, tolerances: &[[f64; 2]]) -> f64 {
-        let growth = |i: usize| 1.0 + 0.1 * i as f64;
-        tolerances.iter().enumerate().map(|(i, t)| self.prepare / t[0] + self.trace * growth(i)).sum()
-    }
-}
-
-struct Sweep<'a> {
-    name: &'a str,
-    workshop: &'a dyn Workshop,
-    settings: &'a Settings,
-    rays: &'a [Ray],
-    truth: Vec<Option<Hit>>,
-    rows: Vec<Row>,
-}
-
-/// One structure in the race, with its latest hits.
-struct Runner<'a> {
-    who: &'a dyn Intersector,
-    hits: Mutex<Vec<Option<Hit>>>,
-}
-
-impl Sweep<'_> {
-    fn race(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
-        let mut rounds = Rounds::default();
-        for runner in runners {
-            rounds.add("", || {
-                if let Ok(mut hits) = runner.hits.lock() {
-                    answer(runner.who, self.rays, threads, &mut hits);
-                }
-            });
-        }
-        rounds.run(self.settings.rounds).into_iter().map(|r| r.1).collect()
-    }
-
-    fn runner<'a>(&self, who: &'a dyn Intersector) -> Runner<'a> {
-        Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
-    }
-
-    fn exact(&mut self) {
-        let who = self.workshop.exact();
-        let runners = [self.runner(who)];
-        for &threads in &self.settings.threads {
-            let timing = self.race(&runners, threads)[0];
-            let footprint = who.footprint();
-            let row = Row { facets: footprint.primitives, bytes: footprint.bytes, ..Row::default() };
-            let row = Row {
-                normals: "exact".into(),
-                intersector: "exact".into(),
-                seconds_build: footprint.build_seconds,
-                ..row
-            };
-            self.push(row, timing, threads);
-        }
-        let [runner] = runners;
-        self.truth = runner.hits.into_inner().unwrap_or_default();
-    }
-
-    /// Seconds of preparing and of tracing.
-    fn tolerance(&mut self, tolerance: [f64; 2]) -> (f64, f64) {
-        let start = Instant::now();
-        let meshed = self.workshop.mesh(tolerance);
-        let settings = self.settings;
-        let workshop = self.workshop;
-        with_all(workshop, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
-            let prepare = start.elapsed().as_secs_f64();
-            let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
-            for &threads in &settings.threads {
-                let timings = self.race(&runners, threads);
-                for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
-                    let hits = runner.hits.lock().map(|h| h.clone()).unwrap_or_default();
-                    let row = self.row(tolerance, &meshed, *combination, &hits);
-                    self.push(row, timing, threads);
-                }
-            }
-            (prepare, start.elapsed().as_secs_f64() - prepare)
-        })
-    }
-
-    fn row(
-        &self,
-        tolerance: [f64; 2],
-        meshed: &Meshed,
-        (tree, normals, who): (Tree, NormalMode, &dyn Intersector),
-        hits: &[Option<Hit>],
-    ) -> Row {
-        let errors = Errors::of(self.rays, hits, &self.truth);
-        let footprint = who.footprint();
-        Row {
-            tolerance_mm: Some(tolerance[0]),
-            adaptive: tolerance[0] != tolerance[1],
-            normals: normals_name(normals).into(),
-            intersector: tree.name().into(),
-            facets: meshed.mesh.facets.len(),
-            bytes: footprint.bytes + meshed.mesh.bytes(),
-            sag_mean_mm: Some(meshed.sag_mean),
-            sag_max_mm: Some(meshed.sag_max),
-            seconds_tessellate: Some(meshed.seconds),
-            seconds_build: footprint.build_seconds,
-            hit_error_mm_p50: errors.position.at(0.5),
-            hit_error_mm_p99: errors.position.at(0.99),
-            direction_error_deg_p50: errors.reflected.at(0.5),
-            direction_error_deg_rms: errors.reflected.rms(),
-            direction_error_deg_p99: errors.reflected.at(0.99),
-            direction_error_deg_max: errors.reflected.max(),
-            refracted_error_deg_rms: errors.refracted.rms(),
-            refracted_error_deg_p99: errors.refracted.at(0.99),
-            flips: errors.flips,
-            ..Row::default()
-        }
-    }
-
-    fn push(&mut self, row: Row, timing: Timing, threads: usize) {
-        self.rows.push(Row {
-            model: self.name.into(),
-            threads,
-            seconds_trace_min: timing.min,
-            seconds_trace_median: timing.median,
-            seconds_trace_p90: timing.p90,
-            rays: self.rays.len() as u64,
-            ..row
-        });
-    }
 }
 
 /// Slopes over the uniform tolerances of the first tree, of the median error: the error goes with tan i, whose mean square

@@ -1,0 +1,96 @@
+//! Accuracy asked for as an angle: the local tolerances and the kind of normals that reach it most cheaply, checked.
+//!
+//! A facet of sag s on a surface of radius R met at incidence i misdirects the mirrored ray by up to 2·(s/R)·tan i with
+//! interpolated normals and 2·acos(1 − s/R) with flat ones. Pilot rays on the spline give radius and incidence on every face, and
+//! with them a tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i); the same rays on such facets then tell how far each face
+//! is from what was asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
+//!
+//! Every kind of normals that could be the cheapest is made to reach what is asked and then timed. Known weakness: the 99th
+//! percentile is over all hits of these rays; other rays (more grazing ones) err more.
+
+mod plan;
+mod search;
+
+pub use plan::{Plan, Share};
+pub use search::{RaysOf, aim, aim_at};
+
+use super::workshop::normals_name;
+use crate::intersect::NormalMode;
+use serde::Serialize;
+
+/// What is asked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ask {
+    /// Direction error that 99 % of the mirrored rays must keep, degrees.
+    pub degrees: f64,
+    /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
+    /// the facets are wanted.
+    pub job_rays: f64,
+    /// Fresh rays of the final check.
+    pub check_rays: u64,
+    /// Kinds of normals that may be taken.
+    pub kinds: Vec<NormalMode>,
+    /// Of all rays here.
+    pub seed: u64,
+}
+
+impl Ask {
+    /// The defaults for an angle: a job of a million rays, checked on 100,000.
+    pub fn degrees(degrees: f64) -> Self {
+        let kinds = vec![NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
+        Self { degrees, job_rays: 1e6, check_rays: 100_000, kinds, seed: 1 }
+    }
+}
+
+/// What to do.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Aim {
+    /// Asked, degrees.
+    pub asked_deg: f64,
+    /// Reached on fresh rays (p99), degrees.
+    pub reached_deg: f64,
+    /// Whether that is within what was asked.
+    pub kept: bool,
+    /// Kind of normals to trace with.
+    #[serde(serialize_with = "by_name")]
+    pub normals: NormalMode,
+    /// Least and largest local tolerance, mm.
+    pub tolerance_mm: [f64; 2],
+    /// Tolerances to mesh with.
+    pub plan: Plan,
+    /// Facets that this makes.
+    pub facets: usize,
+    /// Seconds of meshing and building, measured.
+    pub seconds_prepare: f64,
+    /// Seconds of the job's trace, from the time of the check's rays.
+    pub seconds_trace: f64,
+    /// Every combination that was judged on fresh rays.
+    pub tries: Vec<Try>,
+    /// Rays of the check that hit.
+    pub checked: u64,
+    /// Rays of the check that hit on one of facets and spline only, or different faces: no angle stands for them.
+    pub flips: u64,
+    /// Seconds spent on finding out.
+    pub seconds: f64,
+    /// One sentence.
+    pub answer: String,
+}
+
+/// One combination judged on fresh rays.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Try {
+    /// Kind of normals.
+    pub normals: String,
+    /// Least and largest local tolerance, mm.
+    pub tolerance_mm: [f64; 2],
+    /// Facets.
+    pub facets: usize,
+    /// p99, degrees.
+    pub reached_deg: f64,
+    /// Seconds for the whole job.
+    pub seconds: f64,
+}
+
+fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
+    s.serialize_str(normals_name(*n))
+}

@@ -1,0 +1,216 @@
+//! Tolerances that follow radius and incidence: for each face a share of its radius of curvature.
+
+use crate::intersect::Hit;
+use crate::math::{FaceId, Ray};
+use crate::model::{Face, Model};
+use crate::tessellate::{Law, Override, Place, Settings};
+use rustc_hash::FxHashMap;
+use serde::Serialize;
+
+/// Local tolerances for a model: on each face in proportion to the radius of curvature.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Plan {
+    /// Faces that enough rays met to be judged on their own.
+    pub places: Vec<Share>,
+    /// For all others.
+    pub other: Share,
+    /// No tolerance is larger, mm.
+    pub coarsest_mm: f64,
+    /// No tolerance is smaller, mm.
+    pub finest_mm: f64,
+}
+
+/// A tolerance in proportion to the radius of curvature.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Share {
+    /// The placed faces; those of one face of a part stand together.
+    #[serde(serialize_with = "numbers")]
+    pub faces: Vec<FaceId>,
+    /// Tolerance over radius.
+    pub of_radius: f64,
+    /// The radii between which it follows, mm: nearly the least and the largest that rays met.
+    pub radii_mm: [f64; 2],
+}
+
+fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Error> {
+    s.collect_seq(faces.iter().map(|f| f.0))
+}
+
+/// What is known of one pilot's hit.
+#[derive(Clone, Copy, Debug)]
+struct Pilot {
+    /// Index of the face among the distinct ones.
+    face: usize,
+    radius: f64,
+    /// 2·tan i: the mirrored ray errs by that times sag over radius.
+    tilt: f64,
+}
+
+/// The pilots' hits, face by face.
+pub(super) struct Survey {
+    /// The placed faces of each distinct face.
+    faces: Vec<Vec<FaceId>>,
+    /// Which distinct face a placed one is of.
+    of: Vec<Option<usize>>,
+    pilots: Vec<Pilot>,
+}
+
+/// Hits that a face needs for a plan of its own.
+const ENOUGH: usize = 100;
+/// Hits that it needs for its own 99th percentile to be worth following.
+const MANY: usize = 400;
+
+impl Survey {
+    pub(super) fn new(model: &Model, rays: &[Ray], truth: &[Option<Hit>]) -> Self {
+        let placed: Vec<_> = model.placed_faces().collect();
+        let mut names: FxHashMap<*const Face, usize> = FxHashMap::default();
+        let mut survey = Self { faces: Vec::new(), of: Vec::with_capacity(placed.len()), pilots: Vec::new() };
+        for p in &placed {
+            survey.of.push(p.face.map(|face| {
+                let k = *names.entry(std::ptr::from_ref(face)).or_insert(survey.faces.len());
+                if k == survey.faces.len() {
+                    survey.faces.push(Vec::new());
+                }
+                survey.faces[k].push(p.id);
+                k
+            }));
+        }
+        for (ray, hit) in rays.iter().zip(truth) {
+            let Some(h) = hit else { continue };
+            let i = h.face.index();
+            let (Some(&Some(face)), Some(p)) = (survey.of.get(i), placed.get(i)) else { continue };
+            let Some(forms) = p.face.and_then(|f| f.surface.forms(h.uv)) else { continue };
+            let radius = p.placement.scale / forms.sharpest();
+            let cos = h.normal.dot(ray.direction).abs().clamp(1e-3, 1.0);
+            if radius > 0.0 {
+                survey.pilots.push(Pilot { face, radius, tilt: 2.0 * (1.0 - cos * cos).sqrt() / cos });
+            }
+        }
+        survey
+    }
+
+    /// The plan by the formulas: sag ≤ ε·R/(2·tan i) for interpolated normals, 1 − cos(ε/2) of R for flat ones, each for 99 % of a
+    /// face's hits.
+    pub(super) fn plan(&self, epsilon: f64, flat: bool, [finest_mm, coarsest_mm]: [f64; 2]) -> Plan {
+        let of = |faces: Vec<FaceId>, pilots: &mut [Pilot]| {
+            pilots.sort_by(|a, b| a.tilt.total_cmp(&b.tilt));
+            let count = pilots.len();
+            let at = |share: f64| ((count as f64 * share) as usize).min(count.saturating_sub(1));
+            let tilt = pilots.get(at(0.99)).map_or(1.0, |p| p.tilt.max(1e-3));
+            let of_radius = if flat { 1.0 - (0.5 * epsilon).cos() } else { epsilon / tilt };
+            pilots.sort_by(|a, b| a.radius.total_cmp(&b.radius));
+            let end = |k: usize| pilots.get(k).map_or(1.0, |p| p.radius);
+            // Beyond the radius at which the coarsest tolerance is reached nothing changes; infinity is no length.
+            let least = end(at(0.02)).clamp(1e-9, 1e9);
+            Share { faces, of_radius, radii_mm: [least, end(at(0.98)).clamp(least, 1e12)] }
+        };
+        let mut own: Vec<Vec<Pilot>> = vec![Vec::new(); self.faces.len()];
+        for p in &self.pilots {
+            own[p.face].push(*p);
+        }
+        let mut places = Vec::new();
+        for (faces, pilots) in self.faces.iter().zip(&mut own).filter(|(_, pilots)| pilots.len() >= ENOUGH) {
+            places.push(of(faces.clone(), pilots));
+        }
+        Plan { other: of(Vec::new(), &mut self.pilots.clone()), places, coarsest_mm, finest_mm }
+    }
+
+    /// Which of the plan's places each placed face belongs to.
+    fn place_of(&self, plan: &Plan) -> Vec<Option<usize>> {
+        let mut all = vec![None; self.of.len()];
+        for (k, place) in plan.places.iter().enumerate() {
+            for f in &place.faces {
+                all[f.index()] = Some(k);
+            }
+        }
+        all
+    }
+
+    /// Facets that a plan makes, from those that another made: on each face they go with the inverse of the tolerance.
+    pub(super) fn facets(&self, plan: &Plan, other: &Plan, made: &[FaceId]) -> f64 {
+        let places = self.place_of(plan);
+        let mean = |plan: &Plan, k: Option<usize>| {
+            let [a, b] = plan.range(k.and_then(|k| plan.places.get(k)).unwrap_or(&plan.other)).0;
+            (a * b).sqrt()
+        };
+        // Both plans stand on the same survey, so their places are the same.
+        let ratio = |k: Option<usize>| mean(other, k) / mean(plan, k);
+        let ratios: Vec<f64> = (0..plan.places.len()).map(|k| ratio(Some(k))).collect();
+        let rest = ratio(None);
+        let of = |f: &FaceId| places.get(f.index()).copied().flatten().map_or(rest, |k| ratios[k]);
+        // Borders alone keep a coarse face from having fewer facets still.
+        made.iter().map(|f| of(f).max(0.5)).sum()
+    }
+
+    /// Tightens or loosens every place by what was measured there: the error goes with the sag to the power `order`.
+    pub(super) fn adapt(&self, plan: &mut Plan, errors: &[(FaceId, f64)], epsilon_deg: f64, order: f64) {
+        let places = self.place_of(plan);
+        let mut own: Vec<Vec<f64>> = vec![Vec::new(); plan.places.len()];
+        for &(face, error) in errors {
+            if let Some(k) = places.get(face.index()).copied().flatten() {
+                own[k].push(error);
+            }
+        }
+        for (place, errors) in plan.places.iter_mut().zip(&mut own).filter(|(_, e)| e.len() >= MANY) {
+            place.of_radius *= factor(p99(errors), epsilon_deg, order);
+        }
+        let mut all: Vec<f64> = errors.iter().map(|e| e.1).collect();
+        plan.other.of_radius *= factor(p99(&mut all), epsilon_deg, order);
+    }
+}
+
+/// What to multiply a tolerance with, in moderate steps: the power law holds near where it was measured.
+pub(super) fn factor(error: f64, wanted: f64, order: f64) -> f64 {
+    (wanted / error.max(1e-300)).powf(1.0 / order).clamp(1e-3, 30.0)
+}
+
+/// The 99th percentile; 0 of nothing.
+pub(super) fn p99(errors: &mut [f64]) -> f64 {
+    if errors.is_empty() {
+        return 0.0;
+    }
+    let k = ((errors.len() as f64 * 0.99).ceil() as usize).clamp(1, errors.len()) - 1;
+    *errors.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+impl Plan {
+    /// The same tolerance everywhere.
+    pub fn uniform(tolerance_mm: f64) -> Self {
+        let other = Share { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
+        Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
+    }
+
+    /// All tolerances multiplied.
+    pub(super) fn scale(&mut self, factor: f64) {
+        for share in self.places.iter_mut().chain([&mut self.other]) {
+            share.of_radius *= factor;
+        }
+    }
+
+    /// Tolerances at the ends of the radii, mm, and the radii.
+    fn range(&self, share: &Share) -> ([f64; 2], [f64; 2]) {
+        let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
+        let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
+        // The radii at which exactly these are reached, so that in between it is in proportion.
+        let radii = [0, 1].map(|k| tolerance[k] / share.of_radius.max(1e-300));
+        (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
+    }
+
+    /// Least and largest tolerance, mm.
+    pub fn tolerance_mm(&self) -> [f64; 2] {
+        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
+        let ends = shares.map(|s| self.range(s).0);
+        ends.fold([f64::INFINITY, 0.0], |[a, b], [c, d]| [a.min(c), b.max(d)])
+    }
+
+    /// Puts the plan into the mesher's settings, before overrides that are there already: those win.
+    pub fn apply(&self, settings: &mut Settings) {
+        (settings.tolerance, settings.radii) = self.range(&self.other);
+        settings.law = Law::Power;
+        let own = self.places.iter().map(|share| {
+            let (tolerance, radii) = self.range(share);
+            Override { place: Place::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
+        });
+        settings.overrides.splice(0..0, own);
+    }
+}

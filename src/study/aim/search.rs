@@ -1,0 +1,299 @@
+use super::plan::{Plan, Survey, factor, p99};
+use super::{Aim, Ask, Try};
+use crate::intersect::{Hit, NormalMode};
+use crate::math::{Aabb, FaceId, Ray};
+use crate::model::Model;
+use crate::study::Progress;
+use crate::study::check::angle_deg;
+use crate::study::rays::{RaySource, Uniform};
+use crate::study::timing::Clock;
+use crate::study::workshop::{Tree, Workshop, answer, normals_name, reflect, with_all};
+use std::time::Instant;
+
+/// Rays that look at the model first, and that facets are tuned on.
+const PILOTS: u64 = 65_536;
+/// What is asked is aimed at with this much to spare, since the 99th percentile of fresh rays differs by some percent.
+const MARGIN: f64 = 0.9;
+/// And accepted with this much, so that other rays than the judge's find it kept too.
+const ACCEPTED: f64 = 0.96;
+/// Meshes made for one kind of normals.
+const ATTEMPTS: usize = 6;
+/// A kind of normals that would need more facets than this is given up.
+const MOST_FACETS: f64 = 6e6;
+
+/// Rays of a seed, and how many: those that the job will meet.
+pub type RaysOf<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
+
+/// Finds the cheapest way to an accuracy for random rays through the model. Runs on the current rayon pool.
+pub fn aim(model: &Model, workshop: &dyn Workshop, ask: &Ask, progress: &(dyn Fn(Progress) + Sync)) -> Aim {
+    let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
+    let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    let uniform = |seed: u64, count: u64| {
+        let source = Uniform::new(&bounds, seed, count);
+        source.rays(0..source.len())
+    };
+    aim_at(model, workshop, ask, &uniform, progress)
+}
+
+/// The same for rays of one's own, such as those of a scene.
+pub fn aim_at(
+    model: &Model,
+    workshop: &dyn Workshop,
+    ask: &Ask,
+    rays: &RaysOf<'_>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Aim {
+    let start = Instant::now();
+    let clock = Clock::new(progress);
+    clock.at("pilot rays", 0.0);
+    let pilots = Judged::new(workshop, rays(ask.seed, PILOTS));
+    let survey = Survey::new(model, &pilots.rays, &pilots.truth);
+    let search = Search { workshop, ask, rays, pilots, survey, coarse: coarse(model), fresh: 0.into() };
+    let mut kinds: Vec<Candidate> = ask.kinds.iter().map(|&normals| search.candidate(normals)).collect();
+    kinds.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+    let mut tries: Vec<Try> = Vec::new();
+    let mut best: Option<Found> = None;
+    for (k, candidate) in kinds.iter().enumerate() {
+        // A kind that is dearer by its own forecast than what another was measured to cost is not worth the wait.
+        let beaten = best.as_ref().is_some_and(|b| b.kept(ask) && candidate.predicted > 0.8 * b.seconds());
+        if beaten || (candidate.facets > MOST_FACETS && best.is_some()) {
+            continue;
+        }
+        let stage = format!("{} normals", normals_name(candidate.normals));
+        clock.at(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
+        let found = search.reach(candidate, &mut tries);
+        let better = |b: &Found| match (found.kept(ask), b.kept(ask)) {
+            (true, true) => found.seconds() < b.seconds(),
+            (a, b_kept) => a && !b_kept || a == b_kept && found.reached < b.reached,
+        };
+        if best.as_ref().is_none_or(better) {
+            best = Some(found);
+        }
+    }
+    clock.at("done", 1.0);
+    let found = best.unwrap_or_else(|| search.nothing());
+    let kept = found.kept(ask);
+    let [low, high] = found.plan.tolerance_mm();
+    let answer = format!(
+        "Asked {}°, reached {:.3e}° (p99 of {} fresh rays) with {} normals on {} facets within {low:.2e} to {high:.2e} mm{}.",
+        ask.degrees,
+        found.reached,
+        found.checked,
+        normals_name(found.normals),
+        found.facets,
+        if kept { "" } else { ": not reached" }
+    );
+    Aim {
+        asked_deg: ask.degrees,
+        reached_deg: found.reached,
+        kept,
+        normals: found.normals,
+        tolerance_mm: [low, high],
+        facets: found.facets,
+        seconds_prepare: found.prepare,
+        seconds_trace: found.trace,
+        plan: found.plan,
+        tries,
+        checked: found.checked,
+        flips: found.flips,
+        seconds: start.elapsed().as_secs_f64(),
+        answer,
+    }
+}
+
+/// 0.2 mm, the coarse end of what users ask for, or 1/500 of a small model.
+fn coarse(model: &Model) -> f64 {
+    let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
+    let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    (bounds.diagonal() / 500.0).clamp(1e-6, 0.2)
+}
+
+/// Rays with their exact hits.
+struct Judged {
+    rays: Vec<Ray>,
+    truth: Vec<Option<Hit>>,
+}
+
+impl Judged {
+    fn new(workshop: &dyn Workshop, rays: Vec<Ray>) -> Self {
+        let mut truth = vec![None; rays.len()];
+        answer(workshop.exact(), &rays, rayon::current_num_threads(), &mut truth);
+        Self { rays, truth }
+    }
+}
+
+/// A kind of normals with the tolerances that should do.
+struct Candidate {
+    normals: NormalMode,
+    plan: Plan,
+    /// Order of the error in the sag.
+    order: f64,
+    facets: f64,
+    predicted: f64,
+}
+
+/// What a kind of normals came to.
+struct Found {
+    normals: NormalMode,
+    plan: Plan,
+    facets: usize,
+    prepare: f64,
+    trace: f64,
+    reached: f64,
+    checked: u64,
+    flips: u64,
+}
+
+impl Found {
+    fn kept(&self, ask: &Ask) -> bool {
+        self.reached <= ask.degrees
+    }
+    fn seconds(&self) -> f64 {
+        self.prepare + self.trace
+    }
+}
+
+/// Facets of a plan, asked some rays.
+struct Measured {
+    /// The face of each facet.
+    made: Vec<FaceId>,
+    prepare: f64,
+    per_ray: f64,
+    errors: Vec<(FaceId, f64)>,
+    flips: u64,
+}
+
+struct Search<'a> {
+    workshop: &'a dyn Workshop,
+    ask: &'a Ask,
+    rays: &'a RaysOf<'a>,
+    pilots: Judged,
+    survey: Survey,
+    coarse: f64,
+    /// Sets of fresh rays used so far: none is used twice for the same candidate.
+    fresh: std::cell::Cell<u64>,
+}
+
+impl Search<'_> {
+    fn measure(&self, plan: &Plan, normals: NormalMode, on: &Judged) -> Measured {
+        let meshed = self.workshop.mesh_plan(plan);
+        let mut hits = vec![None; on.rays.len()];
+        let start = Instant::now();
+        let mut measured = with_all(self.workshop, &meshed.mesh, &[Tree::Octree], &[normals], |trees| {
+            let build = start.elapsed().as_secs_f64();
+            let seconds = [0, 1].map(|_| {
+                let start = Instant::now();
+                answer(trees[0].2, &on.rays, rayon::current_num_threads(), &mut hits);
+                start.elapsed().as_secs_f64()
+            });
+            let per_ray = seconds[0].min(seconds[1]) / on.rays.len().max(1) as f64;
+            let prepare = meshed.seconds + build;
+            let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
+            Measured { made, prepare, per_ray, errors: Vec::new(), flips: 0 }
+        });
+        for ((ray, hit), truth) in on.rays.iter().zip(&hits).zip(&on.truth) {
+            match (hit, truth) {
+                (None, None) => {}
+                (Some(h), Some(t)) if h.face == t.face => {
+                    let (a, b) = (reflect(ray.direction, h.normal), reflect(ray.direction, t.normal));
+                    measured.errors.push((t.face, angle_deg(a, b)));
+                }
+                _ => measured.flips += 1,
+            }
+        }
+        measured
+    }
+
+    /// The plan by the formulas, corrected once by what the pilots measure on facets ten times as coarse at most.
+    fn candidate(&self, normals: NormalMode) -> Candidate {
+        let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
+        let epsilon = (MARGIN * self.ask.degrees).to_radians();
+        let range = [1e-4 * self.coarse, 4.0 * self.coarse];
+        let mut plan = if normals == NormalMode::Exact {
+            Plan::uniform(self.coarse)
+        } else {
+            self.survey.plan(epsilon, order == 0.5, range)
+        };
+        // The pilot's facets: the plan itself where it is coarse, else as much coarser as keeps the pilot quick.
+        let [finest, _] = plan.tolerance_mm();
+        let coarser = (0.25 * self.coarse / finest).max(1.0);
+        let mut pilot = plan.clone();
+        pilot.scale(coarser);
+        let m = self.measure(&pilot, normals, &self.pilots);
+        let mut facets = m.made.len() as f64;
+        if normals != NormalMode::Exact {
+            let expected = self.ask.degrees * MARGIN * coarser.powf(order);
+            plan = pilot.clone();
+            self.survey.adapt(&mut plan, &m.errors, expected, order);
+            plan.scale(1.0 / coarser);
+            facets = self.survey.facets(&plan, &pilot, &m.made);
+        }
+        let ratio = facets / m.made.len().max(1) as f64;
+        // Facets, and with them meshing and building, go with 1/tolerance; tracing grows by about a tenth per halving.
+        let trace = m.per_ray * self.ask.job_rays * (1.0 + 0.1 * ratio.log2().max(0.0));
+        Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
+    }
+
+    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste.
+    fn reach(&self, candidate: &Candidate, tries: &mut Vec<Try>) -> Found {
+        let (mut plan, normals) = (candidate.plan.clone(), candidate.normals);
+        let mut best: Option<Found> = None;
+        for attempt in 0..ATTEMPTS {
+            self.fresh.set(self.fresh.get() + 1);
+            let seed = self.ask.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let fresh = Judged::new(self.workshop, (self.rays)(seed, self.ask.check_rays));
+            let m = self.measure(&plan, normals, &fresh);
+            let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();
+            let reached = p99(&mut errors);
+            let found = Found {
+                normals,
+                plan: plan.clone(),
+                facets: m.made.len(),
+                prepare: m.prepare,
+                trace: m.per_ray * self.ask.job_rays,
+                reached,
+                checked: m.errors.len() as u64,
+                flips: m.flips,
+            };
+            tries.push(Try {
+                normals: normals_name(normals).into(),
+                tolerance_mm: plan.tolerance_mm(),
+                facets: m.made.len(),
+                reached_deg: reached,
+                seconds: found.seconds(),
+            });
+            let good = reached <= ACCEPTED * self.ask.degrees;
+            let wasteful = reached < 0.6 * self.ask.degrees && attempt < 2 && found.prepare > 0.2 * found.seconds();
+            let better = |b: &Found| match (good, b.reached <= ACCEPTED * self.ask.degrees) {
+                (true, true) => found.seconds() < b.seconds(),
+                (a, b_good) => a && !b_good || a == b_good && found.reached < b.reached,
+            };
+            let was_good = best.as_ref().is_some_and(|b| b.reached <= ACCEPTED * self.ask.degrees);
+            if best.as_ref().is_none_or(better) {
+                best = Some(found);
+            }
+            if normals == NormalMode::Exact || good && !wasteful || !good && was_good {
+                break;
+            }
+            let growth = factor(reached, MARGIN * self.ask.degrees, candidate.order);
+            if m.made.len() as f64 / growth > MOST_FACETS {
+                break;
+            }
+            plan.scale(growth);
+        }
+        best.unwrap_or_else(|| self.nothing())
+    }
+
+    fn nothing(&self) -> Found {
+        Found {
+            normals: NormalMode::Exact,
+            plan: Plan::uniform(self.coarse),
+            facets: 0,
+            prepare: 0.0,
+            trace: 0.0,
+            reached: f64::INFINITY,
+            checked: 0,
+            flips: 0,
+        }
+    }
+}
