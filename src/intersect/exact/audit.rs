@@ -6,7 +6,8 @@
 //! the uv curves, halved until their hulls decide.
 //!
 //! Guarantee: none is claimed near tangency, at singular points and within about 1e-9 mm of trims; there it reports what it
-//! finds. Known weakness: slow, about a thousandth of the fast path's rate, and without a hierarchy.
+//! finds. Where a patch took all of its steps it says from which distance on crossings may be missing. Known weakness: slow,
+//! about a thousandth of the fast path's rate, and without a hierarchy.
 
 use crate::math::{Aabb, FaceId, Homogeneous, Ray, Uv};
 use crate::model::{Model, TrimLoop};
@@ -41,6 +42,26 @@ pub struct AuditHit {
     pub doubtful: bool,
 }
 
+/// What clipping found along a ray.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AuditAnswer {
+    /// The crossings in `[t_min, t_max]`, in order of t, each once.
+    pub crossings: Vec<AuditHit>,
+    /// From this distance on crossings may be missing, since a patch took all of its steps; infinite when everything was
+    /// searched.
+    pub exhausted: f64,
+}
+
+impl AuditAnswer {
+    /// Whether the first crossing, or that there is none, is beyond doubt.
+    pub fn decides_first(&self) -> bool {
+        match self.crossings.first() {
+            Some(hit) => !hit.doubtful && hit.t < self.exhausted,
+            None => self.exhausted == f64::INFINITY,
+        }
+    }
+}
+
 impl Audit {
     /// Prepares every face that has a surface.
     pub fn new(model: &Model) -> Self {
@@ -58,9 +79,10 @@ impl Audit {
         Self { faces }
     }
 
-    /// Every crossing in `[t_min, t_max]`, in order of t, each once; the point that the ray leaves is left out.
-    pub fn crossings(&self, ray: &Ray) -> Vec<AuditHit> {
+    /// Every crossing in `[t_min, t_max]`; the point that the ray leaves is left out.
+    pub fn answer(&self, ray: &Ray) -> AuditAnswer {
         let mut found: Vec<AuditHit> = Vec::new();
+        let mut exhausted = f64::INFINITY;
         for face in &self.faces {
             if grown(&face.bounds).clip(ray).is_none() {
                 continue;
@@ -68,7 +90,10 @@ impl Audit {
             let mut own: Vec<AuditHit> = Vec::new();
             for (bounds, patch) in &face.patches {
                 if grown(bounds).clip(ray).is_some() {
-                    clip_patch(ray, face.id, patch, &mut own);
+                    let unsearched = clip_patch(ray, face.id, patch, &mut own);
+                    if unsearched <= ray.t_max {
+                        exhausted = exhausted.min(unsearched);
+                    }
                 }
             }
             own.sort_by(|a, b| a.t.total_cmp(&b.t));
@@ -93,12 +118,7 @@ impl Audit {
             found.extend(own);
         }
         found.sort_by(|a, b| a.t.total_cmp(&b.t));
-        found
-    }
-
-    /// The first crossing.
-    pub fn first(&self, ray: &Ray) -> Option<AuditHit> {
-        self.crossings(ray).first().copied()
+        AuditAnswer { crossings: found, exhausted }
     }
 }
 
@@ -112,7 +132,11 @@ struct Piece {
     depth: u32,
 }
 
-fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditHit>) {
+/// Steps for a patch and a ray: a simple root takes about ten, a graze hundreds.
+const STEPS: u32 = 4000;
+
+/// Adds the crossings of a patch; returns from which distance on some were not searched for, infinity when all were.
+fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditHit>) -> f64 {
     // Two planes that hold the ray, from the axes that its direction avoids most.
     let d = ray.direction;
     let axis = if d.x.abs() <= d.y.abs() && d.x.abs() <= d.z.abs() {
@@ -134,6 +158,7 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
     let whole = patch.domain.map(|[lo, hi]| hi - lo);
     let mut stack = vec![Piece { patch: seen, depth: 0 }];
     let mut steps = 0;
+    let mut exhausted = f64::INFINITY;
     while let Some(Piece { mut patch, depth }) = stack.pop() {
         steps += 1;
         let outside = |k: usize| {
@@ -142,11 +167,17 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
         if outside(0) || outside(1) {
             continue;
         }
+        if steps > STEPS {
+            // Where a weight is not positive the hull bounds nothing.
+            let near = |p: &Homogeneous| if p.w > 0.0 { p.z / p.w } else { f64::NEG_INFINITY };
+            exhausted = patch.points.iter().map(near).fold(exhausted, f64::min);
+            continue;
+        }
         let relative = [0, 1].map(|k: usize| (patch.domain[k][1] - patch.domain[k][0]) / whole[k]);
         let across = patch.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
         let tiny = relative[0].max(relative[1]) < 1e-12;
         let contact = across < 1e-9 && depth > 30;
-        if tiny || contact || steps > 4000 {
+        if tiny || contact {
             let m = patch.homogeneous(Uv::splat(0.5))[0];
             let doubtful = !tiny || across > 1e-7;
             if !doubtful || across < 1e-6 {
@@ -180,6 +211,7 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
             stack.extend(patch.halves(longest.0).map(|patch| Piece { patch, depth: depth + 1 }));
         }
     }
+    exhausted
 }
 
 /// Extent of the patch along a parameter as the ray sees it, in all three coordinates.

@@ -36,6 +36,7 @@ mod wide;
 use super::{Certainty, Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, FaceId, Ray, Uv, Vector};
 use crate::model::Model;
+use clip::TANGENT;
 use geometry::Geometry;
 use leaf::{Cutting, Leaf};
 use query::{Query, Root};
@@ -178,10 +179,16 @@ impl Exact {
             if hit.t >= q.doubt {
                 hit.certainty = Certainty::Uncertified;
             }
-            // The same face at the same place with the same side towards the ray is the same crossing.
-            let tolerance = 1e-9 + 1e-13 * hit.t.abs();
-            let twin = hits.iter().rev().take_while(|h| hit.t - h.t <= tolerance).any(|h| {
+            // The same face at the same place with the same side towards the ray is the same crossing. At a pole clipping
+            // ends on boxes TANGENT wide across the ray, as often as patches meet there: along the ray they differ by
+            // that over the sine.
+            let close = 1e-9 + 1e-13 * hit.t.abs();
+            let sine = hit.geometric_normal.dot(ray.direction).abs();
+            let far = close + (2.0 * TANGENT / sine).min(1e3 * TANGENT);
+            let open = |c: Certainty| c == Certainty::Uncertified;
+            let twin = hits.iter().rev().take_while(|h| hit.t - h.t <= far).any(|h| {
                 h.face == hit.face
+                    && (hit.t - h.t <= close || open(root.certainty) && open(h.certainty))
                     && (h.geometric_normal.dot(ray.direction) > 0.0)
                         == (hit.geometric_normal.dot(ray.direction) > 0.0)
             });
