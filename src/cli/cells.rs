@@ -1,16 +1,19 @@
 //! What an octree looks like, for people: its statistics as text and in the report, its boxes as files to turn around.
 
 use super::Failure;
-use crate::formats::{Facets, Group, write_atomic, write_facets};
+use crate::formats::{Facets, Group, Polylines, write_atomic, write_facets};
 use crate::intersect::octree::{Octree, Statistics};
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::report::{AxisStyle, Chart, Content, Section, Table, figures, grouped};
+use crate::report::{AxisStyle, Chart, Content, Section, Table, View, figures, grouped};
 use std::path::Path;
 
 /// Most boxes written to files; deeper levels are left out beyond it.
 const MOST_BOXES: usize = 50_000;
+
+/// Most boxes drawn in the page: 16 corners each are half a megabyte.
+const MOST_DRAWN: usize = 2_000;
 
 /// An octree after its race.
 pub(super) struct Shape {
@@ -108,6 +111,46 @@ fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
     mesh
 }
 
+/// Cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly.
+fn drawn(shape: &Shape) -> View {
+    let mut boxes = shape.boxes.clone();
+    boxes.sort_by_key(|(depth, _)| *depth);
+    let total = boxes.len();
+    let deepest = boxes.last().map_or(0, |(depth, _)| *depth);
+    let mut view = View {
+        name: "octree-cells".into(),
+        title: "Cells of the octree".into(),
+        caption: String::new(),
+        shapes: Vec::new(),
+    };
+    let (mut left, mut shown) = (MOST_DRAWN, 0);
+    for depth in 0..=deepest {
+        let level: Vec<Aabb> = boxes.iter().filter(|(d, _)| *d == depth).map(|(_, b)| *b).collect();
+        if level.is_empty() || left == 0 {
+            continue;
+        }
+        let mut lines = Polylines::default();
+        for b in level.iter().step_by(level.len().div_ceil(left)) {
+            lines.push(frame(b));
+            (left, shown) = (left - 1, shown + 1);
+        }
+        view = view.lines(&format!("depth {depth}"), &lines, shade(depth, deepest));
+    }
+    view.caption(&format!(
+        "{} of {} boxes around the {} facets, from blue at the root to orange at the leaves; octree.vtu and octree.glb hold up to 50 000.",
+        grouped(shown),
+        grouped(total as u64),
+        grouped(shape.facets as u64)
+    ))
+}
+
+/// The edges of a box in one stroke; three are passed twice.
+fn frame(b: &Aabb) -> [Point; 16] {
+    let ends = [b.min, b.max];
+    [0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4]
+        .map(|k: usize| Point::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z))
+}
+
 /// The section of the report.
 pub(super) fn section(shapes: &[Shape]) -> Section {
     let deepest = shapes.iter().map(|s| s.statistics.depths.len()).max().unwrap_or(0);
@@ -155,5 +198,7 @@ pub(super) fn section(shapes: &[Shape]) -> Section {
             ]);
         }
     }
-    Section::new("The octree").with(chart).with(table)
+    let section = Section::new("The octree").with(chart);
+    let section = shapes.first().into_iter().fold(section, |s, shape| s.with(drawn(shape)));
+    section.with(table)
 }

@@ -87,6 +87,18 @@ pub enum SeriesStyle {
 pub(super) const PALETTE: [&str; 8] =
     ["#d97706", "#3b82f6", "#10a37f", "#e0529c", "#8b5cf6", "#0ea5b7", "#b45309", "#84a30d"];
 
+/// The colour of each series; a dashed one has that of the series before it, whose reference it is.
+pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
+    let mut used = 0usize;
+    let colour = |s: &Series| {
+        if s.style != SeriesStyle::Dashed || used == 0 {
+            used += 1;
+        }
+        PALETTE[(used - 1) % PALETTE.len()]
+    };
+    series.iter().map(colour).collect()
+}
+
 impl AxisStyle {
     /// A linear axis.
     pub fn linear(label: &str, unit: &str) -> Self {

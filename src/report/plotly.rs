@@ -1,7 +1,7 @@
 //! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
 
-use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle};
-use super::raster::EYE;
+use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
+use super::raster::{EYE, common_range};
 use super::view::{Shape, View};
 use crate::formats::{ColourMap, base64};
 use serde_json::{Value, json};
@@ -51,7 +51,7 @@ fn axis(style: &AxisStyle) -> Value {
 pub(super) fn chart(chart: &Chart) -> Value {
     let (data, extra): (Vec<Value>, Value) = match &chart.content {
         Content::Series(series) => {
-            let traces: Vec<Value> = series.iter().enumerate().map(|(k, s)| trace(k, s)).collect();
+            let traces: Vec<Value> = series.iter().zip(colours(series)).map(|(s, c)| trace(c, s)).collect();
             (traces, json!({}))
         }
         Content::Bars { categories, layers, stacked } => {
@@ -88,7 +88,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
     json!({"data": data, "layout": layout})
 }
 
-fn trace(k: usize, s: &Series) -> Value {
+fn trace(colour: &str, s: &Series) -> Value {
     let mode = match s.style {
         SeriesStyle::LineAndPoints => "lines+markers",
         SeriesStyle::Line | SeriesStyle::Dashed => "lines",
@@ -99,7 +99,6 @@ fn trace(k: usize, s: &Series) -> Value {
         "x": doubles(s.points.iter().map(|p| p[0])), "y": doubles(s.points.iter().map(|p| p[1])),
         "opacity": if faint { 0.35 } else { 1.0 }, "marker": {"size": if faint { 6 } else { 8 }},
         "line": {"width": 2, "dash": if s.style == SeriesStyle::Dashed { "dash" } else { "solid" }}});
-    let colour = PALETTE[k % PALETTE.len()];
     trace["marker"]["color"] = colour.into();
     trace["line"]["color"] = colour.into();
     if !s.labels.is_empty() {
@@ -114,7 +113,10 @@ fn trace(k: usize, s: &Series) -> Value {
 
 /// Data and layout of a 3-D view.
 pub(super) fn view(view: &View) -> Value {
-    let data: Vec<Value> = view.shapes.iter().map(shape).collect();
+    let range = common_range(&view.shapes);
+    let mut data: Vec<Value> = view.shapes.iter().map(|s| shape(s, range)).collect();
+    // One colour bar for all that is coloured by values.
+    data.iter_mut().filter(|s| !s["colorbar"].is_null()).skip(1).for_each(|s| s["showscale"] = json!(false));
     let quiet = json!({"showbackground": false, "showspikes": false, "zeroline": false, "title": {"text": ""},
         "ticksuffix": " mm", "nticks": 4, "tickfont": {"size": 11}});
     // Nearer than plotly's default, which leaves half of the picture empty.
@@ -123,10 +125,10 @@ pub(super) fn view(view: &View) -> Value {
         "scene": {"aspectmode": "data", "xaxis": quiet, "yaxis": quiet, "zaxis": quiet,
             "camera": {"eye": {"x": x, "y": y, "z": z}, "projection": {"type": "orthographic"}}},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "showlegend": view.shapes.len() > 1,
-        "legend": {"orientation": "h", "y": 0.0, "yanchor": "bottom"}}})
+        "legend": {"orientation": "h", "y": -0.01, "yanchor": "top"}}})
 }
 
-fn shape(shape: &Shape) -> Value {
+fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
         Shape::Surface { name, points, triangles, colour, opacity, values } => {
             let mut mesh = json!({"type": "mesh3d", "name": name, "showlegend": values.is_none(),
@@ -140,6 +142,9 @@ fn shape(shape: &Shape) -> Value {
                 Some(v) => {
                     mesh["intensity"] = singles(v.values.iter().copied());
                     mesh["intensitymode"] = json!("cell");
+                    (mesh["cmin"], mesh["cmax"]) = (json!(low), json!(high));
+                    // Colours that are to be read keep their brightness on every side.
+                    mesh["lighting"] = json!({"ambient": 0.85, "diffuse": 0.25, "specular": 0.0});
                     mesh["colorscale"] = colour_scale(v.map);
                     mesh["colorbar"] =
                         json!({"title": {"text": v.label, "side": "right"}, "thickness": 14, "outlinewidth": 0});

@@ -118,20 +118,25 @@ pub(super) fn render(view: &View) -> Picture {
         Vec3::new(cx + scale * d.dot(right), cy - scale * d.dot(up), -scale * d.dot(back))
     };
     let light = (back + 0.6 * up - 0.4 * right).normalize();
-    for shape in &view.shapes {
+    let [lo, hi] = common_range(&view.shapes);
+    // What is clear comes last, so that what lies behind it is there to be seen through it.
+    let clear = |s: &Shape| matches!(s, Shape::Surface { opacity, .. } if *opacity < 1.0);
+    let (behind, before): (Vec<&Shape>, Vec<&Shape>) = view.shapes.iter().partition(|s| !clear(s));
+    for shape in behind.into_iter().chain(before) {
         match shape {
             Shape::Surface { points, triangles, colour, opacity, values, .. } => {
-                let range = values.as_ref().map(|v| finite_range(&v.values));
                 for (t, corners) in triangles.iter().enumerate() {
                     let [a, b, c] = corners.map(|k| Vec3::from(points[k as usize]));
                     let normal = (b - a).cross(c - a).normalize_or_zero();
-                    let shade = 0.3 + 0.7 * normal.dot(light).abs();
-                    let base = match (values, range) {
-                        (Some(v), Some([lo, hi])) => v
+                    // Colours that are to be read keep their brightness on every side.
+                    let dim = if values.is_some() { 0.75 } else { 0.3 };
+                    let shade = dim + (1.0 - dim) * normal.dot(light).abs();
+                    let base = match values {
+                        Some(v) => v
                             .map
                             .at(f64::from((v.values[t] - lo) / (hi - lo).max(1e-30)))
                             .map(|x| f32::from(x) / 255.0),
-                        _ => colour.map(|c| c as f32),
+                        None => colour.map(|c| c as f32),
                     };
                     canvas.triangle(
                         corners.map(|k| project(&points[k as usize])),
@@ -158,8 +163,13 @@ pub(super) fn render(view: &View) -> Picture {
     canvas.picture()
 }
 
-pub(super) fn finite_range(values: &[f32]) -> [f32; 2] {
-    let finite = values.iter().copied().filter(|v| v.is_finite());
+/// Smallest and largest of all values that colour something: one scale for the whole view.
+pub(super) fn common_range(shapes: &[Shape]) -> [f32; 2] {
+    let of = |s: &Shape| match s {
+        Shape::Surface { values, .. } => values.as_ref().map(|v| v.values.clone()),
+        _ => None,
+    };
+    let finite = shapes.iter().filter_map(of).flatten().filter(|v| v.is_finite());
     finite
         .fold(None, |r, v| Some(r.map_or([v, v], |[lo, hi]: [f32; 2]| [lo.min(v), hi.max(v)])))
         .unwrap_or([0.0, 1.0])

@@ -1,6 +1,6 @@
 //! The static picture of a chart: SVG in the text colour of wherever it stands, maps as an embedded PNG.
 
-use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle};
+use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
 use super::number::figures;
 use crate::formats::{ColourMap, Grid, Picture, base64};
 use std::fmt::Write;
@@ -140,8 +140,7 @@ fn series_chart(svg: &mut String, chart: &Chart, series: &[Series]) {
     let y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
     axes(svg, chart, Some(&x), &y, right);
     let mut names = Vec::new();
-    for (k, s) in series.iter().enumerate() {
-        let colour = PALETTE[k % PALETTE.len()];
+    for (s, colour) in series.iter().zip(colours(series)) {
         if s.style != SeriesStyle::Faint && !s.name.is_empty() {
             names.push((s.name.as_str(), colour));
         }
@@ -181,15 +180,25 @@ fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(
     let [left, top, right, bottom] = AREA;
     let heights = |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0));
     let tallest = |c: usize| if stacked { heights(c).sum::<f64>() } else { heights(c).fold(0.0, f64::max) };
-    let linear = AxisStyle { log: false, ..chart.y.clone() };
-    let y = Scale::new((0..categories.len()).map(tallest), &linear, [bottom, top], true);
+    // Parts of a whole add up on a linear axis only; rivals may stand on a logarithmic one.
+    let log = chart.y.log && !stacked;
+    let axis = AxisStyle { log, ..chart.y.clone() };
+    let y = if log {
+        Scale::new((0..categories.len()).flat_map(heights), &axis, [bottom, top], false)
+    } else {
+        Scale::new((0..categories.len()).map(tallest), &axis, [bottom, top], true)
+    };
     axes(svg, chart, None, &y, right);
     let slot = (right - left) / categories.len().max(1) as f64;
     let width = slot * 0.7 / if stacked { 1.0 } else { layers.len().max(1) as f64 };
     for (c, category) in categories.iter().enumerate() {
         let mut base = 0.0;
         for (k, value) in heights(c).enumerate() {
-            let (low, high) = (y.at(base), y.at(base + value));
+            let (low, high) = if log {
+                (bottom, if value > 0.0 { y.at(value) } else { bottom })
+            } else {
+                (y.at(base), y.at(base + value))
+            };
             let shift = if stacked { 0.0 } else { k as f64 * width };
             let _ = write!(
                 svg,

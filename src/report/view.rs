@@ -110,23 +110,41 @@ impl View {
         values: &[f64],
         map: ColourMap,
     ) -> Self {
-        let (points, triangles) = triangles_of(facets, |_| true);
-        let mut per_triangle = Vec::with_capacity(triangles.len());
-        for (facet, value) in facets.mesh.facets.iter().zip(values) {
-            per_triangle.extend(std::iter::repeat_n(*value as f32, if facet.is_triangle() { 1 } else { 2 }));
+        let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        let step = total.div_ceil(2 * SHOWN).max(1);
+        let caption = match step {
+            1 => String::new(),
+            _ => format!("Shown: every {step}th triangle of {}.", super::grouped(total as u64)),
+        };
+        let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
+        // Clear parts apart, so that one sees through them.
+        for (g, group) in facets.groups.iter().enumerate() {
+            let (points, mut triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
+            if triangles.is_empty() {
+                continue;
+            }
+            let own = facets.mesh.facets.iter().enumerate().filter(|(_, f)| facets.group_of(f.face) == g);
+            let mut per_triangle: Vec<f32> = Vec::with_capacity(triangles.len());
+            for (i, facet) in own {
+                let value = values.get(i).map_or(f32::NAN, |v| *v as f32);
+                per_triangle.extend(std::iter::repeat_n(value, if facet.is_triangle() { 1 } else { 2 }));
+            }
+            if step > 1 {
+                triangles = triangles.into_iter().step_by(step).collect();
+                per_triangle = per_triangle.into_iter().step_by(step).collect();
+            }
+            let values = Some(Values { label: label.into(), values: per_triangle, map });
+            let opacity = if group.opacity < 1.0 { 0.4 } else { 1.0 };
+            view.shapes.push(Shape::Surface {
+                name: group.name.clone(),
+                points,
+                triangles,
+                colour: [0.6; 3],
+                opacity,
+                values,
+            });
         }
-        per_triangle.resize(triangles.len(), f32::NAN);
-        let mut caption = String::new();
-        let (mut kept, step) = (triangles, per_triangle.len().div_ceil(2 * SHOWN).max(1));
-        if step > 1 {
-            caption = format!("Shown: every {step}th triangle of {}.", super::grouped(kept.len() as u64));
-            kept = kept.into_iter().step_by(step).collect();
-            per_triangle = per_triangle.into_iter().step_by(step).collect();
-        }
-        let values = Some(Values { label: label.into(), values: per_triangle, map });
-        let colour = [0.6; 3];
-        let shape = Shape::Surface { name: label.into(), points, triangles: kept, colour, opacity: 1.0, values };
-        Self { name: name.into(), title: title.into(), caption, shapes: vec![shape] }
+        view
     }
 
     /// The view with a sentence in front of its caption.

@@ -163,7 +163,7 @@ fn race(
         let start = Instant::now();
         run(t.who, 1024);
         let affordable = 1024.0 * settings.traditional_seconds / start.elapsed().as_secs_f64();
-        (affordable as u64).clamp(1024, settings.rays)
+        (affordable as u64).max(1024).min(settings.rays)
     });
     let count = |r: &Ready<'_>| if r.name == "traditional" { few } else { settings.rays };
     let mut rounds = Rounds::default();

@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod others;
+mod receivers;
 
 use super::{Cell, Provenance, Report, Section, Table};
 use serde_json::Value;
@@ -25,10 +26,7 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     }
     let lit: Vec<&Value> = document["receivers"].as_array().map(|r| r.iter().collect()).unwrap_or_default();
     if !lit.is_empty() {
-        let text = "The same rays on facets and on the spline: what the facets change (geometric) beside the noise of the run \
-            (statistical), both relative. Where geometry is the larger, finer facets or better normals help; else more rays.";
-        let section = Section::new("Light on the receivers");
-        sections.push(section.with(text).with(rows_table("receivers", &lit)));
+        sections.push(receivers::section(&lit));
     }
     sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }

@@ -67,7 +67,10 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
         models.len()
     );
     let keys = ["model", "algorithm", "normal_error_mean"];
-    let chart = bars("error", "mean normal error", "Shorter is better.", rows, keys, "");
+    let mut chart =
+        bars("error", "mean normal error", "Shorter is better; the axis is logarithmic.", rows, keys, "");
+    // Bilinear and cubic are tens to hundreds of times below nearest: nothing to see on a linear axis.
+    chart.y.log = true;
     let title = "Normals between corners: nearest, bilinear, cubic, exact".into();
     (title, answer, vec![Section::new("Errors").with(chart).with(table)])
 }
