@@ -82,7 +82,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
         }
     };
     let mut layout = json!({"xaxis": axis(&chart.x), "yaxis": axis(&chart.y),
-        "margin": {"l": 60, "r": 14, "t": 10, "b": 48}, "legend": {"orientation": "h", "y": 1.12},
+        "margin": {"l": 60, "r": 14, "t": 10, "b": 48}, "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
         "hoverlabel": {"align": "left"}});
     merge(&mut layout, extra);
     json!({"data": data, "layout": layout})
@@ -97,7 +97,7 @@ fn trace(colour: &str, s: &Series) -> Value {
     let faint = s.style == SeriesStyle::Faint;
     let mut trace = json!({"type": "scatter", "mode": mode, "name": s.name,
         "x": doubles(s.points.iter().map(|p| p[0])), "y": doubles(s.points.iter().map(|p| p[1])),
-        "opacity": if faint { 0.35 } else { 1.0 }, "marker": {"size": if faint { 6 } else { 8 }},
+        "opacity": if faint { 0.55 } else { 1.0 }, "marker": {"size": if faint { 6 } else { 8 }},
         "line": {"width": 2, "dash": if s.style == SeriesStyle::Dashed { "dash" } else { "solid" }}});
     trace["marker"]["color"] = colour.into();
     trace["line"]["color"] = colour.into();

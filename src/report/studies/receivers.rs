@@ -1,7 +1,7 @@
 //! What facets do to the light of a scene: a picture for each receiver, and the rows.
 
 use super::{distinct, number, text};
-use crate::report::{AxisStyle, Cell, Chart, Section, Series, SeriesStyle, Table, file_stem};
+use crate::report::{AxisStyle, Cell, Chart, Section, Series, Table, file_stem};
 use serde_json::Value;
 
 pub(super) fn section(rows: &[&Value]) -> Section {
@@ -29,8 +29,7 @@ fn chart(rows: &[&Value], receiver: &str) -> Chart {
     // The noise is that of the rays, whatever they are traced on; that of the first kind stands for all.
     if let Some(first) = kinds.first() {
         let points = along(first, "map_statistical");
-        let style = SeriesStyle::Line;
-        series.push(Series { name: "noise of the rays".into(), points, style, ..Series::default() });
+        series.push(Series { name: "noise of the rays".into(), points, ..Series::default() });
     }
     series.retain(|s| !s.points.is_empty());
     let caption = "Root mean square difference of the cells from the same rays on the spline, relative to the rms of the cells, by kind of \
