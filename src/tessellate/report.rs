@@ -23,6 +23,9 @@ pub struct Report {
     pub sag_mm: Sag,
     /// Facets whose sampled sag exceeds their local tolerance; `None` when not measured.
     pub over_tolerance: Option<usize>,
+    /// Their indices and sampled sags, mm; not part of the JSON.
+    #[serde(skip)]
+    pub over: Vec<(u32, f64)>,
     /// Bilinear normal against the spline's; `None` when not measured.
     pub normal_error_deg: Option<Percentiles>,
     /// Facets proved to be within their local tolerance.
@@ -201,7 +204,9 @@ fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64
     report.sag_mm.sampled_mean = Some(mean);
     // A sample on the very tolerance differs by rounding alone.
     let over = |(s, q): (&sample::Sampled, &super::FacetQuality)| s.sag > q.tolerance * (1.0 + 1e-9) + 1e-10;
-    report.over_tolerance = Some(sampled.iter().zip(&made.quality).filter(|&x| over(x)).count());
+    let found = sampled.iter().zip(&made.quality).enumerate().filter(|&(_, x)| over(x));
+    report.over = found.map(|(i, (s, _))| (i as u32, s.sag)).collect();
+    report.over_tolerance = Some(report.over.len());
     let mut errors: Vec<f32> = sampled.into_iter().flat_map(|s| s.normal_errors).collect();
     errors.sort_by(f32::total_cmp);
     let at = |share: f64| {
