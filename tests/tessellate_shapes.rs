@@ -131,6 +131,41 @@ fn a_can_shares_its_edges_and_gets_strips() {
 }
 
 #[test]
+fn measured_figures_of_a_can_have_closed_forms() {
+    let made = tessellate(&Model::from_part(can(10.0, 80.0, None)), &measured(0.05));
+    // A chord from p to q lies r − |p + q| / 2 below the wall, at its middle; caps are flat.
+    let wall = (0..made.mesh.facets.len()).filter(|&f| made.mesh.facets[f].face.0 == 0);
+    let flat = |p: Point| Vector::new(p.x, p.y, 0.0);
+    let depth = wall.map(|f| made.mesh.corners(f).map(flat)).map(|p| {
+        let below = |k: usize| 10.0 - 0.5 * (p[k] + p[(k + 1) % 4]).length();
+        (0..4).map(below).fold(0.0, f64::max)
+    });
+    let depth = depth.fold(0.0, f64::max);
+    let sampled = made.report.sag_mm.sampled_max.unwrap();
+    assert!(depth > 0.02 && (sampled - depth).abs() < 1e-9, "{sampled} {depth}");
+    // On a chord between two radial unit normals the interpolated one is radial too: no error, on the cap that is turned
+    // about as well.
+    let errors = made.report.normal_error_deg.unwrap();
+    assert!(errors.max < 1e-4, "{errors:?}");
+}
+
+#[test]
+fn measured_normals_of_a_sphere_stay_within_the_cone_of_a_facet() {
+    let turn = [[0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]];
+    for reversed in [false, true] {
+        let s = sweep::sphere(&Frame::IDENTITY, 50.0, turn[0], turn[1]);
+        let shell = Shell { faces: vec![face(s, reversed, Vec::new())], closed: true, ..Shell::default() };
+        let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+        let made = tessellate(&model, &measured(0.2));
+        // Radial normals of two points of a facet differ by less than its longest chord spans: twice acos(1 − sag / r).
+        let sag = made.report.sag_mm.sampled_max.unwrap();
+        let cone = 2.0 * (1.0 - sag / 50.0).acos().to_degrees();
+        let errors = made.report.normal_error_deg.unwrap();
+        assert!(errors.max < cone, "reversed {reversed}: {errors:?} {cone}");
+    }
+}
+
+#[test]
 fn a_mirrored_and_scaled_instance_stays_turned_outward() {
     let mut model = Model::from_part(can(10.0, 30.0, None));
     let placement = Frame { x: -Vector::X, scale: 2.0, ..Frame::translation(Vector::X * 100.0) };
@@ -139,6 +174,8 @@ fn a_mirrored_and_scaled_instance_stays_turned_outward() {
     assert_sound(&made, "mirrored");
     let exact = PI * 100.0 * 30.0 * 9.0;
     assert!((made.report.volume_mm3.unwrap() - exact).abs() < 0.02 * exact);
+    let errors = made.report.normal_error_deg.unwrap();
+    assert!(errors.max < 1e-4, "{errors:?}");
     for f in 0..made.mesh.facets.len() {
         let [a, b, c, _] = made.mesh.corners(f);
         let n = made.mesh.vertices[made.mesh.facets[f].vertices[0] as usize].normal;
