@@ -79,6 +79,9 @@ fn stl_opens_in_stl_io() {
     let (_folder, path) = written("a.stl", &two_parts(&mesh));
     let stl = stl_io::read_stl(&mut File::open(path).unwrap()).unwrap();
     assert_eq!(stl.faces.len(), 3, "a quad is two triangles, a triangle one");
+    let corner = |face: usize| stl.faces[face].vertices.map(|v| glam::Vec3::from_array(stl.vertices[v].0));
+    let single = |list: [usize; 3]| list.map(|p| mesh.positions[p].as_vec3());
+    assert_eq!([0, 1, 2].map(corner), [[0, 1, 2], [0, 2, 3], [0, 3, 4]].map(single));
     let area: f32 = (stl.faces.iter())
         .map(|f| {
             let [a, b, c] = f.vertices.map(|v| glam::Vec3::from_array(stl.vertices[v].0));
@@ -109,6 +112,7 @@ fn vtu_opens_in_vtkio() {
     assert_eq!(cell("normal_error_deg"), [0.5, 0.25]);
     assert_eq!(cell("curvature_per_mm"), [0.0, 0.125]);
     assert_eq!(cell("face_id"), [0.0, 1.0]);
+    assert_eq!(cell("part"), [0.0, 1.0]);
 }
 
 #[test]
@@ -131,6 +135,15 @@ fn glb_opens_in_gltf() {
     let far = matrix.transform_point3(positions[2].into());
     assert!((far - glam::Vec3::new(2.1e-3, 0.0, -1e-3 / 3.0)).length() < 1e-9, "{far}");
     assert_eq!(reader.read_indices().unwrap().into_u32().collect::<Vec<_>>(), [0, 1, 2, 0, 2, 3]);
+    let housing = document.meshes().nth(1).unwrap().primitives().next().unwrap();
+    let reader = housing.reader(|b| Some(&buffers[b.index()]));
+    assert_eq!(reader.read_indices().unwrap().into_u32().collect::<Vec<_>>(), [0, 1, 2]);
+    assert_eq!(reader.read_normals().unwrap().collect::<Vec<_>>(), [[1.0, 0.0, 0.0]; 3]);
+    for (p, at) in reader.read_positions().unwrap().zip([0, 3, 4]) {
+        let p = matrix.transform_point3(p.into()).as_dvec3();
+        let Point { x, y, z } = mesh.positions[at];
+        assert!((p - 1e-3 * Vector::new(x, z, -y)).length() < 1e-9, "{p}");
+    }
     let lines = document.meshes().nth(2).unwrap().primitives().next().unwrap();
     assert_eq!(lines.mode(), gltf::mesh::Mode::Lines);
     let reader = lines.reader(|b| Some(&buffers[b.index()]));
@@ -152,9 +165,11 @@ fn data2_is_a_count_and_sixteen_numbers_a_facet() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "2");
     let first: Vec<f64> = lines[1].split(' ').map(|w| w.parse().unwrap()).collect();
-    assert_eq!(first.len(), 16);
-    assert_eq!(first[..3], [0.0, 0.0, 1.0]);
-    assert_eq!(first[15], 1.0 / 1.4906);
+    let third = 1.0 / 3.0;
+    let layout = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.1, 0.0, 0.0, 2.1, third, 0.0, 0.0, third, 0.0, 1.0 / 1.4906];
+    assert_eq!(first, layout, "normal, four corners, index ratio");
+    assert_eq!(lines.len(), 3, "a line a facet");
+    assert_eq!(lines[2].split(' ').count(), 16, "a triangle repeats its last corner");
     let facets = read_data2(&path).unwrap();
     assert_eq!(facets[1].corners[2], facets[1].corners[3]);
     assert_eq!(facets[1].normal, Vector::X);
