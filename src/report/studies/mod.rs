@@ -17,7 +17,7 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
         "complexity" => others::complexity(&rows),
         "stability" => others::stability(&rows),
         "bvh" => others::bvh(&rows),
-        "effects" => others::effects(&rows),
+        "effects" => others::effects(&named_by_kernel(&rows).iter().collect::<Vec<_>>()),
         _ => (format!("Study {kind}"), String::new(), Vec::new()),
     };
     // The study's own sentence, where it made one, says it better.
@@ -30,6 +30,20 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     }
     sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
+}
+
+/// The rows with the kernel's name before the first effect: two kernels may trace the same effects, and bars of one name would be put
+/// on top of each other.
+fn named_by_kernel(rows: &[&Value]) -> Vec<Value> {
+    let named = |row: &&Value| {
+        let mut row = (*row).clone();
+        let kernel = text(&row, "kernel").to_owned();
+        if let Some(first) = row["effects"].as_array().and_then(|a| a.first()).and_then(Value::as_str) {
+            row["effects"][0] = format!("{kernel}: {first}").into();
+        }
+        row
+    };
+    rows.iter().map(named).collect()
 }
 
 /// A number of a row; `None` when absent or null.
