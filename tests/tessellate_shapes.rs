@@ -55,6 +55,18 @@ fn a_whole_sphere_is_closed_and_certified() {
     }
 }
 
+/// The ends of its circles differ by a last bit, so the line through them points anywhere.
+#[test]
+fn a_tube_that_starts_a_last_bit_beyond_its_seam_gets_strips() {
+    for start in [0.0, f64::EPSILON, 1e-15, 1e-12] {
+        let axis = Frame::translation(Vector::new(15.24, -50.8, 0.0));
+        let tube = sweep::cylinder(&axis, 0.254, [start, 2.0 * PI], [-3.68, 0.0]);
+        let made = tessellate(&whole(tube), &measured(0.05));
+        assert!(made.mesh.facets.len() <= 16, "{start}: {}", made.mesh.facets.len());
+        assert_eq!((made.report.over_tolerance, made.report.certified), (Some(0), made.mesh.facets.len()));
+    }
+}
+
 #[test]
 fn a_whole_torus_is_closed_and_certified() {
     let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);

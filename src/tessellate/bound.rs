@@ -95,10 +95,10 @@ impl<'s, 'a> Prover<'s, 'a> {
             return self.margin;
         }
         if self.judge == Judge::Sampled {
-            let at = |k: i32| from_line(self.sheet.point(uv[0].lerp(uv[1], k as f64 / 16.0)), &xyz);
+            let at = |k: i32| from_chord(self.sheet.point(uv[0].lerp(uv[1], k as f64 / 16.0)), &xyz);
             return (1..16).map(at).fold(0.0, f64::max);
         }
-        if let Some(quick) = self.quick(&uv, limit, |p| from_line(p, &xyz)) {
+        if let Some(quick) = self.quick(&uv, limit, |p| from_chord(p, &xyz)) {
             return quick;
         }
         self.pieces(&uv, |this, a, b, polygon| {
@@ -107,7 +107,7 @@ impl<'s, 'a> Prover<'s, 'a> {
                 return 0.0;
             }
             let ends = [local(patch, polygon[0]), local(patch, polygon[1])];
-            refine(&mut this.nets, patch, ends, limit, 2 * LEVELS, &|p| from_line(p, &xyz))
+            refine(&mut this.nets, patch, ends, limit, 2 * LEVELS, &|p| from_chord(p, &xyz))
         }) + self.margin
     }
 
@@ -241,15 +241,9 @@ fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
     polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
 }
 
-/// Distance of a point to the line through two points (to the point, when they coincide).
-pub(super) fn from_line(p: Point, [a, b]: &[Point; 2]) -> f64 {
-    let (d, x) = (*b - *a, p - *a);
-    let l = d.length_squared();
-    if l > 0.0 { (x - d * (x.dot(d) / l)).length() } else { x.length() }
-}
-
-/// Distance of a point to a segment.
-fn from_segment(p: Point, a: Point, b: Point) -> f64 {
+/// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
+/// last bit, and the line through them can lie anywhere.
+pub(super) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (b - a, p - a);
     let l = d.length_squared();
     let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
@@ -282,7 +276,7 @@ impl Flat {
         {
             return (p - a).dot(n).abs();
         }
-        from_segment(p, a, b).min(from_segment(p, b, c)).min(from_segment(p, c, a))
+        from_chord(p, &[a, b]).min(from_chord(p, &[b, c])).min(from_chord(p, &[c, a]))
     }
 }
 

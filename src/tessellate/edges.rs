@@ -1,6 +1,6 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
-use super::bound::from_line;
+use super::bound::from_chord;
 use super::opposite;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
@@ -185,7 +185,7 @@ pub(super) fn parameters(
             if scale > 0.0 { 2.0 * x.cross(y).length() / scale } else { 0.0 }
         };
         let chord = [p[0], p[looks]];
-        if p.iter().all(|&q| from_line(q, &chord) <= 1e-12 * (p[looks] - p[0]).length()) {
+        if p.iter().all(|&q| from_chord(q, &chord) <= 1e-12 * (p[looks] - p[0]).length()) {
             t.push(b);
             continue;
         }
@@ -219,7 +219,7 @@ pub(super) fn parameters(
             let excess = |k: usize| {
                 let (x, y) = (ends(k), ends(k + 1));
                 let i = (4.0 * ((0.5 * (x + y) - a) / (b - a) * (looks / 4) as f64)) as usize / 4;
-                from_line(at(0.5 * (x + y)), &[at(x), at(y)]) / some[i.min(looks / 4)]
+                from_chord(at(0.5 * (x + y)), &[at(x), at(y)]) / some[i.min(looks / 4)]
             };
             let worst = (0..=inner.len()).map(excess).fold(0.0, f64::max);
             if worst <= 1.02 || worst > 2.0 {
@@ -241,7 +241,7 @@ fn shorten(t: &mut Vec<f64>, at: impl Fn(f64) -> Point, tolerance: impl Fn(f64, 
         let chord = [at(a), at(b)];
         let along = chord[1] - chord[0];
         let xi = tolerance(0.5 * (a + b), along) * 1.03;
-        [0.2, 0.35, 0.5, 0.65, 0.8].iter().any(|f| from_line(at(a + (b - a) * f), &chord) > xi)
+        [0.2, 0.35, 0.5, 0.65, 0.8].iter().any(|f| from_chord(at(a + (b - a) * f), &chord) > xi)
     });
 }
 

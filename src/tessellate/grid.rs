@@ -1,6 +1,6 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
-use super::bound::{Prover, from_line};
+use super::bound::{Prover, from_chord};
 use super::cells::{Cell, Leaves};
 use super::lines::Lines;
 use super::look::facet_of;
@@ -143,7 +143,7 @@ fn beside(
         return None;
     }
     let middle = sheet.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
-    let off = |i: usize, j: usize| from_line(middle, &[n[i].place, n[j].place]);
+    let off = |i: usize, j: usize| from_chord(middle, &[n[i].place, n[j].place]);
     let better = if off(1, 3) < off(0, 2) * (1.0 - 1e-9) { 1 } else { 0 };
     [better, better + 1].into_iter().find_map(|r| {
         let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
@@ -273,7 +273,7 @@ fn resolve(
     };
     let off = |i: usize, j: usize| {
         let (a, b) = (at(i), at(j));
-        from_line(sheet.point(0.5 * (a.0 + b.0)), &[a.1, b.1])
+        from_chord(sheet.point(0.5 * (a.0 + b.0)), &[a.1, b.1])
     };
     // cost[i][j]: best triangulation of corners i..=j; a triangle of zero area in parameters is no triangle.
     let mut cost = vec![vec![0f64; n]; n];

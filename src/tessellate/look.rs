@@ -1,6 +1,6 @@
 //! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
 
-use super::bound::{Prover, from_line};
+use super::bound::{Prover, from_chord};
 use super::cells::Cell;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
@@ -47,8 +47,8 @@ impl Look {
             sheet.point(uv)
         };
         let p: [[Point; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)));
-        let u = (0..3).map(|j| from_line(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
-        let v = (0..3).map(|i| from_line(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
+        let u = (0..3).map(|j| from_chord(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
+        let v = (0..3).map(|i| from_chord(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
         Self { p, sag: [u, v] }
     }
 
@@ -69,7 +69,7 @@ impl Look {
         let p = [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]];
         let uv = cell.corners();
         let m = self.p[1][1];
-        let r = if from_line(m, &[p[1], p[3]]) < from_line(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 };
+        let r = if from_chord(m, &[p[1], p[3]]) < from_chord(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 };
         std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4]))
     }
 }

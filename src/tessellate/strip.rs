@@ -283,7 +283,7 @@ impl Work<'_, '_> {
                 .map(|&(a, b)| {
                     let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
                     let m = 0.5 * (x.uv + y.uv);
-                    let sag = super::bound::from_line(self.sheet.point(m), &[x.place, y.place]);
+                    let sag = super::bound::from_chord(self.sheet.point(m), &[x.place, y.place]);
                     ((a, b), m, sag)
                 })
                 .max_by(|a, b| a.2.total_cmp(&b.2));

@@ -1,6 +1,6 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
-use super::bound::{Prover, from_line};
+use super::bound::{Prover, from_chord};
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 use crate::model::EdgeUse;
@@ -42,7 +42,7 @@ impl Trim {
             for k in 0..pieces {
                 if cut(k) < cut(k + 1) {
                     let piece = curve.restricted(cut(k), cut(k + 1));
-                    worst = piece.points.iter().map(|p| from_line(p.project(), &xyz)).fold(worst, f64::max);
+                    worst = piece.points.iter().map(|p| from_chord(p.project(), &xyz)).fold(worst, f64::max);
                 }
             }
             worst
