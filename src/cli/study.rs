@@ -150,7 +150,8 @@ fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) ->
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
     let run = RunSettings { rays: own.rays.min(LIT_RAYS), seed, threads: 0, path_samples: 0, ..own };
-    let (study, light) = study::accuracy_of_scene(&name, &product, (&bound, &run), &settings, progress);
+    let plain = Product::new(&loaded.model);
+    let (study, light) = study::accuracy_of_scene(&name, [&product, &plain], (&bound, &run), &settings, progress);
     Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes)?.beside("receivers", &light)
 }
 

@@ -8,11 +8,18 @@ use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::Model;
 use rustc_hash::FxHashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
 use truck_meshalgo::prelude::{Invertible, MeshableShape, PolygonMesh, RobustMeshableShape, StandardVertex};
 
 /// Tolerance below which truck's mesher refuses to work, mm.
 const SMALLEST: f64 = 1e-6;
+
+/// Seconds that truck may take for a whole shell, for one face of it alone, and for a model. It does not come to an end on some
+/// poles: of the biconvex lens of the fixtures, at 0.05 mm, there was nothing after 100 s.
+const SHELL: Duration = Duration::from_secs(20);
+const FACE: Duration = Duration::from_secs(2);
+const MODEL: Duration = Duration::from_secs(60);
 
 /// What truck's mesher made of a model.
 #[derive(Clone, Debug)]
@@ -27,10 +34,12 @@ pub struct Baseline {
 
 /// Meshes the surfaces of a model by `truck_meshalgo` with one chordal tolerance in mm. Faces that are meshes already are left out.
 ///
-/// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message still goes to stderr.
+/// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message still goes to stderr. So is one on
+/// which truck takes too long; the thread that works on it cannot be stopped and goes on until the process ends.
 pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
     let mut out = Baseline { mesh: FacetMesh::default(), seconds: 0.0, failed: Vec::new() };
     let mut positions = FxHashMap::default();
+    let begun = Instant::now();
     for (i, instance) in model.instances.iter().enumerate() {
         let part = model.part(instance.part);
         let first = model.first_face(i).0;
@@ -50,8 +59,11 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
         // All at once, as truck is meant to be used: its faces then share the points of their edges.
         let start = Instant::now();
         let shell: TruckShell = faces.iter().map(|f| f.truck.clone()).collect();
-        let meshes = triangulated(&shell, tolerance).unwrap_or_else(|| {
-            let alone = |f: &TruckFace| triangulated(&[f.truck.clone()].into_iter().collect(), tolerance)?.pop()?;
+        let left = || MODEL.saturating_sub(begun.elapsed());
+        let meshes = triangulated(shell, tolerance, SHELL.min(left())).unwrap_or_else(|| {
+            let alone = |f: &TruckFace| {
+                triangulated([f.truck.clone()].into_iter().collect(), tolerance, FACE.min(left()))?.pop()?
+            };
             faces.iter().map(alone).collect()
         });
         out.seconds += start.elapsed().as_secs_f64();
@@ -61,20 +73,23 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
                 Some(m) if !m.tri_faces().is_empty() || !m.quad_faces().is_empty() => {
                     append(&mut out.mesh, &mut positions, &m, face);
                 }
-                _ => out.failed.push((face, "truck's mesher gives no triangles".into())),
+                _ => out.failed.push((face, "truck's mesher gives no triangles, or takes too long".into())),
             }
         }
     }
     out
 }
 
-/// The mesh of each face with the face's orientation; `None` when truck panics.
+/// The mesh of each face with the face's orientation; `None` when truck panics or takes too long.
 ///
 /// Faces that truck's standard mesher gives up on (poles of rational B-splines, edges that lie a little off their surface) are
 /// tried with its robust one.
-fn triangulated(shell: &TruckShell, tolerance: f64) -> Option<Vec<Option<PolygonMesh>>> {
+fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Vec<Option<PolygonMesh>>> {
+    if limit.is_zero() {
+        return None;
+    }
     let tolerance = tolerance.max(SMALLEST);
-    let work = || {
+    let work = move || {
         let mut meshes: Vec<Option<PolygonMesh>> =
             shell.triangulation(tolerance).face_iter().map(|f| oriented(f.surface(), f.orientation())).collect();
         if meshes.iter().any(Option::is_none) {
@@ -94,7 +109,14 @@ fn triangulated(shell: &TruckShell, tolerance: f64) -> Option<Vec<Option<Polygon
         }
         meshes
     };
-    catch_unwind(AssertUnwindSafe(work)).ok()
+    // Threads of its own: work that does not end would keep those of the process for ever.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build().ok()?;
+    let (send, receive) = channel();
+    std::thread::spawn(move || {
+        // Nobody may be waiting any more.
+        let _ = send.send(catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok());
+    });
+    receive.recv_timeout(limit).ok()?
 }
 
 fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh> {

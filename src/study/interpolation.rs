@@ -40,7 +40,9 @@ pub struct Row {
     pub algorithm: String,
     /// Mean Euclidean distance of the unit normals from the spline's at the exact hit of the same ray.
     pub normal_error_mean: f64,
-    /// The largest such distance.
+    /// 99 % of the distances are smaller.
+    pub normal_error_p99: Option<f64>,
+    /// The largest such distance: that of a ray which meets the face elsewhere on facets, where there is one.
     pub normal_error_max: Option<f64>,
     /// Seconds of the fastest repetition.
     pub seconds_min: Option<f64>,
@@ -128,6 +130,7 @@ fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
             facets: Some(meshed.mesh.facets.len()),
             algorithm: normals_name(algorithm).into(),
             normal_error_mean: errors.normal.mean(),
+            normal_error_p99: Some(errors.normal.at(0.99)),
             normal_error_max: Some(errors.normal.max()),
             seconds_min: Some(timing.min),
             seconds_median: timing.median,
@@ -160,13 +163,16 @@ fn hitting(workshop: &dyn Workshop, meshed: &Meshed, settings: &Settings) -> (Ve
 fn sentence(rows: &[Row]) -> String {
     let mut parts = Vec::new();
     for four in rows.chunks(ALGORITHMS.len()) {
-        let error =
-            |name: &str| four.iter().find(|r| r.algorithm == name).map_or(f64::NAN, |r| r.normal_error_mean);
-        let (n, b, c) = (error("nearest"), error("bilinear"), error("cubic"));
+        let three = |error: &dyn Fn(&Row) -> f64| {
+            ["nearest", "bilinear", "cubic"]
+                .map(|name| four.iter().find(|r| r.algorithm == name).map_or(f64::NAN, error))
+        };
+        let [n, b, c] = three(&|r| r.normal_error_mean);
+        let [n99, b99, c99] = three(&|r| r.normal_error_p99.unwrap_or(f64::NAN));
         let model = four.first().map_or("", |r| &r.model);
         let ratios = format!("nearest : bilinear : cubic = {:.1} : 1 : {:.3}", n / b, c / b);
-        parts.push(if c < b && b < n {
-            format!("{model}: {ratios}")
+        parts.push(if c < b && b < n && c99 < b99 && b99 < n99 {
+            format!("{model}: {ratios} (p99 {:.1} : 1 : {:.3})", n99 / b99, c99 / b99)
         } else {
             // Corner normals are the spline's own, so only curvature that changes within a facet (creases, needles,
             // poles) or an error that is rounding already can turn the order round.

@@ -117,25 +117,39 @@ fn by_replicate(
     (results, by)
 }
 
+/// What a combination will take.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expected {
+    /// Seconds of meshing and building.
+    pub(super) prepare: f64,
+    /// Seconds of tracing over those on the spline.
+    pub(super) of_spline: f64,
+}
+
 /// Traces a scene on the spline once and on facets for every combination. `begun` is when the whole study began.
-pub fn receivers(
+pub(super) fn receivers(
     name: &str,
     bound: &BoundScene,
     workshop: &dyn Workshop,
-    combinations: &[(f64, NormalMode)],
+    combinations: &[(f64, NormalMode, Expected)],
     settings: &RunSettings,
     (begun, progress): (Instant, &(dyn Fn(Progress) + Sync)),
 ) -> Vec<Row> {
     let mut countdown = Countdown::since(begun, progress);
-    let start = Instant::now();
     let truth = simulate(bound, workshop.exact(), settings, &|_| true);
-    let mut rows = Vec::new();
+    let start = Instant::now();
+    let seconds = |of: &[(f64, NormalMode, Expected)]| -> f64 {
+        of.iter().map(|c| c.2.prepare + c.2.of_spline * truth.seconds.trace).sum()
+    };
+    let (mut rows, mut done) = (Vec::new(), 0);
     for of_one in combinations.chunk_by(|a, b| a.0 == b.0) {
         let tolerance = of_one[0].0;
-        // The last tolerances take longer; those so far are all that is known.
-        let left = combinations.len() - rows.len() / truth.receivers.len().max(1);
-        let each = start.elapsed().as_secs_f64() / (combinations.len() - left + 1) as f64;
-        countdown.stage(&format!("receivers at {tolerance} mm"), Some(each * left as f64));
+        // What was expected, corrected by how long the combinations so far took against it.
+        let pace =
+            if done == 0 { 1.0 } else { start.elapsed().as_secs_f64() / seconds(&combinations[..done]).max(1e-9) };
+        let ahead = pace * seconds(&combinations[done..]);
+        countdown.stage(&format!("receivers at {tolerance} mm"), Some(ahead));
+        done += of_one.len();
         let meshed = workshop.mesh([tolerance; 2]);
         let normals: Vec<NormalMode> = of_one.iter().map(|c| c.1).collect();
         let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &normals, |trees| {

@@ -36,6 +36,7 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
         ("model", ""),
         ("algorithm", ""),
         ("normal error, mean", ""),
+        ("normal error, p99", ""),
         ("normal error, max", ""),
         ("time, median", "s"),
     ];
@@ -48,6 +49,7 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
             text(row, "model").into(),
             text(row, "algorithm").into(),
             number(row, "normal_error_mean").into(),
+            number(row, "normal_error_p99").into(),
             number(row, "normal_error_max").into(),
             number(row, "seconds_median").into(),
         ]);

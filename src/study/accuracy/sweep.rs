@@ -28,8 +28,10 @@ pub fn accuracy(
     let mut ahead = Forecast { tolerances: settings.tolerances.clone(), known: Vec::new() };
     let mut blocks: Vec<(usize, Vec<Row>)> = vec![(0, std::mem::take(&mut study.rows))];
     // The finest first, then the coarsest: all that is left lies between, and so does its time.
-    let n = settings.tolerances.len();
-    for k in (n >= 2).then_some(n.saturating_sub(1)).into_iter().chain(0..if n >= 2 { n - 1 } else { n }) {
+    let mut order: Vec<usize> = (0..settings.tolerances.len()).collect();
+    order.sort_by(|&a, &b| ahead.fineness(a).total_cmp(&ahead.fineness(b)));
+    order.get_mut(1..).into_iter().for_each(|rest| rest.reverse());
+    for k in order {
         let [low, high] = settings.tolerances[k];
         let range = if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") };
         let left = ahead.seconds().map(|s| s + settings.seconds_after);
@@ -54,15 +56,20 @@ struct Forecast {
 }
 
 impl Forecast {
+    /// Logarithm of the middle of a range of tolerances.
+    fn fineness(&self, k: usize) -> f64 {
+        0.5 * (self.tolerances[k][0] * self.tolerances[k][1]).ln()
+    }
+
     /// Between two known tolerances time is a power of the tolerance; on one side of all known ones it stays as it is there.
     fn seconds(&self) -> Option<f64> {
-        let key = |k: usize| (0.5 * (self.tolerances[k][0] * self.tolerances[k][1]).ln(), k);
-        let mut known: Vec<(f64, f64)> = self.known.iter().map(|&(k, s)| (key(k).0, s.max(1e-9).ln())).collect();
+        let mut known: Vec<(f64, f64)> =
+            self.known.iter().map(|&(k, s)| (self.fineness(k), s.max(1e-9).ln())).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (first, last) = (*known.first()?, *known.last()?);
         let left = (0..self.tolerances.len()).filter(|k| !self.known.iter().any(|x| x.0 == *k));
         let one = |k: usize| {
-            let x = key(k).0;
+            let x = self.fineness(k);
             let i = known.partition_point(|p| p.0 <= x);
             match (i.checked_sub(1).map(|j| known[j]), known.get(i)) {
                 (Some(a), Some(b)) => (a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)).exp(),

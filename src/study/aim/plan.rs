@@ -196,6 +196,12 @@ impl Plan {
         (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
     }
 
+    /// What the least tolerance would be without the bounds, mm.
+    pub(super) fn unbounded_mm(&self) -> f64 {
+        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
+        shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(1e-300)
+    }
+
     /// Least and largest tolerance, mm.
     pub fn tolerance_mm(&self) -> [f64; 2] {
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));

@@ -215,7 +215,9 @@ impl Search<'_> {
             self.survey.plan(epsilon, order == 0.5, range)
         };
         // The pilot's facets: the plan itself where it is coarse, else as much coarser as keeps the pilot quick.
-        let [finest, _] = plan.tolerance_mm();
+        // Flat normals ask for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
+        // 0.001° took a minute.
+        let finest = if order == 0.5 { plan.unbounded_mm() } else { plan.tolerance_mm()[0] };
         let coarser = (0.25 * self.coarse / finest).max(1.0);
         let mut pilot = plan.clone();
         pilot.scale(coarser);
