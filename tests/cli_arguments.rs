@@ -1,12 +1,8 @@
 //! Arguments, help and the commands about the command, with the real binary.
 
-use assert_cmd::Command;
+mod cli_support;
 
-fn lampyris(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("lampyris").unwrap().args(arguments).env("NO_COLOR", "1").output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
-}
+use cli_support::lampyris;
 
 #[test]
 fn help_and_version_go_to_stdout() {

@@ -1,16 +1,15 @@
 //! `check` with the real binary: rays that were answered differently can be written out and asked again.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::{fixture, lampyris};
 use serde_json::Value;
-use std::path::Path;
 
 fn check(arguments: &[&str]) -> Value {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/reflector_freeform_trimmed.stp");
-    let mut command = Command::cargo_bin("lampyris").unwrap();
-    let output =
-        command.arg("check").arg(file).arg("--json").args(arguments).env("NO_COLOR", "1").output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+    let file = fixture("step/reflector_freeform_trimmed.stp").display().to_string();
+    let (code, out, err) = lampyris(&[&["check", &file, "--json"], arguments].concat());
+    assert_eq!(code, 0, "{err}");
+    serde_json::from_str(&out).unwrap()
 }
 
 fn count(document: &Value, path: &str) -> u64 {

@@ -1,15 +1,10 @@
 //! The main job with the real binary, in a folder of its own, with fewer rays: what it writes and what must hold.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::lampyris_in;
 use serde_json::Value;
 use std::path::Path;
-
-fn lampyris(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("lampyris").unwrap();
-    let output = command.current_dir(folder).args(arguments).env("NO_COLOR", "1").output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
-}
 
 fn results(folder: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(folder.join("results.json")).unwrap()).unwrap()
@@ -18,7 +13,7 @@ fn results(folder: &Path) -> Value {
 #[test]
 fn the_demo_finds_the_light_of_the_lamp_and_says_where_it_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, out, err) = lampyris(folder.path(), &["demo", "--rays", "60000", "--threads", "2"]);
+    let (code, out, err) = lampyris_in(folder.path(), &["demo", "--rays", "60000", "--threads", "2"]);
     assert_eq!((code, out.as_str()), (0, ""), "{err}");
     let demo = folder.path().join("lampyris-demo");
     for name in [
@@ -66,7 +61,7 @@ fn the_demo_gives_the_same_bits_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let digest = |threads: &str, name: &str| {
         let arguments = ["demo", "--rays", "20000", "--threads", threads, "-o", name, "--json"];
-        let (code, out, err) = lampyris(folder.path(), &arguments);
+        let (code, out, err) = lampyris_in(folder.path(), &arguments);
         assert_eq!(code, 0, "{err}");
         // Exactly one document, and the same that is written.
         let document: Value = serde_json::from_str(&out).unwrap();

@@ -1,18 +1,13 @@
 //! `info` and what bad STEP files get, with the real binary.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::{fixture, lampyris};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-fn lampyris(arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("lampyris").unwrap();
-    let output = command.args(arguments).env("NO_COLOR", "1").env("COLUMNS", "200").output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
-}
-
-fn fixture(name: &str) -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step").join(name).display().to_string()
+fn step(name: &str) -> String {
+    fixture("step").join(name).display().to_string()
 }
 
 fn written(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
@@ -23,14 +18,14 @@ fn written(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
 
 #[test]
 fn info_tells_what_the_lamp_holds() {
-    let (code, out, err) = lampyris(&["info", &fixture("lamp_multicavity.stp")]);
+    let (code, out, err) = lampyris(&["info", &step("lamp_multicavity.stp")]);
     assert_eq!((code, err.as_str()), (0, ""));
     assert!(out.contains("housing") && out.contains("0 refused") && out.contains("mm"), "{out}");
 }
 
 #[test]
 fn info_json_is_one_document_with_the_agreed_keys() {
-    let (code, out, _) = lampyris(&["info", "--json", &fixture("lamp_multicavity_inch.stp")]);
+    let (code, out, _) = lampyris(&["info", "--json", &step("lamp_multicavity_inch.stp")]);
     assert_eq!(code, 0);
     let document: Value = serde_json::from_str(&out).unwrap();
     for key in [
@@ -52,12 +47,12 @@ fn info_json_is_one_document_with_the_agreed_keys() {
     ] {
         assert!(document.get(key).is_some(), "{key} is missing");
     }
-    let size = std::fs::metadata(fixture("lamp_multicavity_inch.stp")).unwrap().len();
+    let size = std::fs::metadata(step("lamp_multicavity_inch.stp")).unwrap().len();
     assert_eq!(document["bytes"], size);
     assert_eq!(document["faces"]["refused"], 0);
     assert_eq!(document["faces"]["found"], document["faces"]["converted"]);
     // The model's own millimetres, whatever the unit of the file: as in the millimetre version.
-    let (_, mm, _) = lampyris(&["info", "--json", &fixture("lamp_multicavity.stp")]);
+    let (_, mm, _) = lampyris(&["info", "--json", &step("lamp_multicavity.stp")]);
     let mm: Value = serde_json::from_str(&mm).unwrap();
     for (a, b) in [(0, 0), (0, 2), (1, 1)] {
         let at = |d: &Value| d["bbox_mm"][a][b].as_f64().unwrap();
@@ -91,7 +86,7 @@ fn files_that_are_no_step_end_with_3_and_say_what_to_do() {
 #[test]
 fn a_truncated_file_is_read_as_far_as_it_goes_and_the_rest_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let whole = std::fs::read(fixture("lamp_multicavity.stp")).unwrap();
+    let whole = std::fs::read(step("lamp_multicavity.stp")).unwrap();
     for share in [0.1, 0.5, 0.9, 0.999] {
         let cut = written(folder.path(), "cut.stp", &whole[..(whole.len() as f64 * share) as usize]);
         let (code, out, err) = lampyris(&["info", "--json", &cut.display().to_string()]);

@@ -1,23 +1,20 @@
 //! `study bvh` with the real binary: rows, pictures, the octree's shape as text and as boxes to turn around.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::{fixture, lampyris};
 use serde_json::Value;
 use std::path::Path;
 
 #[test]
 fn the_race_writes_rows_pictures_and_the_octree() {
     let folder = tempfile::tempdir().unwrap();
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
-    let output = Command::cargo_bin("lampyris")
-        .unwrap()
-        .args(["study", "bvh", "--json", "--tolerance", "0.01", "--rays", "600", "--threads", "2", "-o"])
-        .arg(folder.path())
-        .arg(model)
-        .env("NO_COLOR", "1")
-        .output()
-        .unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let model = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
+    let path = folder.path().display().to_string();
+    let options = ["--json", "--tolerance", "0.01", "--rays", "600", "--threads", "2", "-o", &path, &model];
+    let (code, out, err) = lampyris(&[&["study", "bvh"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
     // Six entrants, three kinds of rays; batch and single on one thread, batch on two.
     assert_eq!(rows.len(), 6 * 3 * 3);

@@ -1,26 +1,16 @@
 //! Long runs in pieces, lost rays and ray paths, with the real binary.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::{fixture, lampyris_in};
 use serde_json::Value;
 use std::io::Read;
-use std::path::{Path, PathBuf};
-
-fn lampyris(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("lampyris").unwrap();
-    let command = command.current_dir(folder).args(arguments).env("NO_COLOR", "1").env("COLUMNS", "120");
-    let output = command.output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
-}
+use std::path::Path;
 
 fn document(folder: &Path, arguments: &[&str], code: i32) -> Value {
-    let (found, out, err) = lampyris(folder, arguments);
+    let (found, out, err) = lampyris_in(folder, arguments);
     assert_eq!(found, code, "{arguments:?}: {err}");
     serde_json::from_str(&out).unwrap()
-}
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name)
 }
 
 /// A folder with the lens of scene S1, its model under `model.stp`.
@@ -82,12 +72,14 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
         );
     }
     assert!(folder.path().join("again/replay.vtp").is_file());
-    let (code, out, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", rows[0][0]]);
+    let (code, out, err) =
+        lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", rows[0][0]]);
     assert!(code == 0 && out.contains("lost: no exit"), "{out}{err}");
     for (wrong, code, says) in
         [("99999999", 2, "20000 rays"), ("gone.csv", 3, "gone.csv"), ("scene.toml", 3, "not a ledger")]
     {
-        let (found, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", wrong]);
+        let (found, _, err) =
+            lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", wrong]);
         assert!(found == code && err.contains(says), "{wrong}: {found} {err}");
     }
 }
@@ -115,7 +107,7 @@ fn shards_merge_to_the_bits_of_one_run() {
     }
     // A part too few, one twice, one of another run, a damaged one.
     let other = ["trace", "scene.toml", "--shard", "2/3", "-o", "other.tally", "--seed", "9"];
-    assert_eq!(lampyris(path, &other).0, 0);
+    assert_eq!(lampyris_in(path, &other).0, 0);
     let mut torn = std::fs::read(path.join("part2.tally")).unwrap();
     torn.pop();
     std::fs::write(path.join("torn.tally"), &torn).unwrap();
@@ -130,14 +122,14 @@ fn shards_merge_to_the_bits_of_one_run() {
         ("model.stp", "not a tally file"),
         ("gone.tally", "gone.tally"),
     ] {
-        let (code, _, err) = lampyris(path, &["merge", "part1.tally", second, "-o", "no"]);
+        let (code, _, err) = lampyris_in(path, &["merge", "part1.tally", second, "-o", "no"]);
         assert!(code == 3 && err.replace("\n", " ").contains(says), "{second}: {code} {err}");
         assert!(!path.join("no").exists());
     }
     for wrong in ["0/3", "4/3", "x"] {
-        assert_eq!(lampyris(path, &["trace", "scene.toml", "--shard", wrong]).0, 2, "{wrong}");
+        assert_eq!(lampyris_in(path, &["trace", "scene.toml", "--shard", wrong]).0, 2, "{wrong}");
     }
-    let (code, _, err) = lampyris(path, &["trace", "scene.toml", "--shard", "1/200"]);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", "1/200"]);
     assert!(code == 2 && err.contains("128 replicates"), "{err}");
 }
 
@@ -160,10 +152,10 @@ fn a_killed_run_resumes_to_the_same_bits() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(saved.is_file() && !path.join("out/results.json").exists(), "it was killed on the way");
-    let (code, _, err) = lampyris(path, &["trace", "scene.toml", "--rays", "100000", "-o", "out", "--resume"]);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", "100000", "-o", "out", "--resume"]);
     assert!(code == 2 && err.contains("another run"), "{err}");
     let (code, out, err) =
-        lampyris(path, &["trace", "scene.toml", "--rays", "200000", "-o", "out", "--resume", "--json"]);
+        lampyris_in(path, &["trace", "scene.toml", "--rays", "200000", "-o", "out", "--resume", "--json"]);
     assert!(code == 0 && err.contains("going on from"), "{err}");
     let resumed: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((&whole["digest"], &whole["power"]), (&resumed["digest"], &resumed["power"]));
@@ -186,7 +178,7 @@ fn a_run_goes_on_until_its_error_is_small_enough() {
     let stopped =
         ["trace", "scene.toml", "-o", "out", "--until-error", "0.0001%@focus", "--rays", "5000", "--json"];
     assert_eq!(document(path, &stopped, 4)["until_error"]["reached"], false);
-    let (code, _, err) = lampyris(path, &["trace", "scene.toml", "--until-error", "1%@fokus"]);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--until-error", "1%@fokus"]);
     assert!(code == 2 && err.contains("fokus") && err.contains("focus"), "{err}");
 }
 
@@ -225,6 +217,6 @@ fn all_ray_paths_are_streamed() {
     assert_eq!(found["digest"], without["digest"]);
     let size = |folder: &str| std::fs::metadata(path.join(folder).join("paths.vtp")).unwrap().len();
     assert_eq!(size("out"), size("without"));
-    let (code, _, err) = lampyris(path, &["trace", "scene.toml", "--paths", "paths.parquet"]);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--paths", "paths.parquet"]);
     assert!(code == 2 && err.contains(".npz"), "{err}");
 }

@@ -1,20 +1,10 @@
 //! Scenes with mistakes, and what `facet`, `trace` and `check` do with good ones, with the real binary.
 
-use assert_cmd::Command;
+mod cli_support;
+
+use cli_support::{fixture, lampyris_in};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-
-fn lampyris(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("lampyris").unwrap();
-    let command = command.current_dir(folder).args(arguments).env("NO_COLOR", "1").env("COLUMNS", "120");
-    let output = command.output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
-}
-
-fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures").join(name)
-}
+use std::path::Path;
 
 /// The mirror scene of the fixtures with one text replaced, in a folder of its own.
 fn scene(from: &str, to: &str) -> tempfile::TempDir {
@@ -43,7 +33,7 @@ fn mistakes_in_a_scene_end_with_2_show_the_line_and_leave_nothing() {
         ("kind = \"point\"", "kind = \"sun\"", &["scene.toml:", "sun", "point"]),
     ] {
         let folder = scene(from, to);
-        let (code, out, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+        let (code, out, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
         assert_eq!((code, out.as_str()), (2, ""), "{to}: {err}");
         for word in says {
             assert!(err.contains(word), "{to}: '{word}' is missing in\n{err}");
@@ -56,12 +46,12 @@ fn mistakes_in_a_scene_end_with_2_show_the_line_and_leave_nothing() {
 #[test]
 fn a_rule_for_a_part_that_is_not_in_the_model_names_the_parts_that_are() {
     let folder = scene("[[source]]", "[[material]]\npart = \"no such part\"\nsurface = \"mirror\"\n\n[[source]]");
-    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
     assert_eq!(code, 2, "{err}");
     assert!(err.contains("no such part") && err.contains("scene.toml:"), "{err}");
     assert_eq!(left_behind(folder.path()), Vec::<String>::new());
     let folder = scene("[run]", "[run]");
-    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "--part", "refelctor=0.1"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "--part", "refelctor=0.1"]);
     assert!(code == 2 && err.contains("--part refelctor"), "{err}");
     assert_eq!(left_behind(folder.path()), Vec::<String>::new());
 }
@@ -78,7 +68,7 @@ fn files_that_cannot_be_read_end_with_3() {
         (&["facet", "empty.stp", "-o", "a.obj"], "not a STEP file"),
         (&["facet", "gone.stp"], "gone.stp"),
     ] {
-        let (code, out, err) = lampyris(folder.path(), arguments);
+        let (code, out, err) = lampyris_in(folder.path(), arguments);
         assert_eq!((code, out.as_str()), (3, ""), "{arguments:?}: {err}");
         assert!(err.contains(says) && !err.contains("panicked"), "{arguments:?}: {err}");
     }
@@ -92,7 +82,7 @@ fn facet_writes_what_it_is_asked_for_and_reports_in_the_agreed_keys() {
     let names = ["a.obj", "a.ply", "a.stl", "a.vtu", "a.glb", "a.data2"];
     let mut arguments = vec!["facet", lens.as_str(), "--tolerance", "0.05", "--json"];
     names.iter().for_each(|n| arguments.extend(["-o", n]));
-    let (code, out, err) = lampyris(folder.path(), &arguments);
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
     assert_eq!(code, 0, "{err}");
     let mut found = left_behind(folder.path());
     found.sort();
@@ -126,7 +116,7 @@ fn facet_writes_what_it_is_asked_for_and_reports_in_the_agreed_keys() {
     let triangles = 2 * document["quads"].as_u64().unwrap() + document["triangles"].as_u64().unwrap();
     assert_eq!(stl.faces.len() as u64, triangles);
     // An unknown extension is said before anything is read or written.
-    let (code, _, err) = lampyris(folder.path(), &["facet", "gone.stp", "-o", "mesh.xyz"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["facet", "gone.stp", "-o", "mesh.xyz"]);
     assert!(code == 2 && err.contains("'xyz'") && err.contains(".glb"), "{err}");
 }
 
@@ -136,7 +126,7 @@ fn a_whole_far_field_in_candela_is_written_as_ies_and_holds_the_flux() {
     let folder = scene("[[receiver]]", far);
     let text = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
     std::fs::write(folder.path().join("scene.toml"), text.replace("[run]", "[run]\nunit = \"lm\"")).unwrap();
-    let (code, _, err) = lampyris(folder.path(), &["trace", "scene.toml", "--rays", "50000", "-o", "out"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "--rays", "50000", "-o", "out"]);
     assert_eq!(code, 0, "{err}");
     let out = folder.path().join("out");
     let results: Value = serde_json::from_str(&std::fs::read_to_string(out.join("results.json")).unwrap()).unwrap();
@@ -153,11 +143,11 @@ fn a_whole_far_field_in_candela_is_written_as_ies_and_holds_the_flux() {
 fn trace_writes_its_folder_and_dry_run_does_not() {
     let folder = scene("[run]", "[run]");
     let (code, out, err) =
-        lampyris(folder.path(), &["trace", "scene.toml", "--rays", "20000", "--dry-run", "-o", "dry"]);
+        lampyris_in(folder.path(), &["trace", "scene.toml", "--rays", "20000", "--dry-run", "-o", "dry"]);
     assert_eq!(code, 0, "{err}");
     assert!(out.contains("would trace") && !folder.path().join("dry").exists(), "{out}");
     let arguments = ["trace", "scene.toml", "--rays", "20000", "-o", "out", "--verify-pruning", "--json"];
-    let (code, out, err) = lampyris(folder.path(), &arguments);
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(document["pruning"]["identical"], true);
@@ -172,7 +162,7 @@ fn check_counts_no_defect_on_a_lens_and_its_rays_can_be_used_again() {
     let folder = tempfile::tempdir().unwrap();
     let lens = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
     let arguments = ["check", &lens, "--rays", "6000", "--rays-out", "rays.bin", "--json"];
-    let (code, out, err) = lampyris(folder.path(), &arguments);
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
     assert_eq!(code, 0, "{err}");
     let first: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(first["octree_vs_bvh"]["disagree"], 0);
@@ -181,11 +171,11 @@ fn check_counts_no_defect_on_a_lens_and_its_rays_can_be_used_again() {
         assert!(first["mrays_per_s"][key].as_f64().is_some_and(|r| r > 0.0), "{key}");
     }
     assert_eq!(std::fs::metadata(folder.path().join("rays.bin")).unwrap().len(), 6000 * 56);
-    let (code, out, err) = lampyris(folder.path(), &["check", &lens, "--rays-in", "rays.bin", "--json"]);
+    let (code, out, err) = lampyris_in(folder.path(), &["check", &lens, "--rays-in", "rays.bin", "--json"]);
     assert_eq!(code, 0, "{err}");
     let second: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(first["facets_vs_exact"], second["facets_vs_exact"]);
     std::fs::write(folder.path().join("torn.bin"), [0u8; 57]).unwrap();
-    let (code, _, err) = lampyris(folder.path(), &["check", &lens, "--rays-in", "torn.bin"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["check", &lens, "--rays-in", "torn.bin"]);
     assert!(code == 3 && err.contains("record 1"), "{err}");
 }

@@ -1,15 +1,17 @@
 //! What facets change of the three scenes of the fixtures, against the spline with the same rays: the spot widens as the square
 //! root of the sag with flat normals; with interpolated ones its size changes in proportion to the sag or faster.
 
+mod simulate_support;
+
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::model::Model;
 use lampyris::simulate::scene::Interfaces;
-use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
+use lampyris::simulate::{BoundScene, Results, RunSettings, simulate};
 use lampyris::study::receivers::paired;
 use lampyris::tessellate::{self, tessellate};
-use std::path::Path;
+use simulate_support::fixture_scene;
 
 struct Case {
     bound: BoundScene,
@@ -19,14 +21,7 @@ struct Case {
 }
 
 fn case(file: &str, extra: &str, rays: u64) -> Case {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes");
-    let text = std::fs::read_to_string(folder.join(file)).unwrap() + extra;
-    let scene = Scene::parse(&text, file, &folder).unwrap();
-    let read = |m: &lampyris::simulate::scene::ModelUse| -> Model {
-        lampyris::step::read(&scene.resolve(&m.file), &lampyris::step::Settings::default()).unwrap().model
-    };
-    let model = scene.assemble(scene.models.iter().map(read).collect()).unwrap();
-    let bound = scene.bind(&model).unwrap();
+    let (scene, model, bound) = fixture_scene(file, extra);
     let settings = RunSettings { rays, threads: 2, interfaces: Interfaces::Split, ..RunSettings::from(&scene.run) };
     Case { exact: Exact::build(&model, &exact::Settings::default()), bound, model, settings }
 }

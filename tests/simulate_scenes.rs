@@ -1,11 +1,12 @@
 //! The three scenes that other programs have answered, on the exact spline, against closed forms and converged figures.
 
+mod simulate_support;
+
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::math::{Point, Ray, Vector};
-use lampyris::model::Model;
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, verify_pruning};
+use simulate_support::fixture_scene;
 use std::f64::consts::TAU;
-use std::path::Path;
 
 struct Case {
     bound: BoundScene,
@@ -14,14 +15,7 @@ struct Case {
 }
 
 fn case(file: &str, extra: &str) -> Case {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes");
-    let text = std::fs::read_to_string(folder.join(file)).unwrap() + extra;
-    let scene = Scene::parse(&text, file, &folder).unwrap();
-    let read = |m: &lampyris::simulate::scene::ModelUse| -> Model {
-        lampyris::step::read(&scene.resolve(&m.file), &lampyris::step::Settings::default()).unwrap().model
-    };
-    let model = scene.assemble(scene.models.iter().map(read).collect()).unwrap();
-    let bound = scene.bind(&model).unwrap();
+    let (scene, model, bound) = fixture_scene(file, extra);
     Case { exact: Exact::build(&model, &exact::Settings::default()), bound, scene }
 }
 

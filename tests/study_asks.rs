@@ -29,13 +29,7 @@ fn swept(model: &Model) -> Vec<(f64, Row)> {
     let uniform = [1.6, 0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125, 0.006, 0.003, 0.0015, 7.5e-4];
     let settings = Settings {
         tolerances: uniform.map(|t| [t, t]).into_iter().chain([[0.05, 0.2]]).collect(),
-        normals: vec![
-            NormalMode::Flat,
-            NormalMode::Nearest,
-            NormalMode::Bilinear,
-            NormalMode::Cubic,
-            NormalMode::Exact,
-        ],
+        normals: NormalMode::ALL.to_vec(),
         trees: vec![Tree::Octree],
         rays: 100_000,
         rounds: 3,

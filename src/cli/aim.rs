@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::context::Context;
-use super::options::{self, IntersectorKind, Meshing, NormalKind, Tracing};
+use super::options::{self, IntersectorKind, Meshing, Tracing};
 use super::witness::Witness;
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
@@ -30,7 +30,7 @@ pub(super) fn meshing(
     ask.seed = tracing.seed.unwrap_or(ask.seed);
     ask.job_rays = tracing.rays.or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
     if let Some(normals) = tracing.normals {
-        ask.kinds = vec![mode(normals)];
+        ask.kinds = vec![normals.mode()];
     }
     let product = Product::new(model);
     let bar = context.bar("aiming", "%", 100);
@@ -49,7 +49,7 @@ pub(super) fn meshing(
     bar.finish_and_clear();
     context.say(&found.answer);
     meshing.plan = Some(found.plan.clone());
-    tracing.normals = Some(kind(found.normals));
+    tracing.normals = Some(found.normals.into());
     Ok((meshing, tracing, Some(found)))
 }
 
@@ -91,24 +91,4 @@ fn rays_of(
     simulate(bound, &witness, settings, &|_| true);
     // Facets lie at most 0.8 mm off the surface here.
     witness.rays(settings.rays as usize, model, 1.0)
-}
-
-fn mode(kind: NormalKind) -> NormalMode {
-    match kind {
-        NormalKind::Flat => NormalMode::Flat,
-        NormalKind::Nearest => NormalMode::Nearest,
-        NormalKind::Bilinear => NormalMode::Bilinear,
-        NormalKind::Cubic => NormalMode::Cubic,
-        NormalKind::Exact => NormalMode::Exact,
-    }
-}
-
-fn kind(mode: NormalMode) -> NormalKind {
-    match mode {
-        NormalMode::Flat => NormalKind::Flat,
-        NormalMode::Nearest => NormalKind::Nearest,
-        NormalMode::Bilinear => NormalKind::Bilinear,
-        NormalMode::Cubic => NormalKind::Cubic,
-        NormalMode::Exact => NormalKind::Exact,
-    }
 }

@@ -4,7 +4,7 @@ use super::args::Refusals;
 use super::context::{Context, print};
 use super::engine::Choice;
 use super::load::Input;
-use super::options::{Meshing, NormalKind, Tracing};
+use super::options::{Meshing, Tracing};
 use super::witness::Witness;
 use super::{Failure, Outcome, aim, engine, load, pairs};
 use crate::formats::write_atomic;
@@ -12,7 +12,7 @@ use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::Exact;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
-use crate::intersect::{Cost, Intersector, NormalMode};
+use crate::intersect::{Cost, Intersector};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::report::{figures, grouped, verdict};
@@ -54,12 +54,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let settings = engine::mesh_settings(&meshing, scene, model)?;
     let (made, _) = engine::facets(model, &settings, context);
     let mesh = &made.mesh;
-    let normals = match Choice::new(&tracing, scene)?.normals {
-        NormalKind::Flat => NormalMode::Flat,
-        NormalKind::Nearest => NormalMode::Nearest,
-        NormalKind::Cubic => NormalMode::Cubic,
-        NormalKind::Bilinear | NormalKind::Exact => NormalMode::Bilinear,
-    };
+    let normals = Choice::new(&tracing, scene)?.normals.mode().on_facets();
     let spinner = context.spinner("building octree, BVHs and spline");
     let octree = Octree::build(mesh, &octree::Settings { normals, ..Default::default() });
     let wide = bvh::Settings { normals, ..Default::default() };

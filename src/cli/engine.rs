@@ -7,7 +7,7 @@ use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
-use crate::intersect::{Footprint, Intersector, NormalMode};
+use crate::intersect::{Footprint, Intersector};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::simulate::Scene;
@@ -47,16 +47,6 @@ impl Choice {
             intersector: named(tracing.intersector, accuracy.and_then(|a| a.intersector.as_ref()), "intersector")?,
             normals: named(tracing.normals, accuracy.and_then(|a| a.normals.as_ref()), "normals")?,
         })
-    }
-
-    fn mode(self) -> NormalMode {
-        match self.normals {
-            NormalKind::Flat => NormalMode::Flat,
-            NormalKind::Nearest => NormalMode::Nearest,
-            // Polishing starts from a facet hit whose own normal does not matter.
-            NormalKind::Bilinear | NormalKind::Exact => NormalMode::Bilinear,
-            NormalKind::Cubic => NormalMode::Cubic,
-        }
     }
 }
 
@@ -110,7 +100,7 @@ pub(super) fn with_intersector<T>(
         spinner.finish_and_clear();
         return work(&exact, exact.footprint());
     }
-    let normals = choice.mode();
+    let normals = choice.normals.mode().on_facets();
     let facets: Box<dyn Intersector + '_> = match choice.intersector {
         IntersectorKind::Bvh2 => {
             Box::new(Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, normals, ..Default::default() }))

@@ -1,6 +1,7 @@
 //! Options shared by commands, and the small grammars of their values. Signs are let through the argument parser so that a
 //! negative number gets an answer about the number, not about an unknown option.
 
+use crate::intersect::NormalMode;
 use clap::ValueEnum;
 
 /// Options of everything that tessellates.
@@ -69,6 +70,30 @@ impl std::fmt::Display for IntersectorKind {
             Self::Cwbvh => "cwbvh",
             Self::Exact => "exact",
         })
+    }
+}
+
+impl NormalKind {
+    pub(crate) fn mode(self) -> NormalMode {
+        match self {
+            Self::Flat => NormalMode::Flat,
+            Self::Nearest => NormalMode::Nearest,
+            Self::Bilinear => NormalMode::Bilinear,
+            Self::Cubic => NormalMode::Cubic,
+            Self::Exact => NormalMode::Exact,
+        }
+    }
+}
+
+impl From<NormalMode> for NormalKind {
+    fn from(mode: NormalMode) -> Self {
+        match mode {
+            NormalMode::Flat => Self::Flat,
+            NormalMode::Nearest => Self::Nearest,
+            NormalMode::Bilinear => Self::Bilinear,
+            NormalMode::Cubic => Self::Cubic,
+            NormalMode::Exact => Self::Exact,
+        }
     }
 }
 

@@ -110,3 +110,13 @@ pub enum NormalMode {
     /// From the spline, by polishing the hit.
     Exact,
 }
+
+impl NormalMode {
+    /// Every mode, the coarsest first.
+    pub const ALL: [Self; 5] = [Self::Flat, Self::Nearest, Self::Bilinear, Self::Cubic, Self::Exact];
+
+    /// The mode that facets themselves can answer: polishing starts from a facet hit whose own normal does not matter.
+    pub fn on_facets(self) -> Self {
+        if self == Self::Exact { Self::Bilinear } else { self }
+    }
+}

@@ -63,8 +63,7 @@ pub(super) fn with_all<R>(
     then: impl FnOnce(&[(Tree, NormalMode, &dyn Intersector)]) -> R,
 ) -> R {
     let pairs: Vec<_> = trees.iter().flat_map(|&t| normals.iter().map(move |&n| (t, n))).collect();
-    let base = |n: NormalMode| if n == NormalMode::Exact { NormalMode::Bilinear } else { n };
-    let facets: Vec<_> = pairs.iter().map(|&(t, n)| workshop.build(mesh, t, base(n))).collect();
+    let facets: Vec<_> = pairs.iter().map(|&(t, n)| workshop.build(mesh, t, n.on_facets())).collect();
     let polished: Vec<_> = pairs
         .iter()
         .zip(&facets)

@@ -1,11 +1,14 @@
-//! Spheres and rectangles intersected in closed form, with the models that go with them: scenes whose answer is known.
+//! Spheres and rectangles intersected in closed form, with the models that go with them: scenes whose answer is known;
+//! and the scenes of the fixtures, ready to run.
 #![allow(dead_code, unreachable_pub)]
 
 use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
-use lampyris::simulate::{KernelChoice, Results, RunSettings, Scene, simulate};
+use lampyris::simulate::scene::ModelUse;
+use lampyris::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};
+use lampyris::step;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
@@ -140,4 +143,15 @@ impl Intersector for World {
     fn footprint(&self) -> Footprint {
         Footprint { primitives: self.shapes.len(), ..Footprint::default() }
     }
+}
+
+/// A scene of the fixtures with text added, its model, and the two together.
+pub fn fixture_scene(file: &str, extra: &str) -> (Scene, Model, BoundScene) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes");
+    let text = std::fs::read_to_string(folder.join(file)).unwrap() + extra;
+    let scene = Scene::parse(&text, file, &folder).unwrap();
+    let read = |m: &ModelUse| step::read(&scene.resolve(&m.file), &step::Settings::default()).unwrap().model;
+    let model = scene.assemble(scene.models.iter().map(read).collect()).unwrap();
+    let bound = scene.bind(&model).unwrap();
+    (scene, model, bound)
 }

@@ -39,13 +39,7 @@ impl Default for Settings {
         let all = rayon::current_num_threads();
         Self {
             tolerances: uniform.into_iter().chain([[0.05, 0.2]]).collect(),
-            normals: vec![
-                NormalMode::Flat,
-                NormalMode::Nearest,
-                NormalMode::Bilinear,
-                NormalMode::Cubic,
-                NormalMode::Exact,
-            ],
+            normals: NormalMode::ALL.to_vec(),
             trees: vec![Tree::Octree, Tree::CwBvh],
             rays: 50_000,
             rounds: 3,
