@@ -30,7 +30,7 @@ pub(super) fn meshing(
     ask.seed = tracing.seed.unwrap_or(ask.seed);
     ask.job_rays = tracing.rays.or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
     if let Some(normals) = tracing.normals {
-        ask.kinds = vec![normals.mode()];
+        ask.kinds = vec![normals];
     }
     let product = Product::new(model);
     let bar = context.bar("aiming", "%", 100);
@@ -49,7 +49,7 @@ pub(super) fn meshing(
     bar.finish_and_clear();
     context.say(&found.answer);
     meshing.plan = Some(found.plan.clone());
-    tracing.normals = Some(found.normals.into());
+    tracing.normals = Some(found.normals);
     Ok((meshing, tracing, Some(found)))
 }
 

@@ -54,7 +54,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let settings = engine::mesh_settings(&meshing, scene, model)?;
     let (made, _) = engine::facets(model, &settings, context);
     let mesh = &made.mesh;
-    let normals = Choice::new(&tracing, scene)?.normals.mode().on_facets();
+    let normals = Choice::new(&tracing, scene)?.normals.on_facets();
     let spinner = context.spinner("building octree, BVHs and spline");
     let octree = Octree::build(mesh, &octree::Settings { normals, ..Default::default() });
     let wide = bvh::Settings { normals, ..Default::default() };

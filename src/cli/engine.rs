@@ -2,12 +2,12 @@
 
 use super::Failure;
 use super::context::Context;
-use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
+use super::options::{IntersectorKind, Meshing, Tracing};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
-use crate::intersect::{Footprint, Intersector};
+use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::simulate::Scene;
@@ -18,7 +18,7 @@ use std::time::Instant;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) intersector: IntersectorKind,
-    pub(super) normals: NormalKind,
+    pub(super) normals: NormalMode,
 }
 
 impl Choice {
@@ -100,7 +100,7 @@ pub(super) fn with_intersector<T>(
         spinner.finish_and_clear();
         return work(&exact, exact.footprint());
     }
-    let normals = choice.normals.mode().on_facets();
+    let normals = choice.normals.on_facets();
     let facets: Box<dyn Intersector + '_> = match choice.intersector {
         IntersectorKind::Bvh2 => {
             Box::new(Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, normals, ..Default::default() }))
@@ -110,7 +110,7 @@ pub(super) fn with_intersector<T>(
             Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() }))
         }
     };
-    if choice.normals != NormalKind::Exact {
+    if choice.normals != NormalMode::Exact {
         spinner.finish_and_clear();
         return work(&*facets, facets.footprint());
     }

@@ -4,15 +4,15 @@ use super::context::Context;
 use super::engine::{self, Choice};
 use super::ledger;
 use super::load::Loaded;
-use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
+use super::options::{IntersectorKind, Meshing, Tracing};
 use super::paths::Paths;
 use super::witness::Witness;
 use super::{Failure, files, look};
 use crate::formats::{Polylines, write_facets, write_vtp};
-use crate::intersect::Intersector;
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::Exact;
 use crate::intersect::octree::Octree;
+use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::report::{Cell, Light, Report, Table, file_stem, path_lines};
 use crate::simulate::{
@@ -178,7 +178,7 @@ impl Prepared<'_> {
         let bvh = Bvh::build(mesh, &Default::default());
         let exact = Exact::build(model, &Default::default());
         // The court is about facets: a run on the spline, or polished to it, is no witness for the octree.
-        let facets = self.choice.intersector == IntersectorKind::Octree && self.choice.normals != NormalKind::Exact;
+        let facets = self.choice.intersector == IntersectorKind::Octree && self.choice.normals != NormalMode::Exact;
         let own = (!facets).then(|| Octree::build(mesh, &Default::default()));
         let octree = own.as_ref().map_or(octree, |own| own as &dyn Intersector);
         spinner.finish_and_clear();

@@ -3,6 +3,7 @@
 
 use crate::intersect::NormalMode;
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 
 /// Options of everything that tessellates.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -38,7 +39,7 @@ pub(crate) struct Tracing {
     pub(crate) intersector: Option<IntersectorKind>,
     /// How the normal at a hit is got; exact polishes the hit to the spline
     #[arg(long, value_name = "NAME")]
-    pub(crate) normals: Option<NormalKind>,
+    pub(crate) normals: Option<NormalMode>,
 }
 
 /// What finds the hits.
@@ -48,17 +49,6 @@ pub(crate) enum IntersectorKind {
     Octree,
     Bvh2,
     Cwbvh,
-    Exact,
-}
-
-/// How the normal at a hit is got.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum NormalKind {
-    Flat,
-    Nearest,
-    #[default]
-    Bilinear,
-    Cubic,
     Exact,
 }
 
@@ -73,39 +63,13 @@ impl std::fmt::Display for IntersectorKind {
     }
 }
 
-impl NormalKind {
-    pub(crate) fn mode(self) -> NormalMode {
-        match self {
-            Self::Flat => NormalMode::Flat,
-            Self::Nearest => NormalMode::Nearest,
-            Self::Bilinear => NormalMode::Bilinear,
-            Self::Cubic => NormalMode::Cubic,
-            Self::Exact => NormalMode::Exact,
-        }
+impl ValueEnum for NormalMode {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
     }
-}
 
-impl From<NormalMode> for NormalKind {
-    fn from(mode: NormalMode) -> Self {
-        match mode {
-            NormalMode::Flat => Self::Flat,
-            NormalMode::Nearest => Self::Nearest,
-            NormalMode::Bilinear => Self::Bilinear,
-            NormalMode::Cubic => Self::Cubic,
-            NormalMode::Exact => Self::Exact,
-        }
-    }
-}
-
-impl std::fmt::Display for NormalKind {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Flat => "flat",
-            Self::Nearest => "nearest",
-            Self::Bilinear => "bilinear",
-            Self::Cubic => "cubic",
-            Self::Exact => "exact",
-        })
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()))
     }
 }
 

@@ -4,8 +4,9 @@ use super::Failure;
 use super::context::{Context, print};
 use super::job::{self, Job, Prepared, Ways};
 use super::load;
-use super::options::{IntersectorKind, Meshing, NormalKind, Tracing};
+use super::options::{IntersectorKind, Meshing, Tracing};
 use crate::formats::write_atomic;
+use crate::intersect::NormalMode;
 use crate::report::grouped;
 use crate::simulate::{Fingerprint, Portion, RunSettings};
 use clap::ValueEnum;
@@ -70,7 +71,7 @@ impl Header {
             seed: self.seed,
             threads: None,
             intersector: self.intersector.as_ref().and_then(|n| IntersectorKind::from_str(n, true).ok()),
-            normals: self.normals.as_ref().and_then(|n| NormalKind::from_str(n, true).ok()),
+            normals: self.normals.as_ref().and_then(|n| NormalMode::from_str(n, true).ok()),
         }
     }
 }

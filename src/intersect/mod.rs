@@ -111,6 +111,12 @@ pub enum NormalMode {
     Exact,
 }
 
+impl std::fmt::Display for NormalMode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 impl NormalMode {
     /// Every mode, the coarsest first.
     pub const ALL: [Self; 5] = [Self::Flat, Self::Nearest, Self::Bilinear, Self::Cubic, Self::Exact];
@@ -118,5 +124,16 @@ impl NormalMode {
     /// The mode that facets themselves can answer: polishing starts from a facet hit whose own normal does not matter.
     pub fn on_facets(self) -> Self {
         if self == Self::Exact { Self::Bilinear } else { self }
+    }
+
+    /// The name that people read and write.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Nearest => "nearest",
+            Self::Bilinear => "bilinear",
+            Self::Cubic => "cubic",
+            Self::Exact => "exact",
+        }
     }
 }

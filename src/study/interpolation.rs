@@ -3,7 +3,7 @@
 use super::errors::Errors;
 use super::rays::{RaySource, Uniform};
 use super::timing::Clock;
-use super::workshop::{Meshed, Tree, Workshop, answer, normals_name, with_all};
+use super::workshop::{Meshed, Tree, Workshop, answer, with_all};
 use super::{Progress, Rounds};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::Ray;
@@ -128,7 +128,7 @@ fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
         Row {
             model: name.into(),
             facets: Some(meshed.mesh.facets.len()),
-            algorithm: normals_name(algorithm).into(),
+            algorithm: algorithm.name().into(),
             normal_error_mean: errors.normal.mean(),
             normal_error_p99: Some(errors.normal.at(0.99)),
             normal_error_max: Some(errors.normal.max()),

@@ -3,7 +3,7 @@
 use super::Progress;
 use super::accuracy::{self, Accuracy};
 use super::receivers::{self, Expected};
-use super::workshop::{Tree, Workshop, normals_name, with_all};
+use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{BoundScene, RunSettings, simulate};
 use std::time::Instant;
@@ -28,7 +28,7 @@ pub fn accuracy_of_scene(
     let threads = study.rows.iter().map(|r| r.threads).max().unwrap_or(1);
     let of = |tolerance: Option<f64>, tree: &str, normals: NormalMode| {
         let mut rows = study.rows.iter().filter(|r| r.threads == threads && !r.adaptive);
-        let name = normals_name(normals);
+        let name = normals.name();
         rows.find(|r| r.tolerance_mm == tolerance && r.intersector == tree && r.normals == name)
     };
     // The sweep's rays are not the scene's, but facets and spline stand to each other alike on both.

@@ -35,4 +35,4 @@ pub use product::Product;
 pub use quantiles::{Quantiles, Summary};
 pub use random::Random;
 pub use timing::{Progress, Rounds, Timing};
-pub use workshop::{Meshed, Tree, Workshop, normals_name};
+pub use workshop::{Meshed, Tree, Workshop};

@@ -6,7 +6,7 @@
 
 use super::Progress;
 use super::timing::Countdown;
-use super::workshop::{Tree, Workshop, normals_name, with_all};
+use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{
     BoundScene, Hooks, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
@@ -164,7 +164,7 @@ pub(super) fn receivers(
                 rows.push(Row {
                     scene: name.into(),
                     tolerance_mm: tolerance,
-                    normals: normals_name(*normals).into(),
+                    normals: normals.name().into(),
                     rays: found.rays,
                     seconds_trace: found.seconds.trace,
                     seconds_trace_exact: truth.seconds.trace,

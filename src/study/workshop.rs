@@ -77,17 +77,6 @@ pub(super) fn with_all<R>(
     then(&all)
 }
 
-/// As on the command line.
-pub fn normals_name(normals: NormalMode) -> &'static str {
-    match normals {
-        NormalMode::Flat => "flat",
-        NormalMode::Nearest => "nearest",
-        NormalMode::Bilinear => "bilinear",
-        NormalMode::Cubic => "cubic",
-        NormalMode::Exact => "exact",
-    }
-}
-
 /// Rays of one task.
 const CHUNK: usize = 4096;
 

@@ -6,7 +6,7 @@ use crate::math::Ray;
 use crate::study::errors::Errors;
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Countdown;
-use crate::study::workshop::{Meshed, Tree, Workshop, answer, normals_name, with_all};
+use crate::study::workshop::{Meshed, Tree, Workshop, answer, with_all};
 use crate::study::{Progress, Rounds, Timing};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -165,7 +165,7 @@ impl Sweep<'_> {
         Row {
             tolerance_mm: Some(tolerance[0]),
             adaptive: tolerance[0] != tolerance[1],
-            normals: normals_name(normals).into(),
+            normals: normals.name().into(),
             intersector: tree.name().into(),
             facets: meshed.mesh.facets.len(),
             bytes: footprint.bytes + meshed.mesh.bytes(),

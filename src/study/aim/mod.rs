@@ -14,7 +14,6 @@ mod search;
 pub use plan::{Plan, Share};
 pub use search::{RaysOf, aim, aim_at};
 
-use super::workshop::normals_name;
 use crate::intersect::NormalMode;
 use serde::Serialize;
 
@@ -92,5 +91,5 @@ pub struct Try {
 }
 
 fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
-    s.serialize_str(normals_name(*n))
+    s.serialize_str(n.name())
 }

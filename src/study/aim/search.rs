@@ -7,7 +7,7 @@ use crate::study::Progress;
 use crate::study::check::angle_deg;
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Clock;
-use crate::study::workshop::{Tree, Workshop, answer, normals_name, reflect, with_all};
+use crate::study::workshop::{Tree, Workshop, answer, reflect, with_all};
 use std::time::Instant;
 
 /// Rays that look at the model first, and that facets are tuned on.
@@ -59,7 +59,7 @@ pub fn aim_at(
         if beaten || (candidate.facets > MOST_FACETS && best.is_some()) {
             continue;
         }
-        let stage = format!("{} normals", normals_name(candidate.normals));
+        let stage = format!("{} normals", candidate.normals);
         clock.at(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
         let found = search.reach(candidate, &mut tries);
         let better = |b: &Found| match (found.kept(ask), b.kept(ask)) {
@@ -79,7 +79,7 @@ pub fn aim_at(
         ask.degrees,
         found.reached,
         found.checked,
-        normals_name(found.normals),
+        found.normals.name(),
         found.facets,
         if kept { "" } else { ": not reached" }
     );
@@ -258,7 +258,7 @@ impl Search<'_> {
                 flips: m.flips,
             };
             tries.push(Try {
-                normals: normals_name(normals).into(),
+                normals: normals.name().into(),
                 tolerance_mm: plan.tolerance_mm(),
                 facets: m.made.len(),
                 reached_deg: reached,
