@@ -14,7 +14,7 @@ use lampyris::model::Model;
 use std::time::Instant;
 
 const RAYS: usize = 100_000;
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 15;
 
 struct Case {
     name: String,
@@ -57,6 +57,9 @@ fn main() {
             Ok(import) => cases.push(case(file.rsplit('/').next().unwrap_or(&file), &import.model)),
             Err(e) => eprintln!("{file}: {e}"),
         }
+    }
+    if let Ok(only) = std::env::var("LAMPYRIS_ONLY") {
+        cases.retain(|c| c.name.contains(&only));
     }
     let mut hits: Vec<Option<Hit>> = vec![None; RAYS];
     for _ in 0..ROUNDS {

@@ -6,24 +6,24 @@
 
 use super::geometry::{Geometry, Patch, PatchGrid};
 use super::net::{self, Net, Slopes, V4};
+use super::probe::Probe;
 use super::trim::Region;
 use super::wide;
 use crate::math::Vector;
+use rayon::prelude::*;
 
 /// How far beyond its domain a leaf's derivative boxes hold, in local parameters.
 pub(super) const EXTENSION: f64 = 0.1;
 /// Half an ulp of 1: the relative error of one rounded operation.
 pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
+/// Where roots count on a leaf without trims on its border.
+pub(super) const REACH: [[f64; 2]; 2] = [[-1e-12, 1.0 + 1e-12]; 2];
 
 /// A piece of a patch.
 #[derive(Clone, Debug)]
 pub(super) struct Leaf {
     /// Centre in the world.
     pub(super) center: Vector,
-    /// Derivative boxes over the enlarged domain.
-    pub(super) slopes: Slopes,
-    /// The homogeneous point in the middle.
-    pub(super) middle: V4,
     /// Axis-parallel box in the world.
     pub(super) lo: Vector,
     pub(super) hi: Vector,
@@ -54,6 +54,7 @@ pub(super) struct Leaf {
 #[derive(Debug, Default)]
 pub(super) struct Leaves {
     pub(super) leaves: Vec<Leaf>,
+    pub(super) probes: Vec<Probe>,
     pub(super) pool: Vec<V4>,
 }
 
@@ -88,8 +89,13 @@ fn xyz(a: &V4) -> Vector {
     Vector::new(a[0], a[1], a[2])
 }
 
+/// Cuts every patch.
+pub(super) fn cut_all(geometry: &Geometry, cutting: Cutting) -> Vec<Leaves> {
+    (0..geometry.patches.len() as u32).into_par_iter().map(|p| cut(geometry, p, cutting)).collect()
+}
+
 /// Cuts one patch into leaves; those that lie outside the trims are dropped.
-pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
+fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
     let patch = &geometry.patches[index as usize];
     let trim = &geometry.trims[geometry.faces[patch.face as usize].trim as usize];
     let mut out = Leaves::default();
@@ -101,23 +107,30 @@ pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
         if region == Region::Outside {
             continue;
         }
-        let (mut leaf, centred) = describe(patch, &piece, rect, depth);
+        let Described { mut leaf, slopes, net: centred } = describe(patch, &piece, rect, depth);
         let weights = centred.iter().fold((f64::INFINITY, 0f64), |(lo, hi), p| (lo.min(p[3]), hi.max(p[3])));
-        let flat = deviation(&leaf) < cutting.flatness && weights.1 < 1.5 * weights.0;
+        let flat = deviation(&leaf, &slopes) < cutting.flatness && weights.1 < 1.5 * weights.0;
         if flat || depth >= cutting.depth {
             leaf.whole = region == Region::Inside;
             leaf.patch = index;
             leaf.face = patch.face;
             let face = &geometry.faces[patch.face as usize];
             if !trim.whole && !leaf.whole {
-                widen(&mut leaf, border_sides(&geometry.grids[face.grid as usize], patch, rect), face.band);
+                widen(
+                    &mut leaf,
+                    &slopes,
+                    border_sides(&geometry.grids[face.grid as usize], patch, rect),
+                    face.band,
+                );
             }
             leaf.net = out.pool.len() as u32;
+            let middle = wide::evaluate(&centred, patch.degree, 0.5, 0.5).s;
             out.pool.extend(centred);
+            out.probes.push(Probe::new(&leaf, &slopes, &middle));
             out.leaves.push(leaf);
             continue;
         }
-        let direction = steeper(&leaf, &centred, depth);
+        let direction = steeper(&leaf, &slopes, &centred, depth);
         let [low, high] = net::halves(&piece, patch.degree, direction);
         let middle = 0.5 * (rect[direction][0] + rect[direction][1]);
         let (mut a, mut b) = (rect, rect);
@@ -129,7 +142,14 @@ pub(super) fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
     out
 }
 
-fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Leaf, Net) {
+/// A leaf with what goes elsewhere: derivative boxes over the enlarged domain, and the net about its centre.
+struct Described {
+    leaf: Leaf,
+    slopes: Slopes,
+    net: Net,
+}
+
+fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
     let middle = wide::evaluate(piece, degree, 0.5, 0.5).s;
     let center = patch.center + xyz(&middle) / middle[3];
@@ -170,8 +190,6 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
     let pad = slop + 8.0 * ROUND * (center.abs().max_element() + radius);
     let leaf = Leaf {
         center,
-        slopes,
-        middle: wide::evaluate(&centred, degree, 0.5, 0.5).s,
         lo: center + lo - pad,
         hi: center + hi + pad,
         axes,
@@ -179,7 +197,7 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
         ohi: ohi + pad,
         radius,
         slop,
-        reach: [[-1e-12, 1.0 + 1e-12]; 2],
+        reach: REACH,
         net: 0,
         patch: 0,
         face: 0,
@@ -187,7 +205,7 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> (Le
         whole: false,
         rect,
     };
-    (leaf, centred)
+    Described { leaf, slopes, net: centred }
 }
 
 /// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border, nor
@@ -204,10 +222,10 @@ fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool;
 
 /// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
 /// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
-fn widen(leaf: &mut Leaf, border: [[bool; 2]; 2], band: f64) {
+fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
     // Roots on grazed faces stray beyond the band by the inverse of the sine.
     let far = 32.0 * band;
-    for (d, slope) in [&leaf.slopes.u, &leaf.slopes.v].into_iter().enumerate() {
+    for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
         let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
         if border[d][0] {
             leaf.reach[d][0] = -beyond;
@@ -234,10 +252,10 @@ fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
 }
 
 /// The Jacobian in the tangent plane, and the rule that measures four-vectors along a tangent.
-fn tangent_jacobian(leaf: &Leaf) -> [f64; 4] {
+fn tangent_jacobian(leaf: &Leaf, slopes: &Slopes) -> [f64; 4] {
     let p = |a: &V4, e: Vector| xyz(a).dot(e);
     let [x, y, _] = leaf.axes;
-    [p(&leaf.slopes.u, x), p(&leaf.slopes.v, x), p(&leaf.slopes.u, y), p(&leaf.slopes.v, y)]
+    [p(&slopes.u, x), p(&slopes.v, x), p(&slopes.u, y), p(&slopes.v, y)]
 }
 
 fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
@@ -245,19 +263,19 @@ fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
 }
 
 /// Largest row sum of `|J⁻¹| R` for a ray along the normal.
-fn deviation(leaf: &Leaf) -> f64 {
-    let [a, b, c, d] = tangent_jacobian(leaf);
+fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
+    let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
     if !(det.abs() > 0.0) {
         return f64::INFINITY;
     }
-    let r = |e: Vector| measure(&leaf.slopes.ru, e, leaf.radius) + measure(&leaf.slopes.rv, e, leaf.radius);
+    let r = |e: Vector| measure(&slopes.ru, e, leaf.radius) + measure(&slopes.rv, e, leaf.radius);
     let (rx, ry) = (r(leaf.axes[0]), r(leaf.axes[1]));
     ((d.abs() * rx + b.abs() * ry) / det.abs()).max((c.abs() * rx + a.abs() * ry) / det.abs())
 }
 
 /// The direction whose halving leaves the smaller deviation, predicted from second differences.
-fn steeper(leaf: &Leaf, net: &[V4], depth: u32) -> usize {
+fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;
     let (mut uu, mut uv, mut vv) = ([0f64; 4], [0f64; 4], [0f64; 4]);
@@ -281,7 +299,7 @@ fn steeper(leaf: &Leaf, net: &[V4], depth: u32) -> usize {
             }
         }
     }
-    let [a, b, c, d] = tangent_jacobian(leaf);
+    let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
     let alternate = depth as usize % 2;
     if !(det.abs() > 1e-9 * (a.abs() + b.abs()) * (c.abs() + d.abs())) {

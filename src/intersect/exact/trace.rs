@@ -5,10 +5,11 @@
 //! `middle − Y f(middle) ± |Y| R · ½` (Krawczyk's operator); when that misses the leaf there is none, and when the row
 //! sums of `|Y| R` stay below 1 there is at most one in the enlarged domain, which Newton's method then finds.
 
-use super::leaf::{EXTENSION, Leaf, ROUND};
-use super::net::{self, V4};
+use super::leaf::{EXTENSION, Leaf, REACH, ROUND};
+use super::net::{self, Jet, V4};
+use super::probe::seen;
 use super::query::{Query, Root};
-use super::tree::{ABSENT, LEAF};
+use super::tree::{LEAF, WIDTH};
 use super::{Exact, wide};
 use crate::intersect::Certainty;
 use crate::math::Vector;
@@ -16,6 +17,11 @@ use smallvec::SmallVec;
 
 /// Row sums above this go to clipping: 5 % is kept for the rounding of `Y`, which stays below 1e-6.
 const UNIQUE: f64 = 0.95;
+/// Newton's method stops where its next step is foreseen below this, in local parameters.
+pub(super) const CLOSE: f64 = 1e-12;
+
+/// What is left to visit, with the distance at which it is entered.
+pub(super) type Stack = SmallVec<[(u32, f32); 64]>;
 
 impl Exact {
     /// Bound of the rounding error of a leaf's coordinates across a ray, mm.
@@ -27,105 +33,83 @@ impl Exact {
         32.0 * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs() + leaf.radius) + leaf.slop
     }
 
-    /// Meets every leaf that the ray may touch, nearest boxes first.
+    /// The next leaf that the ray may touch, nearest boxes first; `None` when there is none left.
     #[inline(always)]
-    pub(super) fn walk(&self, q: &mut Query) {
-        if self.tree.nodes.is_empty() {
-            return;
-        }
-        // Entries carry the distance rounded down, so that pruning stays conservative.
-        let mut stack: SmallVec<[(u32, f32); 64]> = SmallVec::new();
-        stack.push((0, f32::NEG_INFINITY));
+    pub(super) fn advance<const WIDE: bool>(&self, q: &mut Query, stack: &mut Stack) -> Option<u32> {
         while let Some((index, near)) = stack.pop() {
-            if f64::from(near) > q.t_max {
+            if near > q.slabs.end {
                 continue;
             }
             if index & LEAF != 0 {
-                self.test_leaf(q, index & !LEAF);
-                continue;
+                return Some(index & !LEAF);
             }
             q.nodes += 1;
             let node = &self.tree.nodes[index as usize];
-            let near = q.slabs(node);
-            let mut met = [(ABSENT, f32::INFINITY); 4];
-            let mut count = 0;
-            for k in 0..4 {
-                if near[k] < f64::INFINITY && node.child[k] != ABSENT {
-                    // Insertion, farthest first: the nearest is popped next.
-                    let entry = (node.child[k], (near[k] as f32).next_down());
-                    let mut at = count;
-                    while at > 0 && met[at - 1].1 < entry.1 {
-                        met[at] = met[at - 1];
-                        at -= 1;
-                    }
-                    met[at] = entry;
-                    count += 1;
-                }
-            }
-            for &entry in &met[..count] {
+            let (near, mut met) = wide::meet::<WIDE>(&q.slabs, node);
+            let first = stack.len();
+            while met != 0 {
+                let k = met.trailing_zeros() as usize % WIDTH;
+                met &= met - 1;
+                let entry = (node.child[k], near[k]);
+                // Insertion, farthest first: the nearest is popped next.
                 stack.push(entry);
+                let new = &mut stack[first..];
+                let mut at = new.len() - 1;
+                while at > 0 && new[at - 1].1 < entry.1 {
+                    new[at] = new[at - 1];
+                    at -= 1;
+                }
+                new[at] = entry;
             }
         }
+        None
     }
 
     #[inline(always)]
-    fn test_leaf(&self, q: &mut Query, index: u32) {
-        let leaf = &self.leaves[index as usize];
+    pub(super) fn test_leaf(&self, q: &mut Query, index: u32) {
+        let probe = &self.probes[index as usize];
         q.leaves_tested += 1;
-        let oc = q.o - leaf.center;
-        let noise = self.noise(leaf, oc);
-        if !touches_oriented_box(q, leaf, oc, noise) {
-            return;
-        }
+        let oc = q.o - probe.center;
+        let noise = 32.0 * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs()) + probe.still;
         let (k1, k2) = (q.n1.dot(oc), q.n2.dot(oc));
-        let value = |a: &V4, n: Vector, k: f64| n.x * a[0] + n.y * a[1] + n.z * a[2] - k * a[3];
-        let bound =
-            |a: &V4, n: Vector, k: f64| n.x.abs() * a[0] + n.y.abs() * a[1] + n.z.abs() * a[2] + k.abs() * a[3];
-        let s = &leaf.slopes;
-        let (a, b) = (value(&s.u, q.n1, k1), value(&s.v, q.n1, k1));
-        let (c, d) = (value(&s.u, q.n2, k2), value(&s.v, q.n2, k2));
+        let [a, b, f1] = probe.seen(q.n1, k1);
+        let [c, d, f2] = probe.seen(q.n2, k2);
         let det = a * d - b * c;
         // Beyond this condition the rounding of the inverse could reach 1e-6 in the test.
         if !(det.abs() > 1e-8 * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
-            return self.clip(q, index);
+            return self.clip_touched(q, index);
         }
-        let (ra, rb) = (bound(&s.ru, q.n1, k1), bound(&s.rv, q.n1, k1));
-        let (rc, rd) = (bound(&s.ru, q.n2, k2), bound(&s.rv, q.n2, k2));
+        let (r1, r2) = (probe.spread(q.n1, k1), probe.spread(q.n2, k2));
         let inv = 1.0 / det;
         let (y00, y01, y10, y11) = (d * inv, -b * inv, -c * inv, a * inv);
-        let row_u = y00.abs() * (ra + rb) + y01.abs() * (rc + rd);
-        let row_v = y10.abs() * (ra + rb) + y11.abs() * (rc + rd);
+        let row_u = y00.abs() * r1 + y01.abs() * r2;
+        let row_v = y10.abs() * r1 + y11.abs() * r2;
         if !(row_u < UNIQUE && row_v < UNIQUE) {
-            return self.clip(q, index);
+            return self.clip_touched(q, index);
         }
-        let (f1, f2) = (value(&leaf.middle, q.n1, k1), value(&leaf.middle, q.n2, k2));
         let du = -(y00 * f1 + y01 * f2);
         let dv = -(y10 * f1 + y11 * f2);
         let margin = 1e-14 + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
-        let half = leaf.reach.map(|[lo, hi]| (0.5 - lo).max(hi - 0.5));
-        let reach_u = half[0] * (1.0 + row_u + 1e-6) + margin;
-        let reach_v = half[1] * (1.0 + row_v + 1e-6) + margin;
+        let reach_u = f64::from(probe.half[0]) * (1.0 + row_u + 1e-6) + margin;
+        let reach_v = f64::from(probe.half[1]) * (1.0 + row_v + 1e-6) + margin;
         if du.abs() > reach_u || dv.abs() > reach_v {
             return;
         }
-        let (mut u, mut v) = (0.5 + du, 0.5 + dv);
         let clamp = |x: f64| x.clamp(-EXTENSION, 1.0 + EXTENSION);
-        (u, v) = (clamp(u), clamp(v));
-        let net = leaf.net(&self.pool);
-        let mut last = f64::INFINITY;
+        let (mut u, mut v) = (clamp(0.5 + du), clamp(0.5 + dv));
+        let net = probe.net(&self.pool);
+        let mut last = du.abs().max(dv.abs());
         let mut at: Option<V4> = None;
         for _ in 0..12 {
-            let jet = net::evaluate(net, leaf.degree, u, v);
-            let (f1, f2) = (value(&jet.s, q.n1, k1), value(&jet.s, q.n2, k2));
-            let (a, b) = (value(&jet.su, q.n1, k1), value(&jet.sv, q.n1, k1));
-            let (c, d) = (value(&jet.su, q.n2, k2), value(&jet.sv, q.n2, k2));
+            let jet = net::evaluate(net, probe.degree, u, v);
+            let ([f1, a, b], [f2, c, d]) = (seen(&jet, q.n1, k1), seen(&jet, q.n2, k2));
             let inv = 1.0 / (a * d - b * c);
             let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
             let step = xu.abs().max(xv.abs());
             u -= xu;
             v -= xv;
-            // After a step of 1e-8 the next error is its square: move the value along and stop.
-            if step < 1e-8 || (step < 1e-6 && step >= last) {
+            // Steps square: the next would be about step³/last². What is left is taken off where the hit is made.
+            if step < 1e-8 || step * step * step < CLOSE * last * last || (step < 1e-6 && step >= last) {
                 let mut s = jet.s;
                 net::axpy(&mut s, -xu, &jet.su);
                 net::axpy(&mut s, -xv, &jet.sv);
@@ -137,15 +121,16 @@ impl Exact {
                 break;
             }
         }
-        let Some(s) = at else { return self.clip(q, index) };
+        let Some(s) = at else { return self.clip_touched(q, index) };
         let within = |x: f64, e: f64| x >= -e && x <= 1.0 + e;
         if !(within(u, EXTENSION) && within(v, EXTENSION)) {
-            return self.clip(q, index);
+            return self.clip_touched(q, index);
         }
         // The only root of the enlarged domain: outside of the leaf it is another leaf's.
-        let e = margin;
+        let e = margin + 2.0 * CLOSE;
+        let reach = if probe.widened { self.leaves[index as usize].reach } else { REACH };
         let counts = |x: f64, [lo, hi]: [f64; 2]| x >= lo - e && x <= hi + e;
-        if !(counts(u, leaf.reach[0]) && counts(v, leaf.reach[1])) {
+        if !(counts(u, reach[0]) && counts(v, reach[1])) {
             return;
         }
         let p = Vector::new(s[0], s[1], s[2]) / s[3];
@@ -154,7 +139,7 @@ impl Exact {
             return;
         }
         if let Some(own) = q.own
-            && let Some(at) = own.in_leaf(leaf, &self.geometry)
+            && let Some(at) = own.in_leaf(&self.leaves[index as usize], &self.geometry)
             && within(at[0], EXTENSION)
             && within(at[1], EXTENSION)
             && own.is_unique_root(t)
@@ -164,17 +149,27 @@ impl Exact {
         self.offer(q, index, [u, v], t, Certainty::Certified);
     }
 
+    /// Clips a leaf whose oriented box the ray touches.
+    #[inline(always)]
+    fn clip_touched(&self, q: &mut Query, index: u32) {
+        let leaf = &self.leaves[index as usize];
+        let oc = q.o - leaf.center;
+        if touches_oriented_box(q, leaf, oc, self.noise(leaf, oc)) {
+            self.clip(q, index);
+        }
+    }
+
     /// Takes a root when it lies in range, inside the trims, and is not the point that the ray leaves.
     pub(super) fn offer(&self, q: &mut Query, index: u32, local: [f64; 2], t: f64, certainty: Certainty) {
         if !q.wants(t) {
             return;
         }
-        let leaf = &self.leaves[index as usize];
-        if q.own.is_some_and(|own| own.is_twin(leaf, local, t, &self.geometry)) {
+        if q.own.is_some_and(|own| own.is_twin(&self.leaves[index as usize], local, t, &self.geometry)) {
             return;
         }
         let mut near_trim = false;
-        if !leaf.whole {
+        if !self.probes[index as usize].whole {
+            let leaf = &self.leaves[index as usize];
             let (inside, near) = self.counts(q, leaf, local);
             near_trim = near;
             if !inside {
@@ -216,6 +211,19 @@ impl Exact {
         };
         (inside, true)
     }
+}
+
+/// A step of Newton's method, to be taken off, and t after it.
+#[inline(always)]
+pub(super) fn corrected(q: &Query, oc: Vector, jet: &Jet) -> ([f64; 2], f64) {
+    let (k1, k2) = (q.n1.dot(oc), q.n2.dot(oc));
+    let ([f1, a, b], [f2, c, d]) = (seen(jet, q.n1, k1), seen(jet, q.n2, k2));
+    let inv = 1.0 / (a * d - b * c);
+    let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
+    let mut s = jet.s;
+    net::axpy(&mut s, -xu, &jet.su);
+    net::axpy(&mut s, -xv, &jet.sv);
+    ([xu, xv], q.d.dot(Vector::new(s[0], s[1], s[2]) / s[3] - oc))
 }
 
 /// The oriented box, with the rounding of the rotated origin as margin.

@@ -8,12 +8,29 @@
 use super::Exact;
 use super::net::{self, Jet, V4};
 use super::query::Query;
+use super::slabs::Slabs;
+use super::tree::{Node, WIDTH};
+use crate::intersect::{Cost, Hit};
+use crate::math::Ray;
 
 /// Whether the wide version may run; the answer is cached by the standard library.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn is_wide() -> bool {
-    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+    std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("fma")
+        && std::arch::is_x86_feature_detected!("bmi1")
+}
+
+/// Where a ray enters each of a node's boxes, and which of them it meets. `WIDE` only in the versions for wide processors.
+#[inline(always)]
+pub(super) fn meet<const WIDE: bool>(slabs: &Slabs, node: &Node) -> ([f32; WIDTH], u32) {
+    #[cfg(target_arch = "x86_64")]
+    if WIDE {
+        // SAFETY: only functions that run where the features were found set `WIDE`.
+        return unsafe { slabs.meet_wide(node) };
+    }
+    slabs.meet(node)
 }
 
 /// Value and derivatives of a net, for callers outside of the hot loops: [`net::evaluate`].
@@ -42,13 +59,30 @@ impl Exact {
             // SAFETY: the features were found.
             return unsafe { self.walk_wide(q) };
         }
-        self.walk(q);
+        self.walk::<false>(q);
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,fma")]
+    #[target_feature(enable = "avx2,fma,bmi1")]
     fn walk_wide(&self, q: &mut Query) {
-        self.walk(q);
+        self.walk::<true>(q);
+    }
+
+    /// Finds the first hits of many rays.
+    #[inline]
+    pub(super) fn search_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        #[cfg(target_arch = "x86_64")]
+        if is_wide() {
+            // SAFETY: the features were found.
+            return unsafe { self.batch_wide(rays, hits, cost) };
+        }
+        self.batch::<false>(rays, hits, cost);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma,bmi1")]
+    fn batch_wide(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        self.batch::<true>(rays, hits, cost);
     }
 
     /// Looks for every root on a leaf by clipping.

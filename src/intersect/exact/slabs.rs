@@ -1,0 +1,164 @@
+//! A ray against the boxes of the hierarchy, in `f32`, rounded so that no box that the ray meets is missed.
+//!
+//! The ray is taken from where it enters the box around everything, computed in `f64`, so that however far away it starts, what
+//! `f32` rounds is relative to the size of the scene. From there all distances are positive, and each is right to three
+//! roundings: one in the difference to the plane, one in the reciprocal, one in their product.
+//!
+//! `unsafe` loads and stores arrays of eight by vectors of eight.
+
+#![allow(unsafe_code)]
+
+use super::tree::{Node, Tree, WIDTH};
+use crate::math::Ray;
+
+/// More than three roundings of `f32` on either side.
+const SLACK: f32 = 1.0 + 16.0 * f32::EPSILON;
+
+/// A ray as the hierarchy sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs {
+    inverse: [f32; 3],
+    /// 1 where the ray runs against the axis.
+    back: [usize; 3],
+    /// The start about the tree's centre, moved so that planes met first lie nearer and planes met last farther, by more than
+    /// its rounding.
+    enter: [f32; 3],
+    leave: [f32; 3],
+    /// Where distances count from, on the ray.
+    start: f64,
+    /// Boxes entered beyond are of no interest.
+    pub(super) end: f32,
+    /// Whether the ray passes beside everything.
+    pub(super) misses: bool,
+}
+
+impl Slabs {
+    /// Meets nothing.
+    pub(super) const IDLE: Self = Self {
+        inverse: [1.0; 3],
+        back: [0; 3],
+        enter: [0.0; 3],
+        leave: [0.0; 3],
+        start: 0.0,
+        end: 0.0,
+        misses: true,
+    };
+
+    /// Takes up a ray.
+    #[inline(always)]
+    pub(super) fn restart(&mut self, ray: &Ray, tree: &Tree) {
+        let (o, d) = (ray.origin, ray.direction);
+        let (lo, hi) = (tree.bounds.min, tree.bounds.max);
+        let reach = o.abs().max_element() + tree.center.abs().max_element();
+        let beyond = 1e-6 * (hi - lo).max_element() + 64.0 * f64::EPSILON * reach;
+        let (mut near, mut far) = (ray.t_min, ray.t_max);
+        for k in 0..3 {
+            // A finite reciprocal keeps 0 · ∞ out of the slab test; 1e-30 moves no plane by more than the slack below.
+            let inverse = 1.0 / if d[k].abs() < 1e-30 { 1e-30f64.copysign(d[k]) } else { d[k] };
+            let (a, b) = ((lo[k] - beyond - o[k]) * inverse, (hi[k] + beyond - o[k]) * inverse);
+            let (a, b) = if a < b { (a, b) } else { (b, a) };
+            near = if a > near { a } else { near };
+            far = if b < far { b } else { far };
+            self.inverse[k] = inverse as f32;
+            self.back[k] = usize::from(inverse < 0.0);
+        }
+        self.start = near;
+        self.misses = near > far;
+        let slack = 4.0 * f64::EPSILON * (reach + near.abs());
+        for k in 0..3 {
+            let at = o[k] - tree.center[k] + d[k] * near;
+            let (up, down) = (((at + slack) as f32).next_up(), ((at - slack) as f32).next_down());
+            (self.enter[k], self.leave[k]) = if self.back[k] == 0 { (up, down) } else { (down, up) };
+        }
+        self.end_at(ray.t_max);
+    }
+
+    /// Boxes entered beyond `t` are of no interest any more.
+    #[inline(always)]
+    pub(super) fn end_at(&mut self, t: f64) {
+        self.end = ((t - self.start).max(0.0) as f32 * SLACK).next_up();
+    }
+
+    /// Where each of a node's boxes is entered, counted from the start and not too far, and a bit for each that is met.
+    #[inline(always)]
+    pub(super) fn meet(&self, node: &Node) -> ([f32; WIDTH], u32) {
+        let (mut near, mut far) = ([0f32; WIDTH], [self.end; WIDTH]);
+        for k in 0..3 {
+            let (first, last) = (&node.planes[self.back[k]][k], &node.planes[1 - self.back[k]][k]);
+            for i in 0..WIDTH {
+                let a = (first[i] - self.enter[k]) * self.inverse[k];
+                let b = (last[i] - self.leave[k]) * self.inverse[k];
+                near[i] = if a > near[i] { a } else { near[i] };
+                far[i] = if b < far[i] { b } else { far[i] };
+            }
+        }
+        let mut met = 0;
+        for i in 0..WIDTH {
+            met |= u32::from(near[i] <= far[i] * SLACK) << i;
+        }
+        (near, met)
+    }
+
+    /// The same bits as [`Slabs::meet`], all boxes side by side.
+    #[cfg(target_arch = "x86_64")]
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(super) fn meet_wide(&self, node: &Node) -> ([f32; WIDTH], u32) {
+        use std::arch::x86_64::*;
+        let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(self.end));
+        for k in 0..3 {
+            let [first, last] = [self.back[k], 1 - self.back[k]].map(|side| row(&node.planes[side & 1][k]));
+            let inverse = _mm256_set1_ps(self.inverse[k]);
+            let a = _mm256_mul_ps(_mm256_sub_ps(first, _mm256_set1_ps(self.enter[k])), inverse);
+            let b = _mm256_mul_ps(_mm256_sub_ps(last, _mm256_set1_ps(self.leave[k])), inverse);
+            // Where the first is not a number both give the second, as the comparisons above do.
+            near = _mm256_max_ps(a, near);
+            far = _mm256_min_ps(b, far);
+        }
+        let met = _mm256_cmp_ps::<_CMP_LE_OQ>(near, _mm256_mul_ps(far, _mm256_set1_ps(SLACK)));
+        let mut entered = [0f32; WIDTH];
+        // SAFETY: the array holds eight.
+        unsafe { _mm256_storeu_ps(entered.as_mut_ptr(), near) };
+        (entered, _mm256_movemask_ps(met) as u32)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2")]
+fn row(row: &[f32; WIDTH]) -> std::arch::x86_64::__m256 {
+    // SAFETY: the array holds eight.
+    unsafe { std::arch::x86_64::_mm256_loadu_ps(row.as_ptr()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn both_tests_give_the_same_bits() {
+        if !is_x86_feature_detected!("avx2") {
+            return;
+        }
+        let mut seed = 1u64;
+        let mut next = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 40) as f64 / (1u64 << 24) as f64 * 2.0 - 1.0
+        };
+        for round in 0..2000 {
+            let boxes: Vec<_> = (0..5 + round % 4)
+                .map(|_| crate::math::Aabb::around([(); 2].map(|()| Point::new(next(), next(), next()))))
+                .collect();
+            let tree = Tree::build(&boxes);
+            let d = Vector::new(next(), next(), if round % 7 == 0 { 0.0 } else { next() }).normalize();
+            let mut slabs = Slabs::IDLE;
+            slabs.restart(&Ray::new(Point::new(next(), next(), next()) * 3.0, d), &tree);
+            let (near, met) = slabs.meet(&tree.nodes[0]);
+            // SAFETY: the feature was found.
+            let wide = unsafe { slabs.meet_wide(&tree.nodes[0]) };
+            assert_eq!((near.map(f32::to_bits), met), (wide.0.map(f32::to_bits), wide.1));
+        }
+    }
+}
