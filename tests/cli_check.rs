@@ -41,3 +41,32 @@ fn what_was_answered_differently_is_so_again() {
     let differ = count(&again, "/facets_vs_exact/hit_miss") + count(&again, "/facets_vs_exact/other_face");
     assert!(differ > 0 && differ <= written, "{again}");
 }
+
+#[test]
+fn the_page_of_a_check_shows_the_disagreeing_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().display().to_string();
+    let found = check(&["--rays", "9000", "-o", &output]);
+    assert_eq!(found["normals"], "bilinear");
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Rays that are answered differently") && page.contains("trim edge"), "{}", &page[..500]);
+    assert!(folder.path().join("figures/disagreeing.png").is_file());
+    let rays = std::fs::read_to_string(folder.path().join("tables/odd-rays.csv")).unwrap();
+    let listed = rays.lines().count() as u64 - 1;
+    let differ = count(&found, "/facets_vs_exact/hit_miss") + count(&found, "/facets_vs_exact/other_face");
+    assert!(listed >= differ.min(500) && differ > 0, "{listed} of {differ}");
+    let causes = std::fs::read_to_string(folder.path().join("tables/causes.csv")).unwrap();
+    let trim = count(&found, "/facets_vs_exact/explained/trim_edge");
+    assert!(causes.lines().any(|l| l.starts_with(&format!("trim edge,{trim},"))), "{causes}");
+    let kept = std::fs::read_to_string(folder.path().join("check.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&kept).unwrap()["facets_vs_exact"], found["facets_vs_exact"]);
+}
+
+#[test]
+fn normals_that_an_accuracy_chose_are_those_that_are_measured() {
+    let found = check(&["--rays", "6000", "--accuracy", "0.0001deg"]);
+    assert_eq!((&found["normals"], &found["accuracy"]["normals"]), (&"exact".into(), &"exact".into()));
+    // Facets of this tolerance alone err by tenths of a degree.
+    let p99 = found.pointer("/facets_vs_exact/normal_error_deg/p99").and_then(Value::as_f64).unwrap();
+    assert!(p99 < 1e-4, "{p99}");
+}

@@ -28,6 +28,9 @@ fn the_demo_finds_the_light_of_the_lamp_and_says_where_it_is_written() {
         "facets.glb",
         "figures/facets.png",
         "figures/far_field.svg",
+        "figures/far_field.png",
+        "figures/sag.png",
+        "figures/octree-cells.png",
         "tables/times.csv",
     ] {
         assert!(demo.join(name).is_file(), "{name} is missing");

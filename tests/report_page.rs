@@ -109,9 +109,12 @@ fn the_page_stands_alone_and_its_parts_lie_beside_it() {
         [
             "report.html",
             "figures/far.svg",
+            "figures/far.png",
             "figures/facets.png",
             "figures/front.svg",
+            "figures/front.png",
             "figures/bars.svg",
+            "figures/bars.png",
             "figures/error.png",
             "tables/times.csv"
         ]
@@ -126,12 +129,19 @@ fn the_page_stands_alone_and_its_parts_lie_beside_it() {
     assert!(page.contains("<strong>42 cd</strong> &amp; no &lt;more&gt;"));
     assert!(!page.contains("left </script>"), "a name may not end a script");
     assert_eq!(
-        std::fs::read_to_string(&written[6]).unwrap(),
+        std::fs::read_to_string(&written[9]).unwrap(),
         "step,time (s),rays\nread,0.25,1000000\ntrace,1.5,7\n"
     );
-    let picture = image::open(&written[2]).unwrap().to_rgb8();
+    let picture = image::open(&written[3]).unwrap().to_rgb8();
     let lit = picture.pixels().filter(|p| p.0[2] > 120 && p.0[0] < 100).count();
     assert!(lit > 20_000, "the blue half of the saddle covers {lit} pixels");
+    // The map's picture and the chart's words, on white.
+    for chart in [2, 5] {
+        let picture = image::open(&written[chart]).unwrap().to_rgb8();
+        let dark = picture.pixels().filter(|p| p.0.iter().all(|c| *c < 90)).count();
+        assert_eq!(picture.get_pixel(2, 2).0, [255; 3]);
+        assert!(dark > 2000, "{} has {dark} dark pixels", names[chart]);
+    }
 }
 
 #[test]

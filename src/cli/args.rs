@@ -85,6 +85,9 @@ pub(crate) enum Command {
         /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
         #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
         accuracy: Option<String>,
+        /// Folder for a report with the disagreeing rays in 3-D, and for check.json
+        #[arg(short, long, value_name = "DIR")]
+        output: Option<PathBuf>,
         /// Write the rays used and the octree's answers
         #[arg(long, value_name = "FILE")]
         rays_out: Option<PathBuf>,

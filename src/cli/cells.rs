@@ -112,7 +112,7 @@ fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
 }
 
 /// Cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly.
-fn drawn(shape: &Shape) -> View {
+pub(super) fn drawn(shape: &Shape) -> View {
     let mut boxes = shape.boxes.clone();
     boxes.sort_by_key(|(depth, _)| *depth);
     let total = boxes.len();
@@ -137,7 +137,8 @@ fn drawn(shape: &Shape) -> View {
         view = view.lines(&format!("depth {depth}"), &lines, shade(depth, deepest));
     }
     view.caption(&format!(
-        "{} of {} boxes around the {} facets, from blue at the root to orange at the leaves; octree.vtu and octree.glb hold up to 50 000.",
+        "{} of the {} boxes into which the octree sorts the {} facets, from blue at the root to orange at the leaves: small where facets \
+         crowd. Click a depth in the legend to hide or show it.",
         grouped(shown),
         grouped(total as u64),
         grouped(shape.facets as u64)
@@ -199,6 +200,11 @@ pub(super) fn section(shapes: &[Shape]) -> Section {
         }
     }
     let section = Section::new("The octree").with(chart);
-    let section = shapes.first().into_iter().fold(section, |s, shape| s.with(drawn(shape)));
+    let files = "octree.vtu and octree.glb hold up to 50 000 of them.";
+    let view = |shape| {
+        let view = drawn(shape);
+        View { caption: format!("{} {files}", view.caption), ..view }
+    };
+    let section = shapes.first().into_iter().fold(section, |s, shape| s.with(view(shape)));
     section.with(table)
 }

@@ -6,20 +6,20 @@ use super::engine::Choice;
 use super::load::Input;
 use super::options::{Meshing, Tracing};
 use super::witness::Witness;
-use super::{Failure, Outcome, aim, engine, load, pairs};
+use super::{Failure, Outcome, aim, engine, load, look, pairs};
 use crate::formats::write_atomic;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::Exact;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
-use crate::intersect::{Cost, Intersector};
+use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
-use crate::report::{figures, grouped, verdict};
+use crate::report::{Trial, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::check::{self, Check, Competitor, Court, measure};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
-use crate::study::records;
+use crate::study::{Quantiles, Summary, records};
 use comfy_table::{Table, presets};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +32,7 @@ pub(super) struct Asked<'a> {
     pub(super) rays_out: Option<&'a PathBuf>,
     pub(super) rays_in: Option<&'a PathBuf>,
     pub(super) disagreements: Option<&'a PathBuf>,
+    pub(super) output: Option<&'a PathBuf>,
     pub(super) limits: Refusals,
 }
 
@@ -41,7 +42,7 @@ const RAYS: u64 = 100_000;
 const TIMED: (usize, usize) = (20_000, 3);
 
 pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
-    engine::threads(asked.tracing.threads)?;
+    let threads = engine::threads(asked.tracing.threads)?;
     let given = asked.rays_in.map(|p| read_rays(p)).transpose()?;
     let input = load::either(asked.file, context)?;
     let (scene, loaded) = match &input {
@@ -54,7 +55,8 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let settings = engine::mesh_settings(&meshing, scene, model)?;
     let (made, _) = engine::facets(model, &settings, context);
     let mesh = &made.mesh;
-    let normals = Choice::new(&tracing, scene)?.normals.on_facets();
+    let chosen = Choice::new(&tracing, scene)?.normals;
+    let normals = chosen.on_facets();
     let spinner = context.spinner("building octree, BVHs and spline");
     let octree = Octree::build(mesh, &octree::Settings { normals, ..Default::default() });
     let wide = bvh::Settings { normals, ..Default::default() };
@@ -75,6 +77,10 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     let total = rays.len() as f64;
     let mut found = check::check(&court, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
     bar.finish_and_clear();
+    if chosen == NormalMode::Exact {
+        let [t, normal] = polished_errors(&polish, &exact, &rays, settings.loosest());
+        (found.facets_vs_exact.t_error_mm, found.facets_vs_exact.normal_error_deg) = (t, normal);
+    }
     let spinner = context.spinner("timing");
     let race = |name: &'static str, who: &dyn Intersector| -> (&'static str, f64, f64) {
         let f = who.footprint();
@@ -122,21 +128,44 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         context.say(format_args!("wrote {}", path.display()));
     }
     let pairs = match scene {
-        Some(scene) => pairs::find(scene, &scene.bind(model)?, [&octree, &exact], &tracing, context),
+        Some(scene) => {
+            let facets: &dyn Intersector = if chosen == NormalMode::Exact { &polish } else { &octree };
+            pairs::find(scene, &scene.bind(model)?, [facets, &exact], &tracing, context)
+        }
         None => Vec::new(),
     };
+    let wrong = |e: serde_json::Error| Failure::running(e.to_string());
+    let mut document = serde_json::to_value(&found).map_err(wrong)?;
+    document["normals"] = chosen.to_string().into();
+    if scene.is_some() {
+        document["receivers"] = serde_json::to_value(&pairs).map_err(wrong)?;
+    }
+    if let Some(aimed) = &aimed {
+        document["accuracy"] = serde_json::to_value(aimed).map_err(wrong)?;
+    }
+    let text = serde_json::to_string_pretty(&document).map_err(wrong)? + "\n";
+    if let Some(folder) = asked.output {
+        let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
+        let trial = Trial {
+            title: asked.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+            check: &found,
+            facets: &look::facets(model, mesh, scene),
+            normals: &chosen.to_string(),
+            tables: if pairs.is_empty() { Vec::new() } else { vec![pairs::table(&pairs)] },
+            also: aimed.iter().map(|a| a.answer.clone()).collect(),
+            provenance: context.provenance(Some(seed), threads),
+        };
+        trial.report().write(folder)?;
+        write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?;
+    }
     if context.json {
-        let wrong = |e: serde_json::Error| Failure::running(e.to_string());
-        let mut document = serde_json::to_value(&found).map_err(wrong)?;
-        if scene.is_some() {
-            document["receivers"] = serde_json::to_value(&pairs).map_err(wrong)?;
-        }
-        if let Some(aimed) = &aimed {
-            document["accuracy"] = serde_json::to_value(aimed).map_err(wrong)?;
-        }
-        print(&(serde_json::to_string_pretty(&document).map_err(wrong)? + "\n"))?;
+        print(&text)?;
     } else {
-        print(&(described(&found) + &pairs::described(&pairs)))?;
+        print(&(described(&found, chosen) + &pairs::described(&pairs)))?;
+    }
+    if let Some(folder) = asked.output {
+        context.say(format_args!("\n  {}", context.strong(&folder.join("report.html").display().to_string())));
+        context.say(format_args!("  {}", folder.join("check.json").display()));
     }
     Ok(load::account(&loaded.reports, asked.limits.max_refused, context))
 }
@@ -182,7 +211,26 @@ fn own_rays(
     Ok(witness.rays(count as usize, model, lift))
 }
 
-fn described(c: &Check) -> String {
+/// How far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
+/// crossing, which the facets' own verdict counts.
+fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ray], near: f64) -> [Summary; 2] {
+    let ask = |who: &dyn Intersector| {
+        let mut hits = vec![None; rays.len()];
+        who.intersect_batch(rays, &mut hits, &mut Cost::default());
+        hits
+    };
+    let (mut distance, mut angle) = (Quantiles::default(), Quantiles::default());
+    for (p, e) in ask(polish).into_iter().zip(ask(exact)).filter_map(|(p, e)| p.zip(e)) {
+        let apart = (p.t - e.t).abs();
+        if p.face == e.face && apart <= near {
+            distance.add(apart);
+            angle.add(p.normal.cross(e.normal).length().atan2(p.normal.dot(e.normal)).to_degrees());
+        }
+    }
+    [distance.summary(), angle.summary()]
+}
+
+fn described(c: &Check, normals: NormalMode) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
     let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));
@@ -214,10 +262,11 @@ fn described(c: &Check) -> String {
             e.unmeshed + e.no_surface
         ),
     );
+    let moved = if normals == NormalMode::Exact { "moved to the spline, " } else { "" };
     line(
         "distance",
         format!(
-            "off by {} mm (median), {} mm (99 %), {} mm (largest)",
+            "{moved}off by {} mm (median), {} mm (99 %), {} mm (largest)",
             figures(f.t_error_mm.p50, 2),
             figures(f.t_error_mm.p99, 2),
             figures(f.t_error_mm.max, 2)
@@ -226,7 +275,7 @@ fn described(c: &Check) -> String {
     line(
         "normals",
         format!(
-            "off by {}° (median), {}° (99 %), {}° (largest)",
+            "{normals}, off by {}° (median), {}° (99 %), {}° (largest)",
             figures(f.normal_error_deg.p50, 2),
             figures(f.normal_error_deg.p99, 2),
             figures(f.normal_error_deg.max, 2)

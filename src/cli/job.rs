@@ -7,14 +7,14 @@ use super::load::Loaded;
 use super::options::{IntersectorKind, Meshing, Tracing};
 use super::paths::Paths;
 use super::witness::Witness;
-use super::{Failure, files, look};
-use crate::formats::{Polylines, write_facets, write_vtp};
+use super::{Failure, cells, files, look};
+use crate::formats::{ColourMap, Facets, Polylines, write_facets, write_vtp};
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::Exact;
 use crate::intersect::octree::Octree;
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::report::{Cell, Light, Report, Table, file_stem, path_lines};
+use crate::report::{Cell, Light, Report, Table, View, file_stem, path_lines};
 use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, Results, RunSettings, Scene, Traced, Verification,
     replay, trace, verify_pruning,
@@ -248,6 +248,7 @@ impl Prepared<'_> {
                 _ => "W",
             },
             check: outcome.check.as_ref(),
+            views: self.views(&facets),
             tables: self.tables(),
             comparison,
             provenance,
@@ -256,6 +257,19 @@ impl Prepared<'_> {
         report.write(folder)?;
         spinner.finish_and_clear();
         Ok((document, report))
+    }
+
+    /// How finely the facets follow the surface, and how the octree sorts them.
+    fn views(&self, facets: &Facets) -> Vec<View> {
+        let mesh = facets.mesh;
+        let (title, label) = ("Distance of the facets from the surface", "proved distance (mm)");
+        let sag = View::of_values("sag", title, facets, label, &mesh.sag, ColourMap::Viridis);
+        let sag = sag.caption(
+            "No point of a facet is farther from the true surface than its colour says; grey is not proved.",
+        );
+        let octree = (self.choice.intersector == IntersectorKind::Octree)
+            .then(|| cells::drawn(&cells::Shape::of(&Octree::build(mesh, &Default::default()))));
+        std::iter::once(sag).chain(octree).collect()
     }
 
     /// What was read and what the facets are.

@@ -89,7 +89,7 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
         Command::Trace { scene, output, meshing, tracing, extra } => {
             trace::run(&scene, &output, &meshing, &tracing, &extra, context)
         }
-        Command::Check { file, meshing, tracing, accuracy, rays_out, rays_in, disagreements, limits } => {
+        Command::Check { file, meshing, tracing, accuracy, output, rays_out, rays_in, disagreements, limits } => {
             let asked = check::Asked {
                 file: &file,
                 meshing: &meshing,
@@ -98,6 +98,7 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
                 rays_out: rays_out.as_ref(),
                 rays_in: rays_in.as_ref(),
                 disagreements: disagreements.as_ref(),
+                output: output.as_ref(),
                 limits,
             };
             check::run(&asked, context)

@@ -3,7 +3,7 @@
 use super::context::Context;
 use super::options::Tracing;
 use crate::intersect::Intersector;
-use crate::report::figures;
+use crate::report::{Cell, Table, figures};
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{Paired, paired};
 
@@ -28,6 +28,31 @@ pub(super) fn find(
     let found = paired(bound, facets, exact, &settings);
     spinner.finish_and_clear();
     found
+}
+
+/// The same for the report.
+pub(super) fn table(pairs: &[Paired]) -> Table {
+    let columns = [
+        ("receiver", ""),
+        ("power on the spline", "W or lm"),
+        ("changed by facets", "%"),
+        ("± (1σ, same rays)", "%"),
+        ("± (1σ, alone)", "%"),
+    ];
+    let mut table = Table::new("receivers", "What facets change of the light", &columns)
+        .caption("The same rays are traced on facets and on the spline, so that most of the noise cancels in the difference.");
+    for p in pairs {
+        let percent = |x: f64| Cell::Number(100.0 * x / p.power_exact.abs().max(1e-300), 2);
+        let power = Cell::Number(p.power_exact, 5);
+        table.row([
+            p.name.as_str().into(),
+            power,
+            percent(p.difference),
+            percent(p.difference_error),
+            percent(p.power_error),
+        ]);
+    }
+    table
 }
 
 /// One line a receiver.

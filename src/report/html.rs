@@ -96,15 +96,17 @@ fn figure(
 ) -> Markup {
     // '<' would let a name end the script element.
     let json = data.to_string().replace('<', "\\u003c");
-    let (kind, file) =
-        if solid { ("view", format!("figures/{name}.png")) } else { ("chart", format!("figures/{name}.svg")) };
+    let (kind, files): (_, &[&str]) = if solid { ("view", &["png"]) } else { ("chart", &["svg", "png"]) };
     let keys = if solid { " Drag or arrow keys turn, wheel or + and − zoom, 0 resets." } else { "" };
     html! {
         figure {
             h3 { (title) }
             div class={ "plot " (kind) } id={ "fig-" (name) } tabindex="0" role="group" aria-label=(title) { (drawing) }
             script type="application/json" data-for={ "fig-" (name) } { (PreEscaped(json)) }
-            figcaption { (caption) (keys) " " a href=(file) { "Static picture" } }
+            figcaption {
+                (caption) (keys) " Static picture:"
+                @for kind in files { " " a href={ "figures/" (name) "." (kind) } { (kind.to_uppercase()) } }
+            }
         }
     }
 }

@@ -1,11 +1,11 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
+use super::court::{self, verdict};
 use super::{AxisStyle, Block, Cell, Chart, Provenance, Report, Section, Series, SeriesStyle, Table, View};
 use super::{figures, grouped, seconds};
 use crate::formats::{Axis, Facets, Grid, Polylines};
-use crate::math::Vector;
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
-use crate::study::check::{Cause, Check};
+use crate::study::check::Check;
 
 /// Everything that the report of a traced scene speaks of.
 pub struct Light<'a> {
@@ -19,6 +19,8 @@ pub struct Light<'a> {
     pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
     pub check: Option<&'a Check>,
+    /// More 3-D views: of the facets, of the octree.
+    pub views: Vec<View>,
     /// More tables: of the model, of the facets.
     pub tables: Vec<Table>,
     /// Sentences that compare with figures from elsewhere.
@@ -222,55 +224,15 @@ impl Light<'_> {
     }
 
     fn cross_check(&self, check: &Check) -> Section {
-        let f = &check.facets_vs_exact;
-        let e = &f.explained;
-        let mut table = Table::new("cross-check", "The same rays, three intersectors", &[("", ""), ("rays", "")]);
-        for (name, count) in [
-            ("asked", check.rays),
-            ("hit the facets", check.hits),
-            ("octree and BVH disagree", check.octree_vs_bvh.disagree),
-            ("facets hit, spline misses, or the reverse", f.hit_miss),
-            ("facets and spline name another face", f.other_face),
-            ("explained: within the facets' sag", e.within_sag),
-            ("explained: silhouette", e.silhouette),
-            ("explained: trim edge", e.trim_edge),
-            ("explained: coincident faces", e.coincident),
-            ("explained: tangent", e.tangent),
-            ("explained: a facet whose distance was not proved", e.unproved),
-            ("explained: a face that has no facets or no surface", e.unmeshed + e.no_surface),
-            ("unexplained", f.unexplained),
-            ("spline hits proved to be the first", check.exact.certified),
-            ("spline hits not proved", check.exact.uncertified),
-        ] {
-            table.row([name.into(), Cell::from(count)]);
-        }
-        let mut errors = Table::new(
-            "facet-errors",
-            "Facets against the spline, same crossing",
-            &[("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")],
-        );
-        for (name, s, unit) in
-            [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
-        {
-            errors.row([name.into(), Cell::from(s.p50), s.p99.into(), s.max.into(), unit.into()]);
-        }
         let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";
-        let mut section = Section::new("Cross-check").with(text).with(table).with(errors);
-        let strange: Vec<_> = (check.disagreements.iter())
-            .filter(|d| d.facets_differ || matches!(d.cause, Some(Cause::Unexplained(_))))
-            .collect();
-        if !strange.is_empty() {
-            let mut lines = Polylines::default();
-            for d in strange.iter().take(200) {
-                let far = d.octree.or(d.exact).map_or(50.0, |h| h.t);
-                lines.push([d.ray.origin, d.ray.origin + far * Vector::from(d.ray.direction)]);
-            }
-            let view = View::of_facets("disagreeing", "Rays without an explanation", self.facets);
-            section = section.with(view.lines("unexplained", &lines, [1.0, 0.1, 0.1]));
+        let section =
+            Section::new("Cross-check").with(text).with(court::counts(check)).with(court::errors(check, "facets"));
+        match court::odd_rays(check, self.facets) {
+            Some(view) => section.with(view),
+            None => section,
         }
-        section
     }
 
     fn effects(&self) -> Section {
@@ -310,23 +272,10 @@ impl Light<'_> {
         ] {
             table.row([name.into(), Cell::Number(time, 3), what.into()]);
         }
-        let section = Section::new("Model, facets and times").with(table);
+        let section = Section::new("Model, facets and times");
+        let section = self.views.iter().cloned().fold(section, |s, v| s.with(v)).with(table);
         self.tables.iter().cloned().fold(section, |s, t| s.with(Block::Table(t)))
     }
-}
-
-/// What the cross-check found, in a sentence.
-pub fn verdict(check: &Check) -> String {
-    let f = &check.facets_vs_exact;
-    let between = match check.octree_vs_bvh.disagree {
-        0 => "octree and BVH agree on every one".to_owned(),
-        n => format!("octree and BVH **disagree on {}**", grouped(n)),
-    };
-    let beside = match f.unexplained {
-        0 => "every difference from the exact spline is explained by the facets' sag".to_owned(),
-        n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
-    };
-    format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
 }
 
 /// The values along both axes through the peak, with their statistical errors.

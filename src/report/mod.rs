@@ -1,13 +1,14 @@
 //! One self-contained HTML file for any result: an answer on top, pictures first, tables that sort and copy, 3-D views that turn.
 //!
 //! A [`Report`] is plain data: sections of text, charts, 3-D views and tables. [`Report::write`] turns it into `report.html`
-//! (plotly.js embedded once, nothing loaded from elsewhere), a static SVG or PNG of every picture under `figures/`, and a CSV of
+//! (plotly.js embedded once, nothing loaded from elsewhere), a static PNG of every picture under `figures/`, for charts with an SVG beside it, and a CSV of
 //! every table under `tables/`. Every chart carries its static twin in the page, so that it shows without scripts or WebGL.
 //!
 //! Guarantee: the page stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
 //! WebGL to turn; without it their static picture remains.
 
 mod chart;
+mod court;
 mod document;
 mod html;
 mod light;
@@ -15,6 +16,7 @@ mod number;
 mod plotly;
 mod provenance;
 mod raster;
+mod still;
 mod studies;
 mod svg;
 mod table;
@@ -22,8 +24,9 @@ mod view;
 mod write;
 
 pub use chart::{AxisStyle, Chart, Content, Series, SeriesStyle};
+pub use court::{Trial, verdict};
 pub use document::{Block, Report, Section};
-pub use light::{Light, file_stem, path_lines, receiver_grid, verdict};
+pub use light::{Light, file_stem, path_lines, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};
 pub use provenance::Provenance;
 pub use studies::study_report;

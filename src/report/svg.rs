@@ -72,8 +72,9 @@ fn escape(text: &str) -> String {
 
 /// The chart as an SVG document.
 pub(super) fn render(chart: &Chart) -> String {
+    let height = HEIGHT + more(chart);
     let mut svg = format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" font-family="system-ui, sans-serif" font-size="13" fill="currentColor"><title>{}</title>"#,
+        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" role="img" font-family="system-ui, sans-serif" font-size="13" fill="currentColor"><title>{}</title>"#,
         escape(&chart.title)
     );
     match &chart.content {
@@ -109,7 +110,7 @@ fn axes(svg: &mut String, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f6
     let _ = write!(
         svg,
         r#"<text x="{cx}" y="{}" text-anchor="middle">{}</text><text transform="translate(17 {cy}) rotate(-90)" text-anchor="middle">{}</text>"#,
-        HEIGHT - 16.0,
+        HEIGHT - 16.0 + more(chart),
         escape(&chart.x.title()),
         escape(&chart.y.title())
     );
@@ -176,6 +177,30 @@ fn series_chart(svg: &mut String, chart: &Chart, series: &[Series]) {
     legend(svg, &names);
 }
 
+/// Distance of lines of text.
+const LINE: f64 = 15.0;
+
+/// A name in lines that fit under a bar, broken at spaces; a letter takes about half the size of the type.
+fn wrapped(name: &str, width: f64) -> Vec<String> {
+    let most = ((width - 4.0) / 6.8).max(3.0) as usize;
+    let mut lines: Vec<String> = Vec::new();
+    for word in name.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => *line += &format!(" {word}"),
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// What the drawing needs below for names of several lines.
+fn more(chart: &Chart) -> f64 {
+    let Content::Bars { categories, .. } = &chart.content else { return 0.0 };
+    let slot = (AREA[2] - AREA[0]) / categories.len().max(1) as f64;
+    let lines = categories.iter().map(|c| wrapped(c, slot).len()).max().unwrap_or(1);
+    LINE * lines.saturating_sub(1) as f64
+}
+
 fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(String, Vec<f64>)], stacked: bool) {
     let [left, top, right, bottom] = AREA;
     let heights = |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0));
@@ -210,13 +235,15 @@ fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(
             );
             base += if stacked { value } else { 0.0 };
         }
-        let _ = write!(
-            svg,
-            r#"<text x="{:.1}" y="{}" text-anchor="middle" opacity=".75">{}</text>"#,
-            left + slot * (c as f64 + 0.5),
-            bottom + 19.0,
-            escape(category)
-        );
+        for (k, line) in wrapped(category, slot).iter().enumerate() {
+            let _ = write!(
+                svg,
+                r#"<text x="{:.1}" y="{}" text-anchor="middle" opacity=".75">{}</text>"#,
+                left + slot * (c as f64 + 0.5),
+                bottom + 19.0 + LINE * k as f64,
+                escape(line)
+            );
+        }
     }
     let names: Vec<(&str, &str)> =
         layers.iter().enumerate().map(|(k, (n, _))| (n.as_str(), PALETTE[k % PALETTE.len()])).collect();

@@ -1,4 +1,5 @@
 use crate::formats::{ColourMap, Facets, Polylines};
+use crate::math::Point;
 use rustc_hash::FxHashMap;
 
 /// A 3-D view: turns in the page, a static picture beside it.
@@ -111,7 +112,7 @@ impl View {
         map: ColourMap,
     ) -> Self {
         let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
-        let step = total.div_ceil(2 * SHOWN).max(1);
+        let step = total.div_ceil(SHOWN).max(1);
         let caption = match step {
             1 => String::new(),
             _ => format!("Shown: every {step}th triangle of {}.", super::grouped(total as u64)),
@@ -119,7 +120,7 @@ impl View {
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
         for (g, group) in facets.groups.iter().enumerate() {
-            let (points, mut triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
+            let (mut points, mut triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
             if triangles.is_empty() {
                 continue;
             }
@@ -132,6 +133,7 @@ impl View {
             if step > 1 {
                 triangles = triangles.into_iter().step_by(step).collect();
                 per_triangle = per_triangle.into_iter().step_by(step).collect();
+                (points, triangles) = used(&points, &triangles);
             }
             let values = Some(Values { label: label.into(), values: per_triangle, map });
             let opacity = if group.opacity < 1.0 { 0.4 } else { 1.0 };
@@ -161,6 +163,25 @@ impl View {
             .collect();
         if !lines.is_empty() {
             self.shapes.push(Shape::Lines { name: name.into(), lines, colour, width: 1.5 });
+        }
+        self
+    }
+
+    /// The view with points.
+    pub fn points(mut self, name: &str, points: &[Point], colour: [f64; 3]) -> Self {
+        if !points.is_empty() {
+            let points = points.iter().map(|p| p.as_vec3().to_array()).collect();
+            self.shapes.push(Shape::Points { name: name.into(), points, colour });
+        }
+        self
+    }
+
+    /// The view with surfaces that let what is behind them shine through.
+    pub fn faded(mut self, most: f64) -> Self {
+        for shape in &mut self.shapes {
+            if let Shape::Surface { opacity, .. } = shape {
+                *opacity = opacity.min(most);
+            }
         }
         self
     }
@@ -204,6 +225,20 @@ fn triangles_of(facets: &Facets, wanted: impl Fn(crate::math::FaceId) -> bool) -
         }
     }
     (points, triangles)
+}
+
+/// The points that triangles use, and no others.
+fn used(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
+    let mut index = FxHashMap::default();
+    let mut kept = Vec::new();
+    let mut of = |k: u32| {
+        *index.entry(k).or_insert_with(|| {
+            kept.push(points[k as usize]);
+            kept.len() as u32 - 1
+        })
+    };
+    let triangles = triangles.iter().map(|t| t.map(&mut of)).collect();
+    (kept, triangles)
 }
 
 /// Merges corners within cells of a grid until no more than `limit` triangles remain: no holes, unlike leaving triangles out.

@@ -1,5 +1,5 @@
 use super::document::{Block, Report};
-use super::{html, raster, svg};
+use super::{html, raster, still, svg};
 use crate::formats::{Error, ErrorKind, write_atomic, write_png};
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ impl Report {
         html::page(self)
     }
 
-    /// Writes `report.html`, `figures/*.svg|png` and `tables/*.csv` into a folder, which is made when missing; gives the files written,
+    /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; gives the files written,
     /// the page first.
     ///
     /// # Errors
@@ -30,7 +30,12 @@ impl Report {
                 Block::Chart(chart) => {
                     let path = inside("figures", format!("{}.svg", chart.name))?;
                     write_atomic(&path, |w| w.write_all(svg::render(chart).as_bytes()))?;
-                    written.push(path);
+                    written.push(path.clone());
+                    if let Some(png) = still::png(chart) {
+                        let path = path.with_extension("png");
+                        write_atomic(&path, |w| w.write_all(&png))?;
+                        written.push(path);
+                    }
                 }
                 Block::View(view) => {
                     let path = inside("figures", format!("{}.png", view.name))?;

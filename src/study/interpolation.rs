@@ -7,7 +7,7 @@ use super::workshop::{Meshed, Tree, Workshop, answer, with_all};
 use super::{Progress, Rounds};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::Ray;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
 
 /// What is compared and how long.
@@ -30,7 +30,7 @@ impl Default for Settings {
 }
 
 /// One way to get normals on one model.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Name of the model; "paper" for the published figures.
     pub model: String,
@@ -159,27 +159,81 @@ fn hitting(workshop: &dyn Workshop, meshed: &Meshed, settings: &Settings) -> (Ve
     (rays, truth)
 }
 
-/// How the errors stand to each other, model by model.
-fn sentence(rows: &[Row]) -> String {
-    let mut parts = Vec::new();
-    for four in rows.chunks(ALGORITHMS.len()) {
-        let three = |error: &dyn Fn(&Row) -> f64| {
-            ["nearest", "bilinear", "cubic"]
-                .map(|name| four.iter().find(|r| r.algorithm == name).map_or(f64::NAN, error))
+/// How the kinds of normals stand to each other on one model; the errors as means.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ratios {
+    /// Error of nearest normals over that of bilinear ones.
+    pub nearest_to_bilinear: f64,
+    /// Error of bilinear normals over that of cubic ones.
+    pub bilinear_to_cubic: f64,
+    /// The same of the 99th percentiles, where they are known.
+    pub at_p99: Option<[f64; 2]>,
+    /// Time with cubic normals over that with bilinear ones.
+    pub cubic_time: f64,
+    /// Why the errors do not fall from nearest over bilinear to cubic, where they do not.
+    pub why_not: Option<&'static str>,
+}
+
+impl Ratios {
+    /// From the rows of one model; `None` when a kind is missing.
+    pub fn of(rows: &[Row]) -> Option<Self> {
+        let row = |name: &str| rows.iter().find(|r| r.algorithm == name);
+        let (nearest, bilinear, cubic) = (row("nearest")?, row("bilinear")?, row("cubic")?);
+        let [n, b, c] = [nearest, bilinear, cubic].map(|r| r.normal_error_mean);
+        let at_p99 = match [nearest, bilinear, cubic].map(|r| r.normal_error_p99) {
+            [Some(n), Some(b), Some(c)] => Some([n / b, b / c]),
+            _ => None,
         };
-        let [n, b, c] = three(&|r| r.normal_error_mean);
-        let [n99, b99, c99] = three(&|r| r.normal_error_p99.unwrap_or(f64::NAN));
-        let model = four.first().map_or("", |r| &r.model);
-        let ratios = format!("nearest : bilinear : cubic = {:.1} : 1 : {:.3}", n / b, c / b);
-        parts.push(if c < b && b < n && c99 < b99 && b99 < n99 {
-            format!("{model}: {ratios} (p99 {:.1} : 1 : {:.3})", n99 / b99, c99 / b99)
-        } else {
-            // Corner normals are the spline's own, so only curvature that changes within a facet (creases, needles,
-            // poles) or an error that is rounding already can turn the order round.
-            let why =
-                if b < 1e-9 { "flat faces, all errors are rounding" } else { "curvature changes within a facet" };
-            format!("{model}: {ratios}, not in the expected order ({why})")
-        });
+        let falls = |[x, y]: [f64; 2]| x > 1.0 && y > 1.0;
+        let mean_falls = falls([n / b, b / c]);
+        // Rays that meet the face elsewhere on facets err whatever the normals: so do those polished to the spline.
+        let elsewhere = row("exact").is_some_and(|e| e.normal_error_mean > 0.5 * c);
+        let why_not = match (mean_falls, at_p99.is_none_or(falls)) {
+            (true, true) => None,
+            _ if b < 1e-9 => Some("the faces are flat: all errors are rounding"),
+            (false, true) if elsewhere => {
+                Some("a few rays meet the face elsewhere on facets and make the mean; the 99th percentile falls")
+            }
+            (false, true) => Some("a few rays make the mean; the 99th percentile falls"),
+            (true, false) => Some(
+                "the mean falls; at creases and needles, where curvature jumps within a facet, no rule is better",
+            ),
+            (false, false) => {
+                Some("curvature jumps within many facets (creases, needles), of which the corners do not tell")
+            }
+        };
+        let (nearest_to_bilinear, bilinear_to_cubic) = (n / b, b / c);
+        let cubic_time = cubic.seconds_median / bilinear.seconds_median;
+        Some(Self { nearest_to_bilinear, bilinear_to_cubic, at_p99, cubic_time, why_not })
     }
-    parts.join("; ") + " (the paper: 1.9 : 1 : 0.625)."
+}
+
+/// What a designer gains by each kind of normals, over all models.
+fn sentence(rows: &[Row]) -> String {
+    let models: Vec<(&str, Ratios)> = rows
+        .chunk_by(|a, b| a.model == b.model)
+        .filter_map(|of| Some((of[0].model.as_str(), Ratios::of(of)?)))
+        .collect();
+    let range = |value: &dyn Fn(&Ratios) -> f64| {
+        let (low, high) =
+            (models.iter()).fold((f64::INFINITY, 0f64), |(a, b), m| (a.min(value(&m.1)), b.max(value(&m.1))));
+        let digits = |x: f64| if x < 9.95 { format!("{x:.1}") } else { format!("{x:.0}") };
+        let (low, high) = (digits(low), digits(high));
+        if low == high { low } else { format!("{low} to {high}") }
+    };
+    let odd: Vec<String> =
+        models.iter().filter_map(|(name, r)| Some(format!("on {name} {}", r.why_not?))).collect();
+    let order = match (odd.len(), models.len()) {
+        (_, 0) => return "Nothing was measured.".into(),
+        (0, n) => format!("so on all {n} models, in the mean and in the 99th percentile"),
+        (k, n) => format!("so on {} of {n} models ({})", n - k, odd.join("; ")),
+    };
+    format!(
+        "Between the corners of a facet, bilinear interpolation brings the surface normal **{} times** nearer to the true one than the \
+         normal of the nearest corner does, and the cubic patch **{} times** nearer still, for {} times the time of bilinear; {order}. \
+         The seed paper reports 1.9 times, 1.6 times and 1.8 times the time.",
+        range(&|r| r.nearest_to_bilinear),
+        range(&|r| r.bilinear_to_cubic),
+        range(&|r| r.cubic_time)
+    )
 }

@@ -1,7 +1,9 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
 use super::{distinct, number, text};
-use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, figures, grouped, seconds};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table, figures, grouped, seconds};
+use crate::study::interpolation::{Ratios, Row};
+use serde::Deserialize;
 use serde_json::Value;
 
 type Parts = (String, String, Vec<Section>);
@@ -54,27 +56,53 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
             number(row, "seconds_median").into(),
         ]);
     }
-    let models: Vec<&str> = distinct(rows, "model").into_iter().filter(|m| *m != "paper").collect();
-    let mean = |model: &str, algorithm: &str| {
-        let fits = |r: &&&Value| text(r, "model") == model && text(r, "algorithm") == algorithm;
-        rows.iter().find(fits).and_then(|r| number(r, "normal_error_mean"))
-    };
-    let ordered = models.iter().filter(|m| {
-        matches!((mean(m, "cubic"), mean(m, "bilinear"), mean(m, "nearest")), (Some(c), Some(b), Some(n)) if c < b && b < n)
-    });
-    let answer = format!(
-        "The error of the normal falls from nearest over bilinear to cubic on **{} of {} models**; the paper reports \
-         0.015, 0.008 and 0.005.",
-        ordered.count(),
-        models.len()
-    );
     let keys = ["model", "algorithm", "normal_error_mean"];
-    let mut chart =
-        bars("error", "mean normal error", "Shorter is better; the axis is logarithmic.", rows, keys, "");
+    let caption = "Mean distance between the interpolated unit normal and the true one; 0.001 is about 0.06°. Shorter is better; the \
+        axis is logarithmic.";
+    let mut chart = bars("error", "Mean error of the normal", caption, rows, keys, "");
     // Bilinear and cubic are tens to hundreds of times below nearest: nothing to see on a linear axis.
     chart.y.log = true;
+    let keys = ["model", "algorithm", "seconds_median"];
+    let own: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "model") != "paper").collect();
+    let caption = "Median time of all rays of a repetition on one thread; shorter is better. The paper's times are of its own machine.";
+    let times = bars("time", "Time", caption, &own, keys, "s");
     let title = "Normals between corners: nearest, bilinear, cubic, exact".into();
-    (title, answer, vec![Section::new("Errors").with(chart).with(table)])
+    let section = Section::new("Errors and times").with(chart).with(times).with(ratios(rows)).with(table);
+    (title, "Nothing was measured.".into(), vec![section])
+}
+
+/// How the errors stand to each other on every model, the paper's beside them.
+fn ratios(rows: &[&Value]) -> Table {
+    let columns = [
+        ("model", ""),
+        ("facets", ""),
+        ("nearest / bilinear", "×"),
+        ("bilinear / cubic", "×"),
+        ("nearest / bilinear, p99", "×"),
+        ("bilinear / cubic, p99", "×"),
+        ("time, cubic / bilinear", "×"),
+        ("falls from nearest to cubic", ""),
+    ];
+    let mut table = Table::new("ratios", "How many times smaller the error becomes", &columns)
+        .caption("Ratios of mean errors, and of their 99th percentiles. Above 1 the second of the two is better.");
+    for model in distinct(rows, "model") {
+        let of = |r: &&&Value| text(r, "model") == model;
+        let own: Vec<Row> = rows.iter().filter(of).filter_map(|r| Row::deserialize(*r).ok()).collect();
+        let Some(r) = Ratios::of(&own) else { continue };
+        let times = |x: f64| Cell::Number(x, 3);
+        let p99 = |k: usize| r.at_p99.map_or(Cell::Empty, |p| times(p[k]));
+        table.row([
+            model.into(),
+            own[0].facets.map(|n| n as u64).into(),
+            times(r.nearest_to_bilinear),
+            times(r.bilinear_to_cubic),
+            p99(0),
+            p99(1),
+            times(r.cubic_time),
+            r.why_not.map_or("yes".into(), |why| format!("no: {why}")).into(),
+        ]);
+    }
+    table
 }
 
 /// The seed paper's table 1: share of time saved, percent.
@@ -96,8 +124,8 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
         ],
     )
     .caption(
-        "Traditional: every spline surface is intersected for every ray. Prepare includes tessellation and build. The \
-         paper's percentages are of its own three lamps.",
+        "Traditional: every spline surface is intersected with every ray. Octree and bvh trace facets and are charged for making them; \
+         exact is the certified spline tracer. The paper's percentages are of its own three lamps.",
     );
     let models = distinct(rows, "model");
     let count = |row: &Value, key: &str| -> Cell { row[key].as_u64().into() };
@@ -128,8 +156,29 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
         )
     });
     let keys = ["model", "method", "ratio_to_traditional"];
-    let chart = bars("ratio", "ratio to traditional", "Longer is better.", rows, keys, "×");
-    ("Three lamps, before and after".into(), answer, vec![Section::new("Time").with(table).with(chart)])
+    let title = "How many times as fast as the traditional way";
+    let caption = "Preparing and tracing together, against intersecting every spline surface with every ray (1 ×). Longer is better.";
+    let mut chart = bars("ratio", title, caption, rows, keys, "×");
+    chart.y.label = "times as fast".into();
+    let section = Section::new("Before and after").with(chart).with(growth(rows)).with(table);
+    ("Three lamps, before and after".into(), answer, vec![section])
+}
+
+/// How the time of a million rays grows with the number of surfaces.
+fn growth(rows: &[&Value]) -> Chart {
+    let line = |method: &&str| {
+        let own = rows.iter().filter(|r| text(r, "method") == *method);
+        let point = |r: &&Value| {
+            let rays = number(r, "rays")? / 1e6;
+            Some([number(r, "patches")?, number(r, "seconds_trace_median")? / rays])
+        };
+        Series { name: (*method).into(), points: own.filter_map(point).collect(), ..Series::default() }
+    };
+    let mut series: Vec<Series> = distinct(rows, "method").iter().map(line).collect();
+    series.retain(|s| !s.points.is_empty());
+    let axes = [AxisStyle::log("spline patches of the lamp", ""), AxisStyle::log("trace of a million rays", "s")];
+    let caption = "Time to trace a million rays from the sources against the number of spline patches, preparing left out. Lower is better.";
+    Chart::series("growth", "How the time grows with the lamp", caption, axes, series)
 }
 
 pub(super) fn stability(rows: &[&Value]) -> Parts {
