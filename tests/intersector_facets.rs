@@ -5,7 +5,7 @@ mod intersector_common;
 use intersector_common::*;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
 use lampyris::intersect::octree::{self, Octree, Path};
-use lampyris::intersect::{Cost, Hit, Intersector, NormalMode};
+use lampyris::intersect::{Cost, Hit, Intersector};
 use lampyris::math::{Departure, Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
 
@@ -309,51 +309,6 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
     assert!(one.0.references >= mesh.facets.len() && one.0.depth() < 20);
     let around = mesh.bounds().grown(1.0);
     assert!(one.1.iter().all(|(_, b)| around.contains(b.min) && around.contains(b.max)));
-}
-
-/// Mean angle between the normals of hits and those of the unit sphere, radians.
-fn normal_error(n: usize, normals: NormalMode) -> f64 {
-    let mut mesh = globe(2 * n, n, |v| v);
-    for vertex in &mut mesh.vertices {
-        vertex.normal = mesh.positions[vertex.position as usize];
-    }
-    let tree = Octree::build(&mesh, &octree::Settings { normals, ..Default::default() });
-    let mut r = Random(4);
-    let count = 4000;
-    (0..count)
-        .map(|_| {
-            let hit = tree.intersect(&Ray::new(Point::ZERO, r.direction()), &mut Cost::default()).unwrap();
-            let facet = mesh.corners(hit.primitive as usize);
-            let [a, b, c, d] = facet;
-            let at = if c == d { (a + b + c) / 3.0 } else { (a + b + c + d) / 4.0 };
-            assert!(hit.normal.dot(at) > 0.5, "inward normal {hit:?}");
-            assert!((hit.normal.length() - 1.0).abs() < 1e-12);
-            hit
-        })
-        .zip({
-            let mut r = Random(4);
-            (0..count).map(move |_| r.direction())
-        })
-        .map(|(hit, d)| hit.normal.cross(d).length().asin() / f64::from(count))
-        .sum()
-}
-
-#[test]
-fn normals_converge_with_the_mesh() {
-    // Halving the facets halves the error of flat and nearest normals and quarters that of smooth ones.
-    let orders = [
-        (NormalMode::Flat, 1.0),
-        (NormalMode::Nearest, 1.0),
-        (NormalMode::Bilinear, 2.0),
-        (NormalMode::Cubic, 2.0),
-    ];
-    for (mode, order) in orders {
-        let (coarse, fine) = (normal_error(20, mode), normal_error(40, mode));
-        let reached = (coarse / fine).log2();
-        // The cubic patch is of a higher order still where the ray is followed to it.
-        let most = if mode == NormalMode::Cubic { 5.0 } else { order + 0.25 };
-        assert!(reached > order - 0.25 && reached < most, "{mode:?}: order {reached}, {coarse} to {fine}");
-    }
 }
 
 #[test]

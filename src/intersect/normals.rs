@@ -3,9 +3,10 @@
 //! Facet parameters are `(0,0), (1,0), (1,1), (0,1)` at the corners, carried over the two traced triangles linearly.
 //! On a mesh of size h the normals of the flat triangle and of the nearest corner are wrong by O(h), those of the bilinear
 //! rule by O(h²), and for a slanted ray most of that is because it meets the facet beside the point where it would meet the surface.
-//! The cubic patch is met where the ray meets it: two Newton steps from the facet hit leave an error of about O(h³) on smooth
-//! surfaces. The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its bicubic relative with the
-//! twist of the bilinear patch.
+//! The cubic patch is met where the ray meets it, by two Newton steps from the facet hit. It is of order 2 as well, four times
+//! below the bilinear rule and more: its one twist is wrong by O(h³) where a facet is no parallelogram or the surface has third
+//! derivatives; without either the order is 3. The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its bicubic
+//! relative with the twist of the bilinear patch.
 //! Weakness: all but the flat normal are only as good as the vertex normals of the mesh; across a crease inside a facet, which no
 //! vertex tells of, the cubic patch is no better than the bilinear rule.
 
