@@ -33,8 +33,8 @@ pub(super) fn meshing(
         ask.kinds = vec![normals];
     }
     let product = Product::new(model);
-    let bar = context.bar("aiming", "%", 100);
-    let progress = |p: crate::study::Progress| bar.set_position((100.0 * p.done) as u64);
+    let bar = context.stages("aiming");
+    let progress = |p: crate::study::Progress| super::study::show(&bar, &p);
     let found = match scene {
         None => aim(model, &product, &ask, &progress),
         Some(scene) => {
@@ -62,8 +62,8 @@ pub(super) fn facets(
 ) -> Result<(Meshing, Option<Aim>), Failure> {
     let Some(ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), None)) };
     let ask = Ask { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
-    let bar = context.bar("aiming", "%", 100);
-    let found = aim(model, &Product::new(model), &ask, &|p| bar.set_position((100.0 * p.done) as u64));
+    let bar = context.stages("aiming");
+    let found = aim(model, &Product::new(model), &ask, &|p| super::study::show(&bar, &p));
     bar.finish_and_clear();
     context.say(&found.answer);
     Ok((Meshing { plan: Some(found.plan.clone()), ..meshing.clone() }, Some(found)))

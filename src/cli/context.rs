@@ -81,6 +81,20 @@ impl Context {
         bar
     }
 
+    /// A progress bar over shares of a work whose stages and remaining time it is told; of length 1000.
+    pub(crate) fn stages(&self, label: &str) -> ProgressBar {
+        let bar = ProgressBar::new(1000);
+        if !self.terminal || self.quiet {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+            return bar;
+        }
+        let style = ProgressStyle::with_template("  {prefix:<14} {bar:30} {percent:>3} %  {msg}");
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.set_style(style.progress_chars("━╸ "));
+        bar.set_prefix(label.to_owned());
+        bar
+    }
+
     /// A sign of life for work of unknown length.
     pub(crate) fn spinner(&self, label: &str) -> ProgressBar {
         let spinner = ProgressBar::new_spinner();

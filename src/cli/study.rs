@@ -59,7 +59,7 @@ impl Found {
 pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
     let threads = engine::threads(asked.tracing.threads)?;
     let seed = asked.tracing.seed.unwrap_or(1);
-    let bar = context.bar(asked.kind.name(), "‰", 1000);
+    let bar = context.stages(asked.kind.name());
     let progress = |p: Progress| show(&bar, &p);
     let mut shapes = Vec::new();
     let found = match asked.kind {
@@ -114,7 +114,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
 }
 
 /// The bar follows the study's own clock, remaining time included.
-fn show(bar: &ProgressBar, p: &Progress) {
+pub(super) fn show(bar: &ProgressBar, p: &Progress) {
     let left = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
     bar.set_message(format!("{}{left}", p.stage));
     bar.set_position((1000.0 * p.done.clamp(0.0, 1.0)) as u64);

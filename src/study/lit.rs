@@ -2,7 +2,7 @@
 
 use super::Progress;
 use super::accuracy::{self, Accuracy};
-use super::receivers::{self, Expected};
+use super::receivers::{self, Combination};
 use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{BoundScene, RunSettings, simulate};
@@ -22,43 +22,84 @@ pub fn accuracy_of_scene(
 ) -> (Accuracy, Vec<receivers::Row>) {
     let begun = Instant::now();
     let uniform: Vec<f64> = settings.tolerances.iter().filter(|t| t[0] == t[1]).map(|t| t[0]).collect();
-    let seconds_after = pilot(plain, bound, run, &uniform);
+    let Some(&middle) = uniform.get(uniform.len() / 2) else {
+        return (accuracy::accuracy(name, workshop, settings, progress), Vec::new());
+    };
+    let pilot = Pilot::of(plain, bound, run, middle);
+    let seconds_after = pilot.spline + uniform.iter().flat_map(|&t| pilot.expected(t, |_| None)).sum::<f64>();
     let settings = accuracy::Settings { seconds_after, ..settings.clone() };
     let study = accuracy::accuracy(name, workshop, &settings, progress);
     let threads = study.rows.iter().map(|r| r.threads).max().unwrap_or(1);
-    let of = |tolerance: Option<f64>, tree: &str, normals: NormalMode| {
+    let of = |tolerance: f64, normals: NormalMode| {
         let mut rows = study.rows.iter().filter(|r| r.threads == threads && !r.adaptive);
-        let name = normals.name();
-        rows.find(|r| r.tolerance_mm == tolerance && r.intersector == tree && r.normals == name)
+        let octree = Tree::Octree.name();
+        rows.find(|r| r.tolerance_mm == Some(tolerance) && r.intersector == octree && r.normals == normals.name())
     };
-    // The sweep's rays are not the scene's, but facets and spline stand to each other alike on both.
-    let spline = of(None, "exact", NormalMode::Exact).map_or(1.0, |r| r.seconds_trace_median.max(1e-9));
-    let expected = |tolerance: f64, normals: NormalMode| {
-        let row = of(Some(tolerance), Tree::Octree.name(), normals);
-        row.map_or(Expected { prepare: 0.0, of_spline: 1.0 }, |r| Expected {
-            prepare: r.seconds_build + r.seconds_tessellate.unwrap_or(0.0) / KINDS.len() as f64,
-            of_spline: r.seconds_trace_median / spline,
-        })
+    // The sweep's rays are not the scene's, but finer facets slow both alike.
+    let slower = |tolerance: f64, normals: NormalMode| {
+        let [now, then] = [tolerance, middle].map(|t| of(t, normals).map(|r| r.seconds_trace_median));
+        Some(now? / then?.max(1e-12))
     };
-    let combinations: Vec<_> = uniform.iter().flat_map(|&t| KINDS.map(|n| (t, n, expected(t, n)))).collect();
-    let rows = receivers::receivers(name, bound, plain, &combinations, run, (begun, progress));
+    let mut combinations = Vec::new();
+    for &t in &uniform {
+        let seconds = pilot.expected(t, |normals| slower(t, normals));
+        combinations.extend(KINDS.into_iter().zip(seconds).map(|(n, seconds)| Combination {
+            tolerance: t,
+            normals: n,
+            seconds,
+        }));
+    }
+    let rows = receivers::receivers(name, bound, plain, (&combinations, pilot.spline), run, (begun, progress));
     (study, rows)
 }
 
-/// Seconds that the light will take, from a tenth of its rays on the spline and on facets of the middle tolerance.
-fn pilot(workshop: &dyn Workshop, bound: &BoundScene, run: &RunSettings, tolerances: &[f64]) -> f64 {
-    let Some(&middle) = tolerances.get(tolerances.len() / 2) else { return 0.0 };
-    let few = RunSettings { rays: run.rays.div_ceil(10), path_samples: 0, ..run.clone() };
-    let more = run.rays as f64 / few.rays.max(1) as f64;
-    let seconds = |who: &dyn Intersector| simulate(bound, who, &few, &|_| true).seconds.trace * more;
-    // Once untimed: threads and caches are cold.
-    seconds(workshop.exact());
-    let spline = seconds(workshop.exact());
-    let start = Instant::now();
-    let meshed = workshop.mesh([middle; 2]);
-    let (prepare, traced) = with_all(workshop, &meshed.mesh, &[Tree::Octree], &KINDS, |trees| {
-        let prepare = start.elapsed().as_secs_f64();
-        (prepare, trees.iter().map(|t| seconds(t.2)).sum::<f64>())
-    });
-    spline + (prepare + traced) * tolerances.len() as f64
+/// Seconds of the whole run of light, from a part of its rays.
+struct Pilot {
+    middle: f64,
+    spline: f64,
+    /// Of meshing and building at the middle tolerance.
+    prepare: f64,
+    /// Of tracing there, for each of [`KINDS`].
+    traced: [f64; 4],
+}
+
+impl Pilot {
+    fn of(workshop: &dyn Workshop, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
+        let timed = |who: &dyn Intersector, rays: u64| {
+            let few = RunSettings { rays, path_samples: 0, ..run.clone() };
+            let start = Instant::now();
+            simulate(bound, who, &few, &|_| true);
+            start.elapsed().as_secs_f64()
+        };
+        // Two numbers of rays, for a run costs something before its first: a tenth of the rays alone gave a third too much. The first
+        // run also warms threads and caches.
+        let (few, more) = (run.rays.div_ceil(20), run.rays.div_ceil(4));
+        let seconds = |who: &dyn Intersector| {
+            timed(who, few);
+            let (a, b) = (timed(who, few), timed(who, more));
+            b + (b - a).max(0.0) * (run.rays - more) as f64 / (more - few).max(1) as f64
+        };
+        let spline = seconds(workshop.exact());
+        let start = Instant::now();
+        let meshed = workshop.mesh([middle; 2]);
+        with_all(workshop, &meshed.mesh, &[Tree::Octree], &KINDS, |trees| {
+            let prepare = start.elapsed().as_secs_f64();
+            let mut traced = [0.0; 4];
+            traced.iter_mut().zip(trees).for_each(|(slot, tree)| *slot = seconds(tree.2));
+            Self { middle, spline, prepare, traced }
+        })
+    }
+
+    /// Seconds for each of [`KINDS`] at a tolerance; `slower` tells how much slower tracing is there than at the middle one, where
+    /// that is known.
+    fn expected(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
+        // Facets go with 1/tolerance, tracing grows by about a tenth per halving.
+        let finer = self.middle / tolerance;
+        let usual = (1.0 + 0.1 * finer.log2()).max(0.5);
+        let mut seconds = self.traced;
+        for (s, normals) in seconds.iter_mut().zip(KINDS) {
+            *s = *s * slower(normals).unwrap_or(usual) + self.prepare * finer / KINDS.len() as f64;
+        }
+        seconds
+    }
 }

@@ -117,13 +117,15 @@ fn by_replicate(
     (results, by)
 }
 
-/// What a combination will take.
+/// What to trace on, and the seconds that this will take.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
-    /// Seconds of meshing and building.
-    pub(super) prepare: f64,
-    /// Seconds of tracing over those on the spline.
-    pub(super) of_spline: f64,
+pub(super) struct Combination {
+    /// Of the facets, mm.
+    pub(super) tolerance: f64,
+    /// At the hits.
+    pub(super) normals: NormalMode,
+    /// Meshing, building and tracing.
+    pub(super) seconds: f64,
 }
 
 /// Traces a scene on the spline once and on facets for every combination. `begun` is when the whole study began.
@@ -131,19 +133,18 @@ pub(super) fn receivers(
     name: &str,
     bound: &BoundScene,
     workshop: &dyn Workshop,
-    combinations: &[(f64, NormalMode, Expected)],
+    (combinations, seconds_spline): (&[Combination], f64),
     settings: &RunSettings,
     (begun, progress): (Instant, &(dyn Fn(Progress) + Sync)),
 ) -> Vec<Row> {
     let mut countdown = Countdown::since(begun, progress);
+    let seconds = |of: &[Combination]| -> f64 { of.iter().map(|c| c.seconds).sum() };
+    countdown.stage("receivers on the spline", Some(seconds_spline + seconds(combinations)));
     let truth = simulate(bound, workshop.exact(), settings, &|_| true);
     let start = Instant::now();
-    let seconds = |of: &[(f64, NormalMode, Expected)]| -> f64 {
-        of.iter().map(|c| c.2.prepare + c.2.of_spline * truth.seconds.trace).sum()
-    };
     let (mut rows, mut done) = (Vec::new(), 0);
-    for of_one in combinations.chunk_by(|a, b| a.0 == b.0) {
-        let tolerance = of_one[0].0;
+    for of_one in combinations.chunk_by(|a, b| a.tolerance == b.tolerance) {
+        let tolerance = of_one[0].tolerance;
         // What was expected, corrected by how long the combinations so far took against it.
         let pace =
             if done == 0 { 1.0 } else { start.elapsed().as_secs_f64() / seconds(&combinations[..done]).max(1e-9) };
@@ -151,7 +152,7 @@ pub(super) fn receivers(
         countdown.stage(&format!("receivers at {tolerance} mm"), Some(ahead));
         done += of_one.len();
         let meshed = workshop.mesh([tolerance; 2]);
-        let normals: Vec<NormalMode> = of_one.iter().map(|c| c.1).collect();
+        let normals: Vec<NormalMode> = of_one.iter().map(|c| c.normals).collect();
         let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &normals, |trees| {
             let run = |tree: &(Tree, NormalMode, &dyn Intersector)| {
                 countdown.tick();

@@ -27,18 +27,22 @@ pub fn accuracy(
     study.exact();
     let mut ahead = Forecast { tolerances: settings.tolerances.clone(), known: Vec::new() };
     let mut blocks: Vec<(usize, Vec<Row>)> = vec![(0, std::mem::take(&mut study.rows))];
-    // The finest first, then the coarsest: all that is left lies between, and so does its time.
+    // One in the middle, which is quick and tells most of the rest, then the finest, whose facets cost most, then coarse to fine.
     let mut order: Vec<usize> = (0..settings.tolerances.len()).collect();
-    order.sort_by(|&a, &b| ahead.fineness(a).total_cmp(&ahead.fineness(b)));
-    order.get_mut(1..).into_iter().for_each(|rest| rest.reverse());
-    for k in order {
+    order.sort_by(|&a, &b| ahead.fineness(b).total_cmp(&ahead.fineness(a)));
+    let first: Vec<usize> = order.get(order.len() / 2).into_iter().chain(order.last()).copied().collect();
+    order.retain(|k| !first.contains(k));
+    for k in first.iter().copied().take(settings.tolerances.len()).chain(order) {
+        if ahead.known.iter().any(|x| x.0 == k) {
+            continue;
+        }
         let [low, high] = settings.tolerances[k];
         let range = if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") };
         let left = ahead.seconds().map(|s| s + settings.seconds_after);
         study.countdown.stage(&format!("tolerance {range}"), left);
         let start = Instant::now();
-        study.tolerance([low, high]);
-        ahead.known.push((k, start.elapsed().as_secs_f64()));
+        let prepare = study.tolerance([low, high]);
+        ahead.known.push((k, [prepare, start.elapsed().as_secs_f64() - prepare]));
         blocks.push((k + 1, std::mem::take(&mut study.rows)));
     }
     study.countdown.stage("done", Some(settings.seconds_after));
@@ -51,8 +55,8 @@ pub fn accuracy(
 /// Seconds of the tolerances still to come.
 struct Forecast {
     tolerances: Vec<[f64; 2]>,
-    /// Those done, with their seconds.
-    known: Vec<(usize, f64)>,
+    /// Those done, with their seconds of meshing and building, and of tracing and judging.
+    known: Vec<(usize, [f64; 2])>,
 }
 
 impl Forecast {
@@ -61,22 +65,29 @@ impl Forecast {
         0.5 * (self.tolerances[k][0] * self.tolerances[k][1]).ln()
     }
 
-    /// Between two known tolerances time is a power of the tolerance; on one side of all known ones it stays as it is there.
+    /// Meshing and building go with the facets, that is with 1/tolerance; tracing grows evenly with its logarithm, by about a tenth
+    /// per halving where only one tolerance is known.
     fn seconds(&self) -> Option<f64> {
-        let mut known: Vec<(f64, f64)> =
-            self.known.iter().map(|&(k, s)| (self.fineness(k), s.max(1e-9).ln())).collect();
+        let mut known: Vec<(f64, [f64; 2])> = self.known.iter().map(|&(k, s)| (self.fineness(k), s)).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (first, last) = (*known.first()?, *known.last()?);
         let left = (0..self.tolerances.len()).filter(|k| !self.known.iter().any(|x| x.0 == *k));
+        let alone = |(at, [prepare, trace]): (f64, [f64; 2]), x: f64| {
+            let halvings = (at - x) / std::f64::consts::LN_2;
+            let slower = if halvings > 0.0 { 1.0 + 0.1 * halvings } else { 1.0 / (1.0 - 0.1 * halvings) };
+            prepare * (at - x).exp() + trace * slower
+        };
         let one = |k: usize| {
             let x = self.fineness(k);
-            let i = known.partition_point(|p| p.0 <= x);
+            let i = known.partition_point(|p| p.0 < x);
             match (i.checked_sub(1).map(|j| known[j]), known.get(i)) {
-                (Some(a), Some(b)) => (a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0)).exp(),
-                (None, _) => first.1.exp(),
-                // Coarser than all known: fewer facets are traced a little faster.
-                _ if known.len() == 1 => 0.75 * last.1.exp(),
-                _ => last.1.exp(),
+                (Some(a), Some(b)) => {
+                    let share = |f: fn(f64) -> f64| (f(x) - f(a.0)) / (f(b.0) - f(a.0));
+                    let along = |m: usize, s: f64| a.1[m] + (b.1[m] - a.1[m]) * s;
+                    along(0, share(|x| (-x).exp())) + along(1, share(|x| x))
+                }
+                (None, _) => alone(first, x),
+                (Some(_), None) => alone(last, x),
             }
         };
         Some(left.map(one).sum())
@@ -136,11 +147,14 @@ impl Sweep<'_> {
         self.truth = runner.hits.into_inner().unwrap_or_default();
     }
 
-    fn tolerance(&mut self, tolerance: [f64; 2]) {
+    /// Gives the seconds of meshing and building.
+    fn tolerance(&mut self, tolerance: [f64; 2]) -> f64 {
+        let start = Instant::now();
         let meshed = self.workshop.mesh(tolerance);
         let settings = self.settings;
         let workshop = self.workshop;
         with_all(workshop, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
+            let prepare = start.elapsed().as_secs_f64();
             let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
             for &threads in &settings.threads {
                 let timings = self.race(&runners, threads);
@@ -150,7 +164,8 @@ impl Sweep<'_> {
                     self.push(row, timing, threads);
                 }
             }
-        });
+            prepare
+        })
     }
 
     fn row(

@@ -180,6 +180,11 @@ impl Plan {
         Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
     }
 
+    /// The same, to be made coarser or finer within bounds.
+    pub(super) fn even(tolerance_mm: f64, [finest_mm, coarsest_mm]: [f64; 2]) -> Self {
+        Self { coarsest_mm, finest_mm, ..Self::uniform(tolerance_mm) }
+    }
+
     /// All tolerances multiplied.
     pub(super) fn scale(&mut self, factor: f64) {
         for share in self.places.iter_mut().chain([&mut self.other]) {
