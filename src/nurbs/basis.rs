@@ -1,11 +1,20 @@
 /// Highest polynomial degree the program handles; real files go to 13.
 pub const MAX_DEGREE: usize = 25;
 
-/// Values of the `degree + 1` non-zero basis functions and of their first two derivatives.
-pub(super) struct Basis {
+/// Values of the `degree + 1 ≤ W` non-zero basis functions and of their first two derivatives.
+///
+/// Tables of the full width would have to be cleared for every evaluation, which took a quarter of the time of meshing.
+pub(super) struct Basis<const W: usize> {
     /// `value[k][i]`: k-th derivative of the i-th non-zero basis function.
-    pub(super) value: [[f64; MAX_DEGREE + 1]; 3],
+    pub(super) value: [[f64; W]; 3],
 }
+
+/// Widths of tables that callers choose among: degrees below 4, below 8, all.
+pub(super) const NARROW: usize = 4;
+/// See [`NARROW`].
+pub(super) const MIDDLE: usize = 8;
+/// See [`NARROW`].
+pub(super) const WIDE: usize = MAX_DEGREE + 1;
 
 /// Index `k` of the knot span `[knots[k], knots[k + 1])` that holds `t`, never an empty one.
 ///
@@ -24,10 +33,12 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
 }
 
 /// Basis functions and derivatives up to `order` (at most 2) in a span: *The NURBS Book*, A2.3.
-pub(super) fn basis(knots: &[f64], degree: usize, span: usize, t: f64, order: usize) -> Basis {
+#[inline]
+pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64, order: usize) -> Basis<W> {
     let p = degree;
-    let mut table = [[0.0; MAX_DEGREE + 1]; MAX_DEGREE + 1];
-    let (mut left, mut right) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
+    assert!(p < W);
+    let mut table = [[0.0; W]; W];
+    let (mut left, mut right) = ([0.0; W], [0.0; W]);
     table[0][0] = 1.0;
     for j in 1..=p {
         left[j] = t - knots[span + 1 - j];
@@ -42,13 +53,16 @@ pub(super) fn basis(knots: &[f64], degree: usize, span: usize, t: f64, order: us
         }
         table[j][j] = saved;
     }
-    let mut value = [[0.0; MAX_DEGREE + 1]; 3];
+    let mut value = [[0.0; W]; 3];
     for r in 0..=p {
         value[0][r] = table[r][p];
     }
     let order = order.min(p);
+    if order == 0 {
+        return Basis { value };
+    }
     for r in 0..=p {
-        let mut a = [[0.0; MAX_DEGREE + 1]; 2];
+        let mut a = [[0.0; W]; 2];
         let (mut s1, mut s2) = (0, 1);
         a[0][0] = 1.0;
         for k in 1..=order {
@@ -99,7 +113,7 @@ mod tests {
         let knots = [0.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.7, 1.0, 1.0, 1.0, 1.0];
         for i in 0..=20 {
             let t = i as f64 / 20.0;
-            let b = basis(&knots, 3, find_span(&knots, 3, t), t, 2);
+            let b: Basis<NARROW> = basis(&knots, 3, find_span(&knots, 3, t), t, 2);
             let sum = |k: usize| b.value[k][..4].iter().sum::<f64>();
             assert!((sum(0) - 1.0).abs() < 1e-14 && sum(1).abs() < 1e-12 && sum(2).abs() < 1e-11);
         }

@@ -1,3 +1,4 @@
+use super::basis::{MIDDLE, NARROW, WIDE};
 use super::{Curve, Surface};
 use crate::math::{Aabb, Homogeneous, Uv};
 
@@ -49,9 +50,17 @@ impl BezierPatch {
 
     /// Homogeneous point and first derivatives with respect to the local parameters in `[0, 1]²`.
     pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.homogeneous_in::<NARROW>(local),
+            NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(local),
+            _ => self.homogeneous_in::<WIDE>(local),
+        }
+    }
+
+    fn homogeneous_in<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
         let [p, q] = self.degree;
-        let (bu, du) = bernstein(p, local.x);
-        let (bv, dv) = bernstein(q, local.y);
+        let (bu, du) = bernstein::<W>(p, local.x);
+        let (bv, dv) = bernstein::<W>(q, local.y);
         let mut sums = [Homogeneous::ZERO; 3];
         for i in 0..=p {
             let (mut row, mut row_v) = (Homogeneous::ZERO, Homogeneous::ZERO);
@@ -65,6 +74,26 @@ impl BezierPatch {
             sums[2] += row_v * bu[i];
         }
         sums
+    }
+
+    /// Homogeneous point at local parameters in `[0, 1]²`: the first of [`BezierPatch::homogeneous`], in a third of its time.
+    pub fn homogeneous_point(&self, local: Uv) -> Homogeneous {
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.point_in::<NARROW>(local),
+            NARROW..MIDDLE => self.point_in::<MIDDLE>(local),
+            _ => self.point_in::<WIDE>(local),
+        }
+    }
+
+    fn point_in<const W: usize>(&self, local: Uv) -> Homogeneous {
+        let [p, q] = self.degree;
+        let bu = values::<W>(p, local.x);
+        let bv = values::<W>(q, local.y);
+        let mut sum = Homogeneous::ZERO;
+        for (row, &b) in self.points.chunks_exact(q + 1).zip(&bu[..=p]) {
+            sum += row.iter().zip(&bv).fold(Homogeneous::ZERO, |s, (&c, &v)| s + c * v) * b;
+        }
+        sum
     }
 
     /// Parameters of the surface at local parameters in `[0, 1]²`.
@@ -107,21 +136,12 @@ impl BezierPatch {
     }
 }
 
-/// Bernstein polynomials of degree `n` and their derivatives at `t`.
-fn bernstein(n: usize, t: f64) -> ([f64; super::MAX_DEGREE + 1], [f64; super::MAX_DEGREE + 1]) {
+/// Bernstein polynomials of degree `n < W` at `t`.
+fn values<const W: usize>(n: usize, t: f64) -> [f64; W] {
     let s = 1.0 - t;
-    let mut b = [0.0; super::MAX_DEGREE + 1];
-    let mut d = [0.0; super::MAX_DEGREE + 1];
+    let mut b = [0.0; W];
     b[0] = 1.0;
     for k in 1..=n {
-        if k == n {
-            // Derivatives from degree n − 1: n (B_{i−1} − B_i).
-            for i in 0..=n {
-                let before = if i > 0 { b[i - 1] } else { 0.0 };
-                let here = if i < n { b[i] } else { 0.0 };
-                d[i] = n as f64 * (before - here);
-            }
-        }
         let mut saved = 0.0;
         for x in &mut b[..k] {
             let value = *x;
@@ -130,7 +150,22 @@ fn bernstein(n: usize, t: f64) -> ([f64; super::MAX_DEGREE + 1], [f64; super::MA
         }
         b[k] = saved;
     }
-    (b, d)
+    b
+}
+
+/// Bernstein polynomials of degree `n < W` and their derivatives at `t`.
+fn bernstein<const W: usize>(n: usize, t: f64) -> ([f64; W], [f64; W]) {
+    let mut d = [0.0; W];
+    if n > 0 {
+        // Derivatives from degree n − 1: n (B_{i−1} − B_i).
+        let b = values::<W>(n - 1, t);
+        for i in 0..=n {
+            let before = if i > 0 { b[i - 1] } else { 0.0 };
+            let here = if i < n { b[i] } else { 0.0 };
+            d[i] = n as f64 * (before - here);
+        }
+    }
+    (values::<W>(n, t), d)
 }
 
 #[cfg(test)]

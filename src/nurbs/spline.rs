@@ -1,4 +1,4 @@
-use super::basis::{MAX_DEGREE, basis, find_span};
+use super::basis::{Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -141,10 +141,19 @@ impl<P: ControlPoint> Spline<P> {
     }
 
     fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {
+        match self.degree {
+            0..NARROW => self.homogeneous_in::<NARROW>(t, order),
+            NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(t, order),
+            _ => self.homogeneous_in::<WIDE>(t, order),
+        }
+    }
+
+    /// As [`Spline::homogeneous`], with tables of width `W`.
+    fn homogeneous_in<const W: usize>(&self, t: f64, order: usize) -> [P; 3] {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
         let span = find_span(&self.knots, self.degree, t);
-        let b = basis(&self.knots, self.degree, span, t, order);
+        let b: Basis<W> = basis(&self.knots, self.degree, span, t, order);
         let active = &self.points[span - self.degree..=span];
         std::array::from_fn(|k| {
             if k > order {

@@ -1,4 +1,4 @@
-use super::basis::{Basis, basis, find_span};
+use super::basis::{Basis, MIDDLE, NARROW, WIDE, basis, find_span};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 
@@ -91,13 +91,22 @@ impl Surface {
 
     /// Sums for (S), (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
     fn sums<const N: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.sums_in::<N, NARROW>(uv, order),
+            NARROW..MIDDLE => self.sums_in::<N, MIDDLE>(uv, order),
+            _ => self.sums_in::<N, WIDE>(uv, order),
+        }
+    }
+
+    /// As [`Surface::sums`], with tables of width `W`.
+    fn sums_in<const N: usize, const W: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
         const DERIVATIVE: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
         let uv = self.clamp(uv);
         let [p, q] = self.degree;
         let count_v = self.counts()[1];
         let (span_u, span_v) = (find_span(&self.knots[0], p, uv.x), find_span(&self.knots[1], q, uv.y));
-        let bu: Basis = basis(&self.knots[0], p, span_u, uv.x, order);
-        let bv: Basis = basis(&self.knots[1], q, span_v, uv.y, order);
+        let bu: Basis<W> = basis(&self.knots[0], p, span_u, uv.x, order);
+        let bv: Basis<W> = basis(&self.knots[1], q, span_v, uv.y, order);
         let mut sums = [Homogeneous::ZERO; N];
         for i in 0..=p {
             let start = (span_u - p + i) * count_v + span_v - q;

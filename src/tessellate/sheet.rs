@@ -47,7 +47,7 @@ impl<'a> Sheet<'a> {
 
     pub(super) fn point(&self, uv: Uv) -> Point {
         let patch = self.patch(self.interval(0, uv.x), self.interval(1, uv.y));
-        patch.homogeneous(local(patch, uv))[0].project()
+        patch.homogeneous_point(local(patch, uv)).project()
     }
 
     /// Outward unit normal, where there is one.
