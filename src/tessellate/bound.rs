@@ -16,7 +16,9 @@
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
 
+use super::near::Near;
 use super::net::Nets;
+use super::scalar::Scalar;
 use super::settings::Judge;
 use super::sheet::{Sheet, local};
 use crate::math::{Point, Uv, Vector};
@@ -34,12 +36,21 @@ pub(super) struct Prover<'s, 'a> {
     sheet: &'s Sheet<'a>,
     judge: Judge,
     nets: Nets,
+    near: Near,
+    scalar: Scalar,
     margin: f64,
 }
 
 impl<'s, 'a> Prover<'s, 'a> {
     pub(super) fn new(sheet: &'s Sheet<'a>, judge: Judge) -> Self {
-        Self { sheet, judge, nets: Nets::default(), margin: 1e-12 * sheet.size }
+        Self {
+            sheet,
+            judge,
+            nets: Nets::default(),
+            near: Near::default(),
+            scalar: Scalar::default(),
+            margin: 1e-12 * sheet.size,
+        }
     }
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space.
@@ -79,7 +90,8 @@ impl<'s, 'a> Prover<'s, 'a> {
             }
             for k in 1..polygon.len() - 1 {
                 let tri = [polygon[0], polygon[k], polygon[k + 1]].map(|x| local(patch, x));
-                let bound = refine(&mut this.nets, patch, tri, limit, LEVELS, &|p| flat.distance(p));
+                let bound =
+                    refine((&mut this.nets, &mut this.scalar), patch, tri, limit, LEVELS, &|p| flat.distance(p));
                 worst = worst.max(bound);
                 if worst > limit {
                     break;
@@ -87,6 +99,26 @@ impl<'s, 'a> Prover<'s, 'a> {
             }
             worst
         }) + self.margin
+    }
+
+    /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
+    /// quick look; `None` when that does not show it to be within the limit.
+    pub(super) fn facet(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> Option<f64> {
+        if self.sheet.affine || self.judge == Judge::Sampled {
+            return None;
+        }
+        let at = uv.map(|x| self.sheet.point(x));
+        let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
+        let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
+        let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
+        let fits = |x: &f64| x + off <= limit;
+        let quick = self.sheet.bends.bound(a, b, hi - lo).filter(fits);
+        let bound = quick.or_else(|| {
+            let patch = self.sheet.patch(a[0], b[0]);
+            let one = a[0] == a[1] && b[0] == b[1];
+            one.then(|| self.near.bound(patch, uv.map(|x| local(patch, x)), at)).flatten().filter(fits)
+        })?;
+        Some(bound + off)
     }
 
     /// Bound of the distance from the curve over a parameter segment to the line of a chord.
@@ -107,7 +139,7 @@ impl<'s, 'a> Prover<'s, 'a> {
                 return 0.0;
             }
             let ends = [local(patch, polygon[0]), local(patch, polygon[1])];
-            refine(&mut this.nets, patch, ends, limit, 2 * LEVELS, &|p| from_chord(p, &xyz))
+            refine((&mut this.nets, &mut this.scalar), patch, ends, limit, 2 * LEVELS, &|p| from_chord(p, &xyz))
         }) + self.margin
     }
 
@@ -174,24 +206,33 @@ impl<'s, 'a> Prover<'s, 'a> {
 
 /// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
 fn refine<const N: usize>(
-    nets: &mut Nets,
+    (nets, scalar): (&mut Nets, &mut Scalar),
     patch: &crate::nurbs::BezierPatch,
     at: [Uv; N],
     limit: f64,
     levels: u32,
     f: &impl Fn(Point) -> f64,
 ) -> f64 {
-    let bound = nets.expand(patch, at).iter().map(|c| f(c.project())).fold(0.0, f64::max);
-    if bound <= limit || levels == 0 {
+    let net = nets.expand(patch, at);
+    let degree = patch.degree[0] + patch.degree[1];
+    let bound = scalar.load::<N>(net.iter().map(|c| (f(c.project()), c.w)), degree);
+    // Corners lie on the surface: there the distance is no bound but true.
+    if bound <= limit || scalar.at_corners::<N>() > limit {
         return bound;
     }
     // Each level brings the bound at most four times closer to the truth; no hope is no work.
     if bound > 8.0 * limit && levels < LEVELS {
         return bound;
     }
+    if let Some(bound) = scalar.within::<N>(limit) {
+        return bound;
+    }
+    if levels == 0 {
+        return bound;
+    }
     let mut worst = 0f64;
     let mut take = |sub: [Uv; N]| {
-        worst = worst.max(refine(nets, patch, sub, limit, levels - 1, f));
+        worst = worst.max(refine((nets, scalar), patch, sub, limit, levels - 1, f));
         worst > limit
     };
     if N == 2 {

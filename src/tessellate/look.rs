@@ -4,6 +4,7 @@ use super::bound::{Prover, from_chord};
 use super::cells::Cell;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
+use smallvec::SmallVec;
 
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(super) type Corners = [(Uv, Point); 4];
@@ -11,13 +12,24 @@ pub(super) type Corners = [(Uv, Point); 4];
 /// Bound of a quad's two triangles, edges and diagonal included.
 pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
     let mut worst = 0f64;
+    let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
     for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
+        match prover.facet([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit) {
+            Some(bound) => worst = worst.max(bound),
+            None => open.push([i, j, k]),
+        }
+    }
+    for &[i, j, k] in &open {
         worst = worst.max(prover.piece([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit));
         if worst > limit {
             return worst;
         }
     }
-    for [i, j] in [[0, 2], [0, 1], [1, 2], [2, 3], [3, 0]] {
+    for (i, j) in open.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]) {
+        // Both triangles hold the diagonal.
+        if (i, j) == (0, 2) && open.len() == 2 {
+            continue;
+        }
         worst = worst.max(prover.side([c[i].0, c[j].0], [c[i].1, c[j].1], limit));
         if worst > limit {
             return worst;

@@ -57,41 +57,27 @@ fn reduce<const N: usize>(
 fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f64; N], out: &mut Vec<Homogeneous>) {
     out.clear();
     let inv = 1.0 / (d + 1) as f64;
+    let mix = |x: usize, c: usize, times: usize| (a[x] * (1.0 - at[c]) + b[x] * at[c]) * (times as f64 * inv);
     if N == 2 {
-        for j in 0..=d + 1 {
-            let i = d + 1 - j;
-            let mut sum = Homogeneous::ZERO;
-            if i > 0 {
-                sum += (a[j] * (1.0 - at[0]) + b[j] * at[0]) * i as f64;
-            }
-            if j > 0 {
-                sum += (a[j - 1] * (1.0 - at[1]) + b[j - 1] * at[1]) * j as f64;
-            }
-            out.push(sum * inv);
+        out.resize(d + 2, Homogeneous::ZERO);
+        for j in 0..=d {
+            out[j] += mix(j, 0, d + 1 - j);
+            out[j + 1] += mix(j, 1, j + 1);
         }
         return;
     }
-    for m in 0..=d + 1 {
+    out.resize((d + 2) * (d + 3) / 2, Homogeneous::ZERO);
+    let (mut row, mut next) = (0, 1);
+    for m in 0..=d {
+        let (here, below) = out[row..].split_at_mut(m + 1);
         for k in 0..=m {
-            let (i, j) = (d + 1 - m, m - k);
-            let mut sum = Homogeneous::ZERO;
-            if i > 0 {
-                let x = m * (m + 1) / 2 + k;
-                sum += (a[x] * (1.0 - at[0]) + b[x] * at[0]) * i as f64;
-            }
-            if m > 0 {
-                let below = (m - 1) * m / 2;
-                if j > 0 {
-                    let x = below + k;
-                    sum += (a[x] * (1.0 - at[1]) + b[x] * at[1]) * j as f64;
-                }
-                if k > 0 {
-                    let x = below + k - 1;
-                    sum += (a[x] * (1.0 - at[2]) + b[x] * at[2]) * k as f64;
-                }
-            }
-            out.push(sum * inv);
+            let x = row + k;
+            here[k] += mix(x, 0, d + 1 - m);
+            below[k] += mix(x, 1, m + 1 - k);
+            below[k + 1] += mix(x, 2, k + 1);
         }
+        row = next;
+        next += m + 2;
     }
 }
 

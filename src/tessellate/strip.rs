@@ -146,12 +146,19 @@ pub(super) fn prove(
             return (prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi), xi);
         }
     }
+    let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (i, j, trims.get(&key(t[i], t[j]))));
     let mut worst = 0f64;
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        worst = worst.max(match trims.get(&key(t[i], t[j])) {
-            Some(trim) => trim.bound(prover, xyz, xi),
-            None => prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi),
-        });
+    for trim in sides.iter().filter_map(|s| s.2) {
+        worst = worst.max(trim.bound(prover, xyz, xi));
+        if worst > xi {
+            return (worst, xi);
+        }
+    }
+    if let Some(bound) = prover.facet(uv, xyz, xi) {
+        return (worst.max(bound), xi);
+    }
+    for (i, j, _) in sides.into_iter().filter(|s| s.2.is_none()) {
+        worst = worst.max(prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi));
     }
     if worst > xi {
         return (worst, xi);

@@ -1,0 +1,168 @@
+//! The proof that most facets pass: how far a Bézier patch strays from the flat triangle between three of its points.
+//!
+//! Over a parameter triangle let L be the linear map onto the triangle in space, and A and W the patch's homogeneous position and
+//! weight. N = A − W·L vanishes at the corners, so Taylor's theorem as in `bend.rs` gives |N| ≤ (Muu + 2 Muv + Mvv)/8, with bounds of
+//! its second derivatives over the rectangle around the triangle, in that rectangle's own parameters. The distance
+//! |S − L| = |N|/W follows, for the inside and the three sides alike, as L lies on the triangle and on its sides. Subtracting
+//! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
+//! included. Where that part matters, the hull of `net.rs` decides.
+
+use crate::math::{Homogeneous, Point, Uv};
+use crate::nurbs::BezierPatch;
+
+/// Triangles with a smaller share of the rectangle around them are left to others: their L is steep.
+const THINNEST: f64 = 0.05;
+
+/// Buffers reused from facet to facet.
+#[derive(Default)]
+pub(super) struct Near {
+    net: Vec<Homogeneous>,
+    deviation: Vec<Point>,
+    line: Vec<Homogeneous>,
+}
+
+impl Near {
+    /// Bound of |S − L| over the triangle with `corners` in the patch's local parameters, which lie at `at` in space.
+    pub(super) fn bound(&mut self, patch: &BezierPatch, corners: [Uv; 3], at: [Point; 3]) -> Option<f64> {
+        let lo = corners[0].min(corners[1]).min(corners[2]);
+        let hi = corners[0].max(corners[1]).max(corners[2]);
+        let x = corners.map(|c| (c - lo) / (hi - lo));
+        let (d1, d2) = (x[1] - x[0], x[2] - x[0]);
+        let det = d1.perp_dot(d2);
+        if !(det.abs() >= THINNEST) {
+            return None;
+        }
+        // L in the rectangle's parameters, seen from the first corner in space.
+        let (e1, e2) = (at[1] - at[0], at[2] - at[0]);
+        let ls = (e1 * d2.y - e2 * d1.y) / det;
+        let lt = (e2 * d1.x - e1 * d2.x) / det;
+        let l00 = -(ls * x[0].x + lt * x[0].y);
+        self.restrict(patch, lo, hi, at[0]);
+        let (w_min, w_max) = self.net.iter().fold((f64::INFINITY, 0f64), |(a, b), c| (a.min(c.w), b.max(c.w)));
+        let [p, q] = patch.degree;
+        let even = w_max - w_min <= 1e-13 * w_max;
+        let second = if even {
+            self.deviation.clear();
+            self.deviation.extend(self.net.iter().map(|c| c.truncate()));
+            seconds(&self.deviation, [p, q])
+        } else {
+            self.subtract([p, q], [l00, l00 + ls, l00 + lt, l00 + ls + lt]);
+            seconds(&self.deviation, [p + 1, q + 1])
+        };
+        Some((second[0] + 2.0 * second[1] + second[2]) / (8.0 * w_min))
+    }
+
+    /// The patch's net over the rectangle, seen from `origin`.
+    fn restrict(&mut self, patch: &BezierPatch, lo: Uv, hi: Uv, origin: Point) {
+        let [p, q] = patch.degree;
+        self.net.clear();
+        self.net.extend(patch.points.iter().map(|c| (c.truncate() - origin * c.w).extend(c.w)));
+        for row in self.net.chunks_exact_mut(q + 1) {
+            cut(row, lo.y, hi.y);
+        }
+        for j in 0..=q {
+            self.line.clear();
+            self.line.extend((0..=p).map(|i| self.net[i * (q + 1) + j]));
+            cut(&mut self.line, lo.x, hi.x);
+            for (i, &c) in self.line.iter().enumerate() {
+                self.net[i * (q + 1) + j] = c;
+            }
+        }
+    }
+
+    /// Bernstein coefficients of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
+    fn subtract(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
+        self.deviation.clear();
+        self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
+        let (pi, qi) = (1.0 / (p + 1) as f64, 1.0 / (q + 1) as f64);
+        for i in 0..=p {
+            let (before, after) = ((p + 1 - i) as f64 * pi, (i + 1) as f64 * pi);
+            for j in 0..=q {
+                let c = self.net[i * (q + 1) + j];
+                let (low, high) = ((q + 1 - j) as f64 * qi, (j + 1) as f64 * qi);
+                let a = c.truncate();
+                let at = i * (q + 2) + j;
+                self.deviation[at] += (a - l[0] * c.w) * (before * low);
+                self.deviation[at + 1] += (a - l[2] * c.w) * (before * high);
+                self.deviation[at + q + 2] += (a - l[1] * c.w) * (after * low);
+                self.deviation[at + q + 3] += (a - l[3] * c.w) * (after * high);
+            }
+        }
+    }
+}
+
+/// Control points over `[lo, hi]` in place of those over `[0, 1]`.
+fn cut(line: &mut [Homogeneous], lo: f64, hi: f64) {
+    let n = line.len() - 1;
+    if hi < 1.0 {
+        // Left part of a cut at `hi`.
+        for step in 1..=n {
+            for k in (step..=n).rev() {
+                line[k] = line[k - 1] * (1.0 - hi) + line[k] * hi;
+            }
+        }
+    }
+    if lo > 0.0 {
+        // Right part of a cut at `lo`, seen from the part before `hi`.
+        let t = if hi < 1.0 { lo / hi } else { lo };
+        for step in 1..=n {
+            for k in 0..=n - step {
+                line[k] = line[k] * (1.0 - t) + line[k + 1] * t;
+            }
+        }
+    }
+}
+
+/// Bounds of the second derivatives (uu, uv, vv) over the unit square of a net of these degrees.
+fn seconds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
+    let n = q + 1;
+    let mut most = [0f64; 3];
+    for i in 0..=p {
+        for j in 0..=q {
+            let at = i * n + j;
+            let x = net[at];
+            if i + 2 <= p {
+                most[0] = most[0].max((net[at + 2 * n] - net[at + n] * 2.0 + x).length_squared());
+            }
+            if j + 2 <= q {
+                most[2] = most[2].max((net[at + 2] - net[at + 1] * 2.0 + x).length_squared());
+            }
+            if i < p && j < q {
+                most[1] = most[1].max((net[at + n + 1] - net[at + n] - net[at + 1] + x).length_squared());
+            }
+        }
+    }
+    let (p, q) = (p as f64, q as f64);
+    [most[0].sqrt() * p * (p - 1.0), most[1].sqrt() * p * q, most[2].sqrt() * q * (q - 1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+
+    #[test]
+    fn the_bound_holds_and_is_sharp_on_rational_patches() {
+        let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 1.3], [0.2, 1.7]);
+        let patch = &s.bezier_patches()[0];
+        let point = |x: Uv| patch.homogeneous_point(x).project();
+        let mut near = Near::default();
+        for k in 0..40 {
+            let lo = Uv::new((k % 8) as f64 / 10.0, (k / 8) as f64 / 7.0);
+            let corners = [lo, lo + Uv::new(0.2, 0.02), lo + Uv::new(0.05, 0.25)];
+            let at = corners.map(point);
+            let bound = near.bound(patch, corners, at).unwrap();
+            let mut worst = 0f64;
+            for i in 0..=20 {
+                for j in 0..=20 - i {
+                    let (a, b) = (i as f64 / 20.0, j as f64 / 20.0);
+                    let c = 1.0 - a - b;
+                    let x = corners[0] * a + corners[1] * b + corners[2] * c;
+                    worst = worst.max((point(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
+                }
+            }
+            assert!(worst <= bound && bound < 1.7 * worst, "{worst} {bound}");
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The hull of distances: sharper than the largest distance of a control point.
+//!
+//! A convex distance of Σ cᵢwᵢBᵢ / Σ wᵢBᵢ is at most Σ dᵢwᵢBᵢ / Σ wᵢBᵢ with the distances dᵢ of the control points: a scalar
+//! rational Bézier function. Its largest value is found by halving its coefficients alone, at a small share of what halving
+//! the piece itself and measuring again would cost. For an arc, whose middle control point lies twice as far out as the arc,
+//! the first halvings already give nearly the arc's own distance.
+
+use smallvec::{SmallVec, smallvec};
+
+/// Halvings in a row; two of them halve a triangle's sides, one a segment.
+const DEPTH: [u32; 2] = [4, 8];
+
+/// Distances over one piece, and buffers for halving.
+#[derive(Default)]
+pub(super) struct Scalar {
+    degree: usize,
+    /// Distance and weight of each control point, in the order of `net.rs`.
+    of: Vec<(f64, f64)>,
+    /// Nets that wait for halving, one after another.
+    stack: Vec<f64>,
+    line: Vec<f64>,
+}
+
+impl Scalar {
+    /// Takes in distances and weights of the control points of a segment (`N = 2`) or triangle; the largest distance.
+    pub(super) fn load<const N: usize>(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
+        self.degree = degree;
+        self.of.clear();
+        self.of.extend(points);
+        self.of.iter().map(|x| x.0).fold(0.0, f64::max)
+    }
+
+    /// Largest distance of the corners.
+    pub(super) fn at_corners<const N: usize>(&self) -> f64 {
+        let n = self.degree;
+        let second = if N == 2 { n } else { n * (n + 1) / 2 };
+        self.of[0].0.max(self.of[second].0).max(self.of[self.of.len() - 1].0)
+    }
+
+    /// A bound that is within the limit, if halving finds one.
+    pub(super) fn within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
+        let n = self.degree;
+        let heaviest = self.of.iter().fold(0.0, |a: f64, x| a.max(x.1));
+        self.stack.clear();
+        // Coefficients of W·(d − limit): a piece is within the limit where none is positive.
+        let e = |x: usize| self.of[x].1 * (self.of[x].0 - limit);
+        if N == 2 {
+            self.stack.extend((0..=n).map(e));
+        } else {
+            // Lines along the side from the first corner to the last, which is halved first.
+            for j in 0..=n {
+                self.stack.extend((0..=n - j).map(|k| (j + k) * (j + k + 1) / 2 + k).map(e));
+            }
+        }
+        let size = self.stack.len();
+        let mut depths: SmallVec<[u32; 16]> = smallvec![DEPTH[3 - N]];
+        let mut most = f64::NEG_INFINITY;
+        while let Some(depth) = depths.pop() {
+            let start = self.stack.len() - size;
+            let worst = self.stack[start..].iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+            if worst <= 0.0 {
+                most = most.max(worst);
+                self.stack.truncate(start);
+                continue;
+            }
+            if depth == 0 || self.certain::<N>(start) > 0.0 {
+                return None;
+            }
+            if N == 2 {
+                self.halve_segment(start, n)
+            } else {
+                self.halve_triangle(start, n)
+            }
+            depths.extend([depth - 1, depth - 1]);
+        }
+        Some(limit + most / heaviest)
+    }
+
+    /// The largest corner of the last net: its value is taken, not only approached.
+    fn certain<const N: usize>(&self, start: usize) -> f64 {
+        let n = self.degree;
+        let net = &self.stack[start..];
+        let last = net[net.len() - 1];
+        if N == 2 { net[0].max(last) } else { net[0].max(net[n]).max(last) }
+    }
+
+    fn halve_segment(&mut self, start: usize, n: usize) {
+        self.stack.extend_from_within(start..);
+        let (low, high) = self.stack[start..].split_at_mut(n + 1);
+        // The second half takes its first points step by step.
+        for step in 0..=n {
+            low[step] = high[0];
+            for k in 0..n - step {
+                high[k] = 0.5 * (high[k] + high[k + 1]);
+            }
+        }
+    }
+
+    /// Halves the side along each line; the halves' lines run across the next side, opposite to the new corner.
+    fn halve_triangle(&mut self, start: usize, n: usize) {
+        let size = (n + 1) * (n + 2) / 2;
+        self.stack.resize(start + 3 * size, 0.0);
+        let (net, halves) = self.stack[start..].split_at_mut(size);
+        let (a, b) = halves.split_at_mut(size);
+        // First place of each line of a half.
+        let place = |line: usize| line * (n + 1) - line * line.saturating_sub(1) / 2;
+        let mut from = 0;
+        for k in 0..=n {
+            let len = n - k + 1;
+            self.line.clear();
+            self.line.extend_from_slice(&net[from..from + len]);
+            from += len;
+            // After r steps, the first entry belongs to the half at the start, the last to that at the end.
+            for r in 0..len {
+                let now = len - r;
+                a[place(r) + k] = self.line[0];
+                b[place(r) + k] = self.line[now - 1];
+                for i in 0..now - 1 {
+                    self.line[i] = 0.5 * (self.line[i] + self.line[i + 1]);
+                }
+            }
+        }
+        net.copy_from_slice(a);
+        a.copy_from_slice(b);
+        self.stack.truncate(start + 2 * size);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Value of the loaded function over a triangle at barycentric coordinates.
+    fn value(d: &[f64], n: usize, b: [f64; 3]) -> f64 {
+        let factorial = |k: usize| (1..=k).map(|x| x as f64).product::<f64>();
+        let mut sum = 0.0;
+        for m in 0..=n {
+            for k in 0..=m {
+                let (i, j) = (n - m, m - k);
+                let c = factorial(n) / factorial(i) / factorial(j) / factorial(k);
+                sum += d[m * (m + 1) / 2 + k] * c * b[0].powi(i as i32) * b[1].powi(j as i32) * b[2].powi(k as i32);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn halving_bounds_the_largest_value_and_comes_near() {
+        let n = 4;
+        for seed in 1..40u64 {
+            let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+            let mut random = || {
+                x ^= x << 13;
+                x ^= x >> 7;
+                x ^= x << 17;
+                (x >> 11) as f64 / (1u64 << 53) as f64
+            };
+            let mut d: Vec<f64> = (0..15).map(|_| random()).collect();
+            (d[0], d[10], d[14]) = (0.0, 0.0, 0.0);
+            let mut most = 0f64;
+            for i in 0..=40 {
+                for j in 0..=40 - i {
+                    let (a, b) = (i as f64 / 40.0, j as f64 / 40.0);
+                    most = most.max(value(&d, n, [a, b, 1.0 - a - b]));
+                }
+            }
+            let mut scalar = Scalar::default();
+            scalar.load::<3>(d.iter().map(|&d| (d, 1.0)), n);
+            assert!(scalar.within::<3>(0.999 * most).is_none());
+            let bound = scalar.within::<3>(1.06 * most).unwrap();
+            assert!(most <= bound && bound <= 1.06 * most, "{most} {bound}");
+            let row: Vec<f64> = (0..=n).map(|j| d[j * (j + 1) / 2]).collect();
+            let along = (0..=100).map(|i| value(&d, n, [1.0 - i as f64 / 100.0, i as f64 / 100.0, 0.0]));
+            let most = along.fold(0.0, f64::max);
+            scalar.load::<2>(row.iter().map(|&d| (d, 1.0)), n);
+            assert!(scalar.within::<2>(0.999 * most).is_none());
+            let bound = scalar.within::<2>(1.01 * most).unwrap();
+            assert!(most <= bound && bound <= 1.01 * most, "{most} {bound}");
+        }
+    }
+}
