@@ -21,13 +21,17 @@ use super::net::Nets;
 use super::scalar::Scalar;
 use super::settings::Judge;
 use super::sheet::{Sheet, local};
+use super::slight::{self, Slight};
 use crate::math::{Point, Uv, Vector};
+use crate::nurbs::BezierPatch;
 use smallvec::SmallVec;
 
 /// How often a piece is cut into four before the bound is taken as it is.
 const LEVELS: u32 = 3;
 /// Knot rectangles that one triangle may span and still be tried.
 const MOST_PIECES: usize = 20_000;
+/// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
+const SLIGHT: f64 = 0.02;
 
 type Polygon = SmallVec<[Uv; 8]>;
 
@@ -37,6 +41,7 @@ pub(super) struct Prover<'s, 'a> {
     judge: Judge,
     nets: Nets,
     near: Near,
+    slight: Slight,
     scalar: Scalar,
     margin: f64,
 }
@@ -48,6 +53,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             judge,
             nets: Nets::default(),
             near: Near::default(),
+            slight: Slight::default(),
             scalar: Scalar::default(),
             margin: 1e-12 * sheet.size,
         }
@@ -90,9 +96,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             }
             for k in 1..polygon.len() - 1 {
                 let tri = [polygon[0], polygon[k], polygon[k + 1]].map(|x| local(patch, x));
-                let bound =
-                    refine((&mut this.nets, &mut this.scalar), patch, tri, limit, LEVELS, &|p| flat.distance(p));
-                worst = worst.max(bound);
+                worst = worst.max(this.hull(patch, tri, limit, LEVELS, &|p| flat.distance(p)));
                 if worst > limit {
                     break;
                 }
@@ -139,8 +143,34 @@ impl<'s, 'a> Prover<'s, 'a> {
                 return 0.0;
             }
             let ends = [local(patch, polygon[0]), local(patch, polygon[1])];
-            refine((&mut this.nets, &mut this.scalar), patch, ends, limit, 2 * LEVELS, &|p| from_chord(p, &xyz))
+            this.hull(patch, ends, limit, 2 * LEVELS, &|p| from_chord(p, &xyz))
         }) + self.margin
+    }
+
+    /// Largest value of a convex distance over a simplex of a patch's local parameters; see [`refine`].
+    fn hull<const N: usize>(
+        &mut self,
+        patch: &BezierPatch,
+        at: [Uv; N],
+        limit: f64,
+        levels: u32,
+        f: &impl Fn(Point) -> f64,
+    ) -> f64 {
+        if slight::is_high(patch) {
+            let (lo, hi) = at.iter().fold((at[0], at[0]), |(l, h), &x| (l.min(x), h.max(x)));
+            let origin = patch.homogeneous_point(at[0]).project();
+            let off = self.slight.make(self.near.restrict(patch, lo, hi, origin), patch.degree, origin);
+            if off <= SLIGHT * limit {
+                let x = at.map(|x| Uv::from_array([0, 1].map(|d| within(x[d], lo[d], hi[d]))));
+                let bound =
+                    off + refine((&mut self.nets, &mut self.scalar), &self.slight.patch, x, limit - off, levels, f);
+                // What the difference may have spoilt is tried on the patch itself.
+                if bound <= limit || bound > limit + 4.0 * off {
+                    return bound;
+                }
+            }
+        }
+        refine((&mut self.nets, &mut self.scalar), patch, at, limit, levels, f)
     }
 
     /// Bound of a convex distance over a piece of surface: the largest at its corners, which holds for the flat triangle between
@@ -204,10 +234,15 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 }
 
+/// Where in `[lo, hi]` a parameter lies, as a share.
+fn within(x: f64, lo: f64, hi: f64) -> f64 {
+    if hi > lo { ((x - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.0 }
+}
+
 /// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
 fn refine<const N: usize>(
     (nets, scalar): (&mut Nets, &mut Scalar),
-    patch: &crate::nurbs::BezierPatch,
+    patch: &BezierPatch,
     at: [Uv; N],
     limit: f64,
     levels: u32,

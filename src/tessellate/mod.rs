@@ -34,6 +34,7 @@ mod sample;
 mod scalar;
 mod settings;
 mod sheet;
+mod slight;
 mod strip;
 mod trim;
 
