@@ -49,6 +49,8 @@ pub(super) struct Stretch {
 
 const SAMPLES: usize = 16;
 const STEPS: usize = 1000;
+/// How often the stretch between two samples of a border is halved.
+const FINEST: u32 = 8;
 
 impl Sheet {
     /// `None` for a face without a surface.
@@ -218,6 +220,8 @@ impl Border {
         }
         let end = curve.domain()[1];
         samples.push((end, surface.evaluate(curve.evaluate(end))));
+        // A straight line of parameters may be a helix of many turns in space.
+        samples = straightened(samples, |t| surface.evaluate(curve.evaluate(t)));
         let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
         let bounds = Aabb::around(samples.iter().map(|s| s.1)).grown(0.25 * longest);
         Self { curve, samples, bounds }
@@ -230,7 +234,7 @@ impl Border {
             let chord = b - a;
             let s = if chord == Vector::ZERO { 0.0 } else { (p - a).dot(chord) / chord.length_squared() };
             let coarse = p.distance(a + chord * s.clamp(0.0, 1.0));
-            // The curve stays within half a chord's length of its chord unless it is sampled far too thinly.
+            // The curve stays within half a chord's length of its chord, as it was sampled.
             if coarse > enough + 0.5 * chord.length() || coarse > best + 0.5 * chord.length() {
                 continue;
             }
@@ -244,6 +248,31 @@ impl Border {
         }
         best
     }
+}
+
+/// Further samples, so that the curve between two of them stays within a quarter of their distance from their chord.
+fn straightened(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f64, Point)> {
+    let mut out = Vec::with_capacity(samples.len());
+    for pair in samples.windows(2) {
+        let mut stack = vec![(pair[0], pair[1], 0)];
+        while let Some((a, b, depth)) = stack.pop() {
+            let chord = b.1 - a.1;
+            let bent = [0.21, 0.5, 0.83].iter().any(|f| {
+                let x = at(a.0 + (b.0 - a.0) * f) - a.1;
+                let s = if chord == Vector::ZERO { 0.0 } else { x.dot(chord) / chord.length_squared() };
+                (x - chord * s.clamp(0.0, 1.0)).length() > 0.25 * chord.length()
+            });
+            if bent && depth < FINEST {
+                let t = 0.5 * (a.0 + b.0);
+                let m = (t, at(t));
+                stack.extend([(m, b, depth + 1), (a, m, depth + 1)]);
+            } else {
+                out.push(a);
+            }
+        }
+    }
+    out.extend(samples.last());
+    out
 }
 
 /// The uv curves that bound a face in space: no seams, no poles.
@@ -317,6 +346,27 @@ mod tests {
             let foot = s.foot(p, guess, Vector::X);
             assert!((foot.point - p.normalize() * 10.0).length() < 1e-9, "{p}: {foot:?}");
             assert!((foot.offset - (p.length() - 10.0)).abs() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn a_straight_line_of_parameters_may_wind_many_times() {
+        // Eight turns around the tube of a torus, first seen at every half turn.
+        let surface = sweep::torus(&Frame::IDENTITY, 20.0, 5.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        let turns = 8.0;
+        let wound = |t: f64| Uv::new(2.0 * PI * t / turns, 2.0 * PI * t.fract());
+        let ts: Vec<f64> = (0..).map(|i| f64::from(i) / 64.0).take_while(|&t| t < turns).collect();
+        let at = |t: f64| surface.evaluate(wound(t));
+        let coarse = (0..=16).map(|i| f64::from(i) * 0.5 * (1.0 - 1e-12)).map(|t| (t, at(t))).collect();
+        let fine = straightened(coarse, at);
+        for t in ts {
+            let p = at(t);
+            let near = fine.windows(2).any(|w| {
+                let chord = w[1].1 - w[0].1;
+                let s = ((p - w[0].1).dot(chord) / chord.length_squared()).clamp(0.0, 1.0);
+                p.distance(w[0].1 + chord * s) <= 0.5 * chord.length()
+            });
+            assert!(near, "{t}");
         }
     }
 
