@@ -67,8 +67,8 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
             let (full, empty) = if collapsed[i] { (j, i) } else { (i, j) };
             // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
             let (uv, xyz) = (t[empty].map(|n| node(n).uv), t[full].map(|n| node(n).place));
-            let covered = strip.bounds[full].max(prover.piece(uv, xyz, tolerance));
-            facets.push(with_pole(strip, t[full], q, covered, tolerance));
+            let covered = bound.max(prover.piece(uv, xyz, tolerance));
+            facets.push(with_pole(strip, prover, t[full], q, [covered, tolerance]));
         } else {
             facets.push(StripFacet { nodes: q, bound, tolerance, pole: None });
         }
@@ -83,12 +83,12 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
             });
         }
     }
-    kites(strip, facets)
+    kites(strip, prover, facets)
 }
 
 /// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
 /// convex quad with the meridian between them as its diagonal.
-fn kites(strip: &Strip, facets: Vec<StripFacet>) -> Vec<StripFacet> {
+fn kites(strip: &Strip, prover: &mut Prover<'_, '_>, facets: Vec<StripFacet>) -> Vec<StripFacet> {
     let node = |n: u32| strip.nodes[n as usize];
     // A sector is (a, b, pole): the next one around starts at b.
     let mut starts: FxHashMap<u32, usize> = FxHashMap::default();
@@ -104,7 +104,7 @@ fn kites(strip: &Strip, facets: Vec<StripFacet>) -> Vec<StripFacet> {
     let mut led = vec![false; facets.len()];
     follows.iter().flatten().for_each(|&j| led[j] = true);
     let heads = (0..facets.len()).filter(|&i| !led[i]).chain((0..facets.len()).filter(|&i| led[i]));
-    let mut into: Vec<Option<usize>> = vec![None; facets.len()];
+    let mut into: Vec<Option<(usize, Uv, f64)>> = vec![None; facets.len()];
     let mut gone = vec![false; facets.len()];
     for head in heads {
         let mut at = Some(head);
@@ -115,25 +115,31 @@ fn kites(strip: &Strip, facets: Vec<StripFacet>) -> Vec<StripFacet> {
             at = follows[i];
             let Some(j) = follows[i].filter(|&j| j != i && !gone[j] && into[j].is_none()) else { continue };
             let (f, g) = (&facets[i], &facets[j]);
-            let holds = f.bound.max(g.bound) <= f.tolerance.min(g.tolerance);
-            if holds && squareness([f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]].map(node)).is_some() {
-                (into[i], gone[j]) = (Some(j), true);
+            let tolerance = f.tolerance.min(g.tolerance);
+            let Some((x, y)) = f.pole.zip(g.pole).filter(|_| f.bound.max(g.bound) <= tolerance) else { continue };
+            if squareness([f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]].map(node)).is_none() {
+                continue;
+            }
+            let pole = 0.5 * (x + y);
+            let also = [f, g].map(|h| seen_from(strip, prover, h.nodes, pole, tolerance));
+            if let [Some(also), Some(too)] = also {
+                (into[i], gone[j]) = (Some((j, pole, also.max(too))), true);
                 at = follows[j];
             }
         }
     }
     let mut out = Vec::with_capacity(facets.len());
     for (i, f) in facets.iter().enumerate().filter(|(i, _)| !gone[*i]) {
-        let Some(g) = into[i].map(|j| &facets[j]) else {
+        let Some((j, pole, also)) = into[i] else {
             out.push(StripFacet { ..*f });
             continue;
         };
-        let pole = f.pole.zip(g.pole).map(|(x, y)| 0.5 * (x + y));
+        let g = &facets[j];
         out.push(StripFacet {
             nodes: [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]],
-            bound: f.bound.max(g.bound),
+            bound: f.bound.max(g.bound).max(also),
             tolerance: f.tolerance.min(g.tolerance),
-            pole,
+            pole: Some(pole),
         });
     }
     out
@@ -190,21 +196,45 @@ fn flat(n: [Node; 3]) -> bool {
     n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position
 }
 
-/// The triangle at a pole, turned so that the pole is its third corner and seen in its middle.
-fn with_pole(strip: &Strip, full: [u32; 3], quad: [u32; 4], bound: f64, tolerance: f64) -> StripFacet {
+/// The triangle at a pole, turned so that the pole is its third corner and seen in its middle, where that is proved too.
+fn with_pole(
+    strip: &Strip,
+    prover: &mut Prover<'_, '_>,
+    full: [u32; 3],
+    quad: [u32; 4],
+    [bound, tolerance]: [f64; 2],
+) -> StripFacet {
     let position = |n: u32| strip.nodes[n as usize].position;
     let twin = quad.iter().copied().find_map(|n| {
         let k = full.iter().position(|&f| f != n && position(f) == position(n) && !full.contains(&n))?;
         Some((k, n))
     });
-    match twin {
-        Some((k, n)) => {
-            let nodes = [full[(k + 1) % 3], full[(k + 2) % 3], full[k], full[k]];
-            let middle = 0.5 * (strip.nodes[full[k] as usize].uv + strip.nodes[n as usize].uv);
-            StripFacet { nodes, bound, tolerance, pole: Some(middle) }
-        }
-        None => StripFacet { nodes: [full[0], full[1], full[2], full[2]], bound, tolerance, pole: None },
+    let alone = StripFacet { nodes: [full[0], full[1], full[2], full[2]], bound, tolerance, pole: None };
+    let Some((k, n)) = twin else { return alone };
+    let nodes = [full[(k + 1) % 3], full[(k + 2) % 3], full[k], full[k]];
+    let middle = 0.5 * (strip.nodes[full[k] as usize].uv + strip.nodes[n as usize].uv);
+    match seen_from(strip, prover, nodes, middle, tolerance) {
+        Some(also) => StripFacet { nodes, bound: bound.max(also), tolerance, pole: Some(middle) },
+        None => alone,
     }
+}
+
+/// Bound of a triangle at a pole with other parameters of its third corner, where it holds: they are those of the facet that is
+/// handed on, whose piece of the surface may lie outside the one that was proved.
+fn seen_from(
+    strip: &Strip,
+    prover: &mut Prover<'_, '_>,
+    [a, b, c, _]: [u32; 4],
+    pole: Uv,
+    tolerance: f64,
+) -> Option<f64> {
+    let n = [a, b, c].map(|n| strip.nodes[n as usize]);
+    let (uv, xyz) = ([n[0].uv, n[1].uv, pole], n.map(|n| n.place));
+    let mut worst = prover.piece(uv, xyz, tolerance);
+    for i in 0..2 {
+        worst = worst.max(prover.side([uv[i], pole], [xyz[i], xyz[2]], tolerance));
+    }
+    (worst <= tolerance).then_some(worst)
 }
 
 /// Whether two triangles that hold their own tolerances hold that of both together, which is the tighter of the two.

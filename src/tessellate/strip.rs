@@ -140,13 +140,10 @@ pub(super) fn prove(
     } else {
         uv.iter().fold(sheet.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(sheet.tolerance(p)))
     };
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        if n[i].position == n[j].position {
-            // A pole is a point all along; the two ends of a closed curve are not, and must be divided.
-            return (prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi), xi);
-        }
-    }
     let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (i, j, trims.get(&key(t[i], t[j]))));
+    // At a pole a triangle is a line, and its neighbour covers its piece of the surface; its sides may be the border of both. The two
+    // ends of a closed curve are one point too, but the curve between them is not, and must be divided.
+    let line = sides.iter().any(|&(i, j, _)| n[i].position == n[j].position);
     let mut worst = 0f64;
     for trim in sides.iter().filter_map(|s| s.2) {
         worst = worst.max(trim.bound(prover, xyz, xi));
@@ -154,13 +151,13 @@ pub(super) fn prove(
             return (worst, xi);
         }
     }
-    if let Some(bound) = prover.facet(uv, xyz, xi) {
+    if !line && let Some(bound) = prover.facet(uv, xyz, xi) {
         return (worst.max(bound), xi);
     }
     for (i, j, _) in sides.into_iter().filter(|s| s.2.is_none()) {
         worst = worst.max(prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi));
     }
-    if worst > xi {
+    if worst > xi || line {
         return (worst, xi);
     }
     (worst.max(prover.piece(uv, xyz, xi)), xi)

@@ -10,6 +10,7 @@
 //! The band is the largest proved sag of those facets of the face that the ray passes within their own sag.
 //! Known weakness: a facet without a proved sag counts with [`Settings::fallback_band_mm`].
 
+mod border;
 mod judge;
 mod measure;
 mod sheet;

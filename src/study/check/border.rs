@@ -1,0 +1,151 @@
+//! The border of a face in space, as sampled curves.
+
+use crate::math::{Aabb, Point, Uv, Vector};
+use crate::model::Face;
+use crate::nurbs::{Surface, UvCurve};
+use rustc_hash::FxHashMap;
+
+/// Samples of a curve between two of its knots, to begin with.
+pub(super) const SAMPLES: usize = 16;
+/// How often the stretch between two samples is halved.
+const FINEST: u32 = 8;
+
+/// One curve of a border.
+pub(super) struct Border {
+    curve: UvCurve,
+    samples: Vec<(f64, Point)>,
+    bounds: Aabb,
+}
+
+impl Border {
+    pub(super) fn new(curve: UvCurve, surface: &Surface) -> Self {
+        let breaks = curve.breakpoints();
+        let mut samples = Vec::new();
+        for pair in breaks.windows(2) {
+            for i in 0..SAMPLES {
+                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / SAMPLES as f64;
+                samples.push((t, surface.evaluate(curve.evaluate(t))));
+            }
+        }
+        let end = curve.domain()[1];
+        samples.push((end, surface.evaluate(curve.evaluate(end))));
+        // A straight line of parameters may be a helix of many turns in space.
+        samples = straightened(samples, |t| surface.evaluate(curve.evaluate(t)));
+        let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
+        let bounds = Aabb::around(samples.iter().map(|s| s.1)).grown(0.25 * longest);
+        Self { curve, samples, bounds }
+    }
+
+    /// Whether `p` may lie within `enough` of the curve.
+    pub(super) fn reaches(&self, p: Point, enough: f64) -> bool {
+        self.bounds.grown(enough).contains(p)
+    }
+
+    /// Distance of `p`; some larger number where it is beyond `enough`.
+    pub(super) fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
+        let mut best = f64::INFINITY;
+        for pair in self.samples.windows(2) {
+            let ((ta, a), (tb, b)) = (pair[0], pair[1]);
+            let chord = b - a;
+            let s = if chord == Vector::ZERO { 0.0 } else { (p - a).dot(chord) / chord.length_squared() };
+            let coarse = p.distance(a + chord * s.clamp(0.0, 1.0));
+            // The curve stays within half a chord's length of its chord, as it was sampled.
+            if coarse > enough + 0.5 * chord.length() || coarse > best + 0.5 * chord.length() {
+                continue;
+            }
+            let at = |t: f64| p.distance_squared(surface.evaluate(self.curve.evaluate(t)));
+            let (mut lo, mut hi) = (ta, tb);
+            for _ in 0..24 {
+                let (x, y) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+                if at(x) < at(y) { hi = y } else { lo = x }
+            }
+            best = best.min(at(0.5 * (lo + hi)).sqrt());
+        }
+        best
+    }
+}
+
+/// Further samples, so that the curve between two of them stays within a quarter of their distance from their chord.
+fn straightened(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f64, Point)> {
+    let mut out = Vec::with_capacity(samples.len());
+    for pair in samples.windows(2) {
+        let mut stack = vec![(pair[0], pair[1], 0)];
+        while let Some((a, b, depth)) = stack.pop() {
+            let chord = b.1 - a.1;
+            let bent = [0.21, 0.5, 0.83].iter().any(|f| {
+                let x = at(a.0 + (b.0 - a.0) * f) - a.1;
+                let s = if chord == Vector::ZERO { 0.0 } else { x.dot(chord) / chord.length_squared() };
+                (x - chord * s.clamp(0.0, 1.0)).length() > 0.25 * chord.length()
+            });
+            if bent && depth < FINEST {
+                let t = 0.5 * (a.0 + b.0);
+                let m = (t, at(t));
+                stack.extend([(m, b, depth + 1), (a, m, depth + 1)]);
+            } else {
+                out.push(a);
+            }
+        }
+    }
+    out.extend(samples.last());
+    out
+}
+
+/// The uv curves that bound a face in space: no seams, no poles.
+pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<UvCurve> {
+    if !face.loops.is_empty() {
+        let mut uses = FxHashMap::default();
+        for u in face.loops.iter().flat_map(|l| &l.uses) {
+            if let Some(edge) = u.edge {
+                *uses.entry(edge).or_insert(0) += 1;
+            }
+        }
+        let is_border = |edge| uses.get(&edge) == Some(&1);
+        let all = face.loops.iter().flat_map(|l| &l.uses);
+        return all.filter(|u| u.edge.is_some_and(is_border)).map(|u| u.uv.clone()).collect();
+    }
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    let side = |a: Uv, b: Uv| UvCurve::line(a, b, [0.0, 1.0]);
+    let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+    let sides = [
+        side(corners[0], corners[1]),
+        side(corners[3], corners[2]),
+        side(corners[0], corners[3]),
+        side(corners[1], corners[2]),
+    ];
+    let points = |c: &UvCurve| -> Vec<Point> {
+        (0..=SAMPLES).map(|i| surface.evaluate(c.evaluate(i as f64 / SAMPLES as f64))).collect()
+    };
+    let traced: Vec<Vec<Point>> = sides.iter().map(points).collect();
+    let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < 1e-9 * size);
+    let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < 1e-9 * size);
+    (0..4).filter(|&i| !close(&traced[i], &traced[i ^ 1]) && !pole(&traced[i])).map(|i| sides[i].clone()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn a_straight_line_of_parameters_may_wind_many_times() {
+        // Eight turns around the tube of a torus, first seen at every half turn.
+        let surface = sweep::torus(&Frame::IDENTITY, 20.0, 5.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
+        let turns = 8.0;
+        let wound = |t: f64| Uv::new(2.0 * PI * t / turns, 2.0 * PI * t.fract());
+        let ts: Vec<f64> = (0..).map(|i| f64::from(i) / 64.0).take_while(|&t| t < turns).collect();
+        let at = |t: f64| surface.evaluate(wound(t));
+        let coarse = (0..=16).map(|i| f64::from(i) * 0.5 * (1.0 - 1e-12)).map(|t| (t, at(t))).collect();
+        let fine = straightened(coarse, at);
+        for t in ts {
+            let p = at(t);
+            let near = fine.windows(2).any(|w| {
+                let chord = w[1].1 - w[0].1;
+                let s = ((p - w[0].1).dot(chord) / chord.length_squared()).clamp(0.0, 1.0);
+                p.distance(w[0].1 + chord * s) <= 0.5 * chord.length()
+            });
+            assert!(near, "{t}");
+        }
+    }
+}
