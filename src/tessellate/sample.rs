@@ -78,18 +78,10 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
             let mut away = (surface.evaluate(foot) - x).length();
             if away > out.sag {
                 // A single start may end beside the nearest point: uneven weights bend the parameters.
-                for k in 0..64 {
-                    let c = [(k % 8) as f64 / 7.0, (k / 8) as f64 / 7.0];
-                    let (c, d) = (c[0].min(1.0 - c[1]), c[1]);
-                    let other = project(
-                        surface,
-                        x,
-                        uv[t[0]] * c.max(0.0) + uv[t[1]] * d + uv[t[2]] * (1.0 - c.max(0.0) - d),
-                    );
-                    let nearer = (surface.evaluate(other) - x).length();
-                    if nearer < away {
-                        (foot, away) = (other, nearer);
-                    }
+                let other = project(surface, x, search(surface, x, t.map(|k| uv[k])));
+                let nearer = (surface.evaluate(other) - x).length();
+                if nearer < away {
+                    (foot, away) = (other, nearer);
                 }
             }
             out.sag = out.sag.max(away);
@@ -112,6 +104,43 @@ fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Ve
     }
     let (u, v) = if t[1] == 1 { (b[1] + b[2], b[2]) } else { (b[1], b[1] + b[2]) };
     n[0] * ((1.0 - u) * (1.0 - v)) + n[1] * (u * (1.0 - v)) + n[2] * (u * v) + n[3] * ((1.0 - u) * v)
+}
+
+/// Pieces that are followed at a time, and how often they are cut into four.
+const FOLLOWED: usize = 8;
+const LEVELS: usize = 40;
+
+/// Parameters of a point near `x` on a piece of the surface: those of its parts go on whose flat triangles lie nearest, so that none
+/// is lost where weights crowd most of the parameters into one place and a step of any length leaps over the surface.
+fn search(surface: &Surface, x: Point, uv: [Uv; 3]) -> Uv {
+    let at = |u: Uv| (u, surface.evaluate(u));
+    let off = |p: &[(Uv, Point); 3]| (x - closest(x, p.map(|q| q.1))).length();
+    let mut best = (f64::INFINITY, uv[0]);
+    let mut pieces = vec![uv.map(at)];
+    for _ in 0..LEVELS {
+        let mut parts = Vec::with_capacity(4 * pieces.len());
+        for [a, b, c] in pieces {
+            let [d, e, f] = [(a, b), (b, c), (c, a)].map(|(p, q)| at(0.5 * (p.0 + q.0)));
+            for (u, p) in [a, b, c, d, e, f] {
+                let away = (p - x).length();
+                if away < best.0 {
+                    best = (away, u);
+                }
+            }
+            let four = [[a, d, f], [d, b, e], [f, e, c], [d, e, f]];
+            parts.extend(four.into_iter().map(|p| (off(&p), p)));
+        }
+        parts.sort_by(|p, q| p.0.total_cmp(&q.0));
+        parts.truncate(FOLLOWED);
+        let small = |[a, b, c]: &[(Uv, Point); 3]| {
+            (a.1 - b.1).length().max((b.1 - c.1).length()).max((c.1 - a.1).length()) <= 1e-3 * best.0
+        };
+        pieces = parts.into_iter().map(|p| p.1).filter(|p| !small(p)).collect();
+        if pieces.is_empty() {
+            break;
+        }
+    }
+    best.1
 }
 
 /// Parameters of a near point of the surface, by damped Gauss–Newton from a start; never farther away than the start.
