@@ -1,6 +1,10 @@
 use super::options::{Meshing, Tracing};
+use super::words;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+
+/// Heading of the options that every command has.
+const EVERYWHERE: &str = "Everywhere";
 
 /// CAD surfaces straight to optical simulation: a STEP file goes in, quad facets within a proved tolerance, a traced
 /// light distribution and an account of what its accuracy cost come out.
@@ -10,13 +14,13 @@ pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Print one JSON document on stdout instead of text
-    #[arg(long, global = true)]
+    #[arg(long, global = true, display_order = 901, help_heading = EVERYWHERE)]
     pub(crate) json: bool,
     /// No messages and no progress
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, display_order = 902, help_heading = EVERYWHERE)]
     pub(crate) quiet: bool,
     /// Say more; twice for everything
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, display_order = 903, help_heading = EVERYWHERE)]
     pub(crate) verbose: u8,
 }
 
@@ -40,6 +44,7 @@ pub(crate) enum Command {
         limits: Refusals,
     },
     /// Tessellate a STEP file into quad facets
+    #[command(after_help = words::FACET, after_long_help = words::FACET_LONG)]
     Facet {
         /// STEP file
         file: PathBuf,
@@ -49,7 +54,13 @@ pub(crate) enum Command {
         #[command(flatten)]
         meshing: Meshing,
         /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+        #[arg(
+            long,
+            help_heading = "Facets",
+            value_name = "Xdeg",
+            conflicts_with = "tolerance",
+            allow_hyphen_values = true
+        )]
         accuracy: Option<String>,
         /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
         #[arg(long)]
@@ -61,6 +72,7 @@ pub(crate) enum Command {
         limits: Refusals,
     },
     /// Simulate a scene and write a report, results.json and the receiver files
+    #[command(after_help = words::TRACE)]
     Trace {
         /// Scene file
         scene: PathBuf,
@@ -75,6 +87,7 @@ pub(crate) enum Command {
         extra: Box<TraceOptions>,
     },
     /// Compare octree, BVH and exact spline ray by ray
+    #[command(after_help = words::CHECK, after_long_help = words::CHECK_LONG)]
     Check {
         /// STEP file or scene
         file: PathBuf,
@@ -83,7 +96,13 @@ pub(crate) enum Command {
         #[command(flatten)]
         tracing: Tracing,
         /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-        #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+        #[arg(
+            long,
+            help_heading = "Facets",
+            value_name = "Xdeg",
+            conflicts_with = "tolerance",
+            allow_hyphen_values = true
+        )]
         accuracy: Option<String>,
         /// Folder for a report with the disagreeing rays in 3-D, and for check.json
         #[arg(short, long, value_name = "DIR")]
@@ -101,6 +120,7 @@ pub(crate) enum Command {
         limits: Refusals,
     },
     /// Measure what accuracy costs in time
+    #[command(after_help = words::STUDY)]
     Study {
         /// Which question
         kind: StudyKind,
@@ -142,7 +162,13 @@ pub(crate) enum Command {
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct TraceOptions {
     /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-    #[arg(long, value_name = "Xdeg", conflicts_with = "tolerance", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        help_heading = "Facets",
+        value_name = "Xdeg",
+        conflicts_with = "tolerance",
+        allow_hyphen_values = true
+    )]
     pub(crate) accuracy: Option<String>,
     /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`
     #[arg(long, value_name = "I/N")]

@@ -163,6 +163,9 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     } else {
         print(&(described(&found, chosen) + &pairs::described(&pairs)))?;
     }
+    if asked.output.is_none() && !found.disagreements.is_empty() && !context.json {
+        context.say(context.faint("  -o DIR writes a page with the rays that differ in 3-D"));
+    }
     if let Some(folder) = asked.output {
         context.say(format_args!("\n  {}", context.strong(&folder.join("report.html").display().to_string())));
         context.say(format_args!("  {}", folder.join("check.json").display()));
@@ -176,7 +179,7 @@ fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
     match read {
         Ok(list) if list.is_empty() => Err(Failure::input(format!("{}: no rays in it", path.display()))),
         Ok(list) => Ok(list.into_iter().map(|(ray, _)| ray).collect()),
-        Err(e) => Err(Failure::input(format!("{}: {e}", path.display()))),
+        Err(e) => Err(Failure::input(format!("{}: cannot be read as a file of rays: {e}", path.display()))),
     }
 }
 

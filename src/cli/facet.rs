@@ -67,6 +67,10 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         print(&(text + "\n"))?;
     } else {
         print(&described(&made.report))?;
+        if asked.output.is_empty() {
+            context
+                .say(context.faint("  no facets were written: -o NAME.glb does (.obj .ply .stl .vtu .data2 too)"));
+        }
         if let Some(b) = baseline {
             print(&b.described(&made.report))?;
         }
@@ -147,7 +151,8 @@ fn described(r: &Report) -> String {
         format!("{}: {} quads, {} triangles; {} vertices", n(r.facets), n(r.quads), n(r.triangles), n(r.vertices)),
     );
     line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
-    line("tolerance", format!("{}..{} mm", figures(r.tolerance_mm.min, 4), figures(r.tolerance_mm.max, 4)));
+    let [low, high] = [r.tolerance_mm.min, r.tolerance_mm.max].map(|t| figures(t, 4));
+    line("tolerance", if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") });
     line(
         "certified",
         format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),

@@ -25,7 +25,9 @@ fn described(r: &ImportReport, context: &Context) -> String {
     let mut text = format!("{}  {}, {}\n", r.file, bytes(r.bytes), list(&r.schema));
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     line("units", format!("length {}; angle {}", list(&r.units.length), list(&r.units.angle)));
-    line("shapes", format!("{} parts, {} instances, {} shells", r.parts, r.instances, r.shells));
+    let some = |n: usize, name: &str| format!("{} {name}{}", grouped(n as u64), if n == 1 { "" } else { "s" });
+    let shapes = [some(r.parts, "part"), some(r.instances, "instance"), some(r.shells, "shell")];
+    line("shapes", shapes.join(", "));
     let f = &r.faces;
     line(
         "faces",

@@ -65,6 +65,14 @@ pub(super) fn scene_models(
 
 /// Reads a scene file and the models it names.
 pub(super) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loaded), Failure> {
+    let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    if ["stp", "step", "p21"].into_iter().any(is) {
+        let failure =
+            Failure::arguments(format!("{}: a STEP file, where a scene (.toml) is needed", path.display()));
+        let advice = "a STEP file alone has no light: name it under [[model]] of a scene with sources and receivers \
+            (`lampyris schema` says how), or use `lampyris info`, `facet` or `check` on it";
+        return Err(failure.help(advice));
+    }
     let scene = Scene::read(path)?;
     let loaded = scene_models(&scene, |entry| step_file(&scene.resolve(&entry.file), entry.unit_mm, context))?;
     Ok((scene, loaded))

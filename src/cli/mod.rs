@@ -30,6 +30,7 @@ mod suggest;
 mod trace;
 mod until;
 mod witness;
+mod words;
 
 use args::{Arguments, Command};
 use clap::Parser;

@@ -8,14 +8,14 @@ use clap::builder::PossibleValue;
 /// Options of everything that tessellates.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct Meshing {
-    /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform
-    #[arg(long, value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
+    /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform; 0.05..0.2 by default
+    #[arg(long, help_heading = "Facets", value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
     pub(crate) tolerance: Option<[f64; 2]>,
     /// Largest angle between facet and surface normal, degrees; off by default
-    #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Facets", value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
     pub(crate) angle: Option<f64>,
     /// Tolerance of one part, by name; may be given several times
-    #[arg(long, value_name = "NAME=MIN..MAX", value_parser = part)]
+    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = part)]
     pub(crate) part: Vec<(String, [f64; 2])>,
     /// Local tolerances that an accuracy came to.
     #[arg(skip)]
@@ -25,20 +25,20 @@ pub(crate) struct Meshing {
 /// Options of everything that traces.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct Tracing {
-    /// Number of rays, such as 1000000 or 1e6
-    #[arg(long, value_name = "N", value_parser = count, allow_hyphen_values = true)]
+    /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command
+    #[arg(long, help_heading = "Rays", value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(crate) rays: Option<u64>,
     /// Seed of all random numbers
-    #[arg(long, value_name = "S")]
+    #[arg(long, help_heading = "Rays", value_name = "S")]
     pub(crate) seed: Option<u64>,
     /// Number of threads; all cores by default
-    #[arg(long, value_name = "N")]
+    #[arg(long, help_heading = "Rays", value_name = "N")]
     pub(crate) threads: Option<usize>,
-    /// What finds the hits
-    #[arg(long, value_name = "NAME")]
+    /// What finds the hits; octree by default
+    #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) intersector: Option<IntersectorKind>,
-    /// How the normal at a hit is got; exact polishes the hit to the spline
-    #[arg(long, value_name = "NAME")]
+    /// How the normal at a hit is got: bilinear by default; exact moves the hit to the spline
+    #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) normals: Option<NormalMode>,
 }
 

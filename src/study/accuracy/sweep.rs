@@ -25,7 +25,10 @@ pub fn accuracy(
     let rays = source.rays(0..source.len());
     let mut study = Sweep { name, workshop, settings, rays: &rays, truth: Vec::new(), rows: Vec::new(), countdown };
     study.exact();
-    let mut ahead = Forecast { tolerances: settings.tolerances.clone(), known: Vec::new() };
+    // Facets in either structure take about half of the spline's time, all kinds of normals taken together.
+    let combinations = (settings.trees.len() * settings.normals.len() * (settings.rounds + 1)) as f64;
+    let guess = 0.5 * combinations * study.rows.iter().map(|r| r.seconds_trace_median).sum::<f64>();
+    let mut ahead = Forecast { tolerances: settings.tolerances.clone(), known: Vec::new(), guess };
     let mut blocks: Vec<(usize, Vec<Row>)> = vec![(0, std::mem::take(&mut study.rows))];
     // One in the middle, which is quick and tells most of the rest, then the finest, whose facets cost most, then coarse to fine.
     let mut order: Vec<usize> = (0..settings.tolerances.len()).collect();
@@ -38,8 +41,8 @@ pub fn accuracy(
         }
         let [low, high] = settings.tolerances[k];
         let range = if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") };
-        let left = ahead.seconds().map(|s| s + settings.seconds_after);
-        study.countdown.stage(&format!("tolerance {range}"), left);
+        let left = ahead.seconds() + settings.seconds_after;
+        study.countdown.stage(&format!("tolerance {range}"), Some(left));
         let start = Instant::now();
         let prepare = study.tolerance([low, high]);
         ahead.known.push((k, [prepare, start.elapsed().as_secs_f64() - prepare]));
@@ -57,6 +60,8 @@ struct Forecast {
     tolerances: Vec<[f64; 2]>,
     /// Those done, with their seconds of meshing and building, and of tracing and judging.
     known: Vec<(usize, [f64; 2])>,
+    /// Seconds of one tolerance while none is known.
+    guess: f64,
 }
 
 impl Forecast {
@@ -67,10 +72,12 @@ impl Forecast {
 
     /// Meshing and building go with the facets, that is with 1/tolerance; tracing grows evenly with its logarithm, by about a tenth
     /// per halving where only one tolerance is known.
-    fn seconds(&self) -> Option<f64> {
+    fn seconds(&self) -> f64 {
         let mut known: Vec<(f64, [f64; 2])> = self.known.iter().map(|&(k, s)| (self.fineness(k), s)).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (first, last) = (*known.first()?, *known.last()?);
+        let (Some(&first), Some(&last)) = (known.first(), known.last()) else {
+            return self.guess * self.tolerances.len() as f64;
+        };
         let left = (0..self.tolerances.len()).filter(|k| !self.known.iter().any(|x| x.0 == *k));
         let alone = |(at, [prepare, trace]): (f64, [f64; 2]), x: f64| {
             let halvings = (at - x) / std::f64::consts::LN_2;
@@ -90,7 +97,7 @@ impl Forecast {
                 (Some(_), None) => alone(last, x),
             }
         };
-        Some(left.map(one).sum())
+        left.map(one).sum()
     }
 }
 
@@ -211,5 +218,32 @@ impl Sweep<'_> {
             rays: self.rays.len() as u64,
             ..row
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forecasts_are_right_after_the_first_tolerance() {
+        let uniform = [1.6, 0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125].map(|t| [t, t]);
+        let tolerances: Vec<[f64; 2]> = uniform.into_iter().chain([[0.05, 0.2]]).collect();
+        // Seconds as on a lamp: meshing and building with 1/tolerance and a little for the borders, tracing with its logarithm.
+        for (growth, share) in [(0.02, 0.1), (0.06, 0.1), (0.15, 0.1), (0.06, 0.3), (0.06, 1.0)] {
+            let seconds = |t: [f64; 2]| {
+                let middle = (t[0] * t[1]).sqrt();
+                [share * (0.1 / middle + 0.3), 2.0 * (1.0 + growth * (0.1 / middle).log2())]
+            };
+            let mut ahead = Forecast { tolerances: tolerances.clone(), known: Vec::new(), guess: 0.0 };
+            for k in [4, 7, 0, 1, 2] {
+                ahead.known.push((k, seconds(tolerances[k])));
+                let left = |k: &usize| !ahead.known.iter().any(|x| x.0 == *k);
+                let truth: f64 =
+                    (0..tolerances.len()).filter(left).map(|k| seconds(tolerances[k]).iter().sum::<f64>()).sum();
+                let ratio = ahead.seconds() / truth;
+                assert!((ratio - 1.0).abs() < 0.3, "{growth}, {share}: {ratio} with {} known", ahead.known.len());
+            }
+        }
     }
 }

@@ -79,12 +79,14 @@ pub fn aim_at(
     let found = best.unwrap_or_else(|| search.nothing());
     let kept = found.kept(ask);
     let [low, high] = found.plan.tolerance_mm();
+    let range =
+        if low == high { format!("{} mm", brief(low)) } else { format!("{} to {} mm", brief(low), brief(high)) };
     let answer = format!(
-        "Asked {}°, reached {:.3e}° (p99 of {} fresh rays) with {} normals on {} facets within {low:.2e} to {high:.2e} mm{}.",
+        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline) with {} normals on {} facets within {range}{}.",
         ask.degrees,
-        found.reached,
+        brief(found.reached),
         found.checked,
-        found.normals.name(),
+        found.normals,
         found.facets,
         if kept { "" } else { ": not reached" }
     );
@@ -104,6 +106,15 @@ pub fn aim_at(
         seconds: start.elapsed().as_secs_f64(),
         answer,
     }
+}
+
+/// Three digits.
+fn brief(x: f64) -> String {
+    if !(1e-4..1e4).contains(&x) {
+        return format!("{x:.1e}");
+    }
+    let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
+    format!("{x:.decimals$}")
 }
 
 /// 0.2 mm, the coarse end of what users ask for, or 1/500 of a small model.
