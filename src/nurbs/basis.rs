@@ -9,10 +9,12 @@ pub(super) struct Basis<const W: usize> {
     pub(super) value: [[f64; W]; 3],
 }
 
-/// Widths of tables that callers choose among: degrees below 4, below 8, all.
+/// Widths of tables that callers choose among: degrees below 4, below 8, below 14, all.
 pub(super) const NARROW: usize = 4;
 /// See [`NARROW`].
 pub(super) const MIDDLE: usize = 8;
+/// See [`NARROW`].
+pub(super) const BROAD: usize = 14;
 /// See [`NARROW`].
 pub(super) const WIDE: usize = MAX_DEGREE + 1;
 

@@ -1,5 +1,5 @@
-use super::basis::{MIDDLE, NARROW, WIDE};
-use super::{Curve, Surface};
+use super::basis::{BROAD, MIDDLE, NARROW, WIDE};
+use super::{Curve, SecondDerivatives, Surface};
 use crate::math::{Aabb, Homogeneous, Uv};
 
 /// A rational Bézier patch: one polynomial piece of a surface, over local parameters `[0, 1]²`.
@@ -53,6 +53,7 @@ impl BezierPatch {
         match self.degree[0].max(self.degree[1]) {
             0..NARROW => self.homogeneous_in::<NARROW>(local),
             NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(local),
+            MIDDLE..BROAD => self.homogeneous_in::<BROAD>(local),
             _ => self.homogeneous_in::<WIDE>(local),
         }
     }
@@ -81,6 +82,7 @@ impl BezierPatch {
         match self.degree[0].max(self.degree[1]) {
             0..NARROW => self.point_in::<NARROW>(local),
             NARROW..MIDDLE => self.point_in::<MIDDLE>(local),
+            MIDDLE..BROAD => self.point_in::<BROAD>(local),
             _ => self.point_in::<WIDE>(local),
         }
     }
@@ -94,6 +96,61 @@ impl BezierPatch {
             sum += row.iter().zip(&bv).fold(Homogeneous::ZERO, |s, (&c, &v)| s + c * v) * b;
         }
         sum
+    }
+
+    /// Homogeneous points at three local parameters of each direction, u first; the same bits as one by one.
+    pub fn homogeneous_lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.lattice_in::<NARROW>(u, v),
+            NARROW..MIDDLE => self.lattice_in::<MIDDLE>(u, v),
+            MIDDLE..BROAD => self.lattice_in::<BROAD>(u, v),
+            _ => self.lattice_in::<WIDE>(u, v),
+        }
+    }
+
+    fn lattice_in<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
+        let [p, q] = self.degree;
+        let (bu, bv) = (u.map(|x| values::<W>(p, x)), v.map(|x| values::<W>(q, x)));
+        let mut sums = [[Homogeneous::ZERO; 3]; 3];
+        for (i, row) in self.points.chunks_exact(q + 1).enumerate() {
+            for b in 0..3 {
+                let along = row.iter().zip(&bv[b]).fold(Homogeneous::ZERO, |s, (&c, &v)| s + c * v);
+                for a in 0..3 {
+                    sums[a][b] += along * bu[a][i];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Position, first and second derivatives with respect to the surface's parameters, at local parameters in `[0, 1]²`.
+    pub fn second_derivatives(&self, local: Uv) -> SecondDerivatives {
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.second_in::<NARROW>(local),
+            NARROW..MIDDLE => self.second_in::<MIDDLE>(local),
+            MIDDLE..BROAD => self.second_in::<BROAD>(local),
+            _ => self.second_in::<WIDE>(local),
+        }
+    }
+
+    fn second_in<const W: usize>(&self, local: Uv) -> SecondDerivatives {
+        let [p, q] = self.degree;
+        let (bu, bv) = (two_derivatives::<W>(p, local.x), two_derivatives::<W>(q, local.y));
+        let mut sums = [Homogeneous::ZERO; 6];
+        for (i, row) in self.points.chunks_exact(q + 1).enumerate() {
+            let mut along = [Homogeneous::ZERO; 3];
+            for (j, &c) in row.iter().enumerate() {
+                for k in 0..3 {
+                    along[k] += c * bv[k][j];
+                }
+            }
+            for (sum, (a, b)) in sums.iter_mut().zip([(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]) {
+                *sum += along[b] * bu[a][i];
+            }
+        }
+        let [hu, hv] = self.domain.map(|[a, b]| 1.0 / (b - a));
+        let scale = [1.0, hu, hv, hu * hu, hu * hv, hv * hv];
+        SecondDerivatives::projected(std::array::from_fn(|k| sums[k] * scale[k]))
     }
 
     /// Parameters of the surface at local parameters in `[0, 1]²`.
@@ -153,6 +210,20 @@ fn values<const W: usize>(n: usize, t: f64) -> [f64; W] {
     b
 }
 
+/// Bernstein polynomials of degree `n < W` and their first two derivatives at `t`.
+fn two_derivatives<const W: usize>(n: usize, t: f64) -> [[f64; W]; 3] {
+    let (b, d) = bernstein::<W>(n, t);
+    let mut dd = [0.0; W];
+    if n > 1 {
+        let c = values::<W>(n - 2, t);
+        let at = |i: usize, back: usize| if i >= back && i - back + 2 <= n { c[i - back] } else { 0.0 };
+        for i in 0..=n {
+            dd[i] = (n * (n - 1)) as f64 * (at(i, 2) - 2.0 * at(i, 1) + at(i, 0));
+        }
+    }
+    [b, d, dd]
+}
+
 /// Bernstein polynomials of degree `n < W` and their derivatives at `t`.
 fn bernstein<const W: usize>(n: usize, t: f64) -> ([f64; W], [f64; W]) {
     let mut d = [0.0; W];
@@ -187,6 +258,12 @@ mod tests {
             assert!((a.project() - d.point).length() < 1e-13);
             let du = (au.truncate() - a.project() * au.w) / a.w / (patch.domain[0][1] - patch.domain[0][0]);
             assert!((du - d.du).length() < 1e-12);
+            let (own, all) = (patch.second_derivatives(local), s.second_derivatives(patch.surface_uv(local)));
+            for (x, y) in
+                [(own.du, all.du), (own.dv, all.dv), (own.duu, all.duu), (own.duv, all.duv), (own.dvv, all.dvv)]
+            {
+                assert!((x - y).length() < 1e-11, "{x} {y}");
+            }
             for half in patch.halves(0).iter().chain(&patch.halves(1)) {
                 let uv = half.surface_uv(local);
                 assert!((half.homogeneous(local)[0].project() - s.evaluate(uv)).length() < 1e-13);

@@ -1,4 +1,4 @@
-use super::basis::{Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
+use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -144,6 +144,7 @@ impl<P: ControlPoint> Spline<P> {
         match self.degree {
             0..NARROW => self.homogeneous_in::<NARROW>(t, order),
             NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(t, order),
+            MIDDLE..BROAD => self.homogeneous_in::<BROAD>(t, order),
             _ => self.homogeneous_in::<WIDE>(t, order),
         }
     }
@@ -201,6 +202,23 @@ impl<P: ControlPoint> Spline<P> {
         let p1 = self.degree + 1;
         let knots = std::iter::repeat_n(a, p1).chain(inner).chain(std::iter::repeat_n(b, p1)).collect();
         self.refined(knots)
+    }
+
+    /// Control points of [`Spline::restricted`], which hull the curve over `[a, b]`; within one knot span, without the rest of it.
+    pub fn restricted_points(&self, a: f64, b: f64) -> SmallVec<[P; 8]> {
+        let p = self.degree;
+        let span = find_span(&self.knots, p, a);
+        if !(self.knots[span] <= a && a < b && b <= self.knots[span + 1]) {
+            return self.restricted(a, b).points.into();
+        }
+        let mut arguments = [a; MAX_DEGREE];
+        let mut out = SmallVec::new();
+        out.push(self.blossom(span, &arguments[..p]));
+        for i in 1..=p {
+            arguments[p - i] = b;
+            out.push(self.blossom(span, &arguments[..p]));
+        }
+        out
     }
 
     /// Whether the first and last `degree + 1` knots coincide.
@@ -288,6 +306,11 @@ mod tests {
         for i in 0..=50 {
             let t = 0.4 + 2.3 * i as f64 / 50.0;
             assert!((cut.evaluate(t) - c.evaluate(t)).length() < 1e-13);
+        }
+        for [a, b] in [[0.4, 2.7], [0.1, 0.3], [1.0, 2.5], [2.6, 3.0]] {
+            let (all, own) = (c.restricted(a, b).points, c.restricted_points(a, b));
+            assert_eq!(all.len(), own.len());
+            assert!(all.iter().zip(&own).all(|(x, y)| (*x - *y).length() < 1e-13));
         }
     }
 

@@ -1,4 +1,4 @@
-use super::basis::{Basis, MIDDLE, NARROW, WIDE, basis, find_span};
+use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, find_span};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 
@@ -41,6 +41,24 @@ pub struct SecondDerivatives {
     pub dvv: Vector,
 }
 
+impl SecondDerivatives {
+    /// Those of the projection of a homogeneous surface with these values of S, Su, Sv, Suu, Suv, Svv.
+    pub(super) fn projected([a, au, av, auu, auv, avv]: [Homogeneous; 6]) -> Self {
+        let inv = 1.0 / a.w;
+        let point = a.truncate() * inv;
+        let du = (au.truncate() - point * au.w) * inv;
+        let dv = (av.truncate() - point * av.w) * inv;
+        Self {
+            point,
+            du,
+            dv,
+            duu: (auu.truncate() - du * (2.0 * au.w) - point * auu.w) * inv,
+            duv: (auv.truncate() - du * av.w - dv * au.w - point * auv.w) * inv,
+            dvv: (avv.truncate() - dv * (2.0 * av.w) - point * avv.w) * inv,
+        }
+    }
+}
+
 impl Surface {
     /// Number of control points in u and v.
     pub fn counts(&self) -> [usize; 2] {
@@ -74,19 +92,7 @@ impl Surface {
 
     /// Position, first and second derivatives at `uv`, which is clamped to the domain.
     pub fn second_derivatives(&self, uv: Uv) -> SecondDerivatives {
-        let [a, au, av, auu, auv, avv] = self.sums::<6>(uv, 2);
-        let inv = 1.0 / a.w;
-        let point = a.truncate() * inv;
-        let du = (au.truncate() - point * au.w) * inv;
-        let dv = (av.truncate() - point * av.w) * inv;
-        SecondDerivatives {
-            point,
-            du,
-            dv,
-            duu: (auu.truncate() - du * (2.0 * au.w) - point * auu.w) * inv,
-            duv: (auv.truncate() - du * av.w - dv * au.w - point * auv.w) * inv,
-            dvv: (avv.truncate() - dv * (2.0 * av.w) - point * avv.w) * inv,
-        }
+        SecondDerivatives::projected(self.sums::<6>(uv, 2))
     }
 
     /// Sums for (S), (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
@@ -94,6 +100,7 @@ impl Surface {
         match self.degree[0].max(self.degree[1]) {
             0..NARROW => self.sums_in::<N, NARROW>(uv, order),
             NARROW..MIDDLE => self.sums_in::<N, MIDDLE>(uv, order),
+            MIDDLE..BROAD => self.sums_in::<N, BROAD>(uv, order),
             _ => self.sums_in::<N, WIDE>(uv, order),
         }
     }

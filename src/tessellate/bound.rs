@@ -16,15 +16,15 @@
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
 
+use super::flat::{Flat, clip, from_chord, whole};
 use super::near::Near;
 use super::net::Nets;
 use super::scalar::Scalar;
 use super::settings::Judge;
 use super::sheet::{Sheet, local};
 use super::slight::{self, Slight};
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
-use smallvec::SmallVec;
 
 /// How often a piece is cut into four before the bound is taken as it is.
 const LEVELS: u32 = 3;
@@ -32,8 +32,6 @@ const LEVELS: u32 = 3;
 const MOST_PIECES: usize = 20_000;
 /// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
 const SLIGHT: f64 = 0.02;
-
-type Polygon = SmallVec<[Uv; 8]>;
 
 /// Bounds facets of one face.
 pub(super) struct Prover<'s, 'a> {
@@ -106,23 +104,67 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
-    /// quick look; `None` when that does not show it to be within the limit.
-    pub(super) fn facet(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> Option<f64> {
+    /// quick look; `None` when that does not show it to be within the limit. `exact`: the corners are known to lie on the surface.
+    pub(super) fn facet(&mut self, uv: [Uv; 3], xyz: [Point; 3], exact: bool, limit: f64) -> Option<f64> {
         if self.sheet.affine || self.judge == Judge::Sampled {
             return None;
         }
-        let at = uv.map(|x| self.sheet.point(x));
+        let at = if exact { xyz } else { uv.map(|x| self.sheet.point(x)) };
         let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
         let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
         let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
         let fits = |x: &f64| x + off <= limit;
         let quick = self.sheet.bends.bound(a, b, hi - lo).filter(fits);
-        let bound = quick.or_else(|| {
-            let patch = self.sheet.patch(a[0], b[0]);
-            let one = a[0] == a[1] && b[0] == b[1];
-            one.then(|| self.near.bound(patch, uv.map(|x| local(patch, x)), at)).flatten().filter(fits)
-        })?;
-        Some(bound + off)
+        if let Some(bound) = quick {
+            return Some(bound + off);
+        }
+        if a[0] != a[1] || b[0] != b[1] {
+            return None;
+        }
+        let patch = self.sheet.patch(a[0], b[0]);
+        let corners = uv.map(|x| local(patch, x));
+        match self.near.bound(patch, corners, at).filter(fits) {
+            Some(bound) => Some(bound + off),
+            None => self.joint(patch, corners, xyz, limit).map(|x| x + self.margin),
+        }
+    }
+
+    /// Bound of a triangle and its sides by the hull of one net, whose outer rows are the nets of the sides.
+    fn joint(&mut self, patch: &BezierPatch, at: [Uv; 3], xyz: [Point; 3], limit: f64) -> Option<f64> {
+        let small = self.smaller(patch, &at, limit);
+        let (patch, at, off) = match &small {
+            Some((x, off)) => (&self.slight.patch, [x[0], x[1], x[2]], *off),
+            None => (patch, at, 0.0),
+        };
+        let limit = limit - off;
+        let net = self.nets.expand(patch, at);
+        let n = patch.degree[0] + patch.degree[1];
+        let flat = Flat::new(&xyz);
+        let mut worst = self.scalar.bound::<3>(net.iter().map(|c| (flat.distance(c.project()), c.w)), n, limit)?;
+        for k in 0..3 {
+            let chord = [xyz[k], xyz[(k + 1) % 3]];
+            // Places in the net's order of the coefficients along a side.
+            let row = (0..=n).map(|m| match k {
+                0 => m * (m + 1) / 2,
+                1 => n * (n + 1) / 2 + m,
+                _ => m * (m + 3) / 2,
+            });
+            let distances = row.map(|i| (from_chord(net[i].project(), &chord), net[i].w));
+            worst = worst.max(self.scalar.bound::<2>(distances, n, limit)?);
+        }
+        Some(worst + off)
+    }
+
+    /// A cubic for a patch of higher degree over the box around some local parameters: these in the cubic's, and the bound of its difference.
+    fn smaller<const N: usize>(&mut self, patch: &BezierPatch, at: &[Uv; N], limit: f64) -> Option<([Uv; N], f64)> {
+        if !slight::is_high(patch) {
+            return None;
+        }
+        let (lo, hi) = at.iter().fold((at[0], at[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let origin = patch.homogeneous_point(at[0]).project();
+        let off = self.slight.make(self.near.restrict(patch, lo, hi, origin), patch.degree, origin);
+        let share = |x: Uv| Uv::from_array([0, 1].map(|d| within(x[d], lo[d], hi[d])));
+        (off <= SLIGHT * limit).then(|| (at.map(share), off))
     }
 
     /// Bound of the distance from the curve over a parameter segment to the line of a chord.
@@ -156,18 +198,12 @@ impl<'s, 'a> Prover<'s, 'a> {
         levels: u32,
         f: &impl Fn(Point) -> f64,
     ) -> f64 {
-        if slight::is_high(patch) {
-            let (lo, hi) = at.iter().fold((at[0], at[0]), |(l, h), &x| (l.min(x), h.max(x)));
-            let origin = patch.homogeneous_point(at[0]).project();
-            let off = self.slight.make(self.near.restrict(patch, lo, hi, origin), patch.degree, origin);
-            if off <= SLIGHT * limit {
-                let x = at.map(|x| Uv::from_array([0, 1].map(|d| within(x[d], lo[d], hi[d]))));
-                let bound =
-                    off + refine((&mut self.nets, &mut self.scalar), &self.slight.patch, x, limit - off, levels, f);
-                // What the difference may have spoilt is tried on the patch itself.
-                if bound <= limit || bound > limit + 4.0 * off {
-                    return bound;
-                }
+        if let Some((x, off)) = self.smaller(patch, &at, limit) {
+            let bound =
+                off + refine((&mut self.nets, &mut self.scalar), &self.slight.patch, x, limit - off, levels, f);
+            // What the difference may have spoilt is tried on the patch itself.
+            if bound <= limit || bound > limit + 4.0 * off {
+                return bound;
             }
         }
         refine((&mut self.nets, &mut self.scalar), patch, at, limit, levels, f)
@@ -250,7 +286,7 @@ fn refine<const N: usize>(
 ) -> f64 {
     let net = nets.expand(patch, at);
     let degree = patch.degree[0] + patch.degree[1];
-    let bound = scalar.load::<N>(net.iter().map(|c| (f(c.project()), c.w)), degree);
+    let bound = scalar.load(net.iter().map(|c| (f(c.project()), c.w)), degree);
     // Corners lie on the surface: there the distance is no bound but true.
     if bound <= limit || scalar.at_corners::<N>() > limit {
         return bound;
@@ -282,80 +318,6 @@ fn refine<const N: usize>(
     worst
 }
 
-/// The part of a segment or convex polygon inside a rectangle.
-fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
-    let mut now: Polygon = uv.into();
-    let closed = uv.len() > 2;
-    for d in 0..2 {
-        for (bound, sign) in [(rectangle[d][0], 1.0), (rectangle[d][1], -1.0)] {
-            let mut next = Polygon::new();
-            let inside = |p: Uv| (p[d] - bound) * sign >= 0.0;
-            let n = now.len();
-            for i in 0..n {
-                let p = now[i];
-                if inside(p) {
-                    next.push(p);
-                }
-                if !closed && i + 1 == n {
-                    break;
-                }
-                let q = now[(i + 1) % n];
-                if inside(p) != inside(q) {
-                    let mut x = p.lerp(q, (bound - p[d]) / (q[d] - p[d]));
-                    x[d] = bound;
-                    next.push(x);
-                }
-            }
-            now = next;
-        }
-    }
-    now
-}
-
-/// Whether a clipped triangle is the whole rectangle.
-fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
-    polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
-}
-
-/// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
-/// last bit, and the line through them can lie anywhere.
-pub(super) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
-    let (d, x) = (b - a, p - a);
-    let l = d.length_squared();
-    let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
-    (x - d * t).length()
-}
-
-/// A triangle, which may be degenerate, ready to measure distances.
-pub(super) struct Flat {
-    corners: [Point; 3],
-    /// Unit normal, and across each side into the triangle; `None` without area.
-    frame: Option<(Vector, [Vector; 3])>,
-}
-
-impl Flat {
-    pub(super) fn new(corners: &[Point; 3]) -> Self {
-        let [a, b, c] = *corners;
-        let n = (b - a).cross(c - a);
-        let frame =
-            (n.length_squared() > 0.0).then(|| (n / n.length(), [n.cross(b - a), n.cross(c - b), n.cross(a - c)]));
-        Self { corners: *corners, frame }
-    }
-
-    /// Distance of a point.
-    pub(super) fn distance(&self, p: Point) -> f64 {
-        let [a, b, c] = self.corners;
-        if let Some((n, [x, y, z])) = self.frame
-            && x.dot(p - a) >= 0.0
-            && y.dot(p - b) >= 0.0
-            && z.dot(p - c) >= 0.0
-        {
-            return (p - a).dot(n).abs();
-        }
-        from_chord(p, &[a, b]).min(from_chord(p, &[b, c])).min(from_chord(p, &[c, a]))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -378,17 +340,5 @@ mod tests {
         assert!(bound >= sag && bound <= 1.03 * sag, "{bound} {sag}");
         let side = prover.side([uv[0], uv[1]], [xyz[0], xyz[1]], 1.03 * sag);
         assert!(side >= sag && side <= 1.03 * sag, "{side} {sag}");
-    }
-
-    #[test]
-    fn clipping_cuts_at_the_rectangle() {
-        let tri = [Uv::new(0.0, 0.0), Uv::new(2.0, 0.0), Uv::new(0.0, 2.0)];
-        let p = clip(&tri, [[0.5, 3.0], [-1.0, 0.5]]);
-        let area: f64 = (1..p.len() - 1).map(|k| 0.5 * (p[k] - p[0]).perp_dot(p[k + 1] - p[0])).sum();
-        assert!((area - (0.5 * 0.5 + 0.5 * (1.0 + 0.5) - 0.25)).abs() < 1e-12 || area > 0.0);
-        assert_eq!(
-            clip(&[Uv::ZERO, Uv::new(4.0, 0.0)], [[1.0, 2.0], [-1.0, 1.0]]).as_slice(),
-            [Uv::X, 2.0 * Uv::X]
-        );
     }
 }

@@ -1,6 +1,6 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
-use super::bound::from_chord;
+use super::flat::from_chord;
 use super::opposite;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
@@ -67,7 +67,7 @@ fn chord_tolerance(sheet: &Sheet<'_>, uv: Uv, along: Vector) -> f64 {
         return sheet.field.loosest();
     }
     let xi = sheet.tolerance(uv);
-    let d = sheet.surface.second_derivatives(uv);
+    let d = sheet.second_derivatives(uv);
     let Some(forms) = crate::nurbs::FundamentalForms::new(&d) else { return 0.5 * xi };
     // The direction across, in parameters: orthogonal to `along` in the tangent plane.
     let across = forms.normal.cross(along);

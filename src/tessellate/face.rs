@@ -244,7 +244,7 @@ fn scale(sheet: &Sheet<'_>, rings: &Rings, leaves: &Leaves) -> Uv {
     let floor = 8.0 * sheet.field.loosest() / (diagonal * diagonal);
     let weigh = |k: f64, speed: f64| k.abs().max(floor).sqrt() * speed;
     for uv in at {
-        let d = sheet.surface.second_derivatives(uv);
+        let d = sheet.second_derivatives(uv);
         let Some(forms) = crate::nurbs::FundamentalForms::new(&d) else { continue };
         sum[0] += weigh(forms.along(Uv::X), d.du.length());
         sum[1] += weigh(forms.along(Uv::Y), d.dv.length());

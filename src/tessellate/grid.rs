@@ -1,9 +1,9 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
-use super::bound::{Prover, from_chord};
-use super::cells::{Cell, Leaves};
+use super::bound::Prover;
+use super::cells::{Cell, Leaf, Leaves};
+use super::flat::from_chord;
 use super::lines::Lines;
-use super::look::facet_of;
 use super::sheet::Sheet;
 use super::strip::{Node, key, prove};
 use super::trim::Trim;
@@ -61,12 +61,14 @@ pub(super) fn build(
         }
     }
     let mut cells: Vec<[u32; 4]> = Vec::with_capacity(leaves.inside.len());
-    for (cell, _, _) in &leaves.inside {
-        cells.push(cell.corners().map(|c| {
+    for leaf in &leaves.inside {
+        let corners = leaf.cell.corners();
+        cells.push([0, 1, 2, 3].map(|k| {
+            let c = corners[k];
             let (i, j) = (lines.find(0, c.x).unwrap_or(0), lines.find(1, c.y).unwrap_or(0));
             *ids.entry([i, j]).or_insert_with(|| {
                 let id = ground.nodes.len() as u32;
-                ground.nodes.push(Node { uv: c, place: sheet.point(c), position: ground.next });
+                ground.nodes.push(Node { uv: c, place: leaf.places[k], position: ground.next });
                 ground.next += 1;
                 lines.on[0][i].push((c.y, id));
                 lines.on[1][j].push((c.x, id));
@@ -77,7 +79,7 @@ pub(super) fn build(
     for line in lines.on.iter_mut().flatten() {
         line.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    let named: Vec<(Cell, [u32; 4])> = leaves.inside.iter().map(|l| l.0).zip(cells.iter().copied()).collect();
+    let named: Vec<(Cell, [u32; 4])> = leaves.inside.iter().map(|l| l.cell).zip(cells.iter().copied()).collect();
     for (i, s, x) in lines.bridges(&named, ground.nodes) {
         let (cell, _) = named[i];
         let (d, e) = (s % 2, 1 - s % 2);
@@ -92,8 +94,8 @@ pub(super) fn build(
     }
     let mut segments: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let mut order: Vec<[u32; 2]> = Vec::new();
-    for ((cell, bound, xi), corners) in leaves.inside.iter().zip(&cells) {
-        let inner = lines.sides(cell);
+    for (leaf, corners) in leaves.inside.iter().zip(&cells) {
+        let inner = lines.sides(&leaf.cell);
         let polygon: Vec<u32> =
             (0..4).flat_map(|k| std::iter::once(corners[k]).chain(inner[k].iter().copied())).collect();
         let at_border = polygon.iter().any(|&n| n < border);
@@ -106,13 +108,12 @@ pub(super) fn build(
                 None => resolve(sheet, prover, &polygon, ground).map(|t| grid.triangles.extend(t)),
             }
         } else if at_border {
-            as_proved(sheet, prover, (cell, [*bound, *xi]), corners, ground)
+            as_proved(sheet, prover, leaf, corners, ground)
                 .or_else(|| beside(sheet, prover, *corners, ground))
                 .map(|q| grid.quads.push(q))
         } else {
-            let first = facet_of(sheet, *cell)[0].0;
-            let r = (0..4).find(|&r| ground.nodes[corners[r] as usize].uv == first).unwrap_or(0);
-            grid.quads.push((std::array::from_fn(|k| corners[(k + r) % 4]), *bound, *xi));
+            let q = std::array::from_fn(|k| corners[(k + leaf.first) % 4]);
+            grid.quads.push((q, leaf.bound, leaf.tolerance));
             Some(())
         };
         if made.is_none() {
@@ -159,16 +160,16 @@ fn beside(
 fn as_proved(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
-    (cell, [bound, xi]): (&Cell, [f64; 2]),
+    leaf: &Leaf,
     corners: &[u32; 4],
     ground: &Ground<'_>,
 ) -> Option<([u32; 4], f64, f64)> {
     let n = corners.map(|c| ground.nodes[c as usize]);
-    let look = facet_of(sheet, *cell);
-    let r = (0..4).find(|&r| cell.corners()[r] == look[0].0)?;
+    let (bound, xi, r) = (leaf.bound, leaf.tolerance, leaf.first);
+    let at = leaf.cell.corners();
     let mut moved = 0f64;
     for k in 0..4 {
-        let (uv, place) = look[(k + 4 - r) % 4];
+        let (uv, place) = (at[k], leaf.places[k]);
         if (n[k].uv - uv).abs().cmpgt(1e-4 * ground.same).any() || (0..k).any(|j| n[j].position == n[k].position) {
             return None;
         }

@@ -71,7 +71,7 @@ fn even(sheet: &Sheet<'_>, root: Cell, d: usize) -> Vec<f64> {
     for j in 0..m {
         for (i, slot) in density.iter_mut().enumerate() {
             let uv = at(i, j);
-            let der = sheet.surface.second_derivatives(uv);
+            let der = sheet.second_derivatives(uv);
             let Some(forms) = crate::nurbs::FundamentalForms::new(&der) else { continue };
             let (mut along, mut across) = (Uv::ZERO, Uv::ZERO);
             along[d] = 1.0;

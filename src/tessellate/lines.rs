@@ -20,7 +20,7 @@ pub(super) struct Lines {
 impl Lines {
     pub(super) fn new(leaves: &Leaves, same: Uv) -> Self {
         let at = [0, 1].map(|d| {
-            let mut x: Vec<f64> = leaves.inside.iter().flat_map(|(c, _, _)| [c.lo[d], c.hi[d]]).collect();
+            let mut x: Vec<f64> = leaves.inside.iter().flat_map(|l| [l.cell.lo[d], l.cell.hi[d]]).collect();
             x.sort_unstable_by(f64::total_cmp);
             x.dedup();
             x

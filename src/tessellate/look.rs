@@ -1,7 +1,8 @@
 //! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
 
-use super::bound::{Prover, from_chord};
+use super::bound::Prover;
 use super::cells::Cell;
+use super::flat::from_chord;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 use smallvec::SmallVec;
@@ -9,12 +10,12 @@ use smallvec::SmallVec;
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(super) type Corners = [(Uv, Point); 4];
 
-/// Bound of a quad's two triangles, edges and diagonal included.
+/// Bound of a quad's two triangles, edges and diagonal included; its corners lie on the surface.
 pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
     let mut worst = 0f64;
     let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
     for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
-        match prover.facet([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit) {
+        match prover.facet([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], true, limit) {
             Some(bound) => worst = worst.max(bound),
             None => open.push([i, j, k]),
         }
@@ -47,18 +48,8 @@ pub(super) struct Look {
 
 impl Look {
     pub(super) fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
-        let step = 0.5 * (cell.hi - cell.lo);
-        let at = |i: usize, j: usize| {
-            let mut uv = cell.lo + step * Uv::new(i as f64, j as f64);
-            if i == 2 {
-                uv.x = cell.hi.x;
-            }
-            if j == 2 {
-                uv.y = cell.hi.y;
-            }
-            sheet.point(uv)
-        };
-        let p: [[Point; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| at(i, j)));
+        let middle = cell.center();
+        let p = sheet.lattice([cell.lo.x, middle.x, cell.hi.x], [cell.lo.y, middle.y, cell.hi.y]);
         let u = (0..3).map(|j| from_chord(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
         let v = (0..3).map(|i| from_chord(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
         Self { p, sag: [u, v] }
@@ -76,17 +67,20 @@ impl Look {
         if along_u >= along_v { 0 } else { 1 }
     }
 
-    /// The cell as a facet, cut along the diagonal that lies nearer to the surface.
+    /// Places of the corners, in the order of [`Cell::corners`].
+    pub(super) fn places(&self) -> [Point; 4] {
+        [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]]
+    }
+
+    /// The corner at which the better diagonal starts, the one that lies nearer to the surface: 0 or 1.
+    pub(super) fn first(&self) -> usize {
+        let (p, m) = (self.places(), self.p[1][1]);
+        if from_chord(m, &[p[1], p[3]]) < from_chord(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 }
+    }
+
+    /// The cell as a facet, cut along the better diagonal.
     pub(super) fn facet(&self, cell: Cell) -> Corners {
-        let p = [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]];
-        let uv = cell.corners();
-        let m = self.p[1][1];
-        let r = if from_chord(m, &[p[1], p[3]]) < from_chord(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 };
+        let (p, uv, r) = (self.places(), cell.corners(), self.first());
         std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4]))
     }
-}
-
-/// The facet of a cell with its better diagonal.
-pub(super) fn facet_of(sheet: &Sheet<'_>, cell: Cell) -> Corners {
-    Look::new(sheet, cell).facet(cell)
 }

@@ -19,6 +19,7 @@ mod bound;
 mod cells;
 mod edges;
 mod face;
+mod flat;
 mod grid;
 mod ladder;
 mod lines;

@@ -22,12 +22,23 @@ pub(super) struct Scalar {
 }
 
 impl Scalar {
-    /// Takes in distances and weights of the control points of a segment (`N = 2`) or triangle; the largest distance.
-    pub(super) fn load<const N: usize>(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
+    /// Takes in distances and weights of the control points of a segment or triangle; the largest distance.
+    pub(super) fn load(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
         self.degree = degree;
         self.of.clear();
         self.of.extend(points);
         self.of.iter().map(|x| x.0).fold(0.0, f64::max)
+    }
+
+    /// The bound of these distances if it is within the limit.
+    pub(super) fn bound<const N: usize>(
+        &mut self,
+        points: impl Iterator<Item = (f64, f64)>,
+        degree: usize,
+        limit: f64,
+    ) -> Option<f64> {
+        let most = self.load(points, degree);
+        if most <= limit { Some(most) } else { self.within::<N>(limit) }
     }
 
     /// Largest distance of the corners.
@@ -165,7 +176,7 @@ mod tests {
                 }
             }
             let mut scalar = Scalar::default();
-            scalar.load::<3>(d.iter().map(|&d| (d, 1.0)), n);
+            scalar.load(d.iter().map(|&d| (d, 1.0)), n);
             assert!(scalar.within::<3>(0.999 * most).is_none());
             // Random coefficients are far rougher than distances; four halvings come within a fifth.
             let bound = scalar.within::<3>(1.2 * most).unwrap();
@@ -173,7 +184,7 @@ mod tests {
             let row: Vec<f64> = (0..=n).map(|j| d[j * (j + 1) / 2]).collect();
             let along = (0..=100).map(|i| value(&d, n, [1.0 - i as f64 / 100.0, i as f64 / 100.0, 0.0]));
             let most = along.fold(0.0, f64::max);
-            scalar.load::<2>(row.iter().map(|&d| (d, 1.0)), n);
+            scalar.load(row.iter().map(|&d| (d, 1.0)), n);
             assert!(scalar.within::<2>(0.999 * most).is_none());
             let bound = scalar.within::<2>(1.01 * most).unwrap();
             assert!(most <= bound && bound <= 1.01 * most, "{most} {bound}");

@@ -1,7 +1,7 @@
 use super::bend::Bends;
 use super::settings::Field;
 use crate::math::{Point, Uv, Vector};
-use crate::nurbs::{BezierPatch, Surface};
+use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};
 
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct Sheet<'a> {
@@ -50,6 +50,28 @@ impl<'a> Sheet<'a> {
         patch.homogeneous_point(local(patch, uv)).project()
     }
 
+    /// Points at three parameters of each direction; the same bits as [`Sheet::point`].
+    pub(super) fn lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Point; 3]; 3] {
+        let (a, b) = (self.interval(0, u[0]), self.interval(1, v[0]));
+        let one = a == self.interval(0, u[2]) && b == self.interval(1, v[2]);
+        if !one {
+            return u.map(|x| v.map(|y| self.point(Uv::new(x, y))));
+        }
+        let patch = self.patch(a, b);
+        let [x, y, z] = [0, 1, 2].map(|i| local(patch, Uv::new(u[i], v[i])));
+        patch.homogeneous_lattice([x.x, y.x, z.x], [x.y, y.y, z.y]).map(|row| row.map(|c| c.project()))
+    }
+
+    /// Position and derivatives at parameters inside the domain.
+    pub(super) fn second_derivatives(&self, uv: Uv) -> SecondDerivatives {
+        let patch = self.patch(self.interval(0, uv.x), self.interval(1, uv.y));
+        patch.second_derivatives(local(patch, uv))
+    }
+
+    fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
+        FundamentalForms::new(&self.second_derivatives(uv))
+    }
+
     /// Outward unit normal, where there is one.
     pub(super) fn normal(&self, uv: Uv) -> Option<Vector> {
         self.surface.normal(uv).map(|n| if self.flip { -n } else { n })
@@ -66,10 +88,10 @@ impl<'a> Sheet<'a> {
             return self.field.loosest();
         }
         let [[u0, u1], [v0, v1]] = self.surface.domain();
-        let forms = self.surface.forms(uv).or_else(|| {
+        let forms = self.forms(uv).or_else(|| {
             // Curvature at a pole is that just beside it.
             let center = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
-            self.surface.forms(uv.lerp(center, 1e-3))
+            self.forms(uv.lerp(center, 1e-3))
         });
         self.field.at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
     }

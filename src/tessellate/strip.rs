@@ -151,7 +151,7 @@ pub(super) fn prove(
             return (worst, xi);
         }
     }
-    if !line && let Some(bound) = prover.facet(uv, xyz, xi) {
+    if !line && let Some(bound) = prover.facet(uv, xyz, false, xi) {
         return (worst.max(bound), xi);
     }
     for (i, j, _) in sides.into_iter().filter(|s| s.2.is_none()) {
@@ -279,7 +279,15 @@ impl Work<'_, '_> {
         for t in bad {
             let xi = known[&sorted(*t)].1;
             let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
-            if sides.iter().any(|&(a, b)| trims.get(&key(a, b)).is_some_and(|trim| trim.deviation > xi)) {
+            // A chord stays as it is: where it strays farther than its own ends allow, no triangle on it can hold. The third corner does not
+            // count: towards a cone's apex the tolerance tightens, and points between bring it back.
+            let lost = |&(a, b): &(u32, u32)| {
+                trims.get(&key(a, b)).is_some_and(|trim| {
+                    let at = |n: u32| self.sheet.tolerance(self.nodes[n as usize].uv);
+                    trim.deviation > xi && trim.deviation > at(a).min(at(b))
+                })
+            };
+            if sides.iter().any(lost) {
                 continue;
             }
             let free = sides.iter().filter(|&&(a, b)| !self.odd.contains_key(&key(a, b)));
@@ -287,7 +295,7 @@ impl Work<'_, '_> {
                 .map(|&(a, b)| {
                     let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
                     let m = 0.5 * (x.uv + y.uv);
-                    let sag = super::bound::from_chord(self.sheet.point(m), &[x.place, y.place]);
+                    let sag = super::flat::from_chord(self.sheet.point(m), &[x.place, y.place]);
                     ((a, b), m, sag)
                 })
                 .max_by(|a, b| a.2.total_cmp(&b.2));

@@ -1,6 +1,7 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
-use super::bound::{Prover, from_chord};
+use super::bound::Prover;
+use super::flat::from_chord;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 use crate::model::EdgeUse;
@@ -41,8 +42,8 @@ impl Trim {
             let mut worst = 0f64;
             for k in 0..pieces {
                 if cut(k) < cut(k + 1) {
-                    let piece = curve.restricted(cut(k), cut(k + 1));
-                    worst = piece.points.iter().map(|p| from_chord(p.project(), &xyz)).fold(worst, f64::max);
+                    let piece = curve.restricted_points(cut(k), cut(k + 1));
+                    worst = piece.iter().map(|p| from_chord(p.project(), &xyz)).fold(worst, f64::max);
                 }
             }
             worst
@@ -85,7 +86,7 @@ fn fan(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> V
     let mut points: Vec<Uv> = pieces
         .iter()
         .filter(|p| p[0] < p[1])
-        .flat_map(|&[a, b]| side.uv.restricted(a, b).points)
+        .flat_map(|&[a, b]| side.uv.restricted_points(a, b))
         .map(|p| sheet.surface.clamp(p.truncate() / p.z))
         .collect();
     let d = (chord[1] - chord[0]) / extent;

@@ -1,0 +1,97 @@
+//! Flat shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
+
+use crate::math::{Point, Uv, Vector};
+use smallvec::SmallVec;
+
+type Polygon = SmallVec<[Uv; 8]>;
+
+/// The part of a segment or convex polygon inside a rectangle.
+pub(super) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
+    let mut now: Polygon = uv.into();
+    let closed = uv.len() > 2;
+    for d in 0..2 {
+        for (bound, sign) in [(rectangle[d][0], 1.0), (rectangle[d][1], -1.0)] {
+            let mut next = Polygon::new();
+            let inside = |p: Uv| (p[d] - bound) * sign >= 0.0;
+            let n = now.len();
+            for i in 0..n {
+                let p = now[i];
+                if inside(p) {
+                    next.push(p);
+                }
+                if !closed && i + 1 == n {
+                    break;
+                }
+                let q = now[(i + 1) % n];
+                if inside(p) != inside(q) {
+                    let mut x = p.lerp(q, (bound - p[d]) / (q[d] - p[d]));
+                    x[d] = bound;
+                    next.push(x);
+                }
+            }
+            now = next;
+        }
+    }
+    now
+}
+
+/// Whether a clipped triangle is the whole rectangle.
+pub(super) fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
+    polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
+}
+
+/// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
+/// last bit, and the line through them can lie anywhere.
+pub(super) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
+    let (d, x) = (b - a, p - a);
+    let l = d.length_squared();
+    let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
+    (x - d * t).length()
+}
+
+/// A triangle, which may be degenerate, ready to measure distances.
+pub(super) struct Flat {
+    corners: [Point; 3],
+    /// Unit normal, and across each side into the triangle; `None` without area.
+    frame: Option<(Vector, [Vector; 3])>,
+}
+
+impl Flat {
+    pub(super) fn new(corners: &[Point; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let n = (b - a).cross(c - a);
+        let frame =
+            (n.length_squared() > 0.0).then(|| (n / n.length(), [n.cross(b - a), n.cross(c - b), n.cross(a - c)]));
+        Self { corners: *corners, frame }
+    }
+
+    /// Distance of a point.
+    pub(super) fn distance(&self, p: Point) -> f64 {
+        let [a, b, c] = self.corners;
+        if let Some((n, [x, y, z])) = self.frame
+            && x.dot(p - a) >= 0.0
+            && y.dot(p - b) >= 0.0
+            && z.dot(p - c) >= 0.0
+        {
+            return (p - a).dot(n).abs();
+        }
+        from_chord(p, &[a, b]).min(from_chord(p, &[b, c])).min(from_chord(p, &[c, a]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipping_cuts_at_the_rectangle() {
+        let tri = [Uv::new(0.0, 0.0), Uv::new(2.0, 0.0), Uv::new(0.0, 2.0)];
+        let p = clip(&tri, [[0.5, 3.0], [-1.0, 0.5]]);
+        let area: f64 = (1..p.len() - 1).map(|k| 0.5 * (p[k] - p[0]).perp_dot(p[k + 1] - p[0])).sum();
+        assert!((area - (0.5 * 0.5 + 0.5 * (1.0 + 0.5) - 0.25)).abs() < 1e-12 || area > 0.0);
+        assert_eq!(
+            clip(&[Uv::ZERO, Uv::new(4.0, 0.0)], [[1.0, 2.0], [-1.0, 1.0]]).as_slice(),
+            [Uv::X, 2.0 * Uv::X]
+        );
+    }
+}
