@@ -85,7 +85,12 @@ fn tightest(sides: &[Side<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
 }
 
 fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f64> {
-    let t = parameters(&breaks(curve), |t| curve.evaluate(t), |t, along| tightest(sides, denser, t, along));
+    // A straight edge is one chord, whatever its faces ask.
+    let t = if curve.degree == 1 && curve.points.len() == 2 {
+        curve.domain().to_vec()
+    } else {
+        parameters(&breaks(curve), |t| curve.evaluate(t), |t, along| tightest(sides, denser, t, along))
+    };
     let mut t = beside(curve, sides, denser, t);
     let (first, last) = (curve.evaluate(t[0]), curve.evaluate(t[t.len() - 1]));
     let closed = (first - last).length() <= 1e-9 + 1e-9 * curve.bounds().diagonal();

@@ -120,7 +120,13 @@ fn follow<'f>(side: &'f EdgeUse, sheet: &Sheet<'_>) -> Option<Along<'f>> {
 fn hand(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2]) -> Option<Vec<f64>> {
     let x = |t: f64| to.uv.evaluate(t)[d];
     let up = x(t1) > x(t0);
+    // Most sides are straight lines of the parameter plane, run evenly.
+    let even = to.uv.degree == 1 && to.uv.points.len() == 2 && to.uv.points[0].z == to.uv.points[1].z;
+    let [s0, s1] = to.uv.domain();
     let invert = |goal: f64| {
+        if even {
+            return (s0 + (s1 - s0) * (goal - x(s0)) / (x(s1) - x(s0))).clamp(t0, t1);
+        }
         let (mut lo, mut hi) = (t0, t1);
         for _ in 0..60 {
             let m = 0.5 * (lo + hi);
