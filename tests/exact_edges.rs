@@ -3,10 +3,11 @@
 
 mod exact_common;
 use exact_common::*;
-use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::exact::{Exact, Passage, Settings};
 use lampyris::intersect::{Certainty, Cost};
-use lampyris::math::{Aabb, Frame, Point, Ray, Vector};
-use lampyris::model::{Edge, Model};
+use lampyris::math::{Aabb, FaceId, Frame, Point, Ray, Uv, Vector};
+use lampyris::model::{Edge, Model, Part};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 fn read(path: &Path) -> Option<Model> {
@@ -21,19 +22,24 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Edges of the parts whose every edge is used exactly twice, with the placements of their instances.
+/// Whether a part's shells are closed and its every edge is used exactly twice.
+fn is_closed(part: &Part) -> bool {
+    let mut uses = vec![0; part.edges.len()];
+    let loops = part.shells.iter().flat_map(|s| &s.faces).flat_map(|f| &f.loops);
+    loops.flat_map(|l| &l.uses).filter_map(|u| u.edge).for_each(|e| uses[e.0 as usize] += 1);
+    part.shells.iter().all(|s| s.closed) && uses.iter().all(|&n| n == 2)
+}
+
+/// Edges of the closed parts, with the placements of their instances.
 fn closed_edges(model: &Model) -> Vec<(&Edge, &Frame)> {
-    let mut edges = Vec::new();
-    for instance in &model.instances {
-        let part = &model.parts[instance.part.0 as usize];
-        let mut uses = vec![0; part.edges.len()];
-        let loops = part.shells.iter().flat_map(|s| &s.faces).flat_map(|f| &f.loops);
-        loops.flat_map(|l| &l.uses).filter_map(|u| u.edge).for_each(|e| uses[e.0 as usize] += 1);
-        if part.shells.iter().all(|s| s.closed) && uses.iter().all(|&n| n == 2) {
-            edges.extend(part.edges.iter().map(|e| (e, &instance.placement)));
-        }
-    }
-    edges
+    let closed = model.instances.iter().map(|i| (&model.parts[i.part.0 as usize], &i.placement));
+    closed.filter(|(part, _)| is_closed(part)).flat_map(|(p, f)| p.edges.iter().map(move |e| (e, f))).collect()
+}
+
+/// Faces of the closed parts: an open part that lies on a closed one would make every count odd.
+fn closed_faces(model: &Model) -> HashSet<FaceId> {
+    let closed: Vec<bool> = model.parts.iter().map(is_closed).collect();
+    model.placed_faces().filter(|p| closed[p.part.0 as usize]).map(|p| p.id).collect()
 }
 
 #[derive(Default, Debug)]
@@ -62,6 +68,7 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
     let show = std::env::var("SHOW").is_ok();
     let mut s = Stream(17);
     let reach = 4.0 * bounds(model).diagonal();
+    let faces = closed_faces(model);
     for k in 0..n {
         let (edge, placement) = edges[(s.next() * edges.len() as f64) as usize];
         let [a, b] = edge.curve.domain();
@@ -72,19 +79,21 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
         let d = s.direction();
         found.rays += 1;
         let ray = Ray::new(target + off - d * reach, d);
-        let crossings = exact.crossings(&ray, &mut Cost::default());
+        let Passage { mut crossings, near_trims } = exact.passage(&ray, &mut Cost::default());
+        crossings.retain(|h| faces.contains(&h.face));
         if crossings.len().is_multiple_of(2) {
             continue;
         }
         found.odd += 1;
         let flagged = crossings.iter().any(|h| h.certainty != Certainty::Certified)
-            || exact.first(&ray.within(reach - 0.5, reach + 0.5), &mut Cost::default()).near_trim;
+            || near_trims.iter().any(|t| (t - reach).abs() < 0.5);
         found.silent += u32::from(!flagged);
         if show {
             println!(
-                "{name}: flagged {flagged} edge #{:?} [{a} {b}] at {at} target {target:?} off {:e} d {d:?}",
+                "{name}: flagged {flagged} edge #{:?} [{a} {b}] at {at} target {target:?} off {:e} d {d:?} o {:?}",
                 edge.entity,
-                off.length()
+                off.length(),
+                ray.origin
             );
             for c in crossings.iter() {
                 println!(
@@ -105,11 +114,13 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
 fn at_random(model: &Model, n: usize) -> u32 {
     let exact = Exact::build(model, &Settings::default());
     let b = bounds(model);
+    let faces = closed_faces(model);
     let mut s = Stream(7);
     let mut odd = 0;
     for _ in 0..n {
         let ray = s.ray(b.center(), 0.5 * b.size());
-        odd += (exact.crossings(&ray, &mut Cost::default()).len() % 2) as u32;
+        let crossings = exact.crossings(&ray, &mut Cost::default());
+        odd += (crossings.iter().filter(|h| faces.contains(&h.face)).count() % 2) as u32;
     }
     odd
 }
@@ -133,6 +144,39 @@ fn fixtures_find_exactly_one_face_at_an_edge() {
 }
 
 #[test]
+fn a_gap_that_only_the_neighbour_knows_of_is_flagged() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_analytic.stp");
+    let mut model = read(&path).expect("fixtures are readable");
+    // One face of the first part leaves its edges by a micrometre, and says so; its neighbours are exact.
+    let face = &mut model.parts[0].shells[0].faces[0];
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    let normal = face.surface.normal(Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))).expect("regular");
+    face.surface = face.surface.transformed(|p| p + normal * 1e-3);
+    face.gap = 1e-3;
+    let torn = face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge).collect::<HashSet<_>>();
+    let part = &mut model.parts[0];
+    assert!(is_closed(part));
+    let exact = Exact::build(&model, &Settings::default());
+    let (mut s, mut odd) = (Stream(23), 0);
+    for edge in torn.iter().cycle().take(40_000) {
+        let curve = &model.parts[0].edges[edge.0 as usize].curve;
+        let [a, b] = curve.domain();
+        let place = &model.instances[0].placement;
+        let target: Point =
+            place.point(curve.evaluate(s.within(a, b))) + s.direction() * 10f64.powf(s.within(-6.0, -3.0));
+        let d = s.direction();
+        let Passage { crossings, near_trims } =
+            exact.passage(&Ray::new(target - d * 1000.0, d), &mut Cost::default());
+        if crossings.len() % 2 == 1 {
+            odd += 1;
+            // Anywhere along the ray: on a face that it grazes the crossing strays by the gap over the sine.
+            assert!(!near_trims.is_empty(), "silent: {target} {d}");
+        }
+    }
+    assert!(odd > 10, "{odd} rays through the gap");
+}
+
+#[test]
 #[ignore = "a minute: every corpus model that reads"]
 fn corpus_finds_exactly_one_face_at_an_edge() {
     let folder = std::env::var_os("LAMPYRIS_CORPUS")
@@ -152,8 +196,9 @@ fn corpus_finds_exactly_one_face_at_an_edge() {
         }
         let leaky = at_random(&model, 2000);
         println!("{name:44} edges {inside:?} vertices {ends:?}; away from edges {leaky} odd");
-        // Files leave gaps of up to 0.02 mm between faces, which rays that graze them see up to twenty times as wide.
-        if inside.odd * 50 > inside.rays || inside.silent * 300 > inside.rays || ends.silent * 300 > ends.rays {
+        // Files leave gaps of up to 0.02 mm between faces, which rays that graze them see up to twenty times as wide: that is
+        // flagged, always.
+        if inside.odd * 50 > inside.rays || inside.silent + ends.silent > 0 {
             bad.push(name);
         }
     }

@@ -3,6 +3,7 @@
 use super::edge::AT_VERTEX;
 use super::net::{Jet, Net, V4};
 use super::trim::Trim;
+use super::uses::gaps_of;
 use super::wide;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
@@ -30,8 +31,8 @@ pub(super) struct FaceRecord {
     pub(super) part: u32,
     /// Distance from a trim within which the side of the shared edge decides, mm.
     pub(super) band: f64,
-    /// Distance from a trim within which a root is flagged, mm: as far as the file's edges lie off the face, and more
-    /// for rays that graze it.
+    /// Largest distance from a trim within which a root is flagged, mm: as far as the faces of the file lie off their edges, and
+    /// more for rays that graze them.
     pub(super) flagged: f64,
 }
 
@@ -88,6 +89,7 @@ impl Geometry {
             ends: model.parts.iter().map(ends_of).collect(),
             ..Self::default()
         };
+        let gaps: Vec<Vec<f64>> = model.parts.iter().map(gaps_of).collect();
         // Instances share the trims and break lines of their part.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
         for placed in model.placed_faces() {
@@ -95,7 +97,8 @@ impl Geometry {
                 Some(face) if is_usable(face) => {
                     let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
                         let grid = PatchGrid::new(face);
-                        geometry.trims.push(Trim::new(face, grid.closed, band.max(8.0 * face.gap)));
+                        let gaps = &gaps[placed.part.0 as usize];
+                        geometry.trims.push(Trim::new(face, grid.closed, band, gaps));
                         geometry.grids.push(grid);
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
@@ -107,6 +110,11 @@ impl Geometry {
         geometry
     }
 
+    /// Distance from a trim within which a root is flagged, mm, where the faces along it lie so far off the edge.
+    pub(super) fn flagged(&self, gap: f64, placement: &Frame) -> f64 {
+        self.band.max(8.0 * gap * placement.scale)
+    }
+
     fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, trim: u32, grid: u32) {
         let record = self.faces.len() as u32;
         let sign = if face.reversed != placed.placement.is_mirrored() { -1.0 } else { 1.0 };
@@ -115,7 +123,7 @@ impl Geometry {
         let placement = *placed.placement;
         // A file's edge may lie off its faces by `gap`: both faces must look that far.
         let band = (self.band).max(2.0 * face.gap.min(MOST_GAP) * placement.scale);
-        let flagged = self.band.max(8.0 * face.gap * placement.scale);
+        let flagged = self.flagged(self.trims[trim as usize].widest_gap(), &placement);
         let part = placed.part.0;
         self.faces.push(FaceRecord {
             id: placed.id,

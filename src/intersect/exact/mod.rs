@@ -117,6 +117,15 @@ pub struct Answer {
     pub near_trim: bool,
 }
 
+/// What a ray crosses all along its way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Passage {
+    /// The crossings in order of t.
+    pub crossings: Vec<Hit>,
+    /// The t, in order, of crossings with a trim within its band, and of those that such a trim turned away.
+    pub near_trims: Vec<f64>,
+}
+
 impl Exact {
     /// Cuts every placed face that has a surface; a hit's [`Hit::primitive`] is the patch.
     ///
@@ -199,6 +208,11 @@ impl Exact {
 
     /// Every crossing in order of t, each once. A crossing found from both sides of a patch border counts once.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
+        self.passage(ray, cost).crossings
+    }
+
+    /// Every crossing in order of t, and where trims were near.
+    pub fn passage(&self, ray: &Ray, cost: &mut Cost) -> Passage {
         let mut q = Query::IDLE;
         self.restart(&mut q, ray, self.settings.budget.saturating_mul(4));
         q.all = Some(Vec::new());
@@ -208,6 +222,9 @@ impl Exact {
         cost.tests += u64::from(q.leaves_tested);
         let mut roots = q.all.take().unwrap_or_default();
         roots.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let mut near_trims = q.all_turned_away.clone();
+        near_trims.extend(roots.iter().filter(|r| r.near_trim).map(|r| r.t));
+        near_trims.sort_by(f64::total_cmp);
         let mut hits: Vec<Hit> = Vec::new();
         for root in roots {
             let mut hit = self.hit(&q, &root);
@@ -231,7 +248,7 @@ impl Exact {
                 hits.push(hit);
             }
         }
-        hits
+        Passage { crossings: hits, near_trims }
     }
 
     /// Names a root, after the steps of Newton's method that the search left to do.

@@ -52,6 +52,8 @@ pub(super) struct Query {
     pub(super) doubt: f64,
     /// The nearest root that a trim within its band turned away.
     pub(super) turned_away: f64,
+    /// Every such root, in a search for all.
+    pub(super) all_turned_away: Vec<f64>,
     /// Clipping steps left.
     pub(super) budget: u32,
     pub(super) leaves_tested: u32,
@@ -75,6 +77,7 @@ impl Query {
         all: None,
         doubt: f64::INFINITY,
         turned_away: f64::INFINITY,
+        all_turned_away: Vec::new(),
         budget: 0,
         leaves_tested: 0,
         nodes: 0,
@@ -102,6 +105,13 @@ impl Query {
     #[inline(always)]
     pub(super) fn wants(&self, t: f64) -> bool {
         t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
+    }
+
+    pub(super) fn turn_away(&mut self, t: f64) {
+        self.turned_away = self.turned_away.min(t);
+        if self.all.is_some() {
+            self.all_turned_away.push(t);
+        }
     }
 
     pub(super) fn accept(&mut self, root: Root) {

@@ -174,7 +174,7 @@ impl Exact {
             near_trim = near;
             if !inside {
                 if near {
-                    q.turned_away = q.turned_away.min(t);
+                    q.turn_away(t);
                 }
                 return;
             }
@@ -197,6 +197,8 @@ impl Exact {
         let (su, sv) = (across(du, 0), across(dv, 1));
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
         let mut place = trim.locate(uv, metric, face.flagged);
+        let widest = |owner: u32| self.geometry.flagged(trim.uses[owner as usize].gap, &face.placement);
+        place.near.retain(|n| n.distance <= widest(n.owner));
         let flagged = !place.near.is_empty();
         place.near.retain(|n| n.distance <= face.band);
         if place.near.is_empty() {

@@ -57,7 +57,7 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    pub(super) fn new(face: &Face, closed: [bool; 2], band: f64) -> Self {
+    pub(super) fn new(face: &Face, closed: [bool; 2], band: f64, gaps: &[f64]) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
         let segments: usize = face.loops.iter().flat_map(|l| &l.uses).map(|u| u.uv.points.len()).sum();
@@ -70,7 +70,7 @@ impl Trim {
         let cell = extent / n as f64;
         let mut trim = Self {
             pieces: pieces_of(face, cell),
-            uses: uses_of(face, closed),
+            uses: uses_of(face, closed, gaps),
             origin: Uv::new(u0, v0),
             density: Uv::ONE / cell,
             count: [n, n],
@@ -85,8 +85,13 @@ impl Trim {
             return trim;
         }
         trim.outside_is_inside = trim.signed_area() < 0.0;
-        trim.fill_cells(reach(face, extent, band));
+        trim.fill_cells(reach(face, extent, band.max(8.0 * trim.widest_gap())));
         trim
+    }
+
+    /// The widest of the gaps along its edges, in the units of the part.
+    pub(super) fn widest_gap(&self) -> f64 {
+        self.uses.iter().map(|u| u.gap).fold(0.0, f64::max)
     }
 
     fn signed_area(&self) -> f64 {

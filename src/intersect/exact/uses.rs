@@ -1,6 +1,6 @@
 //! Uses of edges around a face: what bounds it, and which use follows which around a vertex.
 
-use crate::model::{EdgeId, Face};
+use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::UvCurve;
 use rustc_hash::FxHashMap;
 
@@ -9,6 +9,9 @@ use rustc_hash::FxHashMap;
 pub(super) struct Use {
     /// The edge that ends the face here; `None` for poles, and for seams where the surface closes on itself.
     pub(super) edge: Option<EdgeId>,
+    /// How far the faces on both sides lie off the edge, in the units of the part: rays pass between them, wherever only one of
+    /// the two knows of it.
+    pub(super) gap: f64,
     /// Whether the loop runs against the edge.
     pub(super) reversed: bool,
     next: u32,
@@ -17,8 +20,22 @@ pub(super) struct Use {
     twin: Option<u32>,
 }
 
-/// All uses of a face in the order of its loops; `closed` says in which parameters its surface closes on itself.
-pub(super) fn uses_of(face: &Face, closed: [bool; 2]) -> Vec<Use> {
+/// How far the faces that share each of a part's edges lie off it.
+pub(super) fn gaps_of(part: &Part) -> Vec<f64> {
+    let mut gaps = vec![0f64; part.edges.len()];
+    for face in part.shells.iter().flat_map(|s| &s.faces) {
+        for edge in face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge) {
+            if let Some(gap) = gaps.get_mut(edge.0 as usize) {
+                *gap = gap.max(face.gap);
+            }
+        }
+    }
+    gaps
+}
+
+/// All uses of a face in the order of its loops; `closed` says in which parameters its surface closes on itself, `gaps` how far
+/// faces lie off the part's edges.
+pub(super) fn uses_of(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Use> {
     let mut by_edge: FxHashMap<EdgeId, Vec<u32>> = FxHashMap::default();
     for (k, u) in face.loops.iter().flat_map(|l| &l.uses).enumerate() {
         if let Some(edge) = u.edge {
@@ -36,6 +53,7 @@ pub(super) fn uses_of(face: &Face, closed: [bool; 2]) -> Vec<Use> {
             let twin = twin.filter(|_| is_seam(face, closed, &u.uv));
             uses.push(Use {
                 edge: u.edge.filter(|_| twin.is_none()),
+                gap: u.edge.and_then(|e| gaps.get(e.0 as usize)).map_or(face.gap, |g| g.max(face.gap)),
                 reversed: u.reversed,
                 next: first + (k + 1) % n,
                 previous: first + (k + n - 1) % n,
