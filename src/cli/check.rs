@@ -301,15 +301,7 @@ fn described(c: &Check, normals: NormalMode) -> String {
         "bytes per facet",
     ]);
     let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);
-    for (name, rate, build, size) in [
-        ("octree, batch", m.octree, b.octree, s.octree),
-        ("octree, ray by ray", m.octree_single, b.octree_single, s.octree_single),
-        ("obvhs Bvh2", m.bvh2, b.bvh2, s.bvh2),
-        ("obvhs CwBvh", m.cwbvh, b.cwbvh, s.cwbvh),
-        ("obvhs CwBvh, as shipped", m.cwbvh_as_shipped, b.cwbvh_as_shipped, s.cwbvh_as_shipped),
-        ("octree, polished", m.polish, b.polish, s.polish),
-        ("exact spline (per patch)", m.exact, b.exact, s.exact),
-    ] {
+    for (((name, rate), (_, build)), (_, size)) in m.named().into_iter().zip(b.named()).zip(s.named()) {
         let shown = |x: Option<f64>| x.map_or("–".into(), |x| figures(x, 3));
         let time = build.map_or("–".into(), crate::report::seconds);
         table.add_row([name.to_owned(), shown(rate), time, shown(size)]);

@@ -8,6 +8,7 @@ mod facet;
 mod normals;
 pub mod octree;
 pub mod polish;
+mod prefetch;
 
 use crate::math::{FaceId, Ray, Uv, Vector};
 

@@ -281,17 +281,9 @@ impl Trial<'_> {
         let columns =
             [("", ""), ("rate, one thread", "million rays/s"), ("build", "s"), ("memory", "bytes per facet")];
         let mut table = Table::new("rates", "How fast each answers", &columns)
-            .caption("Median of alternating rounds on the rays of this check. The spline's memory is per patch.");
+            .caption("Median of alternating rounds on the rays of this check.");
         let mut bars: Vec<(&str, f64)> = Vec::new();
-        for (name, rate, build, size) in [
-            ("octree, batch", m.octree, b.octree, s.octree),
-            ("octree, ray by ray", m.octree_single, b.octree_single, s.octree_single),
-            ("obvhs Bvh2", m.bvh2, b.bvh2, s.bvh2),
-            ("obvhs CwBvh", m.cwbvh, b.cwbvh, s.cwbvh),
-            ("obvhs CwBvh, as shipped", m.cwbvh_as_shipped, b.cwbvh_as_shipped, s.cwbvh_as_shipped),
-            ("octree, hits moved to the spline", m.polish, b.polish, s.polish),
-            ("exact spline", m.exact, b.exact, s.exact),
-        ] {
+        for (((name, rate), (_, build)), (_, size)) in m.named().into_iter().zip(b.named()).zip(s.named()) {
             let cell = |x: Option<f64>, digits| x.map_or(Cell::Empty, |x| Cell::Number(x, digits));
             table.row([name.into(), cell(rate, 3), cell(build, 2), cell(size, 3)]);
             bars.extend(rate.map(|r| (name, r)));

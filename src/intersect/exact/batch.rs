@@ -4,9 +4,9 @@
 //! Each ray takes the very steps that it takes alone, so the bits are the same.
 
 use super::Exact;
-use super::prefetch::{prefetch, prefetch_range};
 use super::query::Query;
 use super::trace::Stack;
+use crate::intersect::prefetch::{prefetch, prefetch_range};
 use crate::intersect::{Cost, Hit};
 use crate::math::Ray;
 

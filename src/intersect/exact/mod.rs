@@ -26,7 +26,6 @@ mod leaf;
 mod net;
 mod newton;
 mod piece;
-mod prefetch;
 mod probe;
 mod query;
 mod slabs;

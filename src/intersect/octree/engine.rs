@@ -6,10 +6,10 @@
 
 use super::Octree;
 use super::node::{Block, Link, Node, Target};
-use super::prefetch::{prefetch, prefetch_either};
 use super::state::{BoxRay, SiftRay, State};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
+use crate::intersect::prefetch::{prefetch, prefetch_either};
 use crate::math::Ray;
 use std::cell::RefCell;
 use std::hint::select_unpredictable;

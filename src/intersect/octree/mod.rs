@@ -26,16 +26,15 @@ mod huge;
 mod node;
 mod pack;
 mod portable;
-mod prefetch;
 mod state;
 mod statistics;
 
 use super::facet::{FacetHit, Surroundings};
 use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
+use crate::intersect::prefetch::prefetch;
 use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
 use node::{Block, Node};
-use prefetch::prefetch;
 pub use statistics::Statistics;
 use std::time::Instant;
 

@@ -37,6 +37,19 @@ pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> V
 }
 
 impl Entrants {
+    /// The figures with what people call the intersectors.
+    pub fn named(&self) -> [(&'static str, Option<f64>); 7] {
+        [
+            ("octree, batch", self.octree),
+            ("octree, ray by ray", self.octree_single),
+            ("obvhs Bvh2", self.bvh2),
+            ("obvhs CwBvh", self.cwbvh),
+            ("obvhs CwBvh, as shipped", self.cwbvh_as_shipped),
+            ("octree, hits moved to the spline", self.polish),
+            ("exact spline (memory per patch)", self.exact),
+        ]
+    }
+
     /// Sets the figure of the intersector of that name; an unknown name is ignored.
     pub fn set(&mut self, name: &str, figure: f64) {
         let slot = match name {
