@@ -2,13 +2,15 @@
 //!
 //! Every Bézier patch of every face is clipped as in Nishita, Sederberg and Kakimoto, SIGGRAPH 1990: the signed distances of the
 //! control points to a line in the projection along the ray bound each parameter by the convex hull of (parameter,
-//! distance); what clipping shrinks by less than a fifth is halved. Trims are decided by crossings of a half-line towards +v with
+//! distance); what clipping shrinks by less than a fifth is halved, until the box holds a single root or is as small as rounding.
+//! Trims are decided by crossings of a half-line towards +v with
 //! the uv curves, halved until their hulls decide.
 //!
 //! Guarantee: none is claimed near tangency, at singular points and within about 1e-9 mm of trims; there it reports what it
 //! finds. Where a patch took all of its steps it says from which distance on crossings may be missing. Known weakness: slow,
 //! about a thousandth of the fast path's rate, and without a hierarchy.
 
+use super::single::single_root;
 use crate::math::{Aabb, FaceId, Homogeneous, Ray, Uv};
 use crate::model::{Model, TrimLoop};
 use crate::nurbs::BezierPatch;
@@ -135,6 +137,9 @@ struct Piece {
 /// Steps for a patch and a ray: a simple root takes about ten, a graze hundreds.
 const STEPS: u32 = 4000;
 
+/// Boxes smaller than this part of a patch are asked whether their root is single.
+const SMALL: f64 = 1e-3;
+
 /// Adds the crossings of a patch; returns from which distance on some were not searched for, infinity when all were.
 fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditHit>) -> f64 {
     // Two planes that hold the ray, from the axes that its direction avoids most.
@@ -156,6 +161,8 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
     let size = seen.points.iter().map(|p| p.truncate().abs().max_element()).fold(0.0, f64::max);
     let rounding = 64.0 * f64::EPSILON * (size + ray.origin.abs().max_element());
     let whole = patch.domain.map(|[lo, hi]| hi - lo);
+    let origin = patch.domain.map(|[lo, _]| lo);
+    let all = seen.clone();
     let mut stack = vec![Piece { patch: seen, depth: 0 }];
     let mut steps = 0;
     let mut exhausted = f64::INFINITY;
@@ -174,6 +181,25 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
             continue;
         }
         let relative = [0, 1].map(|k: usize| (patch.domain[k][1] - patch.domain[k][0]) / whole[k]);
+        if relative[0].max(relative[1]) < SMALL {
+            // The box with as much again on all sides, as parts of the whole patch.
+            let [u, v] = [0, 1].map(|k: usize| {
+                let [lo, hi] = patch.domain[k].map(|x| (x - origin[k]) / whole[k]);
+                let beyond = (hi - lo).max(1e-7);
+                ([lo, hi], [lo - beyond, hi + beyond])
+            });
+            let wider = cut(&cut(&all, 0, u.1), 1, v.1);
+            if let Some(root) = single_root(&wider) {
+                let at = [(u, root.x), (v, root.y)].map(|((_, [a, b]), x)| a + (b - a) * x);
+                // Boxes that share a border both take a root on it.
+                let within = |x: f64, [lo, hi]: [f64; 2]| x >= lo - 1e-11 && x <= hi + 1e-11;
+                if within(at[0], u.0) && within(at[1], v.0) {
+                    let m = all.homogeneous_point(Uv::from(at));
+                    out.push(AuditHit { t: m.z / m.w, face, uv: all.surface_uv(Uv::from(at)), doubtful: false });
+                }
+                continue;
+            }
+        }
         let across = patch.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
         let tiny = relative[0].max(relative[1]) < 1e-12;
         let contact = across < 1e-9 && depth > 30;

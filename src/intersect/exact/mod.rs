@@ -28,6 +28,7 @@ mod newton;
 mod piece;
 mod probe;
 mod query;
+mod single;
 mod slabs;
 mod trace;
 pub mod traditional;

@@ -1,0 +1,59 @@
+//! Where clipping has come down to a small box with one root at most, that root: for the audit path.
+//!
+//! Around a root, rounding leaves boxes side by side that clipping cannot tell apart. Over a box so small the Jacobian hardly
+//! varies: when, preconditioned by the inverse of its middle, it deviates from the identity by less than 1, the map from
+//! parameters to the plane across the ray is injective (its root is single), and Newton's method finds it.
+
+use crate::math::Uv;
+use crate::nurbs::BezierPatch;
+
+/// The only root over a patch as the ray sees it, in local parameters; `None` where more than one cannot be ruled out, or none is
+/// found.
+pub(super) fn single_root(patch: &BezierPatch) -> Option<Uv> {
+    let q = patch.degree[1];
+    // Ranges of ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v from the differences of the control points.
+    let mut range = [[(f64::INFINITY, f64::NEG_INFINITY); 2]; 2];
+    for i in 0..=patch.degree[0] {
+        for j in 0..=q {
+            for (d, (next, inside)) in [(i + 1, i < patch.degree[0]), (j + 1, j < q)].into_iter().enumerate() {
+                if !inside {
+                    continue;
+                }
+                let to = if d == 0 { next * (q + 1) + j } else { i * (q + 1) + next };
+                let step = (patch.points[to] - patch.points[i * (q + 1) + j]) * patch.degree[d] as f64;
+                for k in 0..2 {
+                    let (lo, hi) = range[k][d];
+                    range[k][d] = (lo.min(step[k]), hi.max(step[k]));
+                }
+            }
+        }
+    }
+    let middle = range.map(|row| row.map(|(lo, hi)| 0.5 * (lo + hi)));
+    let radius = range.map(|row| row.map(|(lo, hi)| 0.5 * (hi - lo)));
+    let inverse = |[[a, b], [c, d]]: [[f64; 2]; 2]| {
+        let det = a * d - b * c;
+        (det.abs() > 1e-6 * (a.abs() + b.abs()) * (c.abs() + d.abs()))
+            .then(|| [[d / det, -b / det], [-c / det, a / det]])
+    };
+    let y = inverse(middle)?;
+    let deviates =
+        |r: usize| (0..2).map(|c| y[r][0].abs() * radius[0][c] + y[r][1].abs() * radius[1][c]).sum::<f64>();
+    if !(deviates(0) < 0.5 && deviates(1) < 0.5) {
+        return None;
+    }
+    let mut at = Uv::splat(0.5);
+    for _ in 0..20 {
+        let [s, su, sv] = patch.homogeneous(at);
+        let j = inverse([[su.x, sv.x], [su.y, sv.y]])?;
+        let step = Uv::new(j[0][0] * s.x + j[0][1] * s.y, j[1][0] * s.x + j[1][1] * s.y);
+        at -= step;
+        if !(at.x > -0.5 && at.x < 1.5 && at.y > -0.5 && at.y < 1.5) {
+            return None;
+        }
+        if step.abs().max_element() < 1e-6 {
+            let inside = at.x >= 0.0 && at.x <= 1.0 && at.y >= 0.0 && at.y <= 1.0;
+            return inside.then_some(at);
+        }
+    }
+    None
+}
