@@ -1,11 +1,13 @@
 //! Accuracy asked for as an angle, on every fixture: whether it is reached, and what it costs beside a full sweep.
 
-use lampyris::intersect::NormalMode;
+use lampyris::intersect::{Cost, Intersector, NormalMode};
+use lampyris::math::Vector;
 use lampyris::model::Model;
 use lampyris::step;
 use lampyris::study::accuracy::{Row, Settings, accuracy};
-use lampyris::study::aim::{Ask, aim};
-use lampyris::study::{Product, Tree};
+use lampyris::study::aim::{Aim, Ask, aim};
+use lampyris::study::rays::{RaySource, Uniform};
+use lampyris::study::{Product, Tree, Workshop};
 use std::path::{Path, PathBuf};
 
 fn fixtures() -> Vec<PathBuf> {
@@ -89,14 +91,39 @@ impl Costs {
     }
 }
 
+/// The 99th percentile of the error of mirrored directions, degrees, on 100,000 rays that the search has not seen.
+fn judged_again(product: &Product<'_>, found: &Aim) -> f64 {
+    let mesh = product.mesh_plan(&found.plan).mesh;
+    let facets = product.build(&mesh, Tree::Octree, found.normals.on_facets());
+    let polished = (found.normals == NormalMode::Exact).then(|| product.polish(&*facets, &mesh));
+    let who: &dyn Intersector = polished.as_deref().unwrap_or(&*facets);
+    let rays = Uniform::new(&mesh.bounds(), 4711, 100_000).rays(0..100_000);
+    let ask = |who: &dyn Intersector| {
+        let mut hits = vec![None; rays.len()];
+        who.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        hits
+    };
+    let mirrored = |d: Vector, n: Vector| d - n * (2.0 * d.dot(n));
+    let mut errors: Vec<f64> = (rays.iter().zip(ask(who)).zip(ask(product.exact())))
+        .filter_map(|((ray, a), b)| Some((ray.direction, a?, b?)))
+        .filter(|(_, a, b)| a.face == b.face)
+        .map(|(d, a, b)| {
+            let (a, b) = (mirrored(d, a.normal), mirrored(d, b.normal));
+            a.cross(b).length().atan2(a.dot(b)).to_degrees()
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    errors[errors.len() * 99 / 100]
+}
+
 #[test]
 #[ignore = "minutes: eleven fixtures, seven angles, each beside a full sweep"]
 fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
     let asked = [1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001];
     let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
-    let (mut total, mut kept, mut ratios, mut smoothed) = (0, 0, Vec::new(), Vec::new());
+    let (mut total, mut kept, mut again, mut ratios, mut smoothed) = (0, 0, 0, Vec::new(), Vec::new());
     println!(
-        "fixture | asked ° | reached ° | normals | tolerance mm | facets | s | cheapest of the sweep | s | ratio | smoothed | spline s | spent s"
+        "fixture | asked ° | reached ° | on other rays ° | normals | tolerance mm | facets | s | cheapest of the sweep | s | ratio | smoothed | spline s | spent s"
     );
     for path in fixtures().iter().filter(|p| p.to_string_lossy().contains(&only)) {
         let model = read(path);
@@ -107,6 +134,7 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
         for degrees in asked {
             let found = aim(&model, &product, &Ask { job_rays: JOB, ..Ask::degrees(degrees) }, &|_| ());
             let seconds = found.seconds_prepare + found.seconds_trace;
+            let other = judged_again(&product, &found);
             let good =
                 || sweep.iter().filter(|(_, r)| r.intersector != "exact" && r.direction_error_deg_p99 <= degrees);
             let least = good().map(|(_, r)| costs.seconds(&r.normals, r.facets)).fold(f64::INFINITY, f64::min);
@@ -114,7 +142,7 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
             let best = good().min_by(|a, b| a.0.total_cmp(&b.0)).expect("exact normals reach any angle");
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             println!(
-                "{name} | {degrees} | {:.2e} | {:?} | {:.1e}..{:.1e} | {} | {seconds:.3} | {} {} | {:.3} | {:.2} | {smooth:.2} | {spline:.3} | {:.2}",
+                "{name} | {degrees} | {:.2e} | {other:.2e} | {:?} | {:.1e}..{:.1e} | {} | {seconds:.3} | {} {} | {:.3} | {:.2} | {smooth:.2} | {spline:.3} | {:.2}",
                 found.reached_deg,
                 found.normals,
                 found.tolerance_mm[0],
@@ -128,6 +156,7 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
             );
             total += 1;
             kept += usize::from(found.kept);
+            again += usize::from(other <= degrees);
             ratios.push(seconds / best.0);
             smoothed.push(smooth);
             if found.seconds > 2.0 {
@@ -135,11 +164,11 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
             }
         }
     }
-    println!("{kept} of {total} kept");
+    println!("{kept} of {total} kept, {again} on other rays");
     for (name, list) in [("ratio", &mut ratios), ("smoothed ratio", &mut smoothed)] {
         list.sort_by(f64::total_cmp);
         let at = |share: f64| list[((list.len() - 1) as f64 * share) as usize];
         println!("{name}: median {:.2}, p90 {:.2}, largest {:.2}", at(0.5), at(0.9), at(1.0));
     }
-    assert!(kept as f64 >= 0.95 * f64::from(total));
+    assert!(kept.min(again) as f64 >= 0.95 * f64::from(total));
 }

@@ -42,8 +42,17 @@ fn css([r, g, b]: [f64; 3]) -> String {
     format!("rgb({},{},{})", byte(r), byte(g), byte(b))
 }
 
-fn axis(style: &AxisStyle) -> Value {
-    json!({"title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
+/// An axis over these values. On a logarithmic one plotly names every digit of a decade, which overlap where there are more than two.
+fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
+    let good = values.filter(|v| v.is_finite() && *v > 0.0);
+    let (low, high) = good.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
+    let decades = (high / low).log10();
+    let step = match decades {
+        d if !style.log || !d.is_finite() || d > 4.0 => Value::Null,
+        d if d > 1.5 => json!(1),
+        _ => json!("D2"),
+    };
+    json!({"dtick": step, "title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
         "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
@@ -81,7 +90,15 @@ pub(super) fn chart(chart: &Chart) -> Value {
             (vec![heat], json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}}))
         }
     };
-    let mut layout = json!({"xaxis": axis(&chart.x), "yaxis": axis(&chart.y),
+    let along = |k: usize| -> Vec<f64> {
+        match &chart.content {
+            Content::Series(series) => series.iter().flat_map(|s| s.points.iter().map(|p| p[k])).collect(),
+            Content::Bars { layers, .. } if k == 1 => layers.iter().flat_map(|l| l.1.iter().copied()).collect(),
+            _ => Vec::new(),
+        }
+    };
+    let [x, y] = [(&chart.x, 0), (&chart.y, 1)].map(|(style, k)| axis(style, along(k).into_iter()));
+    let mut layout = json!({"xaxis": x, "yaxis": y,
         "margin": {"l": 60, "r": 14, "t": 10, "b": 48}, "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
         "hoverlabel": {"align": "left"}});
     merge(&mut layout, extra);

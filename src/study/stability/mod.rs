@@ -210,10 +210,16 @@ pub fn answer(rows: &[Row]) -> String {
         let (rays, flagged, wrong) = (sum(|r| r.rays), sum(|r| r.flagged), sum(|r| r.wrong));
         let mut cases: Vec<&str> = own().filter(|r| r.wrong > 0).map(|r| r.case.as_str()).collect();
         cases.dedup();
-        let of_cases = if wrong > 0 { format!(" in {} cases", cases.len()) } else { String::new() };
-        format!("{name} {wrong} of {rays}{of_cases} ({flagged} flagged)")
+        let flags = if flagged > 0 { format!(", {flagged} more said to be unproved") } else { String::new() };
+        match wrong {
+            0 => format!("**{name} none** of {rays}{flags}"),
+            _ => format!("{name} {wrong} of {rays} in {} of the cases{flags}", cases.len()),
+        }
     };
-    format!("Wrong in silence: {}.", names.iter().map(part).collect::<Vec<_>>().join("; "))
+    format!(
+        "Rays through edges, corners, poles and silhouettes, the truth known by construction. Answered wrongly without a warning: {}.",
+        names.iter().map(part).collect::<Vec<_>>().join("; ")
+    )
 }
 
 /// All cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees.
