@@ -48,6 +48,14 @@ impl Intersector for Probe<'_> {
         self.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
     }
 
+    fn expect(&self, rays: u64, threads: usize) {
+        self.inner.expect(rays, threads);
+    }
+
+    fn is_gone(&self, ray: &Ray) -> bool {
+        self.inner.is_gone(ray)
+    }
+
     fn footprint(&self) -> Footprint {
         self.inner.footprint()
     }

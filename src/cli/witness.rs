@@ -65,6 +65,19 @@ impl Intersector for Witness<'_> {
         self.inner.intersect_batch(rays, hits, cost);
     }
 
+    fn expect(&self, rays: u64, threads: usize) {
+        self.inner.expect(rays, threads);
+    }
+
+    /// A ray that is gone is not asked about any more: it is noted here.
+    fn is_gone(&self, ray: &Ray) -> bool {
+        let gone = self.inner.is_gone(ray);
+        if gone {
+            self.note(ray);
+        }
+        gone
+    }
+
     fn footprint(&self) -> Footprint {
         self.inner.footprint()
     }

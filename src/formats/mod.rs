@@ -30,7 +30,7 @@ mod stl;
 mod stream;
 mod vtk;
 
-pub use atomic::write_atomic;
+pub use atomic::{file_stem, write_atomic};
 pub use base64::base64;
 pub use data1::{read_data1, write_data1};
 pub use data2::{Data2Facet, read_data2};

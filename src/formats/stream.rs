@@ -3,6 +3,7 @@
 //! The number of rows stands at the head of every array, so each column waits in a file beside the final one until all rows
 //! are known, and is then packed; the disk holds the rows twice for that while.
 
+use super::atomic::remove_stale;
 use super::npz::header;
 use super::{Error, ErrorKind, write_atomic};
 use std::fs::{self, File};
@@ -39,6 +40,7 @@ impl NpzStream {
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, Error> {
         let mut stream = Self { path: path.to_path_buf(), columns: Vec::new(), rows: 0 };
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        remove_stale(path);
         for column in columns {
             let beside = path.with_file_name(format!(".{name}.{}.{}.part", std::process::id(), column.name));
             let file = File::create(&beside).map_err(|e| Error::new(path, ErrorKind::Write(e)))?;

@@ -237,6 +237,15 @@ impl FacetRay {
     /// on the ray.
     #[cold]
     fn ways_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
+        // The fold is the same from both sides; where it opens to the ray whichever side that leaves, nothing is met.
+        let [a, b, c, d] = *corners;
+        let (first, second) = ((b - a).cross(c - a), (c - a).cross(d - a));
+        let fold = first.dot(d - a);
+        let sides = [first, second].map(|n| fold * n.dot(self.direction));
+        let certain = fold.abs() > 1e-9 * first.length_squared() || c == d;
+        if certain && sides[0] <= 0.0 && sides[1] <= 0.0 {
+            return [Way::Never; 2];
+        }
         let start = Point::from_array(self.origin);
         let own = Own::new(corners, start);
         let apex = corners[if own.second { 1 } else { 3 }];

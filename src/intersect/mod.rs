@@ -24,6 +24,15 @@ pub trait Intersector: Sync {
         }
     }
 
+    /// Tells that so many rays are going to be asked, on so many threads: what helps them all may be worked out now.
+    fn expect(&self, _rays: u64, _threads: usize) {}
+
+    /// Whether it is known, without looking for a hit, that a ray which leaves a surface meets nothing, however far it goes;
+    /// `false` says nothing.
+    fn is_gone(&self, _ray: &Ray) -> bool {
+        false
+    }
+
     /// What the structure holds and what it took to build.
     fn footprint(&self) -> Footprint;
 }

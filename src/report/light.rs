@@ -3,6 +3,7 @@
 use super::court::{self, verdict};
 use super::{AxisStyle, Block, Cell, Chart, Provenance, Report, Section, Series, SeriesStyle, Table, View};
 use super::{figures, grouped, seconds};
+use crate::formats::file_stem;
 use crate::formats::{Axis, Facets, Grid, Polylines};
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
 use crate::study::check::Check;
@@ -334,11 +335,4 @@ fn reading(r: &ReceiverResult, grid: &Grid) -> String {
 /// A name as words.
 fn spoken(name: &str) -> String {
     name.replace('_', " ")
-}
-
-/// A name that is safe in a path.
-pub fn file_stem(name: &str) -> String {
-    let safe: String =
-        name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
-    if safe.is_empty() { "unnamed".into() } else { safe }
 }

@@ -23,10 +23,11 @@ mod table;
 mod view;
 mod write;
 
+pub use crate::formats::file_stem;
 pub use chart::{AxisStyle, Chart, Content, Series, SeriesStyle};
 pub use court::{Trial, verdict};
 pub use document::{Block, Report, Section};
-pub use light::{Light, file_stem, path_lines, receiver_grid};
+pub use light::{Light, path_lines, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};
 pub use provenance::Provenance;
 pub use studies::study_report;

@@ -254,6 +254,7 @@ pub fn trace(
         n => n,
     };
     let kind = kernel_of(bound, settings);
+    intersector.expect(context.plan.rays / u64::from(shards.max(1)), threads);
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let share = context.plan.rays * u64::from(last.saturating_sub(first)) / u64::from(replicates);

@@ -22,6 +22,7 @@ mod build;
 mod clip;
 mod engine;
 mod flatten;
+mod horizon;
 mod huge;
 mod node;
 mod pack;
@@ -36,6 +37,7 @@ use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
 use node::{Block, Node};
 pub use statistics::Statistics;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// How the tree is built and walked.
@@ -114,6 +116,8 @@ pub struct Octree<'m> {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
     root: Option<node::Link>,
+    /// Of all facets, once it paid to find them.
+    horizons: OnceLock<Vec<horizon::Horizon>>,
     statistics: Statistics,
     build_seconds: f64,
 }
@@ -135,7 +139,19 @@ impl<'m> Octree<'m> {
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * 1e-6) };
         let frame = state::Frame::new(center, &bounds);
         let build_seconds = started.elapsed().as_secs_f64();
-        Self { around, settings: *settings, center, frame, nodes, blocks, root, statistics, build_seconds }
+        let horizons = OnceLock::new();
+        Self {
+            around,
+            settings: *settings,
+            center,
+            frame,
+            nodes,
+            blocks,
+            root,
+            horizons,
+            statistics,
+            build_seconds,
+        }
     }
 
     /// Distance and facet of the nearest hit of each ray, without normals: what other ray tracers' kernels report.
@@ -226,6 +242,18 @@ impl Intersector for Octree<'_> {
                     found[i].map(|hit| normals::describe(self.around.mesh, &rays[i], &hit, self.settings.normals));
             }
         }
+    }
+
+    fn expect(&self, rays: u64, threads: usize) {
+        if horizon::pays(self, rays) {
+            self.horizons.get_or_init(|| horizon::find(self, threads));
+        }
+    }
+
+    #[inline]
+    fn is_gone(&self, ray: &Ray) -> bool {
+        let (Some(horizons), Some(from)) = (self.horizons.get(), ray.from) else { return false };
+        horizons.get(from.primitive as usize).is_some_and(|h| h.is_below(ray.direction))
     }
 
     fn footprint(&self) -> Footprint {

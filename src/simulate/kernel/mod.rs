@@ -100,7 +100,9 @@ fn trace_rays<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) 
         context.intersector.intersect_batch(&wave.rays, &mut wave.hits, &mut cost);
         local.counts.segments += wave.rays.len() as u64;
         for (i, (path, ray)) in wave.paths.iter_mut().zip(&mut wave.rays).enumerate() {
-            if !step::step(context, path, ray, wave.hits[i].as_ref(), local, &mut wave.pending) {
+            let on = step::step(context, path, ray, wave.hits[i].as_ref(), local, &mut wave.pending)
+                && !(context.intersector.is_gone(ray) && step::go(context, path, ray, local));
+            if !on {
                 wave.ended.push(i as u32);
             }
         }

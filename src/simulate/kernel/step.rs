@@ -136,6 +136,24 @@ pub(super) fn step<C: Carry>(
     going.is_some_and(|going| onward(context, path, ray, &meeting, going, local))
 }
 
+/// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
+#[inline(never)]
+pub(super) fn go<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
+    if path.receiver == SCATTERS {
+        return false;
+    }
+    local.counts.segments += 1;
+    late(context, path, ray, None);
+    if !context.passing.is_empty() {
+        pass(context, path, ray, ray.t_max, local);
+    }
+    if C::MEDIA {
+        attenuate(context, path, ray.t_max, local);
+    }
+    leave(context, path, ray, local);
+    true
+}
+
 /// A ray meets a face.
 pub(super) struct Meeting<'a> {
     pub(super) hit: &'a Hit,

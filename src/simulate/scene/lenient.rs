@@ -1,5 +1,6 @@
 //! Numbers as people write them: `1e6` rays, one length where two may stand.
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserializer;
 use serde::de::{Error, SeqAccess, Unexpected, Visitor};
 use std::fmt;
@@ -17,6 +18,17 @@ pub(super) fn count_if_any<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u64
 /// Two numbers, or one for both.
 pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
     d.deserialize_any(Range).map(Some)
+}
+
+/// What a schema says of a whole number that may be written as `1e6`.
+pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": 9e15})
+}
+
+/// What a schema says of two numbers, or one for both.
+pub(super) fn range_schema(generator: &mut SchemaGenerator) -> Schema {
+    let two = <[f64; 2]>::json_schema(generator);
+    json_schema!({"anyOf": [{"type": "number"}, two]})
 }
 
 struct Count;

@@ -16,6 +16,7 @@ pub(crate) mod suggest;
 mod surface;
 
 use super::{Error, ErrorKind};
+use crate::formats::file_stem;
 pub use material::{
     ColourKey, FaceSelector, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey,
     SurfaceKind,
@@ -27,6 +28,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 pub use source::{Source, SourceKind};
 pub use spectrum::{SpectrumKey, SpectrumName};
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -155,21 +157,35 @@ impl Scene {
         surface::check(self)?;
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
-        let mut names: Vec<&str> = Vec::new();
-        for (i, receiver) in self.receivers.iter().enumerate() {
-            if names.contains(&receiver.name.as_str()) {
-                let message = format!("two receivers are called '{}'", receiver.name);
-                let at = [Key::Name("receiver"), Key::Index(i), Key::Name("name")];
-                return Err(self.error(ErrorKind::Value, &at, message).help("give each a name of its own"));
-            }
-            names.push(&receiver.name);
-        }
+        self.check_receiver_names()?;
         let sums: u64 = self.receivers.iter().map(Receiver::sums).sum();
         if sums > MOST_SUMS {
             let largest = (0..self.receivers.len()).max_by_key(|&i| self.receivers[i].sums()).unwrap_or(0);
             let at = [Key::Name("receiver"), Key::Index(largest), Key::Name("cells")];
             let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
             return Err(self.error(ErrorKind::Value, &at, message).help("use fewer `cells` or fewer `bins_nm`"));
+        }
+        Ok(())
+    }
+
+    /// Every receiver has files of its own.
+    fn check_receiver_names(&self) -> Result<(), Error> {
+        let mut stems: HashMap<String, &str> = HashMap::new();
+        for (i, Receiver { name, .. }) in self.receivers.iter().enumerate() {
+            let stem = file_stem(name);
+            let message = match stems.get(&stem) {
+                _ if stem == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
+                Some(other) if *other == name => format!("two receivers are called '{name}'"),
+                Some(other) => {
+                    format!("the files of the receivers '{other}' and '{name}' would both be called '{stem}'")
+                }
+                None => {
+                    stems.insert(stem, name);
+                    continue;
+                }
+            };
+            let at = [Key::Name("receiver"), Key::Index(i), Key::Name("name")];
+            return Err(self.error(ErrorKind::Value, &at, message).help("give each a name of its own"));
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Run {
     /// Number of rays that leave the sources, such as 1_000_000 or 1e6.
     #[serde(deserialize_with = "lenient::count")]
+    #[schemars(schema_with = "lenient::count_schema")]
     pub rays: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -96,6 +97,7 @@ pub enum Interfaces {
 pub struct Accuracy {
     /// Smallest and largest sag of a facet, mm; one number for both.
     #[serde(deserialize_with = "lenient::range")]
+    #[schemars(schema_with = "lenient::range_schema")]
     pub tolerance_mm: Option<[f64; 2]>,
     /// Largest angle between the normals of a facet's corners, degrees.
     pub angle_deg: Option<f64>,

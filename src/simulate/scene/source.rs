@@ -44,6 +44,7 @@ pub struct Source {
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays; by its share of the power otherwise.
     #[serde(deserialize_with = "lenient::count_if_any")]
+    #[schemars(schema_with = "lenient::count_schema")]
     pub rays: Option<u64>,
 }
 

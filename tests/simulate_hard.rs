@@ -1,0 +1,104 @@
+//! Scenes that are hard on geometry rather than on light: touching layers, tiny and huge units, grazing light, receivers inside parts.
+
+mod simulate_support;
+
+use lampyris::math::Point;
+use lampyris::simulate::Results;
+use simulate_support::World;
+
+const LAYERS: [f64; 3] = [1.5, 1.7, 1.33];
+
+/// Three slabs, each 3 mm thick and touching the next, in mm times `scale`, lit along their normal.
+fn layers(scale: f64, glue: f64) -> Results {
+    let mut world = World::default();
+    let mut text = format!("[run]\nrays = 2000\ninterfaces = 'split'\nsplit_floor = 0\nglue_mm = {glue:e}\n");
+    for (k, index) in LAYERS.iter().enumerate() {
+        let (name, z) = (format!("layer {k}"), 3.0 * k as f64 * scale);
+        let side = 50.0 * scale;
+        world.cuboid(&name, Point::new(-side, -side, z), Point::new(side, side, 3.0 * (k + 1) as f64 * scale));
+        text += &format!(
+            "[[medium]]\nname = 'm{k}'\nindex = {index:?}\n[[material]]\npart = '{name}'\nmedium = 'm{k}'\n"
+        );
+    }
+    text +=
+        &format!("[[source]]\nkind = 'collimated'\nat = [0, 0, {:?}]\nradius = {:?}\n", -10.0 * scale, 5.0 * scale);
+    for (name, z) in [("behind", 20.0), ("before", -20.0)] {
+        let (z, size) = (z * scale, 20.0 * scale);
+        text += &format!("[[receiver]]\nname = '{name}'\nat = [0, 0, {z:?}]\nsize = [{size:?}, {size:?}]\n");
+    }
+    world.run(&text, |_| ())
+}
+
+/// Light to and fro between layers adds up as power: `T = T₁T₂/(1 − R₁R₂)`, `R = R₁ + T₁²R₂/(1 − R₁R₂)`.
+fn of_stack() -> [f64; 2] {
+    let indices = [1.0, LAYERS[0], LAYERS[1], LAYERS[2], 1.0];
+    let (mut t, mut r_front, mut r_back) = (1.0, 0.0, 0.0);
+    for pair in indices.windows(2) {
+        let r: f64 = ((pair[0] - pair[1]) / (pair[0] + pair[1])).powi(2);
+        let echo = 1.0 - r_back * r;
+        (r_front, r_back) = (r_front + t * t * r / echo, r + (1.0 - r).powi(2) * r_back / echo);
+        t = t * (1.0 - r) / echo;
+    }
+    [t, r_front]
+}
+
+#[test]
+fn touching_layers_from_microns_to_kilometres() {
+    let [t, r] = of_stack();
+    assert!((t + r - 1.0).abs() < 1e-14);
+    for (scale, glue) in [(1.0, 1e-3), (1e-3, 1e-6), (1e6, 1e-3), (1e6, 1.0)] {
+        let results = layers(scale, glue);
+        let [behind, before] = &results.receivers[..] else { panic!() };
+        // Below the power floor of 1e-6 light is cut off.
+        assert!(
+            (behind.power - t).abs() < 1e-5 && (before.power - r).abs() < 1e-5,
+            "{scale}: {} {}",
+            behind.power,
+            t
+        );
+        assert!(results.lost_rays == 0 && results.power.cut_off < 1e-5, "{scale}: {:?}", results.ledger.first());
+    }
+}
+
+/// What passes the middle of a slab, either way, is all that fell on it: `(1 − R)(1 + R)/(1 − R²) = 1` at any index.
+#[test]
+fn a_receiver_inside_a_slab_sees_light_pass_to_and_fro() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+    for index in [1.2, 1.5, 2.5] {
+        let text = format!(
+            "[run]\nrays = 2000\ninterfaces = 'split'\nsplit_floor = 0
+            [[medium]]\nname = 'glass'\nindex = {index}\n[[material]]\npart = 'glass'\nmedium = 'glass'
+            [[source]]\nkind = 'collimated'\nat = [0, 0, -10]\nradius = 5
+            [[receiver]]\nname = 'middle'\nat = [0, 0, 1.5]\nsize = [20, 20]\nabsorbs = false"
+        );
+        let results = world.run(&text, |_| ());
+        assert!((results.receivers[0].power - 1.0).abs() < 1e-5, "{index}: {}", results.receivers[0].power);
+    }
+}
+
+/// At 89.9° a plate of 0.01 mm reflects nearly all; to and fro between two faces of reflectance R it lets `(1 − R)/(1 + R)` through.
+#[test]
+fn grazing_light_on_a_thin_plate() {
+    let (n, angle) = (1.5f64, 89.9f64.to_radians());
+    let (cos_i, cos_t) = (angle.cos(), (1.0 - (angle.sin() / n).powi(2)).sqrt());
+    let s = (cos_i - n * cos_t) / (cos_i + n * cos_t);
+    let p = (n * cos_i - cos_t) / (n * cos_i + cos_t);
+    let r = 0.5 * (s * s + p * p);
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-500.0, -500.0, 0.0), Point::new(500.0, 500.0, 0.01));
+    let text = format!(
+        "[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\npower_floor = 1e-9
+        [[medium]]\nname = 'glass'\nindex = {n}\n[[material]]\npart = 'glass'\nmedium = 'glass'
+        [[source]]\nkind = 'collimated'\nat = [{:?}, 0, {:?}]\ndirection = [{:?}, 0, {:?}]\nradius = 0.01
+        [[receiver]]\nname = 'behind'\nat = [0, 0, 1]\nsize = [4000, 4000]",
+        -angle.tan() * 0.5,
+        -0.5,
+        angle.sin(),
+        angle.cos()
+    );
+    let results = world.run(&text, |_| ());
+    let through = (1.0 - r) / (1.0 + r);
+    assert!((results.receivers[0].power - through).abs() < 1e-6, "{} {through}", results.receivers[0].power);
+    assert_eq!(results.lost_rays, 0);
+}
