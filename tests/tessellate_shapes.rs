@@ -55,6 +55,20 @@ fn a_whole_sphere_is_closed_and_certified() {
     }
 }
 
+/// A sector of angle 2α strays r·(1 − cos α) from its triangle, so acos(1 − ξ/r) says how many there must be.
+#[test]
+fn the_tip_of_a_cone_has_as_many_facets_as_its_rim() {
+    let (r, xi) = (10_000.0, 1.0);
+    let surface = sweep::cone(&Frame::IDENTITY, r, PI / 4.0, [0.0, 2.0 * PI], [-r, 0.0]);
+    let shell = Shell { faces: vec![face(surface, false, Vec::new())], ..Shell::default() };
+    let made = tessellate(&Model::from_part(Part { shells: vec![shell], ..Part::default() }), &measured(xi));
+    assert_sound(&made, "cone");
+    let sectors = PI / (1.0 - xi / r).acos();
+    // Two sectors may be a quad; the chords of a rim without an edge take 0.48 of the tolerance.
+    let facets = made.report.facets as f64;
+    assert!(facets >= 0.5 * sectors && facets <= 1.5 * sectors, "{facets} facets, {sectors} sectors");
+}
+
 /// The ends of its circles differ by a last bit, so the line through them points anywhere.
 #[test]
 fn a_tube_that_starts_a_last_bit_beyond_its_seam_gets_strips() {

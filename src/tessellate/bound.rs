@@ -35,7 +35,7 @@ const SLIGHT: f64 = 0.02;
 
 /// Bounds facets of one face.
 pub(super) struct Prover<'s, 'a> {
-    sheet: &'s Sheet<'a>,
+    pub(super) sheet: &'s Sheet<'a>,
     judge: Judge,
     nets: Nets,
     near: Near,

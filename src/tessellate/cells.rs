@@ -7,6 +7,7 @@ use super::bound::Prover;
 use super::ladder::ladder;
 use super::look::{Look, quad_bound};
 use super::rings::{Follows, Rings};
+use super::sector;
 use super::settings::Judge;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv};
@@ -133,7 +134,8 @@ impl Tree<'_, '_> {
             && let Some(xi) = self.looks_fit(cell, &look)
         {
             // A cell at the border is only a measure of size, but a look alone leaves them larger: 6 % more facets on a lens.
-            let bound = quad_bound(&mut out.prover, &look.facet(cell), xi);
+            let prover = &mut out.prover;
+            let bound = at_pole(prover, cell, xi).unwrap_or_else(|| quad_bound(prover, &look.facet(cell), xi));
             if bound <= xi {
                 if inside || self.aligned(cell, &near) && self.contains(cell.center()) {
                     let (first, places) = (look.first(), look.places());
@@ -239,6 +241,16 @@ impl Tree<'_, '_> {
         }
         odd
     }
+}
+
+/// Bound of a cell with a side on a pole, which becomes a triangle.
+fn at_pole(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64> {
+    let c = cell.corners();
+    let polar = c.map(|x| prover.sheet.pole(x).is_some());
+    let k = (0..4).find(|&k| !polar[k] && !polar[(k + 1) % 4] && polar[(k + 2) % 4] && polar[(k + 3) % 4])?;
+    let uv = [0, 1, 2].map(|i| c[(k + i) % 4]);
+    let xyz = uv.map(|x| prover.sheet.point(x));
+    sector::bound(prover, uv, xyz, [None; 3], limit)
 }
 
 /// Whether a segment meets a rectangle.

@@ -175,13 +175,13 @@ struct Emit<'e, 's, 'a> {
 }
 
 impl Emit<'_, '_, '_> {
-    fn facet(&mut self, nodes: [u32; 4], pole: Option<Uv>, bound: f64, tolerance: f64) {
+    fn facet(&mut self, nodes: [u32; 4], pole: Option<(usize, Uv)>, bound: f64, tolerance: f64) {
         let corner = [0, 1, 2, 3].map(|k| {
             if k == 3 && nodes[3] == nodes[2] {
                 return u32::MAX;
             }
             match pole {
-                Some(uv) if k == 2 => self.corner(nodes[2], uv),
+                Some((at, uv)) if k == at => self.corner(nodes[at], uv),
                 _ => match self.ids.get(&nodes[k]) {
                     Some(&id) => id,
                     None => {

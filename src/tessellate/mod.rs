@@ -33,6 +33,7 @@ mod report;
 mod rings;
 mod sample;
 mod scalar;
+mod sector;
 mod settings;
 mod sheet;
 mod slight;

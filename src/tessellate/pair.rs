@@ -2,6 +2,8 @@
 
 use super::bound::Prover;
 use super::matching;
+use super::sector;
+use super::sheet::Sheet;
 use super::strip::{Node, Strip, key};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
@@ -11,8 +13,8 @@ pub(super) struct StripFacet {
     pub(super) nodes: [u32; 4],
     pub(super) bound: f64,
     pub(super) tolerance: f64,
-    /// Other parameters for the third corner: a pole, seen in the middle of its facet.
-    pub(super) pole: Option<Uv>,
+    /// Other parameters for a corner: a pole, seen in the middle of its facet.
+    pub(super) pole: Option<(usize, Uv)>,
 }
 
 /// How far from square (negative: a triangle without area is taken in), two triangles, and the quad they make.
@@ -67,23 +69,25 @@ pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut 
             let (full, empty) = if collapsed[i] { (j, i) } else { (i, j) };
             // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
             let (uv, xyz) = (t[empty].map(|n| node(n).uv), t[full].map(|n| node(n).place));
-            let covered = bound.max(prover.piece(uv, xyz, tolerance));
+            let whole = sector::applies(prover.sheet, t[full].map(|n| node(n).uv));
+            let covered = if whole { bound } else { bound.max(prover.piece(uv, xyz, tolerance)) };
             facets.push(with_pole(strip, prover, t[full], q, [covered, tolerance]));
         } else {
-            facets.push(StripFacet { nodes: q, bound, tolerance, pole: None });
+            let pole = sector::seen(prover.sheet, &q.map(|n| node(n).uv));
+            facets.push(StripFacet { nodes: q, bound, tolerance, pole });
         }
     }
     for (i, tri) in t.iter().enumerate() {
         if !taken[i] && !collapsed[i] {
-            facets.push(StripFacet {
-                nodes: [tri[0], tri[1], tri[2], tri[2]],
-                bound: strip.bounds[i],
-                tolerance: strip.tolerances[i],
-                pole: None,
-            });
+            facets.push(alone(strip, prover.sheet, *tri, [strip.bounds[i], strip.tolerances[i]]));
         }
     }
     kites(strip, prover, facets)
+}
+
+/// Whether a facet is a triangle with a pole as its third corner.
+fn is_sector(f: &StripFacet) -> bool {
+    f.pole.is_some() && f.nodes[2] == f.nodes[3]
 }
 
 /// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
@@ -92,15 +96,14 @@ fn kites(strip: &Strip, prover: &mut Prover<'_, '_>, facets: Vec<StripFacet>) ->
     let node = |n: u32| strip.nodes[n as usize];
     // A sector is (a, b, pole): the next one around starts at b.
     let mut starts: FxHashMap<u32, usize> = FxHashMap::default();
-    for (i, f) in facets.iter().enumerate().filter(|(_, f)| f.pole.is_some()) {
+    for (i, f) in facets.iter().enumerate().filter(|(_, f)| is_sector(f)) {
         starts.insert(f.nodes[0], i);
     }
     let next = |f: &StripFacet| {
         let j = *starts.get(&f.nodes[1])?;
         (node(facets[j].nodes[2]).position == node(f.nodes[2]).position).then_some(j)
     };
-    let follows: Vec<Option<usize>> =
-        facets.iter().map(|f| if f.pole.is_some() { next(f) } else { None }).collect();
+    let follows: Vec<Option<usize>> = facets.iter().map(|f| if is_sector(f) { next(f) } else { None }).collect();
     let mut led = vec![false; facets.len()];
     follows.iter().flatten().for_each(|&j| led[j] = true);
     let heads = (0..facets.len()).filter(|&i| !led[i]).chain((0..facets.len()).filter(|&i| led[i]));
@@ -116,12 +119,21 @@ fn kites(strip: &Strip, prover: &mut Prover<'_, '_>, facets: Vec<StripFacet>) ->
             let Some(j) = follows[i].filter(|&j| j != i && !gone[j] && into[j].is_none()) else { continue };
             let (f, g) = (&facets[i], &facets[j]);
             let tolerance = f.tolerance.min(g.tolerance);
-            let Some((x, y)) = f.pole.zip(g.pole).filter(|_| f.bound.max(g.bound) <= tolerance) else { continue };
+            let Some(((_, x), (_, y))) = f.pole.zip(g.pole).filter(|_| f.bound.max(g.bound) <= tolerance) else {
+                continue;
+            };
             if squareness([f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]].map(node)).is_none() {
                 continue;
             }
-            let pole = 0.5 * (x + y);
-            let also = [f, g].map(|h| seen_from(strip, prover, h.nodes, pole, tolerance));
+            // Both sectors hold the line between them; other poles have to be looked at anew.
+            let quad = [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]].map(|n| node(n).uv);
+            let (pole, also) = match sector::seen(prover.sheet, &quad) {
+                Some((2, pole)) => (pole, [Some(0.0); 2]),
+                _ => {
+                    let pole = 0.5 * (x + y);
+                    (pole, [f, g].map(|h| seen_from(strip, prover, h.nodes, pole, tolerance)))
+                }
+            };
             if let [Some(also), Some(too)] = also {
                 (into[i], gone[j]) = (Some((j, pole, also.max(too))), true);
                 at = follows[j];
@@ -139,7 +151,7 @@ fn kites(strip: &Strip, prover: &mut Prover<'_, '_>, facets: Vec<StripFacet>) ->
             nodes: [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]],
             bound: f.bound.max(g.bound).max(also),
             tolerance: f.tolerance.min(g.tolerance),
-            pole: Some(pole),
+            pole: Some((2, pole)),
         });
     }
     out
@@ -209,14 +221,25 @@ fn with_pole(
         let k = full.iter().position(|&f| f != n && position(f) == position(n) && !full.contains(&n))?;
         Some((k, n))
     });
-    let alone = StripFacet { nodes: [full[0], full[1], full[2], full[2]], bound, tolerance, pole: None };
-    let Some((k, n)) = twin else { return alone };
+    let Some((k, n)) = twin.filter(|_| !sector::applies(prover.sheet, full.map(|n| strip.nodes[n as usize].uv)))
+    else {
+        return alone(strip, prover.sheet, full, [bound, tolerance]);
+    };
     let nodes = [full[(k + 1) % 3], full[(k + 2) % 3], full[k], full[k]];
     let middle = 0.5 * (strip.nodes[full[k] as usize].uv + strip.nodes[n as usize].uv);
     match seen_from(strip, prover, nodes, middle, tolerance) {
-        Some(also) => StripFacet { nodes, bound: bound.max(also), tolerance, pole: Some(middle) },
-        None => alone,
+        Some(also) => StripFacet { nodes, bound: bound.max(also), tolerance, pole: Some((2, middle)) },
+        None => alone(strip, prover.sheet, full, [bound, tolerance]),
     }
+}
+
+/// A triangle by itself, a pole as its third corner.
+fn alone(strip: &Strip, sheet: &Sheet<'_>, t: [u32; 3], [bound, tolerance]: [f64; 2]) -> StripFacet {
+    let uv = t.map(|n| strip.nodes[n as usize].uv);
+    let pole = sector::seen(sheet, &uv).filter(|_| sector::applies(sheet, uv));
+    let k = pole.map_or(2, |(k, _)| k);
+    let nodes = [t[(k + 1) % 3], t[(k + 2) % 3], t[k], t[k]];
+    StripFacet { nodes, bound, tolerance, pole: pole.map(|(_, uv)| (2, uv)) }
 }
 
 /// Bound of a triangle at a pole with other parameters of its third corner, where it holds: they are those of the facet that is

@@ -3,6 +3,9 @@ use super::settings::Field;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};
 
+/// Share of the domain, and of the surface's size, within which a place is a pole; borders end there up to their rounding.
+const POLE: f64 = 1e-9;
+
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct Sheet<'a> {
     pub(super) surface: &'a Surface,
@@ -19,6 +22,10 @@ pub(super) struct Sheet<'a> {
     pub(super) creases: [Vec<f64>; 2],
     /// Diagonal of the box around the surface, mm.
     pub(super) size: f64,
+    /// Whether the sides of the domain are points: at both ends of u, of v.
+    poles: [[bool; 2]; 2],
+    /// Farthest that such a side strays from a point, mm.
+    pub(super) pole_size: f64,
 }
 
 impl<'a> Sheet<'a> {
@@ -32,7 +39,27 @@ impl<'a> Sheet<'a> {
         let creases = [creases(surface, 0, &breaks), creases(surface, 1, &breaks)];
         let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
         let bends = Bends::new(surface, &patches, &breaks);
-        Self { surface, field, flip, affine: is_affine(surface, size), patches, bends, breaks, creases, size }
+        let least = POLE * size;
+        let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
+        let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
+        let affine = is_affine(surface, size);
+        Self { surface, field, flip, affine, patches, bends, breaks, creases, size, poles, pole_size }
+    }
+
+    /// Where `uv` lies on a pole: the parameter that is constant along it.
+    pub(super) fn pole(&self, uv: Uv) -> Option<usize> {
+        let domain = self.surface.domain();
+        let near = |d: usize, end: usize| {
+            let [a, b] = domain[d];
+            (uv[d] - domain[d][end]).abs() <= POLE * (b - a)
+        };
+        (0..2).find(|&d| (0..2).any(|end| self.poles[d][end] && near(d, end)))
+    }
+
+    /// Size of the parameter rectangle.
+    pub(super) fn extent(&self) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        Uv::new(u1 - u0, v1 - v0)
     }
 
     /// Index of the knot interval that holds `x`.
@@ -95,6 +122,17 @@ impl<'a> Sheet<'a> {
         });
         self.field.at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
     }
+}
+
+/// How far the control points of a side of the domain stray from its first.
+fn side_size(s: &Surface, d: usize, end: usize) -> f64 {
+    let counts = s.counts();
+    let fixed = if end == 0 { 0 } else { counts[d] - 1 };
+    let at = |k: usize| {
+        let (i, j) = if d == 0 { (fixed, k) } else { (k, fixed) };
+        s.points[i * counts[1] + j].project()
+    };
+    (1..counts[1 - d]).map(|k| (at(k) - at(0)).length()).fold(0.0, f64::max)
 }
 
 /// Local parameters of `uv` on a patch.

@@ -2,6 +2,7 @@
 //! triangle cannot be proved.
 
 use super::bound::Prover;
+use super::sector;
 use super::settings::Judge;
 use super::sheet::Sheet;
 use super::trim::Trim;
@@ -141,8 +142,14 @@ pub(super) fn prove(
         uv.iter().fold(sheet.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(sheet.tolerance(p)))
     };
     let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (i, j, trims.get(&key(t[i], t[j]))));
-    // At a pole a triangle is a line, and its neighbour covers its piece of the surface; its sides may be the border of both. The two
-    // ends of a closed curve are one point too, but the curve between them is not, and must be divided.
+    if let Some(bound) = sector::bound(prover, uv, xyz, sides.map(|s| s.2), xi) {
+        return (bound, xi);
+    }
+    if let Some(bound) = sector::line(sheet, uv, t, trims) {
+        return (bound, xi);
+    }
+    // What is left with two corners in one place: the two ends of a closed curve are a point too, but the curve between them is not,
+    // and must be divided.
     let line = sides.iter().any(|&(i, j, _)| n[i].position == n[j].position);
     let mut worst = 0f64;
     for trim in sides.iter().filter_map(|s| s.2) {
@@ -274,7 +281,7 @@ impl Work<'_, '_> {
         trims: &FxHashMap<[u32; 2], Trim>,
         known: &FxHashMap<[u32; 3], (f64, f64)>,
     ) -> bool {
-        let mut wanted: Vec<Uv> = Vec::new();
+        let mut wanted: Vec<[Uv; 2]> = Vec::new();
         let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
         for t in bad {
             let xi = known[&sorted(*t)].1;
@@ -290,11 +297,11 @@ impl Work<'_, '_> {
             if sides.iter().any(lost) {
                 continue;
             }
-            let free = sides.iter().filter(|&&(a, b)| !self.odd.contains_key(&key(a, b)));
+            let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
+            let free = sides.iter().zip(middles).filter(|&(&(a, b), _)| !self.odd.contains_key(&key(a, b)));
             let best = free
-                .map(|&(a, b)| {
+                .map(|(&(a, b), m)| {
                     let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
-                    let m = 0.5 * (x.uv + y.uv);
                     let sag = super::flat::from_chord(self.sheet.point(m), &[x.place, y.place]);
                     ((a, b), m, sag)
                 })
@@ -304,17 +311,16 @@ impl Work<'_, '_> {
             match best {
                 Some(((a, b), m, sag)) if sag > 0.2 * xi => {
                     if seen.insert(key(a, b), ()).is_none() {
-                        wanted.push(m);
+                        wanted.push([m, center]);
                     }
                 }
-                _ => wanted.push(center),
+                _ => wanted.push([center; 2]),
             }
         }
         let mut done = false;
-        for uv in wanted {
-            if !self.is_free(uv) {
-                continue;
-            }
+        for places in wanted {
+            // The middle of a parameter line into a pole may be a corner already.
+            let Some(uv) = places.into_iter().find(|&uv| self.is_free(uv)) else { continue };
             let n = self.nodes.len() as u32;
             let place = self.sheet.point(uv);
             self.nodes.push(Node { uv, place, position: self.next });
