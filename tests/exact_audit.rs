@@ -5,7 +5,7 @@ use exact_common::*;
 use lampyris::intersect::exact::audit::Audit;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost};
-use lampyris::math::{Aabb, Point, Ray};
+use lampyris::math::{Aabb, Point, Ray, Uv};
 use lampyris::model::Model;
 use lampyris::nurbs::Surface;
 
@@ -97,6 +97,94 @@ fn every_degree_and_mixed_ones() {
         }
     }
     assert!(flagged <= rays / 1000, "{flagged} of {rays} flagged");
+}
+
+/// Surfaces that real files hold and that are hard: named, from a stream.
+fn hard_surface(kind: &str, s: &mut Stream) -> Surface {
+    let degree = [1, 1].map(|d| d + (s.next() * 4.0) as usize);
+    let count = degree.map(|d| d + 2 + (s.next() * 2.0) as usize);
+    match kind {
+        "one or both ends collapsed to a point" => {
+            let both = s.next() < 0.5;
+            freeform(degree, count, |u, v| {
+                let r = if both { 4.0 * u * (1.0 - u) } else { u };
+                (Point::new(100.0 * u, 60.0 * r * (v - 0.5), r * s.within(-15.0, 15.0)), s.within(1.0, 2.0))
+            })
+        }
+        "weights of 100 beside 0.01" => freeform(degree, count, |u, v| {
+            let w = if s.next() < 0.5 { 100.0 } else { 0.01 };
+            (Point::new(100.0 * u, 100.0 * v, s.within(-20.0, 20.0)), w)
+        }),
+        "cusps" => freeform([3, 3], [7, 7], |u, v| {
+            // Control points in pairs at one place.
+            let q = (u * 3.0).floor() / 3.0;
+            (Point::new(100.0 * q, 100.0 * v, 30.0 * (9.0 * q).sin() + s.within(-3.0, 3.0)), 1.0)
+        }),
+        "self-intersecting" => freeform(degree, count, |_, _| (50.0 * Point::from(s.direction() * s.next()), 1.0)),
+        "a thousand metres away" => freeform(degree, count, |u, v| {
+            (Point::new(1e6 + 100.0 * u, -1e6 + 100.0 * v, 1e6 + s.within(-20.0, 20.0)), s.within(1.0, 2.0))
+        }),
+        "a micrometre large" => freeform(degree, count, |u, v| {
+            (Point::new(1e-3 * u, 1e-3 * v, s.within(-2e-4, 2e-4)), s.within(1.0, 2.0))
+        }),
+        "a sliver" => freeform(degree, count, |u, v| {
+            (Point::new(100.0 * u, 1e-4 * v * s.within(0.5, 1.5), s.within(-1.0, 1.0)), 1.0)
+        }),
+        _ => {
+            // A crease, and two knots 1e-9 apart.
+            let knots = vec![0.0, 0.0, 0.0, 0.5, 0.5, 0.5 + 1e-9, 0.8, 1.0, 1.0, 1.0];
+            let smooth =
+                freeform([2, 2], [7, 7], |u, v| (Point::new(100.0 * u, 100.0 * v, s.within(-20.0, 20.0)), 1.0));
+            Surface { knots: [knots.clone(), knots], ..smooth }
+        }
+    }
+}
+
+#[test]
+fn hard_surfaces() {
+    for kind in [
+        "one or both ends collapsed to a point",
+        "weights of 100 beside 0.01",
+        "cusps",
+        "self-intersecting",
+        "a thousand metres away",
+        "a micrometre large",
+        "a sliver",
+        "a crease and knots that all but coincide",
+    ] {
+        let mut total = Tally::default();
+        for k in 0..40 {
+            let mut s = Stream(77 + 1000 * k);
+            let surface = hard_surface(kind, &mut s);
+            let mut rays = aimed(&surface, k, 5);
+            // As many through points on knot lines and near the low ends, where patches meet or collapse.
+            for i in 0..5 {
+                let uv = Uv::from([0, 1].map(|d| {
+                    let ([a, b], knots) = (surface.domain()[d], &surface.knots[d]);
+                    let knot = knots[(s.next() * knots.len() as f64) as usize];
+                    let low = a + (b - a) * 10f64.powf(s.within(-9.0, -1.0));
+                    if knot > a && knot < b {
+                        knot
+                    } else if i % 2 == d {
+                        low
+                    } else {
+                        s.within(a, b)
+                    }
+                }));
+                let d = s.direction();
+                rays.push(Ray::new(surface.evaluate(uv) - d * 300.0, d));
+            }
+            let tally = compare(&format!("{kind} {k}"), &model([surface]), rays.into_iter());
+            total.rays += tally.rays;
+            total.hits += tally.hits;
+            total.flagged += tally.flagged;
+            total.undecided += tally.undecided;
+        }
+        println!("{kind}: {total:?}");
+        // Near a collapsed end a tenth of the rays is aimed where only rounding tells.
+        assert!(total.hits > total.rays / 4, "{kind}: {total:?}");
+        assert!(total.flagged * 20 <= total.rays && total.undecided * 8 <= total.rays, "{kind}: {total:?}");
+    }
 }
 
 #[test]

@@ -26,6 +26,7 @@ pub struct Audit {
 struct AuditFace {
     id: FaceId,
     bounds: Aabb,
+    domain: [[f64; 2]; 2],
     patches: Vec<(Aabb, BezierPatch)>,
     /// Bézier pieces of the uv curves.
     trims: Vec<Vec<DVec3>>,
@@ -75,7 +76,7 @@ impl Audit {
                 let patches: Vec<_> = surface.bezier_patches().into_iter().map(|p| (p.bounds(), p)).collect();
                 let bounds = patches.iter().fold(Aabb::EMPTY, |b, p| b.union(p.0));
                 let trims = pieces(&face.loops);
-                AuditFace { id, bounds, patches, trims }
+                AuditFace { id, bounds, domain: face.surface.domain(), patches, trims }
             })
             .collect();
         Self { faces }
@@ -92,7 +93,7 @@ impl Audit {
             let mut own: Vec<AuditHit> = Vec::new();
             for (bounds, patch) in &face.patches {
                 if grown(bounds).clip(ray).is_some() {
-                    let unsearched = clip_patch(ray, face.id, patch, &mut own);
+                    let unsearched = clip_patch(ray, face.id, patch, face.domain, &mut own);
                     if unsearched <= ray.t_max {
                         exhausted = exhausted.min(unsearched);
                     }
@@ -140,8 +141,8 @@ const STEPS: u32 = 4000;
 /// Boxes smaller than this part of a patch are asked whether their root is single.
 const SMALL: f64 = 1e-3;
 
-/// Adds the crossings of a patch; returns from which distance on some were not searched for, infinity when all were.
-fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditHit>) -> f64 {
+/// Adds the crossings of a patch of a surface over `domain`; returns from which distance on some were not searched for, infinity when all were.
+fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, domain: [[f64; 2]; 2], out: &mut Vec<AuditHit>) -> f64 {
     // Two planes that hold the ray, from the axes that its direction avoids most.
     let d = ray.direction;
     let axis = if d.x.abs() <= d.y.abs() && d.x.abs() <= d.z.abs() {
@@ -157,11 +158,13 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
         let r = p.truncate() - ray.origin * p.w;
         Homogeneous::new(r.dot(a), r.dot(b), r.dot(d), p.w)
     };
-    let seen = BezierPatch { points: patch.points.iter().map(see).collect(), ..patch.clone() };
+    // Over the unit square: a knot span of 1e-9 has few digits of its own.
+    let unit = [[0.0, 1.0]; 2];
+    let seen = BezierPatch { points: patch.points.iter().map(see).collect(), domain: unit, degree: patch.degree };
+    let surface_uv = |local: Uv| patch.surface_uv(local);
+    let ends = [0, 1].map(|k| [0, 1].map(|end| patch.domain[k][end] == domain[k][end]));
     let size = seen.points.iter().map(|p| p.truncate().abs().max_element()).fold(0.0, f64::max);
     let rounding = 64.0 * f64::EPSILON * (size + ray.origin.abs().max_element());
-    let whole = patch.domain.map(|[lo, hi]| hi - lo);
-    let origin = patch.domain.map(|[lo, _]| lo);
     let all = seen.clone();
     let mut stack = vec![Piece { patch: seen, depth: 0 }];
     let mut steps = 0;
@@ -180,22 +183,25 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
             exhausted = patch.points.iter().map(near).fold(exhausted, f64::min);
             continue;
         }
-        let relative = [0, 1].map(|k: usize| (patch.domain[k][1] - patch.domain[k][0]) / whole[k]);
+        let relative = patch.domain.map(|[lo, hi]| hi - lo);
         if relative[0].max(relative[1]) < SMALL {
             // The box with as much again on all sides, as parts of the whole patch.
             let [u, v] = [0, 1].map(|k: usize| {
-                let [lo, hi] = patch.domain[k].map(|x| (x - origin[k]) / whole[k]);
+                let [lo, hi] = patch.domain[k];
                 let beyond = (hi - lo).max(1e-7);
                 ([lo, hi], [lo - beyond, hi + beyond])
             });
             let wider = cut(&cut(&all, 0, u.1), 1, v.1);
-            if let Some(root) = single_root(&wider) {
+            if let Some((root, moves)) = single_root(&wider) {
                 let at = [(u, root.x), (v, root.y)].map(|((_, [a, b]), x)| a + (b - a) * x);
-                // Boxes that share a border both take a root on it.
-                let within = |x: f64, [lo, hi]: [f64; 2]| x >= lo - 1e-11 && x <= hi + 1e-11;
-                if within(at[0], u.0) && within(at[1], v.0) {
+                // Boxes that share a border both take a root on it; at the end of the surface rounding decides nothing.
+                let slop = [u, v].map(|(_, [a, b])| 1e-11 + 4.0 * rounding * moves * (b - a));
+                let within = |k: usize, [lo, hi]: [f64; 2]| at[k] >= lo - slop[k] && at[k] <= hi + slop[k];
+                if within(0, u.0) && within(1, v.0) {
                     let m = all.homogeneous_point(Uv::from(at));
-                    out.push(AuditHit { t: m.z / m.w, face, uv: all.surface_uv(Uv::from(at)), doubtful: false });
+                    let doubtful =
+                        (0..2).any(|k| ends[k][0] && at[k] < slop[k] || ends[k][1] && at[k] > 1.0 - slop[k]);
+                    out.push(AuditHit { t: m.z / m.w, face, uv: surface_uv(Uv::from(at)), doubtful });
                 }
                 continue;
             }
@@ -207,7 +213,12 @@ fn clip_patch(ray: &Ray, face: FaceId, patch: &BezierPatch, out: &mut Vec<AuditH
             let m = patch.homogeneous(Uv::splat(0.5))[0];
             let doubtful = !tiny || across > 1e-7;
             if !doubtful || across < 1e-6 {
-                out.push(AuditHit { t: m.z / m.w, face, uv: patch.surface_uv(Uv::splat(0.5)), doubtful });
+                out.push(AuditHit {
+                    t: m.z / m.w,
+                    face,
+                    uv: surface_uv(patch.surface_uv(Uv::splat(0.5))),
+                    doubtful,
+                });
             }
             continue;
         }

@@ -7,9 +7,9 @@
 use crate::math::Uv;
 use crate::nurbs::BezierPatch;
 
-/// The only root over a patch as the ray sees it, in local parameters; `None` where more than one cannot be ruled out, or none is
+/// The only root over a patch as the ray sees it, in local parameters, and how far these move with a unit across the ray; `None` where more than one cannot be ruled out, or none is
 /// found.
-pub(super) fn single_root(patch: &BezierPatch) -> Option<Uv> {
+pub(super) fn single_root(patch: &BezierPatch) -> Option<(Uv, f64)> {
     let q = patch.degree[1];
     // Ranges of ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v from the differences of the control points.
     let mut range = [[(f64::INFINITY, f64::NEG_INFINITY); 2]; 2];
@@ -52,7 +52,7 @@ pub(super) fn single_root(patch: &BezierPatch) -> Option<Uv> {
         }
         if step.abs().max_element() < 1e-6 {
             let inside = at.x >= 0.0 && at.x <= 1.0 && at.y >= 0.0 && at.y <= 1.0;
-            return inside.then_some(at);
+            return inside.then_some((at, y.iter().flatten().map(|x| x.abs()).sum()));
         }
     }
     None
