@@ -31,14 +31,16 @@ impl Bends {
         Self { of: patches.iter().map(second).collect(), smooth, columns: breaks[1].len() - 1 }
     }
 
+    /// Whether the surface and its weight are C1 through these knot intervals (first and last).
+    pub(super) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
+        let through = |d: usize, r: [usize; 2]| (r[0] + 1..=r[1]).all(|k| self.smooth[d][k]);
+        through(0, a) && through(1, b)
+    }
+
     /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
     /// `b` (first and last); `None` where it does not hold or costs too much.
     pub(super) fn bound(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
-        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST {
-            return None;
-        }
-        let through = |d: usize, r: [usize; 2]| (r[0] + 1..=r[1]).all(|k| self.smooth[d][k]);
-        if !through(0, a) || !through(1, b) {
+        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST || !self.is_smooth(a, b) {
             return None;
         }
         let mut m = [0f64; 3];

@@ -30,6 +30,8 @@ use crate::nurbs::BezierPatch;
 const LEVELS: u32 = 3;
 /// Knot rectangles that one triangle may span and still be tried.
 const MOST_PIECES: usize = 20_000;
+/// Knot rectangles up to which second derivatives are looked at one by one.
+const MOST_NEAR: usize = 16;
 /// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
 const SLIGHT: f64 = 0.02;
 
@@ -118,14 +120,19 @@ impl<'s, 'a> Prover<'s, 'a> {
         if let Some(bound) = quick {
             return Some(bound + off);
         }
-        if a[0] != a[1] || b[0] != b[1] {
+        let sheet = self.sheet;
+        let count = (a[1] - a[0] + 1) * (b[1] - b[0] + 1);
+        if count > 1 && (count > MOST_NEAR || !sheet.bends.is_smooth(a, b)) {
             return None;
         }
-        let patch = self.sheet.patch(a[0], b[0]);
-        let corners = uv.map(|x| local(patch, x));
-        match self.near.bound(patch, corners, at).filter(fits) {
+        let patches = (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| sheet.patch(i, j)));
+        match self.near.bound(patches, uv, at).filter(fits) {
             Some(bound) => Some(bound + off),
-            None => self.joint(patch, corners, xyz, limit).map(|x| x + self.margin),
+            None if count > 1 => None,
+            None => {
+                let patch = sheet.patch(a[0], b[0]);
+                self.joint(patch, uv.map(|x| local(patch, x)), xyz, limit).map(|x| x + self.margin)
+            }
         }
     }
 

@@ -7,11 +7,14 @@
 //! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
 //! included. Where that part matters, the hull of `net.rs` decides.
 
+use super::sheet::local;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
 
 /// Triangles with a smaller share of the rectangle around them are left to others: their L is steep.
 const THINNEST: f64 = 0.05;
+/// So are those that reach into a patch by less than this share.
+const NARROWEST: f64 = 1e-3;
 
 /// Buffers reused from facet to facet.
 #[derive(Default)]
@@ -24,11 +27,18 @@ pub(super) struct Near {
 }
 
 impl Near {
-    /// Bound of |S − L| over the triangle with `corners` in the patch's local parameters, which lie at `at` in space.
-    pub(super) fn bound(&mut self, patch: &BezierPatch, corners: [Uv; 3], at: [Point; 3]) -> Option<f64> {
+    /// Bound of |S − L| over the triangle with these corners in the surface's parameters, which lie at `at` in space. The patches
+    /// cover it, and where there are several, S and its weight are C1 from one to the next: Taylor's theorem needs no more.
+    pub(super) fn bound<'p>(
+        &mut self,
+        patches: impl Iterator<Item = &'p BezierPatch>,
+        corners: [Uv; 3],
+        at: [Point; 3],
+    ) -> Option<f64> {
         let lo = corners[0].min(corners[1]).min(corners[2]);
         let hi = corners[0].max(corners[1]).max(corners[2]);
-        let x = corners.map(|c| (c - lo) / (hi - lo));
+        let size = hi - lo;
+        let x = corners.map(|c| (c - lo) / size);
         let (d1, d2) = (x[1] - x[0], x[2] - x[0]);
         let det = d1.perp_dot(d2);
         if det.abs() < THINNEST || det.is_nan() {
@@ -39,19 +49,34 @@ impl Near {
         let ls = (e1 * d2.y - e2 * d1.y) / det;
         let lt = (e2 * d1.x - e1 * d2.x) / det;
         let l00 = -(ls * x[0].x + lt * x[0].y);
-        self.restrict(patch, lo, hi, at[0]);
-        let (w_min, w_max) = self.net.iter().fold((f64::INFINITY, 0f64), |(a, b), c| (a.min(c.w), b.max(c.w)));
-        let [p, q] = patch.degree;
-        let even = w_max - w_min <= 1e-13 * w_max;
-        let second = if even {
-            self.deviation.clear();
-            self.deviation.extend(self.net.iter().map(|c| c.truncate()));
-            seconds(&self.deviation, [p, q])
-        } else {
-            self.subtract([p, q], [l00, l00 + ls, l00 + lt, l00 + ls + lt]);
-            seconds(&self.deviation, [p + 1, q + 1])
-        };
-        Some((second[0] + 2.0 * second[1] + second[2]) / (8.0 * w_min))
+        let (mut most, mut lightest) = ([0f64; 3], f64::INFINITY);
+        for patch in patches {
+            let [[u0, u1], [v0, v1]] = patch.domain;
+            let (a, b) = (lo.max(Uv::new(u0, v0)), hi.min(Uv::new(u1, v1)));
+            let (from, share) = ((a - lo) / size, (b - a) / size);
+            // Differences over a sliver are divided by its square: rounding would be all that is left.
+            if !(share.min_element() > NARROWEST) {
+                return None;
+            }
+            self.restrict(patch, local(patch, a), local(patch, b), at[0]);
+            let (w_min, w_max) = self.net.iter().fold((f64::INFINITY, 0f64), |(a, b), c| (a.min(c.w), b.max(c.w)));
+            lightest = lightest.min(w_min);
+            let [p, q] = patch.degree;
+            let even = w_max - w_min <= 1e-13 * w_max;
+            let second = if even {
+                self.deviation.clear();
+                self.deviation.extend(self.net.iter().map(|c| c.truncate()));
+                seconds(&self.deviation, [p, q])
+            } else {
+                let l = l00 + ls * from.x + lt * from.y;
+                let (s, t) = (ls * share.x, lt * share.y);
+                self.subtract([p, q], [l, l + s, l + t, l + s + t]);
+                seconds(&self.deviation, [p + 1, q + 1])
+            };
+            let scale = [share.x * share.x, share.x * share.y, share.y * share.y];
+            most = std::array::from_fn(|k| most[k].max(second[k] / scale[k]));
+        }
+        Some((most[0] + 2.0 * most[1] + most[2]) / (8.0 * lightest))
     }
 
     /// The patch's net over a rectangle of its local parameters, seen from `origin`. It is kept: both triangles of a cell have the same.
@@ -150,29 +175,58 @@ fn seconds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
 mod tests {
     use super::*;
     use crate::math::Frame;
-    use crate::nurbs::sweep;
+    use crate::nurbs::{Surface, sweep};
+
+    /// Bound and largest sampled deviation of a triangle.
+    fn both(s: &Surface, corners: [Uv; 3]) -> (f64, f64) {
+        let at = corners.map(|x| s.evaluate(x));
+        let patches = s.bezier_patches();
+        let lo = corners[0].min(corners[1]).min(corners[2]);
+        let hi = corners[0].max(corners[1]).max(corners[2]);
+        let meets = |p: &&BezierPatch| {
+            let [[u0, u1], [v0, v1]] = p.domain;
+            u0 < hi.x && lo.x < u1 && v0 < hi.y && lo.y < v1
+        };
+        let bound = Near::default().bound(patches.iter().filter(meets), corners, at).unwrap();
+        let mut worst = 0f64;
+        for i in 0..=20 {
+            for j in 0..=20 - i {
+                let (a, b) = (i as f64 / 20.0, j as f64 / 20.0);
+                let c = 1.0 - a - b;
+                let x = corners[0] * a + corners[1] * b + corners[2] * c;
+                worst = worst.max((s.evaluate(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
+            }
+        }
+        (bound, worst)
+    }
 
     #[test]
     fn the_bound_holds_and_is_sharp_on_rational_patches() {
         let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 1.3], [0.2, 1.7]);
-        let patch = &s.bezier_patches()[0];
-        let point = |x: Uv| patch.homogeneous_point(x).project();
-        let mut near = Near::default();
         for k in 0..40 {
-            let lo = Uv::new((k % 8) as f64 / 10.0, (k / 8) as f64 / 7.0);
-            let corners = [lo, lo + Uv::new(0.2, 0.0), lo + Uv::new(0.2, 0.25)];
-            let at = corners.map(point);
-            let bound = near.bound(patch, corners, at).unwrap();
-            let mut worst = 0f64;
-            for i in 0..=20 {
-                for j in 0..=20 - i {
-                    let (a, b) = (i as f64 / 20.0, j as f64 / 20.0);
-                    let c = 1.0 - a - b;
-                    let x = corners[0] * a + corners[1] * b + corners[2] * c;
-                    worst = worst.max((point(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
-                }
-            }
+            let lo = Uv::new(0.1 * (k % 8) as f64, 0.2 + 0.15 * (k / 8) as f64);
+            let (bound, worst) = both(&s, [lo, lo + Uv::new(0.25, 0.0), lo + Uv::new(0.25, 0.3)]);
             assert!(worst <= bound && bound < 2.5 * worst, "{worst} {bound}");
+        }
+    }
+
+    #[test]
+    fn the_bound_holds_across_smooth_knots() {
+        // A shallow bowl with uneven knots and weights, C1 and no more across half of its knots.
+        let knots = vec![0.0, 0.0, 0.0, 0.4, 1.0, 1.3, 2.0, 2.0, 2.0];
+        let points = (0..36)
+            .map(|k| {
+                let (x, y) = ((k / 6) as f64, (k % 6) as f64);
+                let w = 1.0 + 0.2 * ((3 * k) % 5) as f64;
+                let z = 0.2 * (x - 2.5) * (x - 2.5) + 0.1 * y * y + 0.05 * (x * y).sin();
+                (Point::new(x, y, z) * w).extend(w)
+            })
+            .collect();
+        let s = Surface { degree: [2, 2], knots: [knots.clone(), knots], points };
+        for k in 0..25 {
+            let lo = Uv::new(0.05 + 0.2 * (k % 5) as f64, 0.05 + 0.2 * (k / 5) as f64);
+            let (bound, worst) = both(&s, [lo, lo + Uv::new(1.0, 0.0), lo + Uv::new(0.3, 1.0)]);
+            assert!(worst <= bound, "{worst} {bound}");
         }
     }
 }
