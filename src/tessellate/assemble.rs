@@ -7,7 +7,7 @@ use super::sheet::Sheet;
 use super::{FacetQuality, Tessellation};
 use crate::math::{FaceId, Frame, Point};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{Face, Instance, Model, Part, TessellatedFace};
+use crate::model::{EdgeId, Face, Instance, Model, Part, TessellatedFace};
 use rayon::prelude::*;
 
 /// A part's faces, in the order of its shells.
@@ -49,6 +49,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         .collect();
     let mut denser = vec![0u32; part.edges.len()];
     let mut tries = 0;
+    let mut before: Option<Before> = None;
     loop {
         let mut sides: Vec<Vec<Side<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
         for (face, sheet) in faces.iter().zip(&sheets) {
@@ -65,7 +66,22 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| {
             one(part, face, sheet.as_ref()?, &divisions, &shared, settings)
         };
-        let meshes: Vec<Option<FaceMesh>> = faces.par_iter().zip(&sheets).map(mesh).collect();
+        let meshes: Vec<Option<FaceMesh>> = match before.take() {
+            None => faces.par_iter().zip(&sheets).map(mesh).collect(),
+            Some(before) => {
+                // Few edges change: faces whose own did not are as they were, but for the numbers of their corners.
+                let moved = before.moved(part, &divisions);
+                let again = |(face, mesh): (&&Face, &Option<FaceMesh>)| {
+                    mesh.is_none() || face.loops.iter().flat_map(|l| &l.uses).any(|u| moved.has_changed(u.edge))
+                };
+                let dirty: Vec<bool> = faces.iter().zip(&before.meshes).map(again).collect();
+                let all = faces.par_iter().zip(&sheets).zip(before.meshes).zip(dirty);
+                all.map(
+                    |((x, old), dirty)| if dirty { mesh(x) } else { old.map(|m| moved.renamed(m, shared.len())) },
+                )
+                .collect()
+            }
+        };
         let crossing: Vec<usize> =
             meshes.iter().flatten().flat_map(|m| &m.crossing).map(|e| e.0 as usize).collect();
         if crossing.is_empty() || tries == TRIES {
@@ -75,6 +91,49 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         for e in crossing {
             denser[e] = tries as u32;
         }
+        before = Some(Before { divisions, shared: shared.len(), meshes });
+    }
+}
+
+/// What a part looked like before some of its edges were sampled more densely.
+struct Before {
+    divisions: Vec<Division>,
+    shared: usize,
+    meshes: Vec<Option<FaceMesh>>,
+}
+
+/// Where shared positions are now, and which edges have others.
+struct Moved {
+    changed: Vec<bool>,
+    to: Vec<u32>,
+}
+
+impl Before {
+    fn moved(&self, part: &Part, now: &[Division]) -> Moved {
+        let mut to: Vec<u32> = (0..self.shared as u32).collect();
+        let mut changed = Vec::with_capacity(part.edges.len());
+        for (old, new) in self.divisions.iter().zip(now) {
+            changed.push(old.t != new.t);
+            if old.t == new.t {
+                (0..old.t.len() as u32 - 2).for_each(|k| to[(old.first + k) as usize] = new.first + k);
+            }
+        }
+        Moved { changed, to }
+    }
+}
+
+impl Moved {
+    fn has_changed(&self, edge: Option<EdgeId>) -> bool {
+        edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
+    }
+
+    /// The mesh with the numbers that its corners have now.
+    fn renamed(&self, mut mesh: FaceMesh, shared: usize) -> FaceMesh {
+        for (p, _, _) in &mut mesh.corners {
+            let own = (*p as usize).checked_sub(self.to.len());
+            *p = own.map_or_else(|| self.to[*p as usize], |own| (shared + own) as u32);
+        }
+        mesh
     }
 }
 
