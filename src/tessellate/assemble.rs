@@ -50,6 +50,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
     let mut denser = vec![0u32; part.edges.len()];
     let mut tries = 0;
     let mut before: Option<Before> = None;
+    let mut alone = Vec::new();
     loop {
         let mut sides: Vec<Vec<Side<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
         for (face, sheet) in faces.iter().zip(&sheets) {
@@ -62,7 +63,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         }
         let known: Vec<(&Face, &Sheet<'_>)> =
             faces.iter().zip(&sheets).filter_map(|(f, s)| Some((*f, s.as_ref()?))).collect();
-        let (divisions, shared) = edges::divide(part, &known, &sides, &denser);
+        let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut alone);
         let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| {
             one(part, face, sheet.as_ref()?, &divisions, &shared, settings)
         };

@@ -4,7 +4,7 @@ use super::flat::from_chord;
 use super::opposite;
 use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
-use crate::model::{EdgeUse, Face, Part};
+use crate::model::{Edge, EdgeUse, Face, Part};
 use crate::nurbs::Curve;
 use rayon::prelude::*;
 
@@ -29,26 +29,21 @@ pub(super) struct Division {
     pub(super) first: u32,
 }
 
-/// Divides all edges of a part, and returns the shared positions: vertices, then inner points edge by edge.
+/// Divides all edges of a part (`alone` keeps how often each was asked for more and what it then had by itself), and returns the shared positions: vertices, then inner points edge by edge.
 pub(super) fn divide(
     part: &Part,
     faces: &[(&Face, &Sheet<'_>)],
     sides: &[Vec<Side<'_, '_>>],
     denser: &[u32],
+    alone: &mut Vec<(u32, Vec<f64>)>,
 ) -> (Vec<Division>, Vec<Point>) {
-    let mut times: Vec<Vec<f64>> = part
-        .edges
-        .par_iter()
-        .zip(sides)
-        .zip(denser)
-        .map(|((edge, sides), &denser)| {
-            if sides.is_empty() {
-                edge.curve.domain().to_vec()
-            } else {
-                edge_parameters(&edge.curve, sides, denser)
-            }
-        })
-        .collect();
+    let fresh = |(i, (edge, sides)): (usize, (&Edge, &Vec<Side<'_, '_>>))| match alone.get(i) {
+        Some((before, t)) if *before == denser[i] => (*before, t.clone()),
+        _ if sides.is_empty() => (denser[i], edge.curve.domain().to_vec()),
+        _ => (denser[i], edge_parameters(&edge.curve, sides, denser[i])),
+    };
+    *alone = part.edges.par_iter().zip(sides).enumerate().map(fresh).collect();
+    let mut times: Vec<Vec<f64>> = alone.iter().map(|(_, t)| t.clone()).collect();
     opposite::align(part, faces, sides, denser, &mut times);
     let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();

@@ -55,7 +55,7 @@ impl Near {
             let (a, b) = (lo.max(Uv::new(u0, v0)), hi.min(Uv::new(u1, v1)));
             let (from, share) = ((a - lo) / size, (b - a) / size);
             // Differences over a sliver are divided by its square: rounding would be all that is left.
-            if !(share.min_element() > NARROWEST) {
+            if share.min_element() < NARROWEST || share.is_nan() {
                 return None;
             }
             self.restrict(patch, local(patch, a), local(patch, b), at[0]);
