@@ -74,7 +74,8 @@ pub(super) fn mesh(
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
     let mut out =
         FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
-    out.crossing = strip.conflicts.iter().filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
+    let crossing = strip.conflicts.iter().chain(&strip.crossed);
+    out.crossing = crossing.filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };
     for &(nodes, bound, tolerance) in &grid.quads {
         emit.facet(nodes, None, bound, tolerance);

@@ -41,6 +41,8 @@ pub(super) struct Strip {
     pub(super) tolerances: Vec<f64>,
     /// Segments that could not be kept because they cross others.
     pub(super) conflicts: Vec<[u32; 2]>,
+    /// Those that are kept and crossed by them.
+    pub(super) crossed: Vec<[u32; 2]>,
 }
 
 #[derive(Clone, Copy)]
@@ -77,7 +79,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
         odd: FxHashMap::default(),
         handles: Vec::new(),
     };
-    let mut conflicts = Vec::new();
+    let (mut conflicts, mut crossed) = (Vec::new(), Vec::new());
     // Nodes inside whole cells are left out, but in a long outline they keep the region that a constraint clears small.
     let mut used = vec![outline.segments.len() > 4000; work.nodes.len()];
     outline.segments.iter().flatten().for_each(|&n| used[n as usize] = true);
@@ -88,6 +90,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
     for &[a, b] in &outline.segments {
         if !work.constrain(a, b) {
             conflicts.push([a, b]);
+            crossed.extend(work.crossed(a, b));
         }
     }
     let rings = (!conflicts.is_empty()).then_some(&outline.segments);
@@ -114,7 +117,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
             || !work.refine(&bad, &outline.trims, &known)
         {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
-            return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts });
+            return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts, crossed });
         }
     }
     None
@@ -222,6 +225,15 @@ impl Work<'_, '_> {
             *self.odd.entry(key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
         }
         !made.is_empty()
+    }
+
+    /// The constraints that keep a segment out.
+    fn crossed(&self, a: u32, b: u32) -> Vec<[u32; 2]> {
+        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else {
+            return Vec::new();
+        };
+        let edges = self.cdt.get_conflicting_edges_between_vertices(from, to);
+        edges.map(|e| [e.from().data().node, e.to().data().node]).collect()
     }
 
     /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
