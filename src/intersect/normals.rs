@@ -13,36 +13,38 @@
 use super::facet::FacetHit;
 use super::{Certainty, Hit, NormalMode};
 use crate::math::{Point, Ray, Uv, Vector};
-use crate::mesh::{FacetMesh, MeshVertex};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use std::hint::select_unpredictable;
 
-/// The hit as the trait reports it.
+/// The hit of a ray that is asked alone as the trait reports it.
+#[inline(never)]
 pub(crate) fn describe(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mode: NormalMode) -> Hit {
+    describe_in_batch(mesh, ray, hit, mode)
+}
+
+/// The hit as the trait reports it, inlined where batches are answered and without branches on which triangle was hit: of a ray
+/// that is answered in 100 ns this took 30.
+#[inline(always)]
+pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mode: NormalMode) -> Hit {
     let facet = &mesh.facets[hit.facet as usize];
-    let vertices = facet.vertices.map(|v| mesh.vertices[v as usize]);
-    let corners = vertices.map(|v| mesh.positions[v.position as usize]);
-    let [a, b, c] = if hit.second { [0, 2, 3] } else { [0, 1, 2] };
-    let flat = (corners[b] - corners[a]).cross(corners[c] - corners[a]).normalize_or_zero();
+    let vertices = facet.vertices.map(|v| &mesh.vertices[v as usize]);
+    let [a, b, c] =
+        triangle(hit.second, facet.vertices).map(|v| mesh.positions[mesh.vertices[v as usize].position as usize]);
+    let flat = (b - a).cross(c - a).normalize_or_zero();
     let parameters = parameters(hit);
     let weights =
         if facet.is_triangle() { [hit.b[0], hit.b[1], hit.b[2], 0.0] } else { bilinear_weights(parameters) };
+    let [v0, v1, v2, v3] = vertices;
+    let [w0, w1, w2, w3] = weights;
     let smooth = || {
-        let sum: Vector = vertices.iter().zip(weights).map(|(v, w)| v.normal * w).sum();
+        let sum = v0.normal * w0 + v1.normal * w1 + v2.normal * w2 + v3.normal * w3;
         sum.try_normalize().unwrap_or(flat)
     };
     let normal = match mode {
         NormalMode::Flat => flat,
-        NormalMode::Nearest => nearest(hit, &vertices, &corners).try_normalize().unwrap_or(flat),
+        NormalMode::Nearest => nearest(hit, mesh, facet).try_normalize().unwrap_or(flat),
         NormalMode::Bilinear | NormalMode::Exact => smooth(),
-        NormalMode::Cubic => {
-            let across = if facet.is_triangle() {
-                let net = TriangleNet::new(&corners, &vertices);
-                met(|p| net.at(p), Uv::new(hit.b[1], hit.b[2]), ray, flat)
-            } else {
-                let net = QuadNet::new(&corners, &vertices);
-                met(|p| net.at(p), parameters, ray, flat)
-            };
-            across.try_normalize().unwrap_or_else(smooth)
-        }
+        NormalMode::Cubic => cubic(mesh, facet, ray, hit, flat).try_normalize().unwrap_or_else(smooth),
     };
     Hit {
         t: hit.t,
@@ -50,25 +52,51 @@ pub(crate) fn describe(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mode: Normal
         geometric_normal: flat,
         face: facet.face,
         primitive: hit.facet,
-        uv: vertices.iter().zip(weights).map(|(v, w)| v.uv * w).sum(),
+        uv: v0.uv * w0 + v1.uv * w1 + v2.uv * w2 + v3.uv * w3,
         certainty: Certainty::Facet,
     }
 }
 
-/// Facet parameters of a hit.
-fn parameters(hit: &FacetHit) -> Uv {
-    let [_, b1, b2] = hit.b;
-    if hit.second { Uv::new(b1, b1 + b2) } else { Uv::new(b1 + b2, b2) }
+/// Of four things at the corners, those of the triangle that was hit.
+#[inline(always)]
+fn triangle<T: Copy>(second: bool, of: [T; 4]) -> [T; 3] {
+    [of[0], select_unpredictable(second, of[2], of[1]), select_unpredictable(second, of[3], of[2])]
 }
 
+/// Where the ray meets the cubic patch: its normal there, not of unit length.
+#[inline(never)]
+fn cubic(mesh: &FacetMesh, facet: &Facet, ray: &Ray, hit: &FacetHit, flat: Vector) -> Vector {
+    let vertices = facet.vertices.map(|v| mesh.vertices[v as usize]);
+    let corners = vertices.map(|v| mesh.positions[v.position as usize]);
+    if facet.is_triangle() {
+        let net = TriangleNet::new(&corners, &vertices);
+        met(|p| net.at(p), Uv::new(hit.b[1], hit.b[2]), ray, flat)
+    } else {
+        let net = QuadNet::new(&corners, &vertices);
+        met(|p| net.at(p), parameters(hit), ray, flat)
+    }
+}
+
+/// Facet parameters of a hit.
+#[inline(always)]
+fn parameters(hit: &FacetHit) -> Uv {
+    let [_, b1, b2] = hit.b;
+    let sum = b1 + b2;
+    Uv::new(select_unpredictable(hit.second, b1, sum), select_unpredictable(hit.second, sum, b2))
+}
+
+#[inline(always)]
 fn bilinear_weights(p: Uv) -> [f64; 4] {
     let q = 1.0 - p;
     [q.x * q.y, p.x * q.y, p.x * p.y, q.x * p.y]
 }
 
-fn nearest(hit: &FacetHit, vertices: &[MeshVertex; 4], corners: &[Point; 4]) -> Vector {
-    let [a, b, c] = if hit.second { [0, 2, 3] } else { [0, 1, 2] };
-    let at = corners[a] * hit.b[0] + corners[b] * hit.b[1] + corners[c] * hit.b[2];
+#[inline(never)]
+fn nearest(hit: &FacetHit, mesh: &FacetMesh, facet: &Facet) -> Vector {
+    let vertices = facet.vertices.map(|v| &mesh.vertices[v as usize]);
+    let corners = vertices.map(|v| mesh.positions[v.position as usize]);
+    let [a, b, c] = triangle(hit.second, corners);
+    let at = a * hit.b[0] + b * hit.b[1] + c * hit.b[2];
     let distance = |i: usize| (corners[i] - at).length_squared();
     let closest = (1..4).fold(0, |best, i| if distance(i) < distance(best) { i } else { best });
     vertices[closest].normal

@@ -238,8 +238,8 @@ impl Intersector for Octree<'_> {
             self.walk(rays, found, cost);
             for (i, hit) in hits.iter_mut().enumerate() {
                 self.fetch_description(found, i);
-                *hit =
-                    found[i].map(|hit| normals::describe(self.around.mesh, &rays[i], &hit, self.settings.normals));
+                *hit = found[i]
+                    .map(|hit| normals::describe_in_batch(self.around.mesh, &rays[i], &hit, self.settings.normals));
             }
         }
     }
