@@ -24,7 +24,7 @@ use std::path::Path;
 const TOLERANCES: [f64; 3] = [0.02, 0.0018, 0.000125];
 /// Rays of a round, and rounds.
 const RAYS: u64 = 50_000;
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 11;
 
 /// Rows, the sentence that answers, and what the octrees look like.
 pub(super) struct Race {
