@@ -1,4 +1,4 @@
-use super::options::{Meshing, Tracing};
+use super::options::{Meshing, Precision, Tracing};
 use super::words;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -53,15 +53,8 @@ pub(crate) enum Command {
         output: Vec<PathBuf>,
         #[command(flatten)]
         meshing: Meshing,
-        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-        #[arg(
-            long,
-            help_heading = "Facets",
-            value_name = "Xdeg",
-            conflicts_with = "tolerance",
-            allow_hyphen_values = true
-        )]
-        accuracy: Option<String>,
+        #[command(flatten)]
+        precision: Precision,
         /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
         #[arg(long)]
         baseline: bool,
@@ -95,15 +88,8 @@ pub(crate) enum Command {
         meshing: Meshing,
         #[command(flatten)]
         tracing: Tracing,
-        /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-        #[arg(
-            long,
-            help_heading = "Facets",
-            value_name = "Xdeg",
-            conflicts_with = "tolerance",
-            allow_hyphen_values = true
-        )]
-        accuracy: Option<String>,
+        #[command(flatten)]
+        precision: Precision,
         /// Folder for a report with the disagreeing rays in 3-D, and for check.json
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
@@ -161,15 +147,8 @@ pub(crate) enum Command {
 /// Options of `trace` alone.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct TraceOptions {
-    /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
-    #[arg(
-        long,
-        help_heading = "Facets",
-        value_name = "Xdeg",
-        conflicts_with = "tolerance",
-        allow_hyphen_values = true
-    )]
-    pub(crate) accuracy: Option<String>,
+    #[command(flatten)]
+    pub(crate) precision: Precision,
     /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<String>,

@@ -75,12 +75,12 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
     match command {
         Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, context),
         Command::Info { file, limits } => info::run(&file, limits, context),
-        Command::Facet { file, output, meshing, accuracy, baseline, threads, limits } => {
+        Command::Facet { file, output, meshing, precision, baseline, threads, limits } => {
             let asked = facet::Asked {
                 file: &file,
                 output: &output,
                 meshing: &meshing,
-                accuracy: accuracy.as_deref(),
+                accuracy: precision.accuracy.as_deref(),
                 baseline,
                 threads,
                 limits,
@@ -90,12 +90,12 @@ fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
         Command::Trace { scene, output, meshing, tracing, extra } => {
             trace::run(&scene, &output, &meshing, &tracing, &extra, context)
         }
-        Command::Check { file, meshing, tracing, accuracy, output, rays_out, rays_in, disagreements, limits } => {
+        Command::Check { file, meshing, tracing, precision, output, rays_out, rays_in, disagreements, limits } => {
             let asked = check::Asked {
                 file: &file,
                 meshing: &meshing,
                 tracing: &tracing,
-                accuracy: accuracy.as_deref(),
+                accuracy: precision.accuracy.as_deref(),
                 rays_out: rays_out.as_ref(),
                 rays_in: rays_in.as_ref(),
                 disagreements: disagreements.as_ref(),

@@ -5,6 +5,20 @@ use crate::intersect::NormalMode;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
+/// A direction error asked for in place of a tolerance.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct Precision {
+    /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+    #[arg(
+        long,
+        help_heading = "Facets",
+        value_name = "Xdeg",
+        conflicts_with = "tolerance",
+        allow_hyphen_values = true
+    )]
+    pub(crate) accuracy: Option<String>,
+}
+
 /// Options of everything that tessellates.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct Meshing {

@@ -29,13 +29,13 @@ pub(super) fn run(
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     let (scene, loaded) = load::scene_file(path, context)?;
-    if extra.accuracy.is_some() && (shard.is_some() || extra.resume) {
+    if extra.precision.accuracy.is_some() && (shard.is_some() || extra.resume) {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
         return Err(Failure::arguments(message).help("give --tolerance and --normals with --shard and --resume"));
     }
     let options = (meshing, tracing);
     let (meshing, tracing, aimed) =
-        aim::meshing(extra.accuracy.as_deref(), options, Some(&scene), &loaded.model, context)?;
+        aim::meshing(extra.precision.accuracy.as_deref(), options, Some(&scene), &loaded.model, context)?;
     let aimed = aimed.as_ref();
     let job =
         Job { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, recheck: RECHECKED, aimed };

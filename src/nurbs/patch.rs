@@ -13,6 +13,18 @@ pub struct BezierPatch {
     pub domain: [[f64; 2]; 2],
 }
 
+/// Calls a method with tables of basis functions just wide enough for both degrees: clearing wider ones took a quarter of meshing.
+macro_rules! as_wide_as_needed {
+    ($patch:ident.$method:ident($($argument:expr),*)) => {
+        match $patch.degree[0].max($patch.degree[1]) {
+            0..NARROW => $patch.$method::<NARROW>($($argument),*),
+            NARROW..MIDDLE => $patch.$method::<MIDDLE>($($argument),*),
+            MIDDLE..BROAD => $patch.$method::<BROAD>($($argument),*),
+            _ => $patch.$method::<WIDE>($($argument),*),
+        }
+    };
+}
+
 impl BezierPatch {
     pub(super) fn extract(surface: &Surface) -> Vec<Self> {
         let [p, q] = surface.degree;
@@ -50,12 +62,7 @@ impl BezierPatch {
 
     /// Homogeneous point and first derivatives with respect to the local parameters in `[0, 1]²`.
     pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
-        match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.homogeneous_in::<NARROW>(local),
-            NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(local),
-            MIDDLE..BROAD => self.homogeneous_in::<BROAD>(local),
-            _ => self.homogeneous_in::<WIDE>(local),
-        }
+        as_wide_as_needed!(self.homogeneous_in(local))
     }
 
     fn homogeneous_in<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
@@ -79,12 +86,7 @@ impl BezierPatch {
 
     /// Homogeneous point at local parameters in `[0, 1]²`: the first of [`BezierPatch::homogeneous`], in a third of its time.
     pub fn homogeneous_point(&self, local: Uv) -> Homogeneous {
-        match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.point_in::<NARROW>(local),
-            NARROW..MIDDLE => self.point_in::<MIDDLE>(local),
-            MIDDLE..BROAD => self.point_in::<BROAD>(local),
-            _ => self.point_in::<WIDE>(local),
-        }
+        as_wide_as_needed!(self.point_in(local))
     }
 
     fn point_in<const W: usize>(&self, local: Uv) -> Homogeneous {
@@ -100,12 +102,7 @@ impl BezierPatch {
 
     /// Homogeneous points at three local parameters of each direction, u first; the same bits as one by one.
     pub fn homogeneous_lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
-        match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.lattice_in::<NARROW>(u, v),
-            NARROW..MIDDLE => self.lattice_in::<MIDDLE>(u, v),
-            MIDDLE..BROAD => self.lattice_in::<BROAD>(u, v),
-            _ => self.lattice_in::<WIDE>(u, v),
-        }
+        as_wide_as_needed!(self.lattice_in(u, v))
     }
 
     fn lattice_in<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
@@ -125,12 +122,7 @@ impl BezierPatch {
 
     /// Position, first and second derivatives with respect to the surface's parameters, at local parameters in `[0, 1]²`.
     pub fn second_derivatives(&self, local: Uv) -> SecondDerivatives {
-        match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.second_in::<NARROW>(local),
-            NARROW..MIDDLE => self.second_in::<MIDDLE>(local),
-            MIDDLE..BROAD => self.second_in::<BROAD>(local),
-            _ => self.second_in::<WIDE>(local),
-        }
+        as_wide_as_needed!(self.second_in(local))
     }
 
     fn second_in<const W: usize>(&self, local: Uv) -> SecondDerivatives {
