@@ -27,18 +27,18 @@ fn compare(name: &str, model: &Model, rays: impl Iterator<Item = Ray>) -> Tally 
     for ray in rays {
         tally.rays += 1;
         let answer = exact.first(&ray, &mut Cost::default());
-        let clipped = audit.answer(&ray);
+        let clipped = audit.first(&ray);
         tally.hits += u32::from(answer.hit.is_some());
         if answer.certainty != Certainty::Certified || answer.near_trim {
             tally.flagged += 1;
             continue;
         }
         // Where clipping itself is in doubt it can neither confirm nor refute.
-        if !clipped.decides_first() {
+        if !clipped.decided {
             tally.undecided += 1;
             continue;
         }
-        match (answer.hit, clipped.crossings.first()) {
+        match (answer.hit, clipped.first) {
             (None, None) => {}
             (Some(a), Some(b)) => {
                 assert!((a.t - b.t).abs() < 1e-7, "{name}: {} against {} for {ray:?}", a.t, b.t);

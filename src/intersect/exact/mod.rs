@@ -28,7 +28,6 @@ mod newton;
 mod piece;
 mod probe;
 mod query;
-mod single;
 mod slabs;
 mod trace;
 pub mod traditional;

@@ -4,12 +4,13 @@
 //! varies: when, preconditioned by the inverse of its middle, it deviates from the identity by less than 1, the map from
 //! parameters to the plane across the ray is injective (its root is single), and Newton's method finds it.
 
+use super::clip::Net;
 use crate::math::Uv;
 use crate::nurbs::BezierPatch;
 
 /// The only root over a patch as the ray sees it, in local parameters, and how far these move with a unit across the ray; `None` where more than one cannot be ruled out, or none is
 /// found.
-pub(super) fn single_root(patch: &BezierPatch) -> Option<(Uv, f64)> {
+pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let q = patch.degree[1];
     // Ranges of ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v from the differences of the control points.
     let mut range = [[(f64::INFINITY, f64::NEG_INFINITY); 2]; 2];
@@ -41,6 +42,8 @@ pub(super) fn single_root(patch: &BezierPatch) -> Option<(Uv, f64)> {
     if !(deviates(0) < 0.5 && deviates(1) < 0.5) {
         return None;
     }
+    let unit = [[0.0, 1.0]; 2];
+    let patch = BezierPatch { degree: patch.degree, points: patch.points.to_vec(), domain: unit };
     let mut at = Uv::splat(0.5);
     for _ in 0..20 {
         let [s, su, sv] = patch.homogeneous(at);
