@@ -20,7 +20,6 @@ use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::check::{self, Check, Competitor, Court, measure};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::{Quantiles, Summary, records};
-use comfy_table::{Table, presets};
 use std::path::{Path, PathBuf};
 
 /// What `check` was asked for.
@@ -293,19 +292,14 @@ fn described(c: &Check, normals: NormalMode) -> String {
             c.exact.uncertified
         ),
     );
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header([
-        "",
-        "Mrays/s, 1 thread",
-        "build",
-        "bytes per facet",
-    ]);
+    let mut table = super::tables::blank(100);
+    table.set_header(["", "Mrays/s, 1 thread", "build", "bytes per facet"]);
     let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);
     for (((name, rate), (_, build)), (_, size)) in m.named().into_iter().zip(b.named()).zip(s.named()) {
         let shown = |x: Option<f64>| x.map_or("–".into(), |x| figures(x, 3));
         let time = build.map_or("–".into(), crate::report::seconds);
         table.add_row([name.to_owned(), shown(rate), time, shown(size)]);
     }
-    text += &format!("{table}\n");
+    text += &format!("\n{table}\n");
     text
 }

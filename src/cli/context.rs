@@ -56,10 +56,12 @@ impl Context {
         self.colour
     }
 
-    /// Columns for messages.
+    /// Columns for messages: as `COLUMNS` says, as the terminal has, or 120 where there is none.
     pub(crate) fn width(&self) -> usize {
-        let columns = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok());
-        columns.unwrap_or(100).clamp(60, 120)
+        let asked = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok());
+        let own =
+            || if self.terminal { comfy_table::Table::new().use_stderr().width().map(usize::from) } else { None };
+        asked.or_else(own).unwrap_or(120).clamp(60, 140)
     }
 
     /// A progress bar with rate and remaining time; invisible where stderr is no terminal.

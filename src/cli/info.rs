@@ -5,7 +5,6 @@ use super::context::{Context, print};
 use super::{Failure, Outcome, load};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::step::ImportReport;
-use comfy_table::{ContentArrangement, Table, presets};
 use std::path::Path;
 
 pub(super) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
@@ -56,9 +55,8 @@ fn described(r: &ImportReport, context: &Context) -> String {
     let notes: Vec<_> = notes.collect();
     let most = if context.verbose > 0 { usize::MAX } else { 20 };
     if !notes.is_empty() {
-        let mut table = Table::new();
-        table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
-        table.set_width(context.width() as u16).set_header(["", "entity", "why"]);
+        let mut table = super::tables::blank(context.width());
+        table.set_header(["", "entity", "why"]);
         for (what, note) in notes.iter().take(most) {
             table.add_row([(*what).to_owned(), format!("#{} {}", note.id, note.entity), note.reason.clone()]);
         }

@@ -27,6 +27,7 @@ mod portion;
 mod race;
 mod study;
 mod suggest;
+mod tables;
 mod trace;
 mod until;
 mod witness;

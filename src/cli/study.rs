@@ -1,11 +1,11 @@
-//! `lampyris study`: rows to study.json, a page, pictures and tables; one sentence on the terminal.
+//! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
 use super::args::StudyKind;
 use super::context::{Context, print};
 use super::engine::{self, Choice};
 use super::load::{self, Input, Loaded};
 use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, cells, demo};
+use super::{Failure, Outcome, cells, demo, tables};
 use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{
@@ -106,6 +106,7 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     if context.json {
         print(&text)?;
     } else {
+        context.say(format_args!("{}", tables::of_study(&report, context.width())));
         context.say(format_args!("  {}\n", report.answer.replace("**", "")));
         context.say(format_args!("  {}", context.strong(&folder.join("report.html").display().to_string())));
         context.say(format_args!("  {}", folder.join("study.json").display()));

@@ -33,7 +33,9 @@ pub use error::{Error, ErrorKind};
 pub use kernel::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub use portion::{Fingerprint, Portion};
 pub use results::{Absorbed, ChannelResult, EffectsUsed, Power, ReceiverResult, Results, Seconds};
-pub use run::{Hooks, KernelChoice, Progress, RunSettings, Traced, replay, replicates, simulate, trace};
+pub use run::{
+    Hooks, KernelChoice, Progress, RunSettings, Traced, kernel_name, replay, replicates, simulate, trace,
+};
 pub use scene::Scene;
 pub use tally::{Moments, QUANTA, Sum};
-pub use verify::{EffectCost, Verification, effect_costs, verify_pruning};
+pub use verify::{Verification, verify_pruning};

@@ -316,6 +316,11 @@ pub fn replicates(bound: &BoundScene, settings: &RunSettings) -> u32 {
     Plan::new(bound, settings).replicates
 }
 
+/// Name of the kernel that a run with these settings uses; runs of one kernel are the same code.
+pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
+    kernel_of(bound, settings).name()
+}
+
 pub(crate) fn kernel_of(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
     let required = effects::required(bound).kernel;
     match settings.kernel {

@@ -1,11 +1,9 @@
-//! Proofs and prices of leaving effects out.
+//! The proof that leaving effects out changes nothing.
 
 use super::bind::BoundScene;
-use super::effects;
 use super::results::Results;
 use super::run::{KernelChoice, Progress, RunSettings, simulate};
 use crate::intersect::Intersector;
-use crate::optics::{Effect, Effects};
 use serde::Serialize;
 
 /// Whether the pruned and the full kernel gave the same bits.
@@ -64,58 +62,4 @@ fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     }
     found.truncate(20);
     found
-}
-
-/// What a set of effects costs on a scene, whether it needs them or not.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EffectCost {
-    /// The effects that the kernel could do beyond what the scene calls for.
-    pub effects: Vec<Effect>,
-    /// Name of the kernel.
-    pub kernel: &'static str,
-    /// Median seconds of tracing.
-    pub seconds_trace_median: f64,
-    /// Million rays per second, median.
-    pub mrays_per_s_median: f64,
-    /// Whether every tally is that of the pruned kernel, bit by bit.
-    pub identical: bool,
-}
-
-/// Times the pruned kernel, then each effect added alone, then all: `repeats` runs of each, in turns so that a machine that slows
-/// down slows down all of them.
-pub fn effect_costs(
-    bound: &BoundScene,
-    intersector: &dyn Intersector,
-    settings: &RunSettings,
-    repeats: usize,
-) -> Vec<EffectCost> {
-    let needed = effects::required(bound).effects;
-    let mut added: Vec<Effects> = vec![Effects::NONE];
-    added.extend(Effect::ALL.into_iter().filter(|e| !needed.contains(*e)).map(|e| Effects::from([e])));
-    added.push(Effects::ALL - needed);
-    let mut seconds = vec![Vec::new(); added.len()];
-    let mut last: Vec<Option<Results>> = vec![None; added.len()];
-    for _ in 0..repeats.max(1) {
-        for (i, &effects) in added.iter().enumerate() {
-            let kernel = if effects.is_empty() { KernelChoice::Pruned } else { KernelChoice::With(effects) };
-            let results = simulate(bound, intersector, &RunSettings { kernel, ..settings.clone() }, &|_| true);
-            seconds[i].push(results.seconds.trace);
-            last[i] = Some(results);
-        }
-    }
-    let pruned = last[0].as_ref().map(|r| r.digest.clone());
-    let rows = added.iter().zip(seconds).zip(&last);
-    rows.filter_map(|((effects, mut seconds), last)| {
-        let last = last.as_ref()?;
-        seconds.sort_by(f64::total_cmp);
-        let median = seconds[seconds.len() / 2];
-        Some(EffectCost {
-            effects: effects.iter().collect(),
-            kernel: last.effects.kernel,
-            seconds_trace_median: median,
-            mrays_per_s_median: last.rays as f64 / median / 1e6,
-            identical: Some(&last.digest) == pruned.as_ref(),
-        })
-    })
-    .collect()
 }

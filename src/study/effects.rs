@@ -1,22 +1,25 @@
-//! What unneeded effects cost: the smallest kernel a scene calls for against the one that can do everything.
+//! What each effect costs: the smallest kernel a scene calls for, each other effect added alone, and everything together.
 
-use super::Rounds;
+use super::{Rounds, Timing};
 use crate::intersect::Intersector;
-use crate::simulate::{BoundScene, KernelChoice, RunSettings, simulate};
+use crate::optics::{Effect, Effects};
+use crate::simulate::{BoundScene, KernelChoice, Results, RunSettings, kernel_name, simulate};
 use serde::Serialize;
 use std::sync::Mutex;
 
-/// One kernel on one scene.
+/// One choice of effects on one scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     /// Name of the scene.
     pub scene: String,
-    /// `pruned` or `full`.
+    /// `pruned`, `with` one effect more, or `full`.
     pub choice: String,
-    /// Name of the kernel that ran.
+    /// The effect that the scene does not call for and the kernel could do all the same, where it is a single one.
+    pub added: Option<&'static str>,
+    /// Name of the kernel. Choices that need the same kernel share its times: they are the same code.
     pub kernel: String,
-    /// Effects simulated.
-    pub effects: Vec<String>,
+    /// Effects that the kernel was asked to be able to do.
+    pub effects: Vec<&'static str>,
     /// Rays from the sources.
     pub rays: u64,
     /// Fastest run.
@@ -27,11 +30,13 @@ pub struct Row {
     pub seconds_trace_p90: f64,
     /// Million rays from the sources a second, of the middle run.
     pub mrays_per_s_median: f64,
+    /// Time over that of the pruned kernel.
+    pub ratio_to_pruned: f64,
     /// Whether the digest of all tallies equals that of the pruned run.
     pub identical: bool,
 }
 
-/// Times both kernels in alternating rounds and compares their results bit by bit.
+/// Times every kernel that one of the choices needs, in alternating rounds, and compares their results bit by bit.
 pub fn effects(
     name: &str,
     bound: &BoundScene,
@@ -39,48 +44,72 @@ pub fn effects(
     settings: &RunSettings,
     rounds: usize,
 ) -> Vec<Row> {
-    let choices = [("pruned", KernelChoice::Pruned), ("full", KernelChoice::Full)];
-    let results = [Mutex::new(None), Mutex::new(None)];
+    let needed = Effects::required_by(bound);
+    let with = |kernel| RunSettings { kernel, ..settings.clone() };
+    let mut choices = vec![("pruned", None, KernelChoice::Pruned)];
+    let others = Effect::ALL.into_iter().filter(|e| !needed.contains(*e));
+    choices.extend(others.map(|e| ("with", Some(e), KernelChoice::With([e].into()))));
+    choices.push(("full", None, KernelChoice::Full));
+    let mut kernels: Vec<(&'static str, RunSettings, Mutex<Option<Results>>)> = Vec::new();
+    for (_, _, kernel) in &choices {
+        let run = with(*kernel);
+        let called = kernel_name(bound, &run);
+        if kernels.iter().all(|(known, ..)| *known != called) {
+            kernels.push((called, run, Mutex::new(None)));
+        }
+    }
     let mut race = Rounds::default();
-    for ((label, kernel), slot) in choices.into_iter().zip(&results) {
-        let settings = RunSettings { kernel, ..settings.clone() };
-        race.add(label, move || {
-            let result = simulate(bound, who, &settings, &|_| true);
+    for (called, run, slot) in &kernels {
+        race.add(*called, move || {
+            let result = simulate(bound, who, run, &|_| true);
             if let Ok(mut slot) = slot.lock() {
                 *slot = Some(result);
             }
         });
     }
     let timings = race.run(rounds);
-    let results: Vec<_> = results.into_iter().filter_map(|r| r.into_inner().ok().flatten()).collect();
-    let reference = results.first().map(|r| r.digest.clone());
-    let row = |((label, t), r): ((String, super::Timing), &crate::simulate::Results)| Row {
-        scene: name.into(),
-        choice: label,
-        kernel: r.effects.kernel.into(),
-        effects: r.effects.simulated.iter().map(|e| format!("{:?}", e.effect)).collect(),
-        rays: r.rays,
-        seconds_trace_min: t.min,
-        seconds_trace_median: t.median,
-        seconds_trace_p90: t.p90,
-        mrays_per_s_median: r.rays as f64 / t.median / 1e6,
-        identical: reference.as_ref() == Some(&r.digest),
+    let ran = |run: &RunSettings| -> Option<(Timing, &'static str, u64, String)> {
+        let called = kernel_name(bound, run);
+        let k = kernels.iter().position(|(known, ..)| *known == called)?;
+        let result = kernels[k].2.lock().ok()?;
+        let result = result.as_ref()?;
+        Some((timings[k].1, called, result.rays, result.digest.clone()))
     };
-    timings.into_iter().zip(&results).map(row).collect()
+    let Some((base, _, _, digest)) = ran(&with(KernelChoice::Pruned)) else { return Vec::new() };
+    let row = |(choice, added, kernel): &(&str, Option<Effect>, KernelChoice)| {
+        let (t, called, rays, own) = ran(&with(*kernel))?;
+        let able = match kernel {
+            KernelChoice::Full => Effects::ALL,
+            _ => added.map_or(needed, |e| needed.with(e)),
+        };
+        Some(Row {
+            scene: name.into(),
+            choice: (*choice).into(),
+            added: added.map(Effect::name),
+            kernel: called.into(),
+            effects: able.iter().map(Effect::name).collect(),
+            rays,
+            seconds_trace_min: t.min,
+            seconds_trace_median: t.median,
+            seconds_trace_p90: t.p90,
+            mrays_per_s_median: rays as f64 / t.median / 1e6,
+            ratio_to_pruned: t.median / base.median,
+            identical: own == digest,
+        })
+    };
+    choices.iter().filter_map(row).collect()
 }
 
 /// One sentence: what the effects that the scene does not call for would cost.
 pub fn answer(rows: &[Row]) -> String {
-    match rows {
-        [pruned, full, ..] => format!(
-            "Leaving out the effects that the scene {} does not need makes the trace **{:.2} times** as fast (the kernel '{}' against the \
-             kernel '{}', which could trace every effect); the results are {}.",
-            pruned.scene,
-            full.seconds_trace_median / pruned.seconds_trace_median,
-            pruned.kernel,
-            full.kernel,
-            if full.identical { "the same, bit by bit" } else { "NOT the same" }
-        ),
-        _ => String::new(),
-    }
+    let [pruned, .., full] = rows else { return String::new() };
+    format!(
+        "Leaving out the effects that the scene {} does not need makes the trace **{:.2} times** as fast (the kernel '{}' against the \
+         kernel '{}', which could trace every effect); the results are {}.",
+        pruned.scene,
+        full.ratio_to_pruned,
+        pruned.kernel,
+        full.kernel,
+        if rows.iter().all(|r| r.identical) { "the same, bit by bit" } else { "NOT the same" }
+    )
 }

@@ -225,6 +225,7 @@ fn sentence(rows: &[Row]) -> String {
         models.iter().filter_map(|(name, r)| Some(format!("on {name} {}", r.why_not?))).collect();
     let order = match (odd.len(), models.len()) {
         (_, 0) => return "Nothing was measured.".into(),
+        (0, 1) => "so in the mean and in the 99th percentile".into(),
         (0, n) => format!("so on all {n} models, in the mean and in the 99th percentile"),
         (k, n) => format!("so on {} of {n} models ({})", n - k, odd.join("; ")),
     };

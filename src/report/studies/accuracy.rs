@@ -1,7 +1,7 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
 use super::{distinct, number, text};
-use crate::report::{AxisStyle, Chart, Content, Section, Series, SeriesStyle, figures, seconds};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, figures, seconds};
 use serde_json::Value;
 
 /// The direction error that the answer speaks about, degrees.
@@ -18,6 +18,15 @@ impl<'a> Point<'a> {
         let part = |key: &str| number(row, key).unwrap_or(0.0);
         let seconds = part("seconds_tessellate") + part("seconds_build") + number(row, "seconds_trace_median")?;
         Some(Self { row, seconds, error: number(row, "direction_error_deg_p99")? })
+    }
+
+    /// The tolerance of its facets; nothing for the spline.
+    fn tolerance(&self) -> Cell {
+        match (text(self.row, "intersector"), self.row["adaptive"].as_bool()) {
+            ("exact", _) => Cell::Empty,
+            (_, Some(true)) => "adaptive".into(),
+            _ => number(self.row, "tolerance_mm").into(),
+        }
     }
 
     fn label(&self) -> String {
@@ -42,7 +51,8 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
         rows.iter().copied().filter(|r| r["threads"].as_u64().unwrap_or(threads) == threads).collect();
     let points: Vec<Point> = chosen.iter().filter_map(|r| Point::of(r)).collect();
     let title = format!("What accuracy costs in time: {model}");
-    let section = Section::new("Cost against accuracy").with(front(&points)).with(slopes(&chosen));
+    let section =
+        Section::new("Cost against accuracy").with(front(&points)).with(slopes(&chosen)).with(best(&points));
     let time = Section::new("Where the time goes").with(stacked(&chosen));
     (title, answer(&points), vec![section, time])
 }
@@ -68,13 +78,49 @@ fn answer(points: &[Point]) -> String {
     }
 }
 
+/// Whether another combination is at least as good in both time and error, and better in one.
+fn beaten(p: &Point, points: &[Point]) -> bool {
+    let better = |q: &Point| q.seconds < p.seconds || q.error < p.error;
+    points.iter().any(|q| q.seconds <= p.seconds && q.error <= p.error && better(q))
+}
+
+/// The combinations that none beats, the cheapest first.
+fn best(points: &[Point]) -> Table {
+    let columns = [
+        ("tolerance", "mm"),
+        ("normals", ""),
+        ("on", ""),
+        ("facets", ""),
+        ("direction error, p99", "°"),
+        ("distance, p99", "mm"),
+        ("prepare", "s"),
+        ("trace", "s"),
+        ("in all", "s"),
+    ];
+    let mut table = Table::new("front", "The combinations that none beats", &columns)
+        .caption("Each is the cheapest for its error. Prepare: tessellate and build.");
+    let mut front: Vec<&Point> = points.iter().filter(|p| !beaten(p, points)).collect();
+    front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let three = |x: f64| Cell::Number(x, 3);
+    for p in front {
+        let trace = number(p.row, "seconds_trace_median").unwrap_or(0.0);
+        table.row([
+            p.tolerance(),
+            text(p.row, "normals").into(),
+            text(p.row, "intersector").into(),
+            p.row["facets"].as_u64().into(),
+            three(p.error),
+            number(p.row, "hit_error_mm_p99").map_or(Cell::Empty, three),
+            three(p.seconds - trace),
+            three(trace),
+            three(p.seconds),
+        ]);
+    }
+    table
+}
+
 /// Every combination as a point; those that another one beats in both time and error are faint.
 fn front(points: &[Point]) -> Chart {
-    let beaten = |p: &Point| {
-        points
-            .iter()
-            .any(|q| q.seconds <= p.seconds && q.error <= p.error && (q.seconds < p.seconds || q.error < p.error))
-    };
     // An error of exactly 0 has no place on a logarithmic axis; it is shown at a tenth of the smallest other.
     let smallest = points.iter().map(|p| p.error).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
     let shown = |p: &&Point| [p.seconds, if p.error > 0.0 { p.error } else { smallest / 10.0 }];
@@ -89,12 +135,14 @@ fn front(points: &[Point]) -> Chart {
             ..Series::default()
         }
     };
-    let mut series = vec![of("the front".into(), SeriesStyle::Line, &|p| !beaten(p))];
+    let mut series = vec![of("the front".into(), SeriesStyle::Line, &|p| !beaten(p, points))];
     let rows: Vec<&Value> = points.iter().map(|p| p.row).collect();
     for normals in distinct(&rows, "normals") {
-        series.push(of(normals.into(), SeriesStyle::Points, &|p| text(p.row, "normals") == normals && !beaten(p)));
+        series.push(of(normals.into(), SeriesStyle::Points, &|p| {
+            text(p.row, "normals") == normals && !beaten(p, points)
+        }));
     }
-    series.push(of("dominated".into(), SeriesStyle::Faint, &|p| beaten(p)));
+    series.push(of("dominated".into(), SeriesStyle::Faint, &|p| beaten(p, points)));
     series.retain(|s| !s.points.is_empty());
     let caption = "Each point is one combination of tolerance, normals and intersector; lower left is better. Faint: another \
         combination is both faster and more accurate. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \

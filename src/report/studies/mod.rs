@@ -1,8 +1,10 @@
 //! Studies as reports: from the rows of `study … --json` alone, so that a kept `study.json` can be drawn again years later.
 
 mod accuracy;
+mod effects;
 mod others;
 mod receivers;
+mod stability;
 
 use super::{Cell, Provenance, Report, Section, Table};
 use serde_json::Value;
@@ -15,9 +17,9 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
         "accuracy" => accuracy::report(&rows),
         "interpolation" => others::interpolation(&rows),
         "complexity" => others::complexity(&rows),
-        "stability" => others::stability(&rows),
+        "stability" => stability::report(&rows),
         "bvh" => others::bvh(&rows),
-        "effects" => others::effects(&named_by_kernel(&rows).iter().collect::<Vec<_>>()),
+        "effects" => effects::report(&rows),
         _ => (format!("Study {kind}"), String::new(), Vec::new()),
     };
     // The study's own sentence, where it made one, says it better.
@@ -30,20 +32,6 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     }
     sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
-}
-
-/// The rows with the kernel's name before the first effect: two kernels may trace the same effects, and bars of one name would be put
-/// on top of each other.
-fn named_by_kernel(rows: &[&Value]) -> Vec<Value> {
-    let named = |row: &&Value| {
-        let mut row = (*row).clone();
-        let kernel = text(&row, "kernel").to_owned();
-        if let Some(first) = row["effects"].as_array().and_then(|a| a.first()).and_then(Value::as_str) {
-            row["effects"][0] = format!("{kernel}: {first}").into();
-        }
-        row
-    };
-    rows.iter().map(named).collect()
 }
 
 /// A number of a row; `None` when absent or null.

@@ -1,7 +1,7 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
 use super::{distinct, number, text};
-use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table, figures, grouped, seconds};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table, figures, grouped};
 use crate::study::interpolation::{Ratios, Row};
 use serde::Deserialize;
 use serde_json::Value;
@@ -181,34 +181,6 @@ fn growth(rows: &[&Value]) -> Chart {
     Chart::series("growth", "How the time grows with the lamp", caption, axes, series)
 }
 
-pub(super) fn stability(rows: &[&Value]) -> Parts {
-    let sum = |name: &str, key: &str| -> u64 {
-        rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
-    };
-    let names = distinct(rows, "intersector");
-    let columns = [("intersector", ""), ("rays", ""), ("right", ""), ("flagged", ""), ("wrong", "")];
-    let mut table = Table::new("stability", "Hard rays", &columns)
-        .caption("Flagged: the answer itself says that it is not proved. Truths are by construction.");
-    for name in &names {
-        let counts = ["rays", "right", "flagged", "wrong"].map(|key| Cell::from(sum(name, key)));
-        table.row(std::iter::once(Cell::from(*name)).chain(counts));
-    }
-    let verdicts: Vec<String> =
-        names.iter().map(|n| format!("{n} **{}** wrong of {}", sum(n, "wrong"), grouped(sum(n, "rays")))).collect();
-    let answer = format!("Rays through edges, vertices, tangents and other trouble: {}.", verdicts.join(", "));
-    let layers = ["flagged", "wrong"]
-        .map(|key| (key.to_owned(), names.iter().map(|n| sum(n, key) as f64).collect::<Vec<f64>>()));
-    let content = Content::Bars {
-        categories: names.iter().map(|n| (*n).to_owned()).collect(),
-        layers: layers.into(),
-        stacked: true,
-    };
-    let axes = [AxisStyle::linear("intersector", ""), AxisStyle::linear("rays", "")];
-    let caption = "Rays flagged as unproved, and rays answered wrongly.";
-    let chart = Chart { content, ..Chart::series("verdicts", "Flagged and wrong", caption, axes, Vec::new()) };
-    ("Numerical stability".into(), answer, vec![Section::new("Verdicts").with(chart).with(table)])
-}
-
 pub(super) fn bvh(rows: &[&Value]) -> Parts {
     let rate = |name: &str, kind: &str| {
         let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;
@@ -257,34 +229,43 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
         chart.x = AxisStyle::linear("facets and call", "");
         section = section.with(chart);
     }
+    section = section.with(rates(rows));
     ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
 }
 
-pub(super) fn effects(rows: &[&Value]) -> Parts {
-    let list = |r: &Value| -> String {
-        let words = r["effects"].as_array().map(|a| a.iter().filter_map(Value::as_str).collect::<Vec<_>>());
-        words.filter(|w| !w.is_empty()).map_or("none".into(), |w| w.join(" + "))
-    };
-    let categories: Vec<String> = rows.iter().map(|r| list(r)).collect();
-    let times: Vec<f64> = rows.iter().map(|r| number(r, "seconds_trace_median").unwrap_or(0.0)).collect();
-    let answer = match (times.first(), times.last()) {
-        (Some(&pruned), Some(&full)) if pruned > 0.0 && full > 0.0 => format!(
-            "What the scene needs takes **{}**, everything together {}: leaving out what is not called for is **{} ×** as \
-             fast, with {} results.",
-            seconds(pruned),
-            seconds(full),
-            figures(full / pruned, 3),
-            if rows.iter().all(|r| r["identical"].as_bool() != Some(false)) {
-                "bit-identical"
-            } else {
-                "DIFFERENT"
-            }
-        ),
-        _ => String::new(),
-    };
-    let content = Content::Bars { categories, layers: vec![("trace".into(), times)], stacked: true };
-    let axes = [AxisStyle::linear("effects", ""), AxisStyle::linear("time", "s")];
-    let caption = "Median time of the trace by what is compiled into the kernel.";
-    let chart = Chart { content, ..Chart::series("effects", "Time by effect", caption, axes, Vec::new()) };
-    ("What each effect costs".into(), answer, vec![Section::new("Time").with(chart)])
+/// Every rate beside the octree's on the same rays, facets, call and threads.
+fn rates(rows: &[&Value]) -> Table {
+    let columns = [
+        ("rays", ""),
+        ("facets", ""),
+        ("call", ""),
+        ("threads", ""),
+        ("intersector", ""),
+        ("rate", "Mrays/s"),
+        ("octree is faster", "×"),
+        ("build", "s"),
+        ("memory", "B/facet"),
+    ];
+    let mut table = Table::new("rates", "Rates side by side", &columns)
+        .caption("Medians of alternating rounds; the ratio is that of the octree's median to this one.");
+    let same = ["model", "facets", "rays_kind", "call", "threads"];
+    for row in rows.iter().filter(|r| r.is_object()) {
+        let twin = |r: &&&Value| text(r, "intersector") == "octree" && same.iter().all(|k| r[*k] == row[*k]);
+        let octree = rows.iter().find(twin).and_then(|r| number(r, "mrays_per_s_median"));
+        let rate = number(row, "mrays_per_s_median");
+        let ratio = octree.zip(rate).map(|(o, r)| Cell::Number(o / r, 3));
+        let build = Some(text(row, "build")).filter(|b| !b.is_empty()).map_or(String::new(), |b| format!(" ({b})"));
+        table.row([
+            text(row, "rays_kind").into(),
+            row["facets"].as_u64().into(),
+            text(row, "call").into(),
+            row["threads"].as_u64().into(),
+            format!("{}{build}", text(row, "intersector")).into(),
+            rate.map_or(Cell::Empty, |r| Cell::Number(r, 3)),
+            ratio.unwrap_or_default(),
+            number(row, "build_seconds").map_or(Cell::Empty, |b| Cell::Number(b, 3)),
+            number(row, "bytes_per_facet").map_or(Cell::Empty, |b| Cell::Number(b, 3)),
+        ]);
+    }
+    table
 }

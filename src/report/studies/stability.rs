@@ -1,0 +1,57 @@
+//! Right, flagged and wrong: per intersector, and per hard case.
+
+use super::{distinct, text};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, grouped};
+use serde_json::Value;
+
+pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
+    let sum = |name: &str, key: &str| -> u64 {
+        rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
+    };
+    let names = distinct(rows, "intersector");
+    let columns = [("intersector", ""), ("rays", ""), ("right", ""), ("flagged", ""), ("wrong", "")];
+    let mut table = Table::new("stability", "Hard rays", &columns)
+        .caption("Flagged: the answer itself says that it is not proved. Truths are by construction.");
+    for name in &names {
+        let counts = ["rays", "right", "flagged", "wrong"].map(|key| Cell::from(sum(name, key)));
+        table.row(std::iter::once(Cell::from(*name)).chain(counts));
+    }
+    let verdicts: Vec<String> =
+        names.iter().map(|n| format!("{n} **{}** wrong of {}", sum(n, "wrong"), grouped(sum(n, "rays")))).collect();
+    let answer = format!("Rays through edges, vertices, tangents and other trouble: {}.", verdicts.join(", "));
+    let layers = ["flagged", "wrong"]
+        .map(|key| (key.to_owned(), names.iter().map(|n| sum(n, key) as f64).collect::<Vec<f64>>()));
+    let content = Content::Bars {
+        categories: names.iter().map(|n| (*n).to_owned()).collect(),
+        layers: layers.into(),
+        stacked: true,
+    };
+    let axes = [AxisStyle::linear("intersector", ""), AxisStyle::linear("rays", "")];
+    let caption = "Rays flagged as unproved, and rays answered wrongly.";
+    let chart = Chart { content, ..Chart::series("verdicts", "Flagged and wrong", caption, axes, Vec::new()) };
+    ("Numerical stability".into(), answer, vec![Section::new("Verdicts").with(chart).with(table).with(cases(rows))])
+}
+
+/// One row a case, variants added up: right / flagged / wrong of every intersector.
+fn cases(rows: &[&Value]) -> Table {
+    let names = distinct(rows, "intersector");
+    let columns: Vec<(&str, &str)> =
+        [("case", ""), ("rays", "")].into_iter().chain(names.iter().map(|n| (*n, ""))).collect();
+    let mut table = Table::new("stability-cases", "Right / flagged / wrong by case", &columns).caption(
+        "The sum over the five variants: at home, shifted by 10⁶ mm, scaled up and down by 1000, and turned by an odd angle. Octree and BVH are \
+         asked for the facets' truth, exact and plain Newton for the spline's.",
+    );
+    for case in distinct(rows, "case") {
+        let sum = |name: &str, key: &str| -> u64 {
+            let own = rows.iter().filter(|r| text(r, "case") == case && text(r, "intersector") == name);
+            own.filter_map(|r| r[key].as_u64()).sum()
+        };
+        let rays = names.first().map_or(0, |n| sum(n, "rays"));
+        let verdict = |n: &&str| {
+            let [right, flagged, wrong] = ["right", "flagged", "wrong"].map(|key| sum(n, key));
+            Cell::from(format!("{right}/{flagged}/{wrong}"))
+        };
+        table.row([case.into(), rays.into()].into_iter().chain(names.iter().map(verdict)));
+    }
+    table
+}
