@@ -130,6 +130,26 @@ mod tests {
     }
 
     #[test]
+    fn verdicts_are_added_up_by_case_and_by_intersector() {
+        let row = |case: &str, who: &str, counts: [u64; 3]| {
+            json!({"case": case, "variant": "home", "intersector": who, "rays": counts.iter().sum::<u64>(),
+                "right": counts[0], "flagged": counts[1], "wrong": counts[2]})
+        };
+        let rows = json!([
+            row("pole", "octree", [5, 0, 0]),
+            row("pole", "octree", [4, 0, 1]),
+            row("pole", "exact", [7, 3, 0]),
+            row("cusp", "octree", [2, 0, 0]),
+        ]);
+        let report = table(&json!({"study": "stability", "rows": rows}));
+        let csv: Vec<String> = (report.sections[0].blocks.iter())
+            .filter_map(|b| if let crate::report::Block::Table(t) = b { Some(t.to_csv()) } else { None })
+            .collect();
+        assert_eq!(csv[0], "intersector,rays,right,flagged,wrong\noctree,12,11,0,1\nexact,10,7,3,0\n");
+        assert_eq!(csv[1], "case,rays,octree,exact\npole,10,9/0/1,7/3/0\ncusp,2,2/0/0,0/0/0\n");
+    }
+
+    #[test]
     fn documents_that_are_damaged_still_give_a_page() {
         for kind in ["accuracy", "interpolation", "complexity", "stability", "bvh", "effects"] {
             for rows in [json!(null), json!([]), json!([null, 3, {"model": 7, "normals": "flat"}])] {
