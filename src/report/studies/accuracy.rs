@@ -108,7 +108,7 @@ fn best(points: &[Point]) -> Table {
             p.tolerance(),
             text(p.row, "normals").into(),
             text(p.row, "intersector").into(),
-            p.row["facets"].as_u64().into(),
+            p.row["facets"].as_u64().filter(|_| text(p.row, "intersector") != "exact").into(),
             three(p.error),
             number(p.row, "hit_error_mm_p99").map_or(Cell::Empty, three),
             three(p.seconds - trace),
