@@ -16,7 +16,7 @@ pub(super) struct PartMesh {
     faces: Vec<Option<FaceMesh>>,
 }
 
-/// Times that crossing borders are sampled more densely.
+/// Times that borders are sampled more densely where they cross or facets beside them are not proved.
 const TRIES: usize = 3;
 
 /// Meshes every part that is placed.
@@ -83,13 +83,12 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
                 .collect()
             }
         };
-        let crossing: Vec<usize> =
-            meshes.iter().flatten().flat_map(|m| &m.crossing).map(|e| e.0 as usize).collect();
-        if crossing.is_empty() || tries == TRIES {
+        let coarse: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.coarse).map(|e| e.0 as usize).collect();
+        if coarse.is_empty() || tries == TRIES {
             return PartMesh { shared, faces: meshes };
         }
         tries += 1;
-        for e in crossing {
+        for e in coarse {
             denser[e] = tries as u32;
         }
         before = Some(Before { divisions, shared: shared.len(), meshes });

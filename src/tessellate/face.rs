@@ -24,8 +24,8 @@ pub(super) struct FaceMesh {
     pub(super) facets: Vec<[u32; 4]>,
     pub(super) bounds: Vec<f64>,
     pub(super) tolerances: Vec<f64>,
-    /// Edges whose chords cross others in the parameter plane.
-    pub(super) crossing: Vec<EdgeId>,
+    /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
+    pub(super) coarse: Vec<EdgeId>,
     /// Whether something was given up: crossing borders, an exhausted budget.
     pub(super) repaired: bool,
 }
@@ -62,8 +62,9 @@ pub(super) fn mesh(
     let all = border.segments.iter().chain(&grid.outline);
     all.clone().for_each(|s| *met.entry(key(s[0], s[1])).or_insert(0) += 1);
     segments.extend(all.filter(|s| met[&key(s[0], s[1])] % 2 == 1));
+    let trims = border.trims;
     let outline =
-        Outline { nodes: border.nodes, segments, trims: border.trims, scale: scale(sheet, &rings, &leaves), next };
+        Outline { nodes: border.nodes, segments, trims: &trims, scale: scale(sheet, &rings, &leaves), next };
     let mut strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
     for &(t, bound, tolerance) in &grid.triangles {
         strip.triangles.push(t);
@@ -74,8 +75,9 @@ pub(super) fn mesh(
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
     let mut out =
         FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
-    let crossing = strip.conflicts.iter().chain(&strip.crossed);
-    out.crossing = crossing.filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
+    let unproved = strip.unproved_chords(&trims);
+    let coarse = strip.conflicts.iter().chain(&strip.crossed).chain(&unproved);
+    out.coarse = coarse.filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };
     for &(nodes, bound, tolerance) in &grid.quads {
         emit.facet(nodes, None, bound, tolerance);

@@ -21,12 +21,12 @@ pub(super) struct Node {
 }
 
 /// What is to be triangulated.
-pub(super) struct Outline {
+pub(super) struct Outline<'t> {
     pub(super) nodes: Vec<Node>,
     /// Constraint segments, each turning outside into inside.
     pub(super) segments: Vec<[u32; 2]>,
     /// What border segments follow.
-    pub(super) trims: FxHashMap<[u32; 2], Trim>,
+    pub(super) trims: &'t FxHashMap<[u32; 2], Trim>,
     /// Multiplies parameters before triangulating.
     pub(super) scale: Uv,
     /// First free own position.
@@ -43,6 +43,16 @@ pub(super) struct Strip {
     pub(super) conflicts: Vec<[u32; 2]>,
     /// Those that are kept and crossed by them.
     pub(super) crossed: Vec<[u32; 2]>,
+}
+
+impl Strip {
+    /// Chords of the border beside triangles that are not proved, where shorter ones may help.
+    pub(super) fn unproved_chords(&self, trims: &FxHashMap<[u32; 2], Trim>) -> Vec<[u32; 2]> {
+        let stands = self.bounds.iter().zip(&self.tolerances);
+        let unproved = self.triangles.iter().zip(stands).filter(|(_, (bound, xi))| bound > xi);
+        let sides = unproved.flat_map(|(t, (_, &xi))| [0, 1, 2].map(|k| (key(t[k], t[(k + 1) % 3]), xi)));
+        sides.filter(|(s, xi)| trims.get(s).is_some_and(|trim| trim.gap < 0.5 * xi)).map(|(s, _)| s).collect()
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -69,7 +79,7 @@ pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
 const ROUNDS: usize = 40;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
-pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, budget: usize) -> Option<Strip> {
+pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline<'_>, budget: usize) -> Option<Strip> {
     let mut work = Work {
         sheet,
         nodes: outline.nodes,
@@ -105,7 +115,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
             .with_min_len(16)
             .map_init(
                 || Prover::new(sheet, judge),
-                |prover, &t| prove(sheet, prover, &work.nodes, t, &outline.trims),
+                |prover, &t| prove(sheet, prover, &work.nodes, t, outline.trims),
             )
             .collect();
         known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
@@ -114,7 +124,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline, bud
         if bad.is_empty()
             || round == ROUNDS
             || work.cdt.num_vertices() >= most
-            || !work.refine(&bad, &outline.trims, &known)
+            || !work.refine(&bad, outline.trims, &known)
         {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
             return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts, crossed });

@@ -13,6 +13,8 @@ pub(super) struct Trim {
     /// Bound of the distance between the edge's curve and the line of the chord, mm, with the offset of the chord's ends
     /// from the surface.
     pub(super) deviation: f64,
+    /// The file's own gap between edge and face here, mm, which no shorter chord closes.
+    pub(super) gap: f64,
     /// Parameter triangles that cover what lies between the chord and the curve in the parameter plane.
     pub(super) between: Vec<[Uv; 3]>,
 }
@@ -35,7 +37,7 @@ impl Trim {
         let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
         let offset = [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max);
         if a >= b || a.is_nan() || b.is_nan() {
-            return Self { deviation: offset, between: Vec::new() };
+            return Self { deviation: offset, gap: offset, between: Vec::new() };
         }
         let over = |pieces: i32| {
             let cut = |k: i32| if k == pieces { b } else { a + (b - a) * k as f64 / pieces as f64 };
@@ -52,7 +54,7 @@ impl Trim {
         if curve.degree > 1 && deviation + offset > 0.5 * sheet.field.tightest() {
             deviation = over(8);
         }
-        let mut trim = Self { deviation: deviation + offset, between: Vec::new() };
+        let mut trim = Self { deviation: deviation + offset, gap: offset, between: Vec::new() };
         if !sheet.affine {
             trim.between = fan(sheet, side, [a, b], uv);
         }

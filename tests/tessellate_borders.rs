@@ -1,0 +1,82 @@
+//! Borders that were hard to mesh, built here: nothing over its tolerance, everything proved.
+
+use lampyris::math::{Frame, Point, Uv};
+use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
+use lampyris::tessellate::{Settings, Tessellation, tessellate};
+
+/// A face between chains of points in the parameter plane, one chain an edge; each edge follows the surface from point to point.
+fn face(surface: Surface, loops: &[Vec<Vec<Uv>>]) -> Model {
+    let mut part = Part::default();
+    let mut trims = Vec::new();
+    for chains in loops {
+        let first = part.vertices.len() as u32;
+        let n = chains.len() as u32;
+        let mut uses = Vec::new();
+        for (k, chain) in (0..n).zip(chains) {
+            part.vertices.push(surface.evaluate(chain[0]));
+            let m = chain.len() - 1;
+            let mut knots = vec![0.0];
+            knots.extend((0..=m).map(|i| i as f64 / m as f64));
+            knots.push(1.0);
+            let points = chain.iter().map(|&uv| surface.evaluate(uv).extend(1.0)).collect();
+            let curve = Curve { degree: 1, knots: knots.clone(), points };
+            let uv = UvCurve { degree: 1, knots, points: chain.iter().map(|p| p.extend(1.0)).collect() };
+            uses.push(EdgeUse { edge: Some(EdgeId(part.edges.len() as u32)), reversed: false, uv });
+            let vertices = [VertexId(first + k), VertexId(first + (k + 1) % n)];
+            part.edges.push(Edge { curve, vertices, entity: None });
+        }
+        trims.push(TrimLoop { uses });
+    }
+    let (name, analytic) = (String::new(), Analytic::Other);
+    let face =
+        Face { name, entity: None, colour: None, surface, analytic, reversed: false, loops: trims, gap: 0.0 };
+    part.shells = vec![Shell { faces: vec![face], ..Shell::default() }];
+    Model::from_part(part)
+}
+
+fn chain(n: usize, at: impl Fn(f64) -> Uv) -> Vec<Uv> {
+    (0..=n).map(|i| at(i as f64 / n as f64)).collect()
+}
+
+fn measured(tolerance: f64) -> Settings {
+    Settings { measure: true, ..Settings::uniform(tolerance) }
+}
+
+fn assert_proved(made: &Tessellation) {
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired), (0, 0));
+    assert_eq!(r.over_tolerance, Some(0), "{:?}", r.sag_mm);
+    assert_eq!(r.certified, r.facets, "{:?}", r.not_certified);
+}
+
+/// A plane cuts a shallow cone in a curve that is nearly straight in space (sag 0.03) but not in angle and height, where its chord
+/// runs 0.28 beside it.
+#[test]
+fn a_chord_that_strays_in_the_parameter_plane_alone_is_divided() {
+    let half = 0.075;
+    let turn = [-2.0 * half, 2.0 * half];
+    let slope = 0.1;
+    let cone = sweep::cone(&Frame::IDENTITY, 100.0, f64::atan(1.0 / slope), turn, [-5.0, 10.0]);
+    let at = |angle: f64, r: f64| {
+        let v = (0..200).fold([-5.0, 10.0], |[lo, hi], _| {
+            let m = 0.5 * (lo + hi);
+            let p: Point = cone.evaluate(Uv::new(0.0, m));
+            if p.x.hypot(p.y) < r { [m, hi] } else { [lo, m] }
+        });
+        Uv::new(conic::parameter_of_angle(turn, angle), v[0])
+    };
+    let plane = |f: f64| {
+        let angle = half * (1.0 - 2.0 * f);
+        at(angle, 100.0 / angle.cos())
+    };
+    let rim = |f: f64| at(half * (2.0 * f - 1.0), 96.0);
+    let loops = vec![vec![
+        chain(64, rim),
+        chain(1, |f| rim(1.0).lerp(plane(0.0), f)),
+        chain(64, plane),
+        chain(1, |f| plane(1.0).lerp(rim(0.0), f)),
+    ]];
+    let made = tessellate(&face(cone, &loops), &measured(0.1));
+    assert_proved(&made);
+}
