@@ -23,6 +23,7 @@ use crate::study::aim::Aim;
 use crate::study::check::{self, Check, Court, check};
 use crate::tessellate::{self, Tessellation};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What to do beside tracing.
 pub(super) struct Job<'a> {
@@ -58,8 +59,9 @@ pub(super) struct Ways<'a> {
     pub(super) from: Option<Portion>,
     /// Which part of how many, from 0.
     pub(super) shard: Option<[u32; 2]>,
-    /// Told of all that is done after each replicate.
+    /// Told of all that is done, each thread after so long.
     pub(super) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    pub(super) every: Duration,
     /// Takes every path.
     pub(super) paths: Option<&'a Paths>,
 }
@@ -152,6 +154,7 @@ impl Prepared<'_> {
         let hooks = Hooks {
             progress: &progress,
             finished: ways.finished,
+            every: ways.every,
             paths: take.as_ref().map(|take| take as PathSink<'_>),
         };
         let traced = trace(&self.bound, intersector, settings, ways.from, &hooks);

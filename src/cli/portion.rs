@@ -149,6 +149,11 @@ impl<'a> Checkpoint<'a> {
         Self { prepared, header, scene, shard, file, every, last, context }
     }
 
+    /// How often to look whether it is time to save.
+    pub(super) fn often(&self) -> Duration {
+        self.every.min(Duration::from_millis(250))
+    }
+
     /// What an earlier run left behind; `None` when there is nothing.
     pub(super) fn read(&self) -> Result<Option<Portion>, Failure> {
         let bytes = match std::fs::read(&self.file) {
@@ -287,7 +292,8 @@ pub(super) fn trace_shard(
     context: &Context,
 ) -> Result<(), Failure> {
     let finished = |p: &Portion| checkpoint.finished(p);
-    let ways = Ways { from, shard: Some(shard), finished: Some(&finished), ..Ways::default() };
+    let ways =
+        Ways { from, shard: Some(shard), finished: Some(&finished), every: checkpoint.often(), ..Ways::default() };
     let portion = prepared.portion(ways, context);
     checkpoint.write(&portion)?;
     say_shard(&checkpoint.file, &portion, shard, context)

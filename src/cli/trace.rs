@@ -82,6 +82,7 @@ pub(super) fn run(
         verify: extra.verify_pruning,
         from: traced.or(from),
         finished: until.is_none().then_some(&finished),
+        every: checkpoint.often(),
         paths: paths.as_ref(),
         ..Ways::default()
     };

@@ -125,10 +125,40 @@ impl Light<'_> {
             figures(r.mrays_per_s, 3),
             if r.lost_rays == 0 { "none".into() } else { grouped(r.lost_rays) }
         );
+        text += &self.cut_off();
         if let Some(check) = self.check {
             text += &verdict(check);
         }
         text
+    }
+
+    /// What limits took away, when it matters.
+    fn cut_off(&self) -> String {
+        let r = self.results;
+        let share = r.power.cut_off / r.power.emitted;
+        if share < 1e-4 {
+            return String::new();
+        }
+        let why = match (r.caught_rays, r.cut_off_rays - r.caught_rays) {
+            (0, _) => "at a limit of [run]: max_bounces, max_length_mm or power_floor".into(),
+            (caught, 0) => format!(
+                "because {} paths went round in a clear body by total reflection without end ([run] caught_after); a medium that \
+                 absorbs, as all real ones do, says where this light ends",
+                grouped(caught)
+            ),
+            (caught, others) => format!(
+                "{} paths that went round in a clear body by total reflection without end ([run] caught_after), {} at \
+                 another limit of [run]",
+                grouped(caught),
+                grouped(others)
+            ),
+        };
+        format!(
+            "**{} {}** ({}) were cut off, {why}. ",
+            figures(r.power.cut_off, 4),
+            self.unit,
+            self.share(r.power.cut_off)
+        )
     }
 
     /// The whole report.

@@ -17,6 +17,7 @@ mod digest;
 mod effects;
 mod emitter;
 mod error;
+mod gather;
 mod kernel;
 mod portion;
 pub mod random;

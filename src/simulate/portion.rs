@@ -25,7 +25,7 @@ pub struct Portion {
     pub seconds: f64,
 }
 
-const MAGIC: &[u8] = b"lampyris tally 1\n";
+const MAGIC: &[u8] = b"lampyris tally 2\n";
 
 impl Portion {
     pub(crate) fn none(bound: &BoundScene, replicates: u32) -> Self {
@@ -54,11 +54,16 @@ impl Portion {
         if let Some(twice) = other.done.iter().find(|r| self.done.binary_search(r).is_ok()) {
             return Err(format!("its replicate {twice} is in an earlier part already; each part counts once"));
         }
+        self.add(other);
+        self.seconds += other.seconds;
+        Ok(())
+    }
+
+    /// Adds other replicates of the same run.
+    pub(crate) fn add(&mut self, other: &Self) {
         self.done.extend(&other.done);
         self.done.sort_unstable();
         self.tallies.merge(&other.tallies);
-        self.seconds += other.seconds;
-        Ok(())
     }
 
     /// Writes the file, with a header of the caller's.
@@ -82,7 +87,7 @@ impl Portion {
             out.extend(m.farthest.to_le_bytes());
         }
         let c = &t.counts;
-        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off]
+        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught]
             .iter()
             .for_each(|x| out.extend(x.to_le_bytes()));
         // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
@@ -138,8 +143,9 @@ impl Portion {
                 farthest: r.u64()?,
             };
         }
-        let [rays, segments, corrected_normals, lost, cut_off] = [r.u64()?, r.u64()?, r.u64()?, r.u64()?, r.u64()?];
-        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off };
+        let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
+        let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
+        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught };
         let ledger: Vec<(LostRay, Vec<[u64; 3]>)> = r.json()?;
         let paths: Vec<(PathVertex, Vec<[u64; 3]>, u64)> = r.json()?;
         let place = |b: &[[u64; 3]], k: usize| b.get(k).map(|b| b.map(f64::from_bits).into()).unwrap_or_default();

@@ -35,6 +35,8 @@ pub struct Results {
     pub lost_rays: u64,
     /// Paths that a limit cut off.
     pub cut_off_rays: u64,
+    /// Those of them that went round by total reflection without end.
+    pub caught_rays: u64,
     /// Hits that used the facet's normal because the interpolated one would have sent the ray through the wrong side.
     pub corrected_normals: u64,
     /// Power absorbed by each instance on its faces, and in each medium.
@@ -195,7 +197,7 @@ impl Results {
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
-        let Counts { rays, segments, corrected_normals, lost, cut_off } = tallies.counts;
+        let Counts { rays, segments, corrected_normals, lost, cut_off, caught } = tallies.counts;
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
         let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;
         let digest = super::digest::of(&tallies);
@@ -214,6 +216,7 @@ impl Results {
             power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },
             lost_rays: lost,
             cut_off_rays: cut_off,
+            caught_rays: caught,
             corrected_normals,
             absorbed: absorbed_by(bound, &tallies, quantum),
             receivers: bound

@@ -1,5 +1,6 @@
 use super::bind::BoundScene;
 use super::effects::{self, KernelKind};
+use super::gather::{Gather, Own};
 use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, PathSink, Stack, Which};
 use super::portion::Portion;
 use super::receiver::Shape;
@@ -8,9 +9,8 @@ use super::scene::{Interfaces, Run, Sampling};
 use super::tally::QUANTA;
 use crate::intersect::{Cost, Intersector};
 use crate::optics::Effects;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 /// What a simulation is run with: the scene's own settings, which the command may override, and how to spread the work.
 #[derive(Clone, Debug, PartialEq)]
@@ -198,8 +198,10 @@ impl Plan {
 pub struct Hooks<'a> {
     /// Called from the worker threads after each replicate; it ends the run early by returning `false`.
     pub progress: &'a (dyn Fn(Progress) -> bool + Sync),
-    /// Called with all that is done so far after each replicate, one call at a time.
+    /// Called with all that is done so far, one call at a time.
     pub finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    /// How long each thread keeps what it has done from `finished`; zero for a call after each replicate.
+    pub every: Duration,
     /// Takes the vertices of every path, in pieces and in no particular order, from any thread.
     pub paths: Option<PathSink<'a>>,
 }
@@ -225,7 +227,7 @@ pub fn simulate(
     settings: &RunSettings,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Results {
-    let hooks = Hooks { progress, finished: None, paths: None };
+    let hooks = Hooks { progress, finished: None, every: Duration::ZERO, paths: None };
     Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks))
 }
 
@@ -258,22 +260,16 @@ pub fn trace(
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let share = context.plan.rays * u64::from(last.saturating_sub(first)) / u64::from(replicates);
-    let spent = before.seconds;
-    let total = Mutex::new((before, Cost::default()));
+    let rays_done = AtomicU64::new(before.tallies.counts.rays);
+    let all = Gather::new(before, hooks, start);
     let work = || {
         let mut local = Local::new(bound);
+        let mut own = Own::new(&all, bound, replicates);
         while !stop.load(Ordering::Relaxed) {
             let Some(&replicate) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
             let cost = dispatch(kind, &context, Which::Replicate(replicate), &mut local);
-            let mut sums = total.lock().unwrap_or_else(|e| e.into_inner());
-            sums.0.take(replicate, &mut local, &context);
-            sums.0.seconds = spent + start.elapsed().as_secs_f64();
-            sums.1 += cost;
-            let rays = sums.0.tallies.counts.rays;
-            if let Some(finished) = hooks.finished {
-                finished(&sums.0);
-            }
-            drop(sums);
+            let rays = local.counts.rays + rays_done.fetch_add(local.counts.rays, Ordering::Relaxed);
+            own.take(replicate, &mut local, &context, cost);
             let so_far = Progress { rays, total: share, seconds: start.elapsed().as_secs_f64() };
             if !(hooks.progress)(so_far) {
                 stop.store(true, Ordering::Relaxed);
@@ -286,9 +282,7 @@ pub fn trace(
         }
         work();
     });
-    let (mut portion, cost) = total.into_inner().unwrap_or_else(|e| e.into_inner());
-    portion.tallies.sort();
-    portion.seconds = spent + start.elapsed().as_secs_f64();
+    let (portion, cost) = all.into_whole();
     Traced { portion, cost, threads }
 }
 

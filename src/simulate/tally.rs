@@ -65,27 +65,29 @@ impl Sum {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grid {
     cells: Vec<u64>,
+    /// The cells that hold something, of which the first `count` mean something; as long as the cells and one more.
     touched: Vec<u32>,
+    count: usize,
 }
 
 impl Grid {
     pub(crate) fn new(cells: usize) -> Self {
-        Self { cells: vec![0; cells], touched: Vec::new() }
+        Self { cells: vec![0; cells], touched: vec![0; cells + 1], count: 0 }
     }
 
+    /// Without a branch on whether the cell is empty: half the cells of a picture are, and to wait for the answer was 7 % of a run.
     #[inline]
     pub(crate) fn add(&mut self, cell: usize, quanta: f64) {
         let quanta = count(quanta);
         let c = &mut self.cells[cell];
-        if *c == 0 && quanta > 0 {
-            self.touched.push(cell as u32);
-        }
+        self.touched[self.count] = cell as u32;
+        self.count += usize::from((*c == 0) & (quanta > 0));
         *c += quanta;
     }
 
     /// Every cell that was touched, with what it holds.
     pub(crate) fn touched(&self) -> impl Iterator<Item = (usize, u64)> {
-        self.touched.iter().map(|&c| (c as usize, self.cells[c as usize]))
+        self.touched[..self.count].iter().map(|&c| (c as usize, self.cells[c as usize]))
     }
 
     pub(crate) fn get(&self, cell: usize) -> u64 {
@@ -94,9 +96,10 @@ impl Grid {
 
     /// Moves what the replicate gathered to the sums of the run.
     pub(crate) fn flush(&mut self, sums: &mut [Sum]) {
-        for cell in self.touched.drain(..) {
+        for &cell in &self.touched[..self.count] {
             sums[cell as usize].add_replicate(std::mem::take(&mut self.cells[cell as usize]));
         }
+        self.count = 0;
     }
 }
 

@@ -13,6 +13,7 @@ use crate::simulate::{
 };
 use serde::Serialize;
 use std::sync::Mutex;
+use std::time::Duration;
 use std::time::Instant;
 
 /// One receiver under one combination.
@@ -111,7 +112,7 @@ fn by_replicate(
         done.clone_from(&p.done);
         *sums = now;
     };
-    let hooks = Hooks { progress: &|_| true, finished: Some(&finished), paths: None };
+    let hooks = Hooks { progress: &|_| true, finished: Some(&finished), every: Duration::ZERO, paths: None };
     let results = Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks));
     let (_, _, by) = parts.into_inner().unwrap_or_else(|e| e.into_inner());
     (results, by)

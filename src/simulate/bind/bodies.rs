@@ -5,6 +5,7 @@ use crate::model::{Model, PlacedFace};
 use crate::optics::{self, Absorption, BulkScatter, Index};
 use crate::simulate::scene::{Key, Scene, medium};
 use crate::simulate::{Error, ErrorKind};
+use std::collections::HashMap;
 
 /// Something with a medium inside.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub(crate) struct Body {
     pub(crate) name: String,
     /// Name of the medium.
     pub(crate) medium: String,
+    /// Length that light goes by total reflection alone before it is taken to be caught, mm.
+    pub(crate) patience: f64,
 }
 
 impl Body {
@@ -35,6 +38,7 @@ impl Body {
             scatter: m.scatter,
             name,
             medium: m.name,
+            patience: f64::INFINITY,
         }
     }
 
@@ -82,16 +86,15 @@ pub(super) fn find(
         None => optics::Medium::vacuum(),
     };
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
-    let mut keys: Vec<Option<(usize, &str)>> = vec![None];
+    let mut places: HashMap<(usize, &str), usize> = HashMap::new();
     let mut boxes = vec![Aabb::EMPTY];
     let mut of_face = vec![AMBIENT; chosen.len()];
     for (f, &(_, rule)) in model.placed_faces().zip(chosen) {
         let Some((rule, name)) = rule.and_then(|r| Some((r, scene.materials[r].medium.as_deref()?))) else {
             continue;
         };
-        let key = Some((f.instance, name));
-        let body = match keys.iter().position(|k| *k == key) {
-            Some(body) => body,
+        let body = match places.get(&(f.instance, name)) {
+            Some(&body) => body,
             None => {
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
                 let instance = model.instances[f.instance].name.clone();
@@ -100,10 +103,10 @@ pub(super) fn find(
                     let message = format!("'{name}' has no index at {} nm", light.wavelength);
                     return Err(scene.error(ErrorKind::Value, &at, message));
                 }
-                keys.push(key);
+                places.insert((f.instance, name), bodies.len());
                 boxes.push(Aabb::EMPTY);
                 bodies.push(body);
-                keys.len() - 1
+                bodies.len() - 1
             }
         };
         boxes[body] = boxes[body].union(bounds(&f));
@@ -112,6 +115,9 @@ pub(super) fn find(
     if bodies.len() > usize::from(u16::MAX) {
         let message = format!("{} bodies with media; at most 65534 are possible", bodies.len());
         return Err(scene.error(ErrorKind::Model, &[Key::Name("material")], message));
+    }
+    for (body, b) in bodies.iter_mut().zip(&boxes).skip(1).filter(|(_, b)| !b.is_empty()) {
+        body.patience = scene.run.caught_after * b.diagonal();
     }
     let mut order: Vec<Aabb> = boxes[1..].iter().map(|b| b.grown(scene.run.glue_mm)).collect();
     order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));

@@ -78,7 +78,10 @@ impl Stream {
     /// Makes ready the numbers of one ray, which is the one to start.
     pub(crate) fn prepare_alone(&mut self, index: u32) -> u32 {
         if self.sampling == Sampling::Sobol {
-            self.chunk(index - index % CHUNK as u32);
+            for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
+                self.numbers[d].resize(CHUNK, 0);
+                self.numbers[d][index as usize % CHUNK] = random::scrambled(index, d, self.scrambles[d]);
+            }
         }
         index
     }

@@ -134,6 +134,8 @@ pub struct Counts {
     pub lost: u64,
     /// Paths that a limit cut off.
     pub cut_off: u64,
+    /// Those of them that went round by total reflection without end.
+    pub caught: u64,
 }
 
 impl Counts {
@@ -143,6 +145,7 @@ impl Counts {
         self.corrected_normals += o.corrected_normals;
         self.lost += o.lost;
         self.cut_off += o.cut_off;
+        self.caught += o.caught;
     }
 }
 

@@ -70,6 +70,8 @@ pub(crate) struct Path<C> {
     pub(crate) length: f64,
     /// The receiver that ends the segment unless a face comes first; `u32::MAX` for none.
     pub(crate) receiver: u32,
+    /// Length up to the last hit that was no total reflection, mm.
+    pub(crate) free: f32,
     pub(crate) carry: C,
 }
 
@@ -131,7 +133,8 @@ impl<C: Carry> Wave<C> {
     fn idle(batch: usize) -> Option<Self> {
         let carry = C::inside(&[])?;
         let receiver = NO_RECEIVER;
-        let path = Path { ray: 0, branch: 0, bounce: 0, quanta: 0.0, first: 0.0, length: 0.0, receiver, carry };
+        let path =
+            Path { ray: 0, branch: 0, bounce: 0, quanta: 0.0, first: 0.0, length: 0.0, receiver, free: 0.0, carry };
         let ray = Ray::new(Point::ZERO, Vector::Z);
         Some(Self {
             paths: vec![path; batch],
@@ -294,7 +297,8 @@ fn start<C: Carry>(
         });
     }
     let receiver = NO_RECEIVER;
-    *path = Path { ray: ticket.ray, branch: 0, bounce: 0, quanta, first: quanta, length: 0.0, receiver, carry };
+    let (ray_number, first) = (ticket.ray, quanta);
+    *path = Path { ray: ray_number, branch: 0, bounce: 0, quanta, first, length: 0.0, receiver, free: 0.0, carry };
     step::record(context, path, ray.origin, Event::Emitted, local);
     step::aim(context, path, ray);
     true

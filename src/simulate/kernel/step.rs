@@ -125,13 +125,19 @@ pub(super) fn step<C: Carry>(
             local.absorb(hit.face, path.quanta);
             return false;
         }
-        Surface::Mirror(share) => Some(surface::mirror(context, *share, path, ray.direction, &meeting, local)),
+        Surface::Mirror(share) => {
+            stray(path);
+            Some(surface::mirror(context, *share, path, ray.direction, &meeting, local))
+        }
         Surface::Interface if C::MEDIA && face.body != AMBIENT => {
             surface::interface(context, path, ray, &meeting, local, pending)
         }
         // A bare face without a medium behind it is not there for light.
         Surface::Interface => Some(ray.direction),
-        Surface::Coated(c) => surface::coated(context, c, path, ray, &meeting, local, pending),
+        Surface::Coated(c) => {
+            stray(path);
+            surface::coated(context, c, path, ray, &meeting, local, pending)
+        }
     };
     going.is_some_and(|going| onward(context, path, ray, &meeting, going, local))
 }
@@ -199,16 +205,44 @@ fn proceed<C: Carry>(
         || path.quanta <= s.power_floor * path.first
         || path.quanta < 1.0
     {
-        if path.quanta > 0.0 {
-            local.ends.cut_off += count(path.quanta);
-            local.counts.cut_off += 1;
-            record(context, path, next.origin, Event::CutOff, local);
-        }
+        cut_off(context, path, next.origin, local);
         return false;
     }
     *ray = next;
     aim(context, path, ray);
     true
+}
+
+/// Ends a path at a limit.
+#[cold]
+fn cut_off<C: Carry>(context: &Context<'_>, path: &Path<C>, at: Point, local: &mut Local) {
+    if path.quanta > 0.0 {
+        local.ends.cut_off += count(path.quanta);
+        local.counts.cut_off += 1;
+        record(context, path, at, Event::CutOff, local);
+    }
+}
+
+/// Notes that a path has just met what is no total reflection.
+#[inline(always)]
+pub(super) fn stray<C: Carry>(path: &mut Path<C>) {
+    if C::MEDIA {
+        path.free = path.length as f32;
+    }
+}
+
+/// Whether a path that has just been reflected totally goes round in its body for ever; it ends here then.
+///
+/// Where the body absorbs, the path ends by its power.
+#[inline(always)]
+pub(super) fn caught<C: Carry>(context: &Context<'_>, path: &Path<C>, at: Point, local: &mut Local) -> bool {
+    let body = &context.bound.bodies[path.carry.body() as usize];
+    let caught = path.length - f64::from(path.free) > body.patience && !body.absorbs();
+    if caught {
+        local.counts.caught += u64::from(path.quanta > 0.0);
+        cut_off(context, path, at, local);
+    }
+    caught
 }
 
 /// Beer's law over the segment, for bodies that absorb.
@@ -232,6 +266,7 @@ fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, l
     let point = ray.at(ray.t_max);
     let numbers = key(context, path).pair(Purpose::BulkDirection);
     path.length += ray.t_max;
+    stray(path);
     path.bounce += 1;
     record(context, path, point, Event::Scattered, local);
     let going = scatter.sample(ray.direction, numbers);

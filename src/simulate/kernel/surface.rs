@@ -1,6 +1,6 @@
 //! What happens to a path at a face.
 
-use super::step::{Meeting, key, lose, onward, record};
+use super::step::{Meeting, caught, key, lose, onward, record, stray};
 use super::{Carry, Cause, Context, Event, Local, Path};
 use crate::intersect::{Cost, Hit};
 use crate::math::{Departure, Point, Ray, Vector};
@@ -104,12 +104,16 @@ pub(super) fn interface<C: Carry>(
     let d = ray.direction;
     let (normal, cos_i, transmitted) = refracted(d, eta, at, local);
     let Some((transmitted, cos_t)) = transmitted else {
+        if caught(context, path, at.point, local) {
+            return None;
+        }
         record(context, path, at.point, Event::Reflected, local);
         if path.carry.stokes().is_some() {
             turn(context, path, &polarised::reflected(cos_i, eta), d, normal);
         }
         return Some(mirrored(d, normal, at, local));
     };
+    stray(path);
     let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
     let mut matrices = None;
     if path.carry.stokes().is_some() {

@@ -27,6 +27,9 @@ pub struct Run {
     pub unit: PowerUnit,
     /// Hits after which a path ends and counts as cut off: what is caught in a clear block goes round for ever.
     pub max_bounces: u32,
+    /// Diagonals of a body that light goes in it by total reflection alone before it counts as caught there and is cut off, where the
+    /// body absorbs nothing; `inf` for a guide that is wound up on itself.
+    pub caught_after: f64,
     /// Length after which a path ends and counts as cut off, mm.
     pub max_length_mm: f64,
     /// Share of a ray's first power below which its path ends and counts as cut off.
@@ -49,6 +52,7 @@ impl Default for Run {
             wavelength_nm: 587.5618,
             unit: PowerUnit::Watt,
             max_bounces: 20_000,
+            caught_after: 200.0,
             max_length_mm: 1e9,
             power_floor: 1e-6,
             glue_mm: 1e-3,
@@ -153,6 +157,7 @@ impl Run {
             r if !(1e-9..=1.0).contains(&r.glue_mm) => {
                 fail("glue_mm", "must be from 1e-9 to 1: faces at the same place are always one interface")
             }
+            r if r.caught_after.is_nan() || r.caught_after < 1.0 => fail("caught_after", "must be at least 1"),
             r if r.max_bounces == 0 => fail("max_bounces", "must be at least 1"),
             _ => Ok(()),
         }
