@@ -4,7 +4,9 @@ mod exact_common;
 use exact_common::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost, Intersector};
-use lampyris::math::{Departure, Point, Ray, Vector};
+use lampyris::math::{Departure, Homogeneous, Point, Ray, Uv, Vector};
+use lampyris::model::{EdgeUse, Face, Model, Part, Shell, TrimLoop};
+use lampyris::nurbs::{Surface, UvCurve};
 
 fn build(m: &lampyris::model::Model) -> Exact {
     Exact::build(m, &Settings::default())
@@ -149,4 +151,45 @@ fn crossings_of_a_torus_satisfy_its_equation_and_are_even() {
             assert_eq!(first.map(|h| h.t), hits.first().map(|h| h.t));
         }
     }
+}
+
+/// A tilted plane a hundred times as large as the square that its loop leaves, and a strip across all three axes.
+#[test]
+fn rays_far_from_the_trims_and_beside_a_slanted_strip_test_no_leaf() {
+    let x = Vector::new(1.0, 1.0, 1.0).normalize();
+    let y = x.any_orthonormal_vector();
+    let corner = |u: f64, v: f64| Homogeneous::from((x * u + y * v, 1.0));
+    let plane = |u: [f64; 2], v: [f64; 2]| Surface {
+        degree: [1, 1],
+        knots: [vec![u[0], u[0], u[1], u[1]], vec![v[0], v[0], v[1], v[1]]],
+        points: vec![corner(u[0], v[0]), corner(u[0], v[1]), corner(u[1], v[0]), corner(u[1], v[1])],
+    };
+    let square = [[30.0, 30.0], [40.0, 30.0], [40.0, 40.0], [30.0, 40.0]].map(Uv::from);
+    let side = |k: usize| EdgeUse {
+        edge: None,
+        reversed: false,
+        uv: UvCurve::line(square[k], square[(k + 1) % 4], [0.0, 1.0]),
+    };
+    let trimmed = Face {
+        loops: vec![TrimLoop { uses: (0..4).map(side).collect() }],
+        ..face(plane([-500.0, 500.0], [-500.0, 500.0]))
+    };
+    let strip = face(plane([-400.0, -100.0], [0.0, 1.0]));
+    let part = Part { shells: vec![Shell { faces: vec![trimmed, strip], ..Shell::default() }], ..Part::default() };
+    let exact = Exact::build(&Model::from_part(part), &Settings::default());
+    let normal = x.cross(y);
+    let mut s = Stream(5);
+    let mut cost = Cost::default();
+    for _ in 0..2000 {
+        let [u, v] = [s.within(-450.0, 450.0), s.within(-450.0, 450.0)];
+        let ray = Ray::new(x * u + y * v - 50.0 * normal, normal);
+        let within = |x: f64, [a, b]: [f64; 2]| x > a && x < b;
+        let expected = within(u, [30.0, 40.0]) && within(v, [30.0, 40.0])
+            || within(u, [-400.0, -100.0]) && within(v, [0.0, 1.0]);
+        let hit = exact.first(&ray, &mut cost).hit;
+        assert_eq!(hit.is_some(), expected, "{u} {v}");
+        assert!(hit.is_none_or(|h| (h.t - 50.0).abs() < 1e-12));
+    }
+    // Of the 2000, some 10 aim at the square and at the strip; the whole plane in one leaf would be tested 2000 times.
+    assert!(cost.tests < 200, "{} tests", cost.tests);
 }

@@ -39,17 +39,7 @@ impl Stream {
 }
 
 pub fn face(surface: Surface) -> Face {
-    let analytic = Analytic::Rational;
-    Face {
-        name: String::new(),
-        entity: None,
-        colour: None,
-        surface,
-        analytic,
-        reversed: false,
-        loops: vec![],
-        gap: 0.0,
-    }
+    Face { analytic: Analytic::Rational, ..Face::whole(surface) }
 }
 
 pub fn model(surfaces: impl IntoIterator<Item = Surface>) -> Model {

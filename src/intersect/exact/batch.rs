@@ -101,24 +101,16 @@ mod tests {
     use crate::intersect::Intersector;
     use crate::intersect::exact::Settings;
     use crate::math::{Departure, Frame, Point, Uv, Vector};
-    use crate::model::{Analytic, Face, Model, Part, Shell};
+    use crate::model::{Face, Model, Part, Shell};
     use crate::nurbs::sweep;
     use std::f64::consts::PI;
 
     fn torus() -> Exact {
         let surface = sweep::torus(&Frame::IDENTITY, 50.0, 15.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
-        let analytic = Analytic::Rational;
-        let face = Face {
-            name: String::new(),
-            entity: None,
-            colour: None,
-            surface,
-            analytic,
-            reversed: false,
-            loops: vec![],
-            gap: 0.0,
+        let part = Part {
+            shells: vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }],
+            ..Part::default()
         };
-        let part = Part { shells: vec![Shell { faces: vec![face], ..Shell::default() }], ..Part::default() };
         Exact::build(&Model::from_part(part), &Settings::default())
     }
 

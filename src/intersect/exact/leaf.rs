@@ -4,13 +4,10 @@
 //! [`EXTENSION`], an axis-parallel and an oriented box. Patches are halved until the derivative boxes, preconditioned by the
 //! inverse of their middles, deviate from the identity by less than `Settings::flatness` when seen along the normal.
 
-use super::geometry::{Geometry, Patch, PatchGrid};
+use super::geometry::{Patch, PatchGrid};
 use super::net::{self, Net, Slopes, V4};
-use super::probe::Probe;
-use super::trim::Region;
 use super::wide;
-use crate::math::Vector;
-use rayon::prelude::*;
+use crate::math::{Aabb, Vector};
 
 /// How far beyond its domain a leaf's derivative boxes hold, in local parameters.
 pub(super) const EXTENSION: f64 = 0.1;
@@ -50,21 +47,6 @@ pub(super) struct Leaf {
     pub(super) rect: [[f64; 2]; 2],
 }
 
-/// Leaves and their control points.
-#[derive(Debug, Default)]
-pub(super) struct Leaves {
-    pub(super) leaves: Vec<Leaf>,
-    pub(super) probes: Vec<Probe>,
-    pub(super) pool: Vec<V4>,
-}
-
-/// When to stop cutting.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cutting {
-    pub(super) flatness: f64,
-    pub(super) depth: u32,
-}
-
 impl Leaf {
     pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
         let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
@@ -78,6 +60,10 @@ impl Leaf {
         [u0 + (u1 - u0) * u, v0 + (v1 - v0) * v]
     }
 
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb { min: self.lo, max: self.hi }
+    }
+
     /// Local parameters of the leaf at local parameters of the patch.
     pub(super) fn of_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
@@ -85,71 +71,18 @@ impl Leaf {
     }
 }
 
-fn xyz(a: &V4) -> Vector {
+pub(super) fn xyz(a: &V4) -> Vector {
     Vector::new(a[0], a[1], a[2])
 }
 
-/// Cuts every patch.
-pub(super) fn cut_all(geometry: &Geometry, cutting: Cutting) -> Vec<Leaves> {
-    (0..geometry.patches.len() as u32).into_par_iter().map(|p| cut(geometry, p, cutting)).collect()
-}
-
-/// Cuts one patch into leaves; those that lie outside the trims are dropped.
-fn cut(geometry: &Geometry, index: u32, cutting: Cutting) -> Leaves {
-    let patch = &geometry.patches[index as usize];
-    let trim = &geometry.trims[geometry.faces[patch.face as usize].trim as usize];
-    let mut out = Leaves::default();
-    let mut stack = vec![(patch.net.clone(), [[0.0, 1.0]; 2], 0)];
-    while let Some((piece, rect, depth)) = stack.pop() {
-        let [u, v] = rect;
-        let (from, to) = (patch.uv([u[0], v[0]]), patch.uv([u[1], v[1]]));
-        let region = trim.region([[from.x, to.x], [from.y, to.y]]);
-        if region == Region::Outside {
-            continue;
-        }
-        let Described { mut leaf, slopes, net: centred } = describe(patch, &piece, rect, depth);
-        let weights = centred.iter().fold((f64::INFINITY, 0f64), |(lo, hi), p| (lo.min(p[3]), hi.max(p[3])));
-        let flat = deviation(&leaf, &slopes) < cutting.flatness && weights.1 < 1.5 * weights.0;
-        if flat || depth >= cutting.depth {
-            leaf.whole = region == Region::Inside;
-            leaf.patch = index;
-            leaf.face = patch.face;
-            let face = &geometry.faces[patch.face as usize];
-            if !trim.whole && !leaf.whole {
-                widen(
-                    &mut leaf,
-                    &slopes,
-                    border_sides(&geometry.grids[face.grid as usize], patch, rect),
-                    face.band,
-                );
-            }
-            leaf.net = out.pool.len() as u32;
-            let middle = wide::evaluate(&centred, patch.degree, 0.5, 0.5).s;
-            out.pool.extend(centred);
-            out.probes.push(Probe::new(&leaf, &slopes, &middle));
-            out.leaves.push(leaf);
-            continue;
-        }
-        let direction = steeper(&leaf, &slopes, &centred, depth);
-        let [low, high] = net::halves(&piece, patch.degree, direction);
-        let middle = 0.5 * (rect[direction][0] + rect[direction][1]);
-        let (mut a, mut b) = (rect, rect);
-        a[direction][1] = middle;
-        b[direction][0] = middle;
-        stack.push((high, b, depth + 1));
-        stack.push((low, a, depth + 1));
-    }
-    out
-}
-
 /// A leaf with what goes elsewhere: derivative boxes over the enlarged domain, and the net about its centre.
-struct Described {
-    leaf: Leaf,
-    slopes: Slopes,
-    net: Net,
+pub(super) struct Described {
+    pub(super) leaf: Leaf,
+    pub(super) slopes: Slopes,
+    pub(super) net: Net,
 }
 
-fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
+pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
     let middle = wide::evaluate(piece, degree, 0.5, 0.5).s;
     let center = patch.center + xyz(&middle) / middle[3];
@@ -210,7 +143,7 @@ fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Des
 
 /// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border, nor
 /// is a pole, beyond which the surface comes back.
-fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool; 2]; 2] {
+pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool; 2]; 2] {
     [0, 1].map(|d: usize| {
         let ends = [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]];
         [0, 1].map(|end| {
@@ -222,7 +155,7 @@ fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool;
 
 /// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
 /// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
-fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
+pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
     // Roots on grazed faces stray beyond the band by the inverse of the sine.
     let far = 32.0 * band;
     for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
@@ -263,7 +196,7 @@ fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
 }
 
 /// Largest row sum of `|J⁻¹| R` for a ray along the normal.
-fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
+pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
     let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
     if !(det.abs() > 0.0) {
@@ -275,7 +208,7 @@ fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
 }
 
 /// The direction whose halving leaves the smaller deviation, predicted from second differences.
-fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
+pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;
     let (mut uu, mut uv, mut vv) = ([0f64; 4], [0f64; 4], [0f64; 4]);

@@ -20,6 +20,7 @@
 pub mod audit;
 mod batch;
 mod clip;
+mod cut;
 mod edge;
 mod geometry;
 mod leaf;
@@ -40,8 +41,9 @@ use super::{Certainty, Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, FaceId, Ray, Vector};
 use crate::model::Model;
 use clip::TANGENT;
+use cut::Cutting;
 use geometry::Geometry;
-use leaf::{Cutting, Leaf};
+use leaf::Leaf;
 use probe::{Label, Probe};
 use query::{Query, Root};
 use std::time::Instant;
@@ -77,13 +79,11 @@ impl Default for Settings {
 /// ```
 /// use lampyris::intersect::{Certainty, Cost, Intersector, exact::{Exact, Settings}};
 /// use lampyris::math::{Frame, Point, Ray, Vector};
-/// use lampyris::model::{Analytic, Face, Model, Part, Shell};
+/// use lampyris::model::{Face, Model, Part, Shell};
 /// use lampyris::nurbs::sweep;
 /// # use std::f64::consts::{FRAC_PI_2, PI};
 /// let surface = sweep::sphere(&Frame::IDENTITY, 50.0, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]);
-/// let analytic = Analytic::Sphere { frame: Frame::IDENTITY, radius: 50.0 };
-/// let face = Face { name: String::new(), entity: None, colour: None, surface, analytic, reversed: false, loops: vec![], gap: 0.0 };
-/// let part = Part { shells: vec![Shell { faces: vec![face], ..Shell::default() }], ..Part::default() };
+/// let part = Part { shells: vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }], ..Part::default() };
 /// let exact = Exact::build(&Model::from_part(part), &Settings::default());
 /// let hit = exact.intersect(&Ray::new(Point::new(-150.0, 3.0, 4.0), Vector::X), &mut Cost::default()).unwrap();
 /// assert!((hit.t - (150.0 - (2500f64 - 25.0).sqrt())).abs() < 1e-12);
@@ -133,11 +133,11 @@ impl Exact {
         let start = Instant::now();
         let geometry = Geometry::new(model, settings.trim_band);
         let mut cutting = Cutting { flatness: settings.flatness, depth: settings.depth };
-        let mut cut = leaf::cut_all(&geometry, cutting);
-        let count = |cut: &[leaf::Leaves]| cut.iter().map(|c| c.leaves.len()).sum::<usize>();
+        let mut cut = cut::cut_all(&geometry, cutting);
+        let count = |cut: &[cut::Leaves]| cut.iter().map(|c| c.leaves.len()).sum::<usize>();
         while count(&cut) < settings.leaves && cutting.flatness > 0.21 * settings.flatness {
             cutting.flatness = (0.6 * cutting.flatness).max(0.2 * settings.flatness);
-            cut = leaf::cut_all(&geometry, cutting);
+            cut = cut::cut_all(&geometry, cutting);
         }
         let (mut leaves, mut probes, mut pool) = (Vec::new(), Vec::new(), Vec::new());
         for part in cut {
@@ -149,7 +149,7 @@ impl Exact {
         let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
         starts.push(pool.len() as u32);
         let labels = leaves.iter().map(|l| Label::new(l, &geometry)).collect();
-        let boxes: Vec<Aabb> = leaves.iter().map(|l: &Leaf| Aabb { min: l.lo, max: l.hi }).collect();
+        let boxes: Vec<Aabb> = leaves.iter().map(Leaf::bounds).collect();
         let tree = Tree::build(&boxes);
         let build_seconds = start.elapsed().as_secs_f64();
         Self { geometry, leaves, probes, labels, pool, starts, tree, settings: *settings, build_seconds }

@@ -41,7 +41,10 @@ pub(super) struct Near {
 pub(super) struct Trim {
     pieces: Vec<Piece>,
     pub(super) uses: Vec<Use>,
+    /// Low corner of the grid of cells.
     origin: Uv,
+    /// Whether the grid ends before the domain does, at the low and the high end of u, and of v: beyond is outside.
+    ends: [[bool; 2]; 2],
     /// Cells per unit of u and v.
     density: Uv,
     count: [usize; 2],
@@ -67,11 +70,16 @@ impl Trim {
             25..=200 => 48,
             _ => 96,
         };
-        let cell = extent / n as f64;
+        let uses = uses_of(face, closed, gaps);
+        let widest = uses.iter().map(|u| u.gap).fold(0.0, f64::max);
+        let reach = reach(face, extent, band.max(8.0 * widest));
+        let ([lo, hi], ends) = gridded(face, reach);
+        let cell = (hi - lo) / n as f64;
         let mut trim = Self {
             pieces: pieces_of(face, cell),
-            uses: uses_of(face, closed, gaps),
-            origin: Uv::new(u0, v0),
+            uses,
+            origin: lo,
+            ends,
             density: Uv::ONE / cell,
             count: [n, n],
             cells: vec![Region::Inside; n * n],
@@ -85,7 +93,13 @@ impl Trim {
             return trim;
         }
         trim.outside_is_inside = trim.signed_area() < 0.0;
-        trim.fill_cells(reach(face, extent, band.max(8.0 * trim.widest_gap())));
+        if trim.outside_is_inside {
+            // Holes alone: what lies around them counts too.
+            let cell = extent / n as f64;
+            trim.pieces = pieces_of(face, cell);
+            (trim.origin, trim.density, trim.ends) = (Uv::new(u0, v0), Uv::ONE / cell, Default::default());
+        }
+        trim.fill_cells(reach);
         trim
     }
 
@@ -151,12 +165,53 @@ impl Trim {
         (crossings % 2 == 1) != self.outside_is_inside
     }
 
+    /// Whether a point lies beyond the grid, where nothing counts.
+    fn is_beyond(&self, q: Uv) -> bool {
+        (0..2).any(|d| {
+            let x = (q[d] - self.origin[d]) * self.density[d];
+            self.ends[d][0] && x < 0.0 || self.ends[d][1] && x > self.count[d] as f64
+        })
+    }
+
+    /// The part of a rectangle of the domain that holds all of it that is not outside; `None` when all is.
+    pub(super) fn kept(&self, rect: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+        if self.whole {
+            return Some(rect);
+        }
+        let [us, vs] = [0, 1].map(|d| self.cell_range(rect[d][0], rect[d][1], d));
+        let (mut lo, mut hi) = ([usize::MAX; 2], [0; 2]);
+        for j in vs.clone() {
+            let row = &self.cells[j * self.count[0]..][us.clone()];
+            let counts = |c: &Region| *c != Region::Outside;
+            let (Some(first), Some(last)) = (row.iter().position(counts), row.iter().rposition(counts)) else {
+                continue;
+            };
+            (lo[0], hi[0]) = (lo[0].min(us.start() + first), hi[0].max(us.start() + last));
+            (lo[1], hi[1]) = (lo[1].min(j), hi[1].max(j));
+        }
+        if lo[0] == usize::MAX {
+            return None;
+        }
+        // A little more, so that rounding takes no point into a cell beyond; and the first and last cells hold what the
+        // domain has beyond the grid unless it ends there.
+        let place = |d: usize, cell: f64| self.origin[d] + cell / self.density[d];
+        let kept = [0, 1].map(|d: usize| {
+            let [a, b] = rect[d];
+            let low = if lo[d] == 0 && !self.ends[d][0] { a } else { place(d, lo[d] as f64 - 1e-6) };
+            let last = self.count[d] - 1;
+            let high = if hi[d] == last && !self.ends[d][1] { b } else { place(d, hi[d] as f64 + 1.0 + 1e-6) };
+            [a.max(low), b.min(high)]
+        });
+        kept.iter().all(|[a, b]| a < b).then_some(kept)
+    }
+
     /// What a rectangle of the domain is: inside or outside only when all its cells are.
     pub(super) fn region(&self, [u, v]: [[f64; 2]; 2]) -> Region {
         if self.whole {
             return Region::Inside;
         }
-        let mut found = None;
+        let beyond = [[u[0], v[0]], [u[1], v[1]]].map(|[u, v]| self.is_beyond(Uv::new(u, v)));
+        let mut found = beyond.contains(&true).then_some(Region::Outside);
         for j in self.cell_range(v[0], v[1], 1) {
             for i in self.cell_range(u[0], u[1], 0) {
                 let cell = self.cells[j * self.count[0] + i];
@@ -171,6 +226,9 @@ impl Trim {
 
     /// Whether `q` is inside, and what uses pass within `band` mm; `metric` as for [`Piece::nearest`].
     pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
+        if self.is_beyond(q) {
+            return Place { inside: false, near: SmallVec::new() };
+        }
         let i = *self.cell_range(q.x, q.x, 0).start();
         let j = *self.cell_range(q.y, q.y, 1).start();
         let cell = j * self.count[0] + i;
@@ -206,6 +264,25 @@ impl Trim {
         }
         Place { inside: self.parity(q, j), near }
     }
+}
+
+/// The rectangle over which cells are laid: around the loops as far as `reach`, within the domain; and which of its
+/// sides end before the domain does.
+fn gridded(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
+    let domain = face.surface.domain();
+    let whole = [0, 1].map(|end| Uv::new(domain[0][end], domain[1][end]));
+    let points = face.loops.iter().flat_map(|l| &l.uses).flat_map(|u| &u.uv.points);
+    let (mut lo, mut hi) = (Uv::INFINITY, Uv::NEG_INFINITY);
+    for p in points {
+        let at = p.truncate() / p.z;
+        (lo, hi) = (lo.min(at), hi.max(at));
+    }
+    let margin = reach + 1e-3 * (hi - lo);
+    let (lo, hi) = ((lo - margin).max(whole[0]), (hi + margin).min(whole[1]));
+    if !(lo.x < hi.x && lo.y < hi.y) {
+        return (whole, Default::default());
+    }
+    ([lo, hi], [0, 1].map(|d| [lo[d] > whole[0][d], hi[d] < whole[1][d]]))
 }
 
 /// How far, in u and v, a cell border must keep from a trimming curve so that the band stays in border cells.

@@ -205,22 +205,13 @@ impl Sheet {
 mod tests {
     use super::*;
     use crate::math::Frame;
-    use crate::model::{Analytic, Face};
+    use crate::model::Face;
     use crate::nurbs::sweep;
     use std::f64::consts::PI;
 
     fn sphere(radius: f64) -> Sheet {
-        let face = Face {
-            name: String::new(),
-            entity: None,
-            colour: None,
-            surface: sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]),
-            analytic: Analytic::Other,
-            reversed: false,
-            loops: Vec::new(),
-            gap: 0.0,
-        };
-        of(&face)
+        let surface = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        of(&Face::whole(surface))
     }
 
     fn of(face: &Face) -> Sheet {

@@ -36,6 +36,8 @@ struct AuditFace {
     id: FaceId,
     domain: [[f64; 2]; 2],
     trims: Vec<Trim>,
+    /// Whether the loops run clockwise: holes in a domain that counts otherwise.
+    holes_alone: bool,
 }
 
 /// A Bézier piece of a uv curve and a box around it.
@@ -81,7 +83,12 @@ impl Audit {
             for patch in surface.bezier_patches() {
                 split(patch, faces.len() as u32, &mut pieces);
             }
-            faces.push(AuditFace { id: placed.id, domain: face.surface.domain(), trims: trims(&face.loops) });
+            faces.push(AuditFace {
+                id: placed.id,
+                domain: face.surface.domain(),
+                trims: trims(&face.loops),
+                holes_alone: area(&face.loops) < 0.0,
+            });
         }
         let boxes: Vec<Aabb> = pieces.iter().map(|(_, p)| p.bounds()).collect();
         Self { faces, pieces, boxes: Boxes::new(&boxes) }
@@ -103,11 +110,13 @@ impl Audit {
             }
             let (face, patch) = &self.pieces[piece as usize];
             let AuditFace { id, domain, .. } = self.faces[*face as usize];
-            let mut own = SmallVec::new();
+            let mut own: SmallVec<[AuditHit; 8]> = SmallVec::new();
             let unsearched = clip_patch((ray, &view), id, patch, domain, &mut own);
             if unsearched <= ray.t_max {
                 exhausted = exhausted.min(unsearched);
             }
+            // Before crossings are taken for one: a surface of more than one turn covers itself, and its trims choose.
+            own.retain(|h| self.faces[*face as usize].holds(h.uv));
             if own.is_empty() {
                 continue;
             }
@@ -145,14 +154,44 @@ fn split(patch: BezierPatch, face: u32, out: &mut Vec<(u32, BezierPatch)>) {
 /// How often a patch is halved at most before any ray comes.
 const DEPTH: u32 = 6;
 
+/// The pieces of every loop; ends that do not meet are joined by straight pieces, so that parity has one meaning.
 fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
-    let pieces = loops.iter().flat_map(|l| &l.uses).flat_map(|u| u.uv.bezier_pieces());
-    pieces
-        .map(|points| {
-            let (lo, hi) = around(&points);
-            Trim { lo, hi, points }
-        })
-        .collect()
+    let mut out = Vec::new();
+    let mut add = |points: Vec<DVec3>| {
+        let (lo, hi) = around(&points);
+        out.push(Trim { lo, hi, points });
+    };
+    for l in loops {
+        let uses: Vec<(bool, Vec<Vec<DVec3>>)> = l
+            .uses
+            .iter()
+            .map(|u| (u.reversed, u.uv.bezier_pieces().into_iter().map(|p| p.to_vec()).collect()))
+            .collect();
+        let end = |(reversed, pieces): &(bool, Vec<Vec<DVec3>>), last: bool| {
+            let at = if *reversed != last { pieces.last()?.last()? } else { pieces.first()?.first()? };
+            Some(at.truncate() / at.z)
+        };
+        for (k, this) in uses.iter().enumerate() {
+            if let (Some(from), Some(to)) = (end(this, true), end(&uses[(k + 1) % uses.len()], false)) {
+                add(vec![from.extend(1.0), to.extend(1.0)]);
+            }
+        }
+        uses.into_iter().flat_map(|(_, pieces)| pieces).for_each(&mut add);
+    }
+    out
+}
+
+/// Area within the loops, positive where they run counterclockwise, from points along each curve.
+fn area(loops: &[TrimLoop]) -> f64 {
+    let uses = loops.iter().flat_map(|l| &l.uses);
+    uses.map(|u| {
+        let [a, b] = u.uv.domain();
+        let n = 64 * u.uv.points.len();
+        let at = |k: usize| u.uv.evaluate(a + (b - a) * k as f64 / n as f64);
+        let signed = (0..n).map(|k| 0.5 * at(k).perp_dot(at(k + 1))).sum::<f64>();
+        if u.reversed { -signed } else { signed }
+    })
+    .sum()
 }
 
 fn around(points: &[DVec3]) -> (DVec2, DVec2) {
@@ -163,7 +202,7 @@ fn around(points: &[DVec3]) -> (DVec2, DVec2) {
 }
 
 impl AuditFace {
-    /// The first crossing of those found on the face.
+    /// The first crossing of those found on the face within its trims.
     fn first(&self, ray: &Ray, mut own: SmallVec<[AuditHit; 8]>) -> Option<AuditHit> {
         own.sort_by(|a, b| a.t.total_cmp(&b.t));
         // Boxes that share a border, and clusters around a tangency, find the same crossing several times.
@@ -182,7 +221,7 @@ impl AuditFace {
         }
         own.into_iter().find(|h| {
             let leaving = ray.from.is_some_and(|f| f.face == h.face && h.t.abs() < 1e-7);
-            !leaving && h.t >= ray.t_min && h.t <= ray.t_max && self.holds(h.uv)
+            !leaving && h.t >= ray.t_min && h.t <= ray.t_max
         })
     }
 
@@ -192,7 +231,7 @@ impl AuditFace {
             return true;
         }
         let near = self.trims.iter().filter(|t| q.x >= t.lo.x && q.x < t.hi.x && q.y <= t.hi.y);
-        near.map(|t| above(&t.points, q, 0)).sum::<u32>() % 2 == 1
+        (near.map(|t| above(&t.points, q, 0)).sum::<u32>() % 2 == 1) != self.holes_alone
     }
 }
 
