@@ -1,4 +1,4 @@
-use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
+use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span, functions};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
@@ -122,7 +122,7 @@ impl<P: ControlPoint> Spline<P> {
 
     /// Position at `t`, which is clamped to the domain.
     pub fn evaluate(&self, t: f64) -> P::Position {
-        self.homogeneous(t, 0)[0].position()
+        self.homogeneous_at(t).position()
     }
 
     /// Position and derivatives at `t`, which is clamped to the domain.
@@ -137,7 +137,21 @@ impl<P: ControlPoint> Spline<P> {
 
     /// Homogeneous point at `t` inside the domain.
     pub(super) fn homogeneous_at(&self, t: f64) -> P {
-        self.homogeneous(t, 0)[0]
+        match self.degree {
+            0..NARROW => self.point_in::<NARROW>(t),
+            NARROW..MIDDLE => self.point_in::<MIDDLE>(t),
+            MIDDLE..BROAD => self.point_in::<BROAD>(t),
+            _ => self.point_in::<WIDE>(t),
+        }
+    }
+
+    fn point_in<const W: usize>(&self, t: f64) -> P {
+        let [t0, t1] = self.domain();
+        let t = t.clamp(t0, t1);
+        let span = find_span(&self.knots, self.degree, t);
+        let b = functions::<W>(&self.knots, self.degree, span, t);
+        let active = &self.points[span - self.degree..=span];
+        active.iter().zip(&b).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
     }
 
     fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {

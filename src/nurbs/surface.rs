@@ -1,4 +1,4 @@
-use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, find_span};
+use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, find_span, functions};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 
@@ -79,7 +79,28 @@ impl Surface {
 
     /// Position at `uv`, which is clamped to the domain.
     pub fn evaluate(&self, uv: Uv) -> Point {
-        self.sums::<1>(uv, 0)[0].project()
+        match self.degree[0].max(self.degree[1]) {
+            0..NARROW => self.point_in::<NARROW>(uv),
+            NARROW..MIDDLE => self.point_in::<MIDDLE>(uv),
+            MIDDLE..BROAD => self.point_in::<BROAD>(uv),
+            _ => self.point_in::<WIDE>(uv),
+        }
+    }
+
+    fn point_in<const W: usize>(&self, uv: Uv) -> Point {
+        let uv = self.clamp(uv);
+        let [p, q] = self.degree;
+        let count_v = self.counts()[1];
+        let (span_u, span_v) = (find_span(&self.knots[0], p, uv.x), find_span(&self.knots[1], q, uv.y));
+        let bu = functions::<W>(&self.knots[0], p, span_u, uv.x);
+        let bv = functions::<W>(&self.knots[1], q, span_v, uv.y);
+        let mut sum = Homogeneous::ZERO;
+        for (i, &b) in bu[..=p].iter().enumerate() {
+            let start = (span_u - p + i) * count_v + span_v - q;
+            let row = self.points[start..=start + q].iter().zip(&bv);
+            sum += row.fold(Homogeneous::ZERO, |s, (&c, &v)| s + c * v) * b;
+        }
+        sum.project()
     }
 
     /// Position and first derivatives at `uv`, which is clamped to the domain.
@@ -95,7 +116,7 @@ impl Surface {
         SecondDerivatives::projected(self.sums::<6>(uv, 2))
     }
 
-    /// Sums for (S), (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
+    /// Sums for (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
     fn sums<const N: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
         match self.degree[0].max(self.degree[1]) {
             0..NARROW => self.sums_in::<N, NARROW>(uv, order),

@@ -32,6 +32,8 @@ const LEVELS: u32 = 3;
 const MOST_PIECES: usize = 20_000;
 /// Knot rectangles up to which second derivatives are looked at one by one.
 const MOST_NEAR: usize = 16;
+/// Knot rectangles up to which the hulls of a facet's deviation are looked at one by one.
+const MOST_HULL: usize = 1000;
 /// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
 const SLIGHT: f64 = 0.02;
 
@@ -122,18 +124,19 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         let sheet = self.sheet;
         let count = (a[1] - a[0] + 1) * (b[1] - b[0] + 1);
-        if count > 1 && (count > MOST_NEAR || !sheet.bends.is_smooth(a, b)) {
-            return None;
-        }
-        let patches = (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| sheet.patch(i, j)));
-        match self.near.bound(patches, uv, at).filter(fits) {
-            Some(bound) => Some(bound + off),
-            None if count > 1 => None,
-            None => {
-                let patch = sheet.patch(a[0], b[0]);
-                self.joint(patch, uv.map(|x| local(patch, x)), xyz, limit).map(|x| x + self.margin)
+        let patches = || (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| sheet.patch(i, j)));
+        if count == 1 || count <= MOST_NEAR && sheet.bends.is_smooth(a, b) {
+            let near = self.near.bound(patches(), uv, at).filter(fits);
+            if let Some(bound) = near {
+                return Some(bound + off);
             }
         }
+        if count > 1 {
+            let hull = if count <= MOST_HULL { self.near.hull(patches(), uv, at, limit - off) } else { None };
+            return hull.map(|x| x + off);
+        }
+        let patch = sheet.patch(a[0], b[0]);
+        self.joint(patch, uv.map(|x| local(patch, x)), xyz, limit).map(|x| x + self.margin)
     }
 
     /// Bound of a triangle and its sides by the hull of one net, whose outer rows are the nets of the sides.

@@ -2,7 +2,8 @@
 //!
 //! De Casteljau's steps are taken with linear forms in place of numbers; each step raises the degree by one, so a
 //! patch of degrees (p, q) gives total degree p + q. All steps are convex combinations when the triangle lies in the
-//! patch, so weights stay positive and the control points hull the piece.
+//! patch, so weights stay positive and the control points hull the piece. On the way coefficients are those of plain
+//! powers, multiplied by their multinomials, which spares each step a factor.
 //! With AVX the same steps are compiled a second time, four numbers at once; no operation is fused or reordered, so the bits are
 //! the same. The one unsafe call is to that copy, after the processor was asked.
 //! Source: T. D. DeRose, *Composing Bézier simplexes*, ACM TOG 7 (1988).
@@ -15,22 +16,38 @@ use crate::nurbs::BezierPatch;
 /// Buffers reused from piece to piece.
 #[derive(Default)]
 pub(super) struct Nets {
-    rows: Vec<Vec<Homogeneous>>,
-    spare: Vec<Homogeneous>,
-    columns: Vec<Vec<Homogeneous>>,
+    /// Nets of one step and of the next, one after another.
+    work: [Vec<Homogeneous>; 2],
+    /// What the first direction leaves.
+    columns: Vec<Homogeneous>,
+    out: Vec<Homogeneous>,
+    /// One over the multinomials of a degree, for segments or triangles.
+    shares: Vec<f64>,
+    /// Corners and degree that these belong to.
+    of: (usize, usize),
+}
+
+/// Coefficients of degree `d` over a simplex with `corners` corners.
+const fn size(corners: usize, d: usize) -> usize {
+    if corners == 2 { d + 1 } else { (d + 1) * (d + 2) / 2 }
 }
 
 impl Nets {
     /// Control points over the simplex with 2 or 3 corners, given in local parameters.
     pub(super) fn expand<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) -> &[Homogeneous] {
+        let degree = patch.degree[0] + patch.degree[1];
+        if self.of != (N, degree) {
+            self.of = (N, degree);
+            multinomials::<N>(degree, &mut self.shares);
+        }
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("avx") {
             // Sound: the processor has what the function was compiled for.
             unsafe { self.expand_wide(patch, corners) };
-            return &self.columns[0];
+            return &self.out;
         }
         self.expand_plain(patch, corners);
-        &self.columns[0]
+        &self.out
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -42,73 +59,102 @@ impl Nets {
     #[inline(always)]
     fn expand_plain<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) {
         let [p, q] = patch.degree;
-        let (u, v) = (corners.map(|c| c.x), corners.map(|c| c.y));
-        self.rows.resize_with(self.rows.len().max(p + 1), Vec::new);
-        self.columns.resize_with(self.columns.len().max(q + 1), Vec::new);
+        let (mut u, mut v) = ([0.0; N], [0.0; N]);
+        for c in 0..N {
+            (u[c], v[c]) = (corners[c].x, corners[c].y);
+        }
+        let (one, all) = (size(N, p), size(N, p + q));
+        let most = ((p + 1) * one).max((q + 1) * all);
+        for work in &mut self.work {
+            if work.len() < most {
+                work.resize(most, Homogeneous::ZERO);
+            }
+        }
+        self.columns.clear();
         for j in 0..=q {
             for i in 0..=p {
-                self.rows[i].clear();
-                self.rows[i].push(patch.points[i * (q + 1) + j]);
+                self.work[0][i * one] = patch.points[i * (q + 1) + j];
             }
-            reduce::<N>(&mut self.rows[..=p], 0, u, &mut self.spare);
-            std::mem::swap(&mut self.rows[0], &mut self.columns[j]);
+            let last = reduce::<N>(&mut self.work, p, 0, u, one);
+            self.columns.extend_from_slice(&self.work[last][..one]);
         }
-        reduce::<N>(&mut self.columns[..=q], p, v, &mut self.spare);
+        for (column, to) in self.columns.chunks_exact(one).zip(self.work[0].chunks_exact_mut(all)) {
+            to[..one].copy_from_slice(column);
+        }
+        let last = reduce::<N>(&mut self.work, q, p, v, all);
+        self.out.clear();
+        self.out.extend(self.work[last][..all].iter().zip(&self.shares).map(|(&c, &s)| c * s));
     }
 }
 
-/// All de Casteljau steps of one direction; `rows[0]` holds the result.
+/// All de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result
+/// is first in the returned one of the two.
 #[inline(always)]
 fn reduce<const N: usize>(
-    rows: &mut [Vec<Homogeneous>],
+    work: &mut [Vec<Homogeneous>; 2],
+    steps: usize,
     degree: usize,
     at: [f64; N],
-    spare: &mut Vec<Homogeneous>,
-) {
-    for step in 0..rows.len() - 1 {
-        for i in 0..rows.len() - 1 - step {
-            blend::<N>(&rows[i], &rows[i + 1], degree + step, at, spare);
-            std::mem::swap(&mut rows[i], spare);
+    stride: usize,
+) -> usize {
+    let [first, second] = work;
+    let (mut from, mut to) = (first.as_mut_slice(), second.as_mut_slice());
+    for step in 0..steps {
+        let d = degree + step;
+        let (before, after) = (size(N, d), size(N, d + 1));
+        for i in 0..steps - step {
+            let (a, b) = (&from[i * stride..][..before], &from[(i + 1) * stride..][..before]);
+            blend::<N>(a, b, d, at, &mut to[i * stride..][..after]);
         }
+        std::mem::swap(&mut from, &mut to);
     }
+    steps % 2
 }
 
 /// `(1 − ℓ)·a + ℓ·b` for the linear form ℓ with values `at` at the corners; degree `d` becomes `d + 1`.
 ///
 /// The coefficient with exponents (i, j, k) stands at `(j + k)(j + k + 1)/2 + k`, whatever i is.
 #[inline(always)]
-fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f64; N], out: &mut Vec<Homogeneous>) {
-    out.clear();
-    let inv = 1.0 / (d + 1) as f64;
-    let mix = |x: usize, c: usize, times: usize| mixed(a[x], b[x], at[c], times as f64 * inv);
+fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f64; N], out: &mut [Homogeneous]) {
+    let mut carry = Homogeneous::ZERO;
     if N == 2 {
-        out.resize(d + 2, Homogeneous::ZERO);
-        for j in 0..=d {
-            out[j] += mix(j, 0, d + 1 - j);
-            out[j + 1] += mix(j, 1, j + 1);
+        for ((&a, &b), out) in a.iter().zip(b).zip(out.iter_mut()) {
+            let e = b - a;
+            *out = carry + (a + e * at[0]);
+            carry = a + e * at[1];
         }
+        out[d + 1] = carry;
         return;
     }
-    out.resize((d + 2) * (d + 3) / 2, Homogeneous::ZERO);
-    let (mut row, mut next) = (0, 1);
+    out[0] = Homogeneous::ZERO;
+    let mut row = 0;
     for m in 0..=d {
         let (here, below) = out[row..].split_at_mut(m + 1);
-        for k in 0..=m {
-            let x = row + k;
-            here[k] += mix(x, 0, d + 1 - m);
-            below[k] += mix(x, 1, m + 1 - k);
-            below[k + 1] += mix(x, 2, k + 1);
+        carry = Homogeneous::ZERO;
+        let lines = a[row..][..m + 1].iter().zip(&b[row..][..m + 1]);
+        for ((&a, &b), (here, below)) in lines.zip(here.iter_mut().zip(below.iter_mut())) {
+            let e = b - a;
+            *here += a + e * at[0];
+            *below = carry + (a + e * at[1]);
+            carry = a + e * at[2];
         }
-        row = next;
-        next += m + 2;
+        below[m + 1] = carry;
+        row += m + 1;
     }
 }
 
-/// `((1 − t)·a + t·b)·s`, number by number.
-#[inline(always)]
-fn mixed(a: Homogeneous, b: Homogeneous, t: f64, s: f64) -> Homogeneous {
-    let (a, b, r) = (a.to_array(), b.to_array(), 1.0 - t);
-    Homogeneous::from_array(std::array::from_fn(|k| (a[k] * r + b[k] * t) * s))
+/// Fills in one over the multinomials of a degree.
+fn multinomials<const N: usize>(degree: usize, out: &mut Vec<f64>) {
+    // Rows of Pascal's triangle by products; exact up to degree 50 to a last digit.
+    let choose = |n: usize, k: usize| (0..k).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64);
+    out.clear();
+    for m in 0..=degree {
+        if N == 2 {
+            out.push(1.0 / choose(degree, m));
+        } else {
+            out.extend((0..=m).map(|k| 1.0 / (choose(degree, m) * choose(m, k))));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -139,8 +185,9 @@ mod tests {
         let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
         assert!((sum.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
         let mut plain = Nets::default();
+        multinomials::<3>(n, &mut plain.shares);
         plain.expand_plain(patch, corners);
-        assert_eq!(plain.columns[0], net);
+        assert_eq!(plain.out, net);
         let segment = nets.expand(patch, [corners[0], corners[1]]).to_vec();
         let middle = (0..=n).fold(Homogeneous::ZERO, |s, j| {
             s + segment[j] * (factorial(n) / factorial(j) / factorial(n - j) * 0.5f64.powi(n as i32))
