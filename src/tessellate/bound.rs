@@ -107,6 +107,25 @@ impl<'s, 'a> Prover<'s, 'a> {
         }) + self.margin
     }
 
+    /// Bound of the distance from the surface over a convex parameter polygon to a triangle in space.
+    pub(super) fn polygon(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
+        let flat = Flat::new(&xyz);
+        if !self.sheet.affine
+            && self.judge == Judge::Bound
+            && let Some(quick) = self.quick(uv, limit, |p| flat.distance(p))
+        {
+            return quick;
+        }
+        let mut worst = 0f64;
+        for k in 1..uv.len().saturating_sub(1) {
+            worst = worst.max(self.piece([uv[0], uv[k], uv[k + 1]], xyz, limit));
+            if worst > limit {
+                break;
+            }
+        }
+        worst
+    }
+
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
     /// quick look; `None` when that does not show it to be within the limit. `exact`: the corners are known to lie on the surface.
     pub(super) fn facet(&mut self, uv: [Uv; 3], xyz: [Point; 3], exact: bool, limit: f64) -> Option<f64> {
@@ -219,7 +238,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         refine((&mut self.nets, &mut self.scalar), patch, at, limit, levels, f)
     }
 
-    /// Bound of a convex distance over a piece of surface: the largest at its corners, which holds for the flat triangle between
+    /// Bound of a convex distance over a convex piece of surface: the largest at its corners, which holds for all that is flat between
     /// them, and the deviation from that by second derivatives; `None` above the limit.
     fn quick(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));

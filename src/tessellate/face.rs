@@ -63,8 +63,8 @@ pub(super) fn mesh(
     all.clone().for_each(|s| *met.entry(key(s[0], s[1])).or_insert(0) += 1);
     segments.extend(all.filter(|s| met[&key(s[0], s[1])] % 2 == 1));
     let trims = border.trims;
-    let outline =
-        Outline { nodes: border.nodes, segments, trims: &trims, scale: scale(sheet, &rings, &leaves), next };
+    let scale = if segments.is_empty() { Uv::ONE } else { scale(sheet, &rings, &leaves) };
+    let outline = Outline { nodes: border.nodes, segments, trims: &trims, scale, next };
     let mut strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
     for &(t, bound, tolerance) in &grid.triangles {
         strip.triangles.push(t);
@@ -233,7 +233,7 @@ impl Emit<'_, '_, '_> {
 /// the strip's triangles lie along the direction that does not bend.
 fn scale(sheet: &Sheet<'_>, rings: &Rings, leaves: &Leaves) -> Uv {
     let (lo, hi) = rings.bounds();
-    let n = 5;
+    let n = if sheet.affine { 1 } else { 5 };
     let grid = |k: usize| lo + (Uv::new((k / n) as f64, (k % n) as f64) + 0.5) / n as f64 * (hi - lo);
     // Cells at the border are where the strip will be.
     let step = leaves.border.len() / 64 + 1;

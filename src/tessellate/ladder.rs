@@ -59,6 +59,10 @@ pub(super) fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> 
 
 /// Lines spread evenly in `√(curvature / tolerance)`, as many as the sharpest of a few lines needs, times a power of two.
 fn even(sheet: &Sheet<'_>, root: Cell, d: usize) -> Vec<f64> {
+    if sheet.surface.degree[d] == 1 && sheet.breaks[d].len() == 2 {
+        // Straight lines bend nowhere.
+        return Vec::new();
+    }
     let (n, m) = (32, 5);
     let other = 1 - d;
     let at = |i: usize, j: usize| {

@@ -377,4 +377,38 @@ mod tests {
             assert!(worst <= bound, "{worst} {bound}");
         }
     }
+
+    #[test]
+    fn hulls_hold_across_creases_and_come_near() {
+        // Folded at the knots of degree one in v: no second derivatives there.
+        let folds = [0.0, 0.03, -0.02, 0.05, 0.0];
+        let points = (0..15)
+            .map(|k| {
+                let (i, j) = (k / 5, k % 5);
+                let w = 1.0 + 0.1 * (i * j % 3) as f64;
+                (Point::new(i as f64, j as f64, folds[j] + 0.02 * ((i * i) as f64)) * w).extend(w)
+            })
+            .collect();
+        let knots = [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 4.0]];
+        let s = Surface { degree: [2, 1], knots, points };
+        let patches = s.bezier_patches();
+        for corners in [
+            [Uv::new(0.1, 0.2), Uv::new(0.9, 0.2), Uv::new(0.9, 3.7)],
+            [Uv::new(0.1, 3.9), Uv::new(0.2, 0.1), Uv::new(0.8, 2.2)],
+        ] {
+            let at = corners.map(|x| s.evaluate(x));
+            let mut worst = 0f64;
+            for i in 0..=60 {
+                for j in 0..=60 - i {
+                    let (a, b) = (i as f64 / 60.0, j as f64 / 60.0);
+                    let c = 1.0 - a - b;
+                    let x = corners[0] * a + corners[1] * b + corners[2] * c;
+                    worst = worst.max((s.evaluate(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
+                }
+            }
+            assert!(Near::default().hull(patches.iter(), corners, at, 0.99 * worst).is_none());
+            let bound = Near::default().hull(patches.iter(), corners, at, 2.0 * worst).unwrap();
+            assert!(worst <= bound && bound <= 2.0 * worst, "{worst} {bound}");
+        }
+    }
 }

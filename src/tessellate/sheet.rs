@@ -24,6 +24,8 @@ pub(super) struct Sheet<'a> {
     pub(super) size: f64,
     /// Whether the sides of the domain are points: at both ends of u, of v.
     poles: [[bool; 2]; 2],
+    /// How far the face's edges lie from the surface, mm, where the file was measured.
+    pub(super) gap: Option<f64>,
     /// Farthest that such a side strays from a point, mm.
     pub(super) pole_size: f64,
 }
@@ -43,7 +45,7 @@ impl<'a> Sheet<'a> {
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
         let affine = is_affine(surface, size);
-        Self { surface, field, flip, affine, patches, bends, breaks, creases, size, poles, pole_size }
+        Self { surface, field, flip, affine, patches, bends, breaks, creases, size, poles, gap: None, pole_size }
     }
 
     /// Where `uv` lies on a pole: the parameter that is constant along it.

@@ -3,9 +3,13 @@
 use super::bound::Prover;
 use super::flat::from_chord;
 use super::sheet::Sheet;
-use crate::math::{Point, Uv};
+use crate::math::{Homogeneous, Point, Uv};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
+use smallvec::{SmallVec, smallvec};
+
+/// Share of the tolerance below which the file's own gap is taken as it is known for the whole face.
+const NEGLIGIBLE: f64 = 1e-3;
 
 /// One chord of a border edge.
 #[derive(Clone, Debug, Default)]
@@ -15,8 +19,8 @@ pub(super) struct Trim {
     pub(super) deviation: f64,
     /// The file's own gap between edge and face here, mm, which no shorter chord closes.
     pub(super) gap: f64,
-    /// Parameter triangles that cover what lies between the chord and the curve in the parameter plane.
-    pub(super) between: Vec<[Uv; 3]>,
+    /// A convex polygon around what lies between the chord and the curve in the parameter plane.
+    pub(super) between: Vec<Uv>,
 }
 
 impl Trim {
@@ -29,34 +33,24 @@ impl Trim {
         xyz: [Point; 2],
     ) -> Self {
         let (a, b) = (t[0].min(t[1]), t[0].max(t[1]));
-        // The file's own gap between edge and face, as measured at the ends and at places between.
+        // The file's own gap between edge and face, as measured at the ends and at places between; not where it is known to be small.
         let gap = |f: f64| {
             let at = a + (b - a) * f;
             (sheet.point(sheet.surface.clamp(side.uv.evaluate(at))) - curve.evaluate(at)).length()
         };
         let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
-        let offset = [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max);
+        let known = sheet.gap.filter(|&g| g <= NEGLIGIBLE * sheet.field.tightest());
+        let offset = match known {
+            Some(gap) => ends[0].max(ends[1]).max(gap),
+            None => [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max),
+        };
         if a >= b || a.is_nan() || b.is_nan() {
             return Self { deviation: offset, gap: offset, between: Vec::new() };
         }
-        let over = |pieces: i32| {
-            let cut = |k: i32| if k == pieces { b } else { a + (b - a) * k as f64 / pieces as f64 };
-            let mut worst = 0f64;
-            for k in 0..pieces {
-                if cut(k) < cut(k + 1) {
-                    let piece = curve.restricted_points(cut(k), cut(k + 1));
-                    worst = piece.iter().map(|p| from_chord(p.project(), &xyz)).fold(worst, f64::max);
-                }
-            }
-            worst
-        };
-        let mut deviation = over(if curve.degree == 1 { 1 } else { 2 });
-        if curve.degree > 1 && deviation + offset > 0.5 * sheet.field.tightest() {
-            deviation = over(8);
-        }
+        let deviation = stray(curve, [a, b], &xyz, 0.5 * sheet.field.tightest() - offset);
         let mut trim = Self { deviation: deviation + offset, gap: offset, between: Vec::new() };
         if !sheet.affine {
-            trim.between = fan(sheet, side, [a, b], uv);
+            trim.between = around(sheet, side, [a, b], uv);
         }
         trim
     }
@@ -64,23 +58,74 @@ impl Trim {
     /// The part of the bound that the border adds to a triangle of facets.
     pub(super) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
-        for &uv in &self.between {
-            if worst > limit {
-                break;
-            }
-            worst = worst.max(prover.piece(uv, xyz, limit));
+        if worst <= limit && self.between.len() > 2 {
+            worst = worst.max(prover.polygon(&self.between, xyz, limit));
         }
         worst
     }
 }
 
-/// Triangles over the convex hull of the curve's control points in the parameter plane.
-fn fan(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<[Uv; 3]> {
+/// Bound of the distance between a piece of a curve and a chord, by the hulls of its two halves, and of eighths where that is not
+/// clearly small.
+fn stray(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
+    let mut piece = curve.restricted_points(a, b);
+    let away = |points: &[Homogeneous]| points.iter().map(|p| from_chord(p.project(), chord)).fold(0.0, f64::max);
+    let n = curve.degree;
+    if n == 1 {
+        return away(&piece);
+    }
+    if piece.len() != n + 1 {
+        // Several knot spans: each part has its own control points.
+        let over = |parts: i32| {
+            let cut = |k: i32| if k == parts { b } else { a + (b - a) * k as f64 / parts as f64 };
+            let parts = (0..parts).filter(|&k| cut(k) < cut(k + 1));
+            parts.map(|k| away(&curve.restricted_points(cut(k), cut(k + 1)))).fold(0.0, f64::max)
+        };
+        let coarse = over(2);
+        return if coarse > small { over(8) } else { coarse };
+    }
+    // Halves by de Casteljau, the last one first, each further halved while it is not small.
+    let mut worst = 0f64;
+    let mut depths: SmallVec<[u32; 8]> = smallvec![0];
+    while let Some(depth) = depths.pop() {
+        let start = piece.len() - n - 1;
+        let off = away(&piece[start..]);
+        if depth == 3 || depth > 0 && off <= small || off <= worst {
+            worst = worst.max(off);
+            piece.truncate(start);
+            continue;
+        }
+        for k in 0..=n {
+            piece.push(piece[start + k]);
+        }
+        let (low, high) = piece[start..].split_at_mut(n + 1);
+        for step in 0..=n {
+            low[step] = high[0];
+            for k in 0..n - step {
+                high[k] = 0.5 * (high[k] + high[k + 1]);
+            }
+        }
+        depths.extend([depth + 1, depth + 1]);
+    }
+    worst
+}
+
+/// The convex hull of the curve's control points in the parameter plane.
+fn around(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<Uv> {
     let [[u0, u1], [v0, v1]] = sheet.surface.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);
     let [s0, s1] = side.uv.domain();
     let (a, b) = (a.clamp(s0, s1), b.clamp(s0, s1));
     if a >= b || a.is_nan() || b.is_nan() {
+        return Vec::new();
+    }
+    let d = (chord[1] - chord[0]) / extent;
+    let off = |p: Uv| {
+        let x = (p - chord[0]) / extent;
+        if d.length() > 0.0 { x.perp_dot(d).abs() / d.length() } else { x.length() }
+    };
+    let line = side.uv.degree == 1 && side.uv.points.len() == 2;
+    if line && [a, b].iter().all(|&t| off(sheet.surface.clamp(side.uv.evaluate(t))) < 1e-12) {
         return Vec::new();
     }
     let m = 0.5 * (a + b);
@@ -91,17 +136,11 @@ fn fan(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> V
         .flat_map(|&[a, b]| side.uv.restricted_points(a, b))
         .map(|p| sheet.surface.clamp(p.truncate() / p.z))
         .collect();
-    let d = (chord[1] - chord[0]) / extent;
-    let off = |p: Uv| {
-        let x = (p - chord[0]) / extent;
-        if d.length() > 0.0 { x.perp_dot(d).abs() / d.length() } else { x.length() }
-    };
     if points.iter().all(|&p| off(p) < 1e-12) {
         return Vec::new();
     }
     points.extend(chord);
-    let hull = hull(points);
-    (1..hull.len().saturating_sub(1)).map(|k| [hull[0], hull[k], hull[k + 1]]).collect()
+    hull(points)
 }
 
 /// Convex hull, counter-clockwise (Andrew's monotone chain).
