@@ -22,6 +22,7 @@ mod face;
 mod flat;
 mod grid;
 mod ladder;
+mod linear;
 mod lines;
 mod look;
 mod matching;
