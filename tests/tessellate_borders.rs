@@ -80,3 +80,19 @@ fn a_chord_that_strays_in_the_parameter_plane_alone_is_divided() {
     let made = tessellate(&face(cone, &loops), &measured(0.1));
     assert_proved(&made);
 }
+
+/// An edge that the file has 5 mm beside its face: no division closes that gap, so there must be none for its sake.
+#[test]
+fn a_gap_of_the_file_is_not_divided() {
+    let turn = [0.0, 1.0];
+    let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, turn, [0.0, 40.0]);
+    let c = [Uv::new(0.0, 0.0), Uv::new(1.0, 0.0), Uv::new(1.0, 40.0), Uv::new(0.0, 40.0)];
+    let sides = (0..4).map(|k| chain(16, |f| c[k].lerp(c[(k + 1) % 4], f))).collect();
+    let mut model = face(wall, &[sides]);
+    for p in &mut model.parts[0].edges[0].curve.points[1..16] {
+        p.x += 5.0;
+    }
+    let made = tessellate(&model, &Settings::uniform(0.1));
+    assert_eq!(made.report.faces.failed, 0);
+    assert!(made.report.facets < 200, "{}", made.report.facets);
+}

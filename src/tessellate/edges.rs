@@ -103,7 +103,7 @@ pub(super) fn hold(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Ve
 }
 
 /// In the parameter plane the chord must stay by its curve too, or loops would cross; closer still where facets beside it could not
-/// be proved. What the file's own gap takes there no division gives back.
+/// be proved. What the file's own gap takes no division gives back: a gap of 9 mm once made 67,000 chords.
 fn beside(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     let at = |t: f64| curve.evaluate(t);
     let slack = |s: &Side<'_, '_>| 2.0 * s.sheet.field.tightest() / 4f64.powi(denser as i32);
@@ -119,13 +119,12 @@ fn beside(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -
                 }
                 let near = nearest_on(&at, a, b, on);
                 let off = (on - near).length();
-                let allowed = if denser == 0 {
-                    0.02 * (chord[1] - chord[0]).length()
-                } else {
-                    let t = a + (b - a) * f;
-                    slack(s) + 2.0 * (s.sheet.point(s.sheet.surface.clamp(s.side.uv.evaluate(t))) - at(t)).length()
-                };
-                off > slack(s) && off > allowed
+                if off <= slack(s) || denser == 0 && off <= 0.02 * (chord[1] - chord[0]).length() {
+                    return false;
+                }
+                let t = a + (b - a) * f;
+                let gap = (s.sheet.point(s.sheet.surface.clamp(s.side.uv.evaluate(t))) - at(t)).length();
+                off > slack(s) + 2.0 * gap
             })
         })
     });

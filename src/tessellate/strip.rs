@@ -316,7 +316,10 @@ impl Work<'_, '_> {
                     trim.deviation > xi && trim.deviation > at(a).min(at(b))
                 })
             };
-            if sides.iter().any(lost) {
+            // Nor does a corner move that the file puts beside the surface.
+            let off =
+                |&n: &u32| (self.sheet.point(self.nodes[n as usize].uv) - self.nodes[n as usize].place).length();
+            if sides.iter().any(lost) || t.iter().any(|n| off(n) > xi) {
                 continue;
             }
             let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
