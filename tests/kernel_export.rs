@@ -3,7 +3,7 @@
 use lampyris::kernel::truck::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3, Vector4};
 use lampyris::kernel::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
 use lampyris::math::{Frame, Point, Uv, Vector};
-use lampyris::model::Model;
+use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::{Surface, sweep};
 use lampyris::tessellate::{Settings, tessellate};
 use std::f64::consts::PI;
@@ -18,7 +18,7 @@ fn v(q: Vector3) -> Vector {
 
 /// Position, first and second derivatives and the normal against truck's, relative to their sizes.
 fn compare(s: &Surface, samples: usize) {
-    let t = surface_to_truck(s);
+    let t = surface_to_truck(s).unwrap();
     let [[u0, u1], [v0, v1]] = s.domain();
     let size = s.bounds().diagonal();
     for i in 0..samples {
@@ -85,7 +85,7 @@ fn truck_evaluates_surfaces_of_files_as_we_do() {
             surfaces += 1;
         }
         for edge in model.parts.iter().flat_map(|p| &p.edges) {
-            let t = curve_to_truck(&edge.curve);
+            let t = curve_to_truck(&edge.curve).unwrap();
             let [a, b] = edge.curve.domain();
             for k in 0..=20 {
                 let s = a + (b - a) * f64::from(k) / 20.0;
@@ -177,4 +177,19 @@ fn the_baseline_mesher_takes_every_face_of_files_seams_cut_open() {
         let ours = tessellate(&model, &Settings::uniform(0.1)).mesh.volume();
         assert!((made.mesh.volume() / ours - 1.0).abs() < 0.01, "{name}: {} and {ours}", made.mesh.volume());
     }
+}
+
+/// truck takes parameters that span less than 1e-6 for a single value and panics: a refusal with a reason instead.
+#[test]
+fn a_surface_of_a_tiny_domain_is_refused_and_does_not_panic() {
+    let corners = [(0.0, 0.0), (0.0, 1e-7), (1.0, 0.0), (1.0, 1e-7)];
+    let points = corners.map(|(x, y)| Point::new(x, y, 0.0).extend(1.0)).to_vec();
+    let knots = [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1e-7, 1e-7]];
+    let surface = Surface { degree: [1, 1], knots, points };
+    assert!(surface_to_truck(&surface).unwrap_err().contains("truck refuses the surface"));
+    let shell = Shell { faces: vec![Face::whole(surface)], ..Shell::default() };
+    let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+    let made = baseline::mesh(&model, 0.1);
+    assert_eq!((made.failed.len(), made.mesh.facets.len()), (1, 0));
+    assert!(made.failed[0].1.contains("truck refuses the surface"), "{}", made.failed[0].1);
 }

@@ -21,6 +21,9 @@ const SHELL: Duration = Duration::from_secs(20);
 const FACE: Duration = Duration::from_secs(2);
 const MODEL: Duration = Duration::from_secs(60);
 
+/// Name of the threads that truck's mesher runs in: a panic there is a face without triangles and no more.
+pub const THREAD: &str = "truck";
+
 /// What truck's mesher made of a model.
 #[derive(Clone, Debug)]
 pub struct Baseline {
@@ -34,8 +37,9 @@ pub struct Baseline {
 
 /// Meshes the surfaces of a model by `truck_meshalgo` with one chordal tolerance in mm. Faces that are meshes already are left out.
 ///
-/// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message still goes to stderr. So is one on
-/// which truck takes too long; the thread that works on it cannot be stopped and goes on until the process ends.
+/// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message goes to the panic hook, in a thread
+/// named [`THREAD`]. So is one on which truck takes too long; the thread that works on it cannot be stopped and goes on until the
+/// process ends.
 pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
     let mut out = Baseline { mesh: FacetMesh::default(), seconds: 0.0, failed: Vec::new() };
     let mut positions = FxHashMap::default();
@@ -110,12 +114,15 @@ fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Ve
         meshes
     };
     // Threads of its own: work that does not end would keep those of the process for ever.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).build().ok()?;
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).thread_name(|_| THREAD.into());
+    let pool = pool.build().ok()?;
     let (send, receive) = channel();
-    std::thread::spawn(move || {
+    let waiting = move || {
         // Nobody may be waiting any more.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| pool.install(work))).ok());
-    });
+    };
+    std::thread::Builder::new().name(THREAD.into()).spawn(waiting).ok()?;
     receive.recv_timeout(limit).ok()?
 }
 

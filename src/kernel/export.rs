@@ -52,7 +52,7 @@ impl<'a> Exporter<'a> {
     }
 
     fn face(&mut self, f: &Face) -> Result<truck::Face, String> {
-        let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)));
+        let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)))?;
         if f.loops.is_empty() {
             return Err("a face without edges: truck has no closed surfaces without a boundary".into());
         }
@@ -139,7 +139,7 @@ impl<'a> Exporter<'a> {
 }
 
 fn truck_edge(a: &truck::Vertex, b: &truck::Vertex, c: &Curve) -> Result<truck::Edge, String> {
-    truck::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c))).map_err(|e| format!("an edge: {e}"))
+    truck::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c)?)).map_err(|e| format!("an edge: {e}"))
 }
 
 /// The curve in space of a use without an edge: a line of constant u or v.

@@ -122,13 +122,22 @@ fn vector4(p: &Homogeneous) -> Vector4 {
 }
 
 /// Our curve as truck's.
-pub fn curve_to_truck(c: &Curve) -> NurbsCurve<Vector4> {
-    NurbsCurve::new(BSplineCurve::new(KnotVec::from(c.knots.clone()), c.points.iter().map(vector4).collect()))
+///
+/// # Errors
+/// What truck says of it: it takes an interval of parameters below 1e-6 for a single value.
+pub fn curve_to_truck(c: &Curve) -> Result<NurbsCurve<Vector4>, String> {
+    let curve = BSplineCurve::try_new(KnotVec::from(c.knots.clone()), c.points.iter().map(vector4).collect());
+    curve.map(NurbsCurve::new).map_err(|e| format!("truck refuses a curve: {e}"))
 }
 
 /// Our surface as truck's, with the same parameters.
-pub fn surface_to_truck(s: &Surface) -> NurbsSurface<Vector4> {
+///
+/// # Errors
+/// What truck says of it, as for [`curve_to_truck`].
+pub fn surface_to_truck(s: &Surface) -> Result<NurbsSurface<Vector4>, String> {
     let knots = (KnotVec::from(s.knots[0].clone()), KnotVec::from(s.knots[1].clone()));
     let rows = s.points.chunks(s.counts()[1]).map(|r| r.iter().map(vector4).collect()).collect();
-    NurbsSurface::new(BSplineSurface::new(knots, rows))
+    BSplineSurface::try_new(knots, rows)
+        .map(NurbsSurface::new)
+        .map_err(|e| format!("truck refuses the surface: {e}"))
 }
