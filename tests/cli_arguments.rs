@@ -24,6 +24,10 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["trace", "a.toml", "--rays", "-5"], "at least 1"),
         (&["trace", "a.toml", "--normals", "smooth"], "bilinear"),
         (&["study", "everything"], "accuracy"),
+        (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
+        (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),
+        (&["study", "stability", "--rays", "5"], "its questions are fixed"),
+        (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
         (&["tarce"], "trace"),
         (&[], "Usage"),
     ] {

@@ -179,3 +179,30 @@ fn check_counts_no_defect_on_a_lens_and_its_rays_can_be_used_again() {
     let (code, _, err) = lampyris_in(folder.path(), &["check", &lens, "--rays-in", "torn.bin"]);
     assert!(code == 3 && err.contains("record 1"), "{err}");
 }
+
+/// A lens without its rim: what has gone in by a face and comes to the opening is lost, and the user is told so before and after.
+#[test]
+fn a_medium_in_an_open_shell_is_named_before_and_after() {
+    let text = std::fs::read_to_string(fixture("step/lens_planoconvex_analytic.stp")).unwrap();
+    let solid = text.find("MANIFOLD_SOLID_BREP(").expect("a solid");
+    let shell = solid + text[solid..].find('#').unwrap();
+    let end = shell + text[shell..].find(')').unwrap();
+    let model = format!("SHELL_BASED_SURFACE_MODEL('',({}){}", &text[shell..end], &text[end..]);
+    let open = format!("{}{model}", &text[..solid]).replace("CLOSED_SHELL", "OPEN_SHELL");
+    let faces = open.find("OPEN_SHELL(").unwrap();
+    let (first, last) = (faces + open[faces..].find(",(").unwrap() + 2, faces + open[faces..].find("))").unwrap());
+    let kept = open[first..last].rsplit_once(',').expect("several faces").0;
+    let open = format!("{}{kept}{}", &open[..first], &open[last..]);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("open.stp"), open).unwrap();
+    let text = std::fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
+    let text = text.replace("../step/lens_planoconvex_nurbs.stp", "open.stp").replace("1_000_000", "2000");
+    let text =
+        text.split_once("[[receiver]]").unwrap().0.to_owned() + "[[receiver]]\nname = 'far'\nkind = 'far_field'\n";
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+    assert_eq!(code, 4, "{err}");
+    for says in ["has the medium 'glass' but no closed shell", "a gap or an open shell", "lost_rays.csv"] {
+        assert!(err.contains(says), "'{says}' is missing in\n{err}");
+    }
+}

@@ -328,3 +328,25 @@ fn rectangles_of_parameters_are_in_the_units_of_their_context() {
         assert!((got - expected).abs() < 1e-6, "{lo:?} {hi:?}");
     }
 }
+
+/// A solid whose shell is written inside out is turned, and a void is left as it is.
+#[test]
+fn the_shell_of_a_solid_that_is_inside_out_is_turned() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/step/lens_planoconvex_analytic.stp");
+    let text = std::fs::read_to_string(path).unwrap();
+    let solid = text.find("MANIFOLD_SOLID_BREP(").expect("a solid");
+    let shell = solid + text[solid..].find('#').unwrap();
+    let end = shell + text[shell..].find(')').unwrap();
+    let turned = format!("#900000=ORIENTED_CLOSED_SHELL('',*,{},.F.);\nENDSEC;\nEND-ISO", &text[shell..end]);
+    let other = format!("{}#900000{}", &text[..shell], &text[end..]);
+    let place = other.rfind("ENDSEC;").unwrap();
+    let other = format!("{}{turned}{}", &other[..place], &other[place..].split_once("END-ISO").unwrap().1);
+    let read = |text: &str| read_bytes("lens.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+    let (good, mended) = (read(&text), read(&other));
+    let sides = |i: &Import| -> Vec<bool> {
+        i.model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces).map(|f| f.reversed).collect()
+    };
+    assert_eq!(sides(&good), sides(&mended));
+    assert!(!good.report.repairs.iter().any(|r| r.reason.contains("inside out")));
+    assert_eq!(mended.report.repairs.iter().filter(|r| r.reason.contains("inside out")).count(), 1);
+}

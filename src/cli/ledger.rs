@@ -6,8 +6,9 @@ use super::engine;
 use super::job::Prepared;
 use crate::formats::{write_atomic, write_vtp};
 use crate::report::path_lines;
-use crate::simulate::{LostRay, PathVertex, Results, RunSettings, replay};
+use crate::simulate::{Cause, LostRay, PathVertex, Results, RunSettings, replay};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Name of the ledger in a folder of results.
@@ -49,6 +50,42 @@ pub(super) fn write(folder: &Path, results: &Results, prepared: &Prepared) -> Re
         Ok(())
     })?;
     Ok(true)
+}
+
+/// Says which bodies are open: light that goes in by a face and out by the opening is lost.
+pub(super) fn warn_of_openings(prepared: &Prepared, context: &Context) {
+    let open = prepared.bound.open_bodies(&prepared.job.loaded.model);
+    let Some([first, medium]) = open.first() else { return };
+    let others = if open.len() > 1 { format!(" (and {} more)", open.len() - 1) } else { String::new() };
+    context.say(format_args!(
+        "'{first}'{others} has the medium '{medium}' but no closed shell: light that passes its opening is lost; close it in the \
+         model, or give it a surface instead of a medium"
+    ));
+}
+
+/// Why rays were lost and where, the most frequent first.
+pub(super) fn reasons(results: &Results, prepared: &Prepared) -> String {
+    let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for l in &results.ledger {
+        let at = l.face.and_then(|f| prepared.bound.instance(f));
+        let inside = || prepared.bound.body(l.body).map(|[instance, _]| instance);
+        *count.entry((meaning(l.cause), at.or_else(inside).unwrap_or(""))).or_default() += 1;
+    }
+    let mut all: Vec<_> = count.into_iter().collect();
+    all.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    let some: Vec<String> = all.iter().take(3).map(|((why, at), n)| format!("{n} {why} at '{at}'")).collect();
+    let of = if results.lost_rays as usize > results.ledger.len() { "of the first 1000: " } else { "" };
+    format!("{of}{}", some.join("; "))
+}
+
+fn meaning(cause: Cause) -> &'static str {
+    match cause {
+        Cause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
+        Cause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
+        Cause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
+        Cause::TooDeep => "were in more than 7 bodies at once, as after entering an open shell again and again,",
+        _ => "had a distance or direction that is no number",
+    }
 }
 
 fn quoted(text: &str) -> String {

@@ -56,7 +56,29 @@ impl Found {
     }
 }
 
+/// Options that a study would not look at are refused: whoever gives one believes that it changes the rows.
+fn refuse_idle(asked: &Asked) -> Result<(), Failure> {
+    use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
+    let (kind, m, t) = (asked.kind, asked.meshing, asked.tracing);
+    let lit = matches!(kind, Effects);
+    let faceted = matches!(kind, Effects | Bvh | Accuracy);
+    let given = [
+        ("--intersector", t.intersector.is_some(), lit, "it compares those that it is about"),
+        ("--normals", t.normals.is_some(), lit, "it compares those that it is about"),
+        ("--rays", t.rays.is_some(), kind != Stability, "its questions are fixed"),
+        ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
+        ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
+        ("--angle", m.angle.is_some(), faceted, "it goes through facets of its own"),
+        ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
+    ];
+    let idle = given.iter().find(|(_, given, used, _)| *given && !used);
+    let Some((option, _, _, why)) = idle else { return Ok(()) };
+    let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
+    Err(failure.help("leave it out"))
+}
+
 pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+    refuse_idle(asked)?;
     let threads = engine::threads(asked.tracing.threads)?;
     let seed = asked.tracing.seed.unwrap_or(1);
     let bar = context.stages(asked.kind.name());

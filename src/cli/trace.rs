@@ -45,6 +45,7 @@ pub(super) fn run(
         return dry_run(&prepared, folder, context);
     }
     let refused = load::account(&loaded.reports, extra.limits.max_refused, context);
+    ledger::warn_of_openings(&prepared, context);
     if !replay.is_empty() {
         ledger::run(&prepared, &replay, folder, context)?;
         return Ok(refused);
@@ -122,8 +123,10 @@ pub(super) fn run(
     let share = p.lost / p.emitted;
     if share > extra.max_lost {
         context.say(format_args!(
-            "{} % of the energy was lost, more than --max-lost allows; results.json and the report say where",
-            figures(100.0 * share, 2)
+            "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
+            figures(100.0 * share, 2),
+            ledger::reasons(&outcome.results, &prepared),
+            folder.join(ledger::LEDGER).display()
         ));
         return Ok(Outcome::Incomplete);
     }

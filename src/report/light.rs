@@ -117,13 +117,17 @@ impl Light<'_> {
             }
         }
         text += &format!(
-            "**{} rays** of {} segments each took **{}** on {} threads, {} million rays/s; {} was lost. ",
+            "**{} rays** of {} segments each took **{}** on {} threads, {} million rays/s; {} lost. ",
             grouped(r.rays),
             figures(r.segments as f64 / r.rays.max(1) as f64, 4),
             seconds(r.seconds.trace),
             r.threads,
             figures(r.mrays_per_s, 3),
-            if r.lost_rays == 0 { "none".into() } else { grouped(r.lost_rays) }
+            match r.lost_rays {
+                0 => "none was".into(),
+                1 => "one was".into(),
+                n => format!("{} were", grouped(n)),
+            }
         );
         text += &self.cut_off();
         if let Some(check) = self.check {

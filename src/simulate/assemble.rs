@@ -1,9 +1,9 @@
 //! Several models in one.
 
-use super::scene::{Key, Placement, Scene};
+use super::scene::{Key, ModelUse, Placement, Scene};
 use super::{Error, ErrorKind};
 use crate::math::{Frame, Point, Vector};
-use crate::model::{Model, PartId};
+use crate::model::{Model, Part, PartId};
 
 impl Placement {
     /// The placement as a frame.
@@ -22,14 +22,28 @@ impl Scene {
             return Err(self.error(ErrorKind::Model, &[Key::Name("model")], message));
         }
         let mut whole = Model { name: self.title.clone(), ..Model::default() };
+        let mut firsts: Vec<u32> = Vec::new();
         for (i, (mut model, entry)) in models.into_iter().zip(&self.models).enumerate() {
             let placement = entry.placement.frame();
             if !(entry.placement.scale > 0.0 && entry.placement.scale.is_finite()) {
                 let at = [Key::Name("model"), Key::Index(i), Key::Name("placement")];
                 return Err(self.error(ErrorKind::Value, &at, "`scale` must be positive"));
             }
-            let first = whole.parts.len() as u32;
-            whole.parts.append(&mut model.parts);
+            // What stands in several places is one part with several instances: meshed once.
+            let same = |e: &ModelUse| {
+                (&e.file, e.unit_mm, e.placement.scale) == (&entry.file, entry.unit_mm, entry.placement.scale)
+            };
+            let alike = self.models[..i].iter().position(same).map(|k| firsts[k]);
+            let like = |(a, b): (&Part, &Part)| (&a.name, a.face_count()) == (&b.name, b.face_count());
+            let known = |first: &u32| {
+                let there = whole.parts.get(*first as usize..).unwrap_or_default();
+                there.len() >= model.parts.len() && there.iter().zip(&model.parts).all(like)
+            };
+            let first = alike.filter(known).unwrap_or(whole.parts.len() as u32);
+            if first as usize == whole.parts.len() {
+                whole.parts.append(&mut model.parts);
+            }
+            firsts.push(first);
             for mut instance in model.instances {
                 instance.part = PartId(first + instance.part.0);
                 if !placement.is_identity() {
@@ -48,7 +62,6 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Part;
     use std::path::Path;
 
     #[test]
@@ -58,9 +71,15 @@ mod tests {
         let model = || Model::from_part(Part { name: "p".into(), ..Part::default() });
         let whole = scene.assemble(vec![model(), model()]).unwrap();
         assert_eq!(whole.instances[1].name, "b/p");
+        // Not of one scale, and so not meshed alike.
         assert_eq!(whole.instances[1].part, PartId(1));
         assert_eq!(whole.instances[1].placement.point(Point::ONE), Point::new(3.0, 4.0, 5.0));
         assert!(whole.instances[0].placement.is_identity());
         assert!(scene.assemble(vec![model()]).is_err());
+        let other = Model::from_part(Part { name: "q".into(), ..Part::default() });
+        let text = "[[model]]\nfile = 'a.stp'\n[[model]]\nfile = 'a.stp'\nplacement = { at = [1, 2, 3] }";
+        let scene = Scene::parse(text, "s.toml", Path::new(".")).unwrap();
+        assert_eq!(scene.assemble(vec![model(), model()]).unwrap().parts.len(), 1);
+        assert_eq!(scene.assemble(vec![model(), other]).unwrap().parts.len(), 2);
     }
 }

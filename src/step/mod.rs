@@ -38,6 +38,7 @@ mod loose;
 mod meridian;
 mod offset;
 mod order;
+mod outward;
 mod part;
 mod part21;
 mod pcurves;

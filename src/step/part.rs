@@ -5,6 +5,7 @@ use super::face::{Built, EdgeShape, Task, build, trim_loops};
 use super::geometry::{Geometry, Outcome, Refusal};
 use super::loops::Source;
 use super::order::{Ends, follow};
+use super::outward::is_inside_out;
 use super::part21::File;
 use super::settings::Settings;
 use super::styles::Styles;
@@ -105,8 +106,15 @@ pub(super) fn convert(
             face.reversed ^= flip;
             Some(face)
         });
+        let mut own: Vec<Face> = own.collect();
+        if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {
+            own.iter_mut().for_each(|face| face.reversed ^= true);
+            let id = plan.owners.first().copied().unwrap_or_default();
+            let entity = file.entity(id).map(|e| e.name()).unwrap_or_default();
+            out.repaired.push(Refusal { id, entity, reason: "the shell of a solid was inside out".into() });
+        }
         let shell = Shell {
-            faces: own.collect(),
+            faces: own,
             closed: plan.closed,
             colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
             name: plan.name.clone(),

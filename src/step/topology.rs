@@ -29,6 +29,8 @@ const RECIPES: [&str; 16] = [
 pub(super) struct ShellPlan {
     pub(super) name: String,
     pub(super) closed: bool,
+    /// Whether a solid lies inside of it, and no void.
+    pub(super) outer: bool,
     /// Faces, and whether the shell turns them around.
     pub(super) faces: Vec<(u64, bool)>,
     /// Entities whose style the shell inherits, the nearest first.
@@ -97,7 +99,13 @@ impl Items {
         ]) {
             self.shell(file, Some(id), &name, &[], false, e);
         } else if e.is_any(&["ADVANCED_FACE", "FACE_SURFACE"]) {
-            self.shells.push(ShellPlan { name, closed: false, faces: vec![(id, false)], owners: vec![] });
+            self.shells.push(ShellPlan {
+                name,
+                closed: false,
+                outer: false,
+                faces: vec![(id, false)],
+                owners: vec![],
+            });
         } else if let Some(a) = e.own("GEOMETRIC_SET", 1) {
             for element in a.list(0).ids() {
                 self.element(file, element);
@@ -119,7 +127,9 @@ impl Items {
 
     fn voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
         for shell in shells {
+            let before = self.shells.len();
             self.shell(file, Some(shell), name, &[e.id], true, e);
+            self.shells.iter_mut().skip(before).for_each(|s| s.outer = false);
         }
     }
 
@@ -165,7 +175,7 @@ impl Items {
             faces.push((face, turned));
         }
         let closed = solid || e.is("CLOSED_SHELL");
-        self.shells.push(ShellPlan { name: name.to_string(), closed, faces, owners });
+        self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, faces, owners });
     }
 }
 

@@ -75,6 +75,8 @@ pub struct BoundScene {
     pub(crate) light: Light,
     /// Whether bodies may touch or lie inside each other, so that paths need a stack of media.
     pub(crate) nested: bool,
+    /// Whether a face that may lie on one of another body has a surface of its own.
+    pub(crate) dressed: bool,
     pub(crate) emitters: Vec<Emitter>,
     pub(crate) receivers: Vec<Receiver>,
     /// Around all faces and the places of the sources, with room to spare.
@@ -123,6 +125,7 @@ impl Scene {
         }
         let against = bodies::against(self, model, &body_of_face, &opaques);
         faces.iter_mut().zip(against).for_each(|(f, against): (&mut FaceOptics, bool)| f.against = against);
+        let dressed = faces.iter().any(|f| f.touching && surfaces[f.surface as usize] != Surface::Interface);
         let mut emitters = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
             let area = shining(self, i, model)?;
@@ -146,6 +149,7 @@ impl Scene {
             bodies,
             light,
             nested,
+            dressed,
             emitters,
             receivers,
             region,
@@ -159,6 +163,19 @@ impl BoundScene {
     /// The instance and the medium of a body, as lost rays name it.
     pub fn body(&self, body: u16) -> Option<[&str; 2]> {
         self.bodies.get(usize::from(body)).map(|b| [b.name.as_str(), b.medium.as_str()])
+    }
+
+    /// Instance and medium of every body that has faces in no closed shell.
+    pub fn open_bodies(&self, model: &Model) -> Vec<[&str; 2]> {
+        let open =
+            |f: &PlacedFace<'_>| f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed);
+        let mut bodies: Vec<u16> = (model.placed_faces().filter(open))
+            .filter_map(|f| Some(self.faces.get(f.id.index())?.body))
+            .filter(|body| *body != AMBIENT)
+            .collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies.into_iter().filter_map(|body| self.body(body)).collect()
     }
 
     /// The instance of a face, by the face's index in the model.

@@ -105,9 +105,14 @@ pub(super) fn step<C: Carry>(
         true => surface::contact(context, ray, hit, face, point),
         false => None,
     };
-    let (hit, face, entering, point) = match &contact {
-        Some((hit, face, point)) => (hit, *face, true, *point),
-        None => (hit, face, entering, point),
+    let pair = match C::MEDIA && context.bound.dressed && face.touching && contact.is_none() {
+        true => surface::dressed(context, ray, hit, face, point),
+        false => None,
+    };
+    let (hit, face, entering, point) = match (&contact, &pair) {
+        (Some((hit, face, point)), _) => (hit, *face, true, *point),
+        (None, Some(Ok((hit, face, point)))) => (hit, *face, !entering, *point),
+        (None, _) => (hit, face, entering, point),
     };
     if face.sealed && !entering {
         record(context, path, point, Event::Lost, local);
@@ -115,7 +120,7 @@ pub(super) fn step<C: Carry>(
         return false;
     }
     let meeting = Meeting { hit, face, entering, point, skip: Cell::new(0.0) };
-    if C::MEDIA && face.against && face.body == AMBIENT && path.carry.body() != AMBIENT {
+    if C::MEDIA && (pair.is_some() || face.against && face.body == AMBIENT && path.carry.body() != AMBIENT) {
         // Light that comes back from an opaque face does not meet the face of its own body on it once more.
         meeting.skip.set(context.bound.scene.run.glue_mm);
     }

@@ -6,7 +6,7 @@ use crate::intersect::{Cost, Hit};
 use crate::math::{Departure, Point, Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
 use crate::optics::{Coating, Split, fresnel, reflect, refract_with_cosine};
-use crate::simulate::bind::{AMBIENT, Coated, FaceOptics};
+use crate::simulate::bind::{AMBIENT, Coated, FaceOptics, Surface};
 use crate::simulate::random::Purpose;
 use crate::simulate::scene::Interfaces;
 use crate::simulate::tally::whole;
@@ -219,14 +219,47 @@ fn cross<C: Carry>(
 /// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
 /// whether rounding puts it before or behind.
 fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
-    let cos = ray.direction.dot(at.hit.geometric_normal).abs().max(1e-3);
-    let reach = context.bound.scene.run.glue_mm / cos;
-    let from = Departure { face: at.hit.face, primitive: at.hit.primitive, uv: at.hit.uv };
-    let probe = Ray::new(at.point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
-    let hit = context.intersector.intersect(&probe, &mut Cost::default())?;
-    let other = context.bound.faces.get(hit.face.index())?;
+    partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
+}
+
+/// That face, with its optics and the place.
+fn partner(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<(Hit, FaceOptics, Point)> {
+    let along = ray.direction.dot(hit.geometric_normal);
+    let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+    let probe = Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
+    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+    let other = *context.bound.faces.get(found.face.index())?;
+    let opposite = (ray.direction.dot(found.geometric_normal) < 0.0) != (along < 0.0);
+    (other.touching && other.body != face.body && opposite).then(|| (found, other, probe.at(found.t)))
+}
+
+/// Which of two faces at one place says what happens there, when not both are bare: the one that is not, of two such the one that
+/// the light is leaving; so it does not depend on which of them rounding puts first. `Ok` is the partner, `Err` the face itself,
+/// none when there is no such pair.
+#[inline(never)]
+pub(super) fn dressed(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<Result<(Hit, FaceOptics, Point), ()>> {
+    let (found, other, place) = partner(context, ray, hit, face, point)?;
+    let bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-    (other.touching && other.body != at.face.body && entering != at.entering).then_some(other.body)
+    match [bare(&face), bare(&other)] {
+        [true, true] => None,
+        [true, false] => Some(Ok((found, other, place))),
+        [false, true] => Some(Err(())),
+        [false, false] => Some(if entering { Ok((found, other, place)) } else { Err(()) }),
+    }
 }
 
 /// How far back the front of a solid is looked for, mm, that a ray has slipped into between the facets of two touching faces.

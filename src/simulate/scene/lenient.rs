@@ -36,7 +36,7 @@ struct Count;
 impl Visitor<'_> for Count {
     type Value = u64;
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a whole positive number, such as 1_000_000 or 1e6")
+        f.write_str("a whole positive number below 9e15, such as 1_000_000 or 1e6")
     }
     fn visit_i64<E: Error>(self, n: i64) -> Result<u64, E> {
         u64::try_from(n).map_err(|_| E::invalid_value(Unexpected::Signed(n), &self))

@@ -108,7 +108,7 @@ impl Source {
             && !(1e-30..=1e30).contains(&power)
         {
             let message = match power > 0.0 {
-                true => format!("a power of {power} is not within 1e-30 and 1e30"),
+                true => format!("a power of {power:e} is not within 1e-30 and 1e30"),
                 false => format!("a power of {power} is not positive"),
             };
             return fail("power", message);

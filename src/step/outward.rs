@@ -1,0 +1,113 @@
+//! Whether the shell of a solid is inside out: its normals look into what it encloses.
+//!
+//! Some exporters write the shell of a mirrored part so, and its readers turn it. The volume tells, by the divergence theorem over a
+//! grid of points on each face. First on few; where that says inside out on more, and with a bound on the error that thin walls
+//! fail, for which the file is believed.
+
+use crate::math::{Aabb, Point, Uv};
+use crate::model::Face;
+use rayon::prelude::*;
+
+/// Points across a face of the first look and of the two that decide.
+const GRIDS: [usize; 3] = [4, 16, 23];
+/// Points on each edge of a loop.
+const EDGE: usize = 6;
+
+/// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
+pub(super) fn is_inside_out(faces: &[Face]) -> bool {
+    let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(polygons).collect();
+    let around = Aabb::around(faces.iter().map(|f| f.surface.evaluate(middle(f))));
+    if around.is_empty() {
+        return false;
+    }
+    let flux = |grid: usize| {
+        let of = |(face, loops): (&Face, &Vec<Vec<Uv>>)| flux(face, loops, around.center(), grid);
+        let parts: Vec<[f64; 2]> = faces.par_iter().zip(&loops).map(of).collect();
+        parts.into_iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+    };
+    let [volume, _] = flux(GRIDS[0]);
+    if volume.is_nan() || volume >= 0.0 {
+        return false;
+    }
+    let ([coarse, _], [fine, whole]) = (flux(GRIDS[1]), flux(GRIDS[2]));
+    fine < 0.0 && -fine > 4.0 * (fine - coarse).abs() && -fine > 0.02 * whole
+}
+
+fn middle(face: &Face) -> Uv {
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))
+}
+
+fn polygons(face: &Face) -> Vec<Vec<Uv>> {
+    let points = |u: &crate::model::EdgeUse| {
+        let ([a, b], reversed) = (u.uv.domain(), u.reversed);
+        (0..EDGE)
+            .map(|i| i as f64 / EDGE as f64)
+            .map(|s| u.uv.evaluate(a + (b - a) * if reversed { 1.0 - s } else { s }))
+            .collect::<Vec<_>>()
+    };
+    face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
+}
+
+fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
+    let sides = loops.iter().flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])));
+    let crossed =
+        |(a, b): &(Uv, Uv)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
+    loops.is_empty() || sides.filter(crossed).count() % 2 == 1
+}
+
+/// A third of the flow of `p - center` out of a face, and what it would be with all signs alike.
+fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] {
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    let (mut low, mut high) = (Uv::new(u0, v0), Uv::new(u1, v1));
+    if !loops.is_empty() {
+        let points = || loops.iter().flatten();
+        low = low.max(points().fold(Uv::INFINITY, |m, p| m.min(*p)));
+        high = high.min(points().fold(Uv::NEG_INFINITY, |m, p| m.max(*p)));
+    }
+    let step = (high - low) / grid as f64;
+    if !(step.x > 0.0 && step.y > 0.0) {
+        return [0.0; 2];
+    }
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for k in 0..grid * grid {
+        let uv = low + step * Uv::new((k % grid) as f64 + 0.5, (k / grid) as f64 + 0.5);
+        if !inside(loops, uv) {
+            continue;
+        }
+        let d = face.surface.derivatives(uv);
+        let flow = (d.point - center).dot(d.du.cross(d.dv)) / 3.0;
+        sum += if face.reversed { -flow } else { flow };
+        whole += flow.abs();
+    }
+    [sum * step.x * step.y, whole * step.x * step.y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Frame, Vector};
+    use crate::nurbs::sweep::plane;
+
+    fn block(size: [f64; 3], reversed: bool) -> Vec<Face> {
+        let size = Vector::from_array(size);
+        let side = |k: usize| {
+            let (axes, sign) = ([Vector::X, Vector::Y, Vector::Z], if k < 3 { 1.0 } else { -1.0 });
+            let [z, x, y] = [0, 1, 2].map(|i| axes[(k + i) % 3]);
+            let frame = Frame::from_axis(z * (0.5 * sign * size.dot(z)), z * sign, Some(x));
+            let [a, b] = [x, y].map(|axis| 0.5 * size.dot(axis));
+            Face { reversed, ..Face::whole(plane(&frame, [[-a, a], [-b, b]])) }
+        };
+        (0..6).map(side).collect()
+    }
+
+    #[test]
+    fn a_block_is_turned_but_nothing_without_sense() {
+        assert!(!is_inside_out(&block([1.0, 2.0, 3.0], false)));
+        assert!(is_inside_out(&block([1.0, 2.0, 3.0], true)));
+        assert!(!is_inside_out(&[]));
+        let mut odd = block([1.0, 1.0, 1.0], true);
+        odd.iter_mut().take(3).for_each(|f| f.reversed = false);
+        assert!(!is_inside_out(&odd), "no sense in it");
+    }
+}
