@@ -184,9 +184,18 @@ impl Sheet {
                 }
                 // Steps of two bands cannot jump over a border unseen; a ray that lies almost in the sheet gets longer ones.
                 let longest = band * if steps < STEPS / 2 { 2.0 } else { 2.0 + (steps - STEPS / 2) as f64 };
-                at += sign * self.step(&foot, ray, band).min(longest);
-                at = if end == 0 { at.max(limit) } else { at.min(limit) };
-                foot = self.foot(ray.at(at), foot.uv, ray.direction);
+                let mut step = self.step(&foot, ray, band).min(longest);
+                let (before, last) = (at, foot);
+                // On the hollow side of the sheet the foot runs ahead of the ray; where it jumps no step is short enough.
+                for _ in 0..4 {
+                    at = before + sign * step;
+                    at = if end == 0 { at.max(limit) } else { at.min(limit) };
+                    foot = self.foot(ray.at(at), last.uv, ray.direction);
+                    if foot.point.distance(last.point) <= longest {
+                        break;
+                    }
+                    step *= 0.7;
+                }
             }
             found.range[end] = at;
         }
@@ -205,8 +214,8 @@ impl Sheet {
 mod tests {
     use super::*;
     use crate::math::Frame;
-    use crate::model::Face;
-    use crate::nurbs::sweep;
+    use crate::model::{EdgeId, EdgeUse, Face, TrimLoop};
+    use crate::nurbs::{UvCurve, sweep};
     use std::f64::consts::PI;
 
     fn sphere(radius: f64) -> Sheet {
@@ -266,5 +275,28 @@ mod tests {
         let t = 20.0 - (100f64 - 9.0).sqrt();
         assert_eq!(s.stretch(&into, t, Uv::new(PI, 0.3), band).unwrap().sides, [1, -1]);
         assert!(s.stretch(&into, t - 1.0, Uv::new(PI, 0.3), band).is_none());
+    }
+
+    #[test]
+    fn no_step_along_the_hollow_side_jumps_over_a_border() {
+        let surface = sweep::cylinder(&Frame::IDENTITY, 1.0, [0.0, 2.0 * PI], [-10.0, 10.0]);
+        // The ray passes 0.03 inside of the sheet, where feet are 3 % farther apart than their points.
+        let (band, start) = (0.05, 1.0f64);
+        let (sin, cos) = start.sin_cos();
+        let ray = Ray::new(Point::new(0.97 * cos, 0.97 * sin, 0.0), Vector::new(-sin, cos, 0.0));
+        for k in 0..300 {
+            let end = start + 0.03 + 5e-4 * f64::from(k);
+            let corners = [[0.3, -0.5], [end, -0.5], [end, 0.5], [0.3, 0.5]].map(Uv::from);
+            let side = |k: usize| EdgeUse {
+                edge: Some(EdgeId(k as u32)),
+                reversed: false,
+                uv: UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]),
+            };
+            let uses = (0..4).map(side).collect();
+            let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(surface.clone()) };
+            let forward = ray.within(-1.0, 1.0);
+            let stretch = of(&face).stretch(&forward, 0.0, Uv::new(start, 0.0), band).expect("in the band");
+            assert!(stretch.border, "end {end}");
+        }
     }
 }
