@@ -87,6 +87,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         if self.judge == Judge::Sampled {
             return self.sampled(uv, &flat).max(sampled);
         }
+        self.hulls(uv, &flat, limit)
+    }
+
+    /// Bound of the distance from the surface over a parameter triangle to a triangle in space, by hulls.
+    fn hulls(&mut self, uv: [Uv; 3], flat: &Flat, limit: f64) -> f64 {
         self.pieces(&uv, |this, a, b, polygon| {
             let patch = this.sheet.patch(a, b);
             let mut worst = 0f64;
@@ -110,15 +115,16 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// Bound of the distance from the surface over a convex parameter polygon to a triangle in space.
     pub(super) fn polygon(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
         let flat = Flat::new(&xyz);
-        if !self.sheet.affine
-            && self.judge == Judge::Bound
-            && let Some(quick) = self.quick(uv, limit, |p| flat.distance(p))
-        {
+        let bounded = !self.sheet.affine && self.judge == Judge::Bound;
+        if bounded && let Some(quick) = self.quick(uv, limit, |p| flat.distance(p)) {
             return quick;
         }
         let mut worst = 0f64;
         for k in 1..uv.len().saturating_sub(1) {
-            worst = worst.max(self.piece([uv[0], uv[k], uv[k + 1]], xyz, limit));
+            let triangle = [uv[0], uv[k], uv[k + 1]];
+            // Nearly all of these slivers hold: samples would seldom spare the proof.
+            let one = if bounded { self.hulls(triangle, &flat, limit) } else { self.piece(triangle, xyz, limit) };
+            worst = worst.max(one);
             if worst > limit {
                 break;
             }

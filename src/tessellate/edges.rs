@@ -45,12 +45,15 @@ pub(super) fn divide(
     *alone = part.edges.par_iter().zip(sides).enumerate().map(fresh).collect();
     let mut times: Vec<Vec<f64>> = alone.iter().map(|(_, t)| t.clone()).collect();
     opposite::align(part, faces, sides, denser, &mut times);
+    let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
+        t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
+    };
+    let inner: Vec<Vec<Point>> = part.edges.par_iter().zip(&times).with_min_len(16).map(inner).collect();
     let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();
-    for (edge, t) in part.edges.iter().zip(times) {
-        let first = positions.len() as u32;
-        positions.extend(t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)));
-        divisions.push(Division { t, first });
+    for (inner, t) in inner.into_iter().zip(times) {
+        divisions.push(Division { t, first: positions.len() as u32 });
+        positions.extend(inner);
     }
     (divisions, positions)
 }

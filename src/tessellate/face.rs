@@ -11,7 +11,8 @@ use super::sheet::Sheet;
 use super::strip::{self, Node, Outline, key};
 use super::trim::Trim;
 use crate::math::{Point, Uv, Vector};
-use crate::model::{EdgeId, Face, Part, TrimLoop};
+use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// The facets of a face in its part's coordinates.
@@ -112,6 +113,7 @@ fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, sha
         poles: Vec::new(),
     };
     let sides: Vec<_> = loops.iter().flat_map(|l| &l.uses).collect();
+    let mut followed: Vec<([u32; 2], &EdgeUse, EdgeId, [f64; 2])> = Vec::new();
     for ring in &rings.rings {
         let first = out.nodes.len() as u32;
         let n = ring.len() as u32;
@@ -124,17 +126,22 @@ fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, sha
                 Follows::Edge { side, t } => {
                     out.segments.push([a, b]);
                     let u = sides[side as usize];
-                    let (x, y) = (out.nodes[a as usize], out.nodes[b as usize]);
                     if let Some(edge) = u.edge {
-                        let curve = &part.edges[edge.0 as usize].curve;
-                        let trim = Trim::new(sheet, curve, u, t, [x.uv, y.uv], [x.place, y.place]);
-                        out.trims.insert(key(a, b), trim);
-                        out.followed.insert(key(a, b), edge);
+                        followed.push(([a, b], u, edge, t));
                     }
                 }
             }
         }
     }
+    // A face with a long border would hold up the others.
+    let trim = |&([a, b], u, edge, t): &([u32; 2], &EdgeUse, EdgeId, [f64; 2])| {
+        let (x, y) = (out.nodes[a as usize], out.nodes[b as usize]);
+        let curve = &part.edges[edge.0 as usize].curve;
+        Trim::new(sheet, curve, u, t, [x.uv, y.uv], [x.place, y.place])
+    };
+    let trims: Vec<Trim> = followed.par_iter().with_min_len(32).map(trim).collect();
+    out.trims.extend(followed.iter().map(|f| key(f.0[0], f.0[1])).zip(trims));
+    out.followed.extend(followed.iter().map(|f| (key(f.0[0], f.0[1]), f.2)));
     out
 }
 

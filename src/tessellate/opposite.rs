@@ -7,6 +7,7 @@
 use super::edges::{Side, breaks, hold};
 use super::sheet::Sheet;
 use crate::model::{EdgeUse, Face, Part};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Uses of a face beyond which no opposite ones are looked for.
@@ -29,32 +30,17 @@ struct Along<'f> {
 type Pair<'f> = [(usize, &'f EdgeUse); 2];
 
 /// Makes samples of opposite edges equal. `times` are the parameters at which each edge is divided.
-pub(super) fn align(
+pub(super) fn align<'f>(
     part: &Part,
-    faces: &[(&Face, &Sheet<'_>)],
+    faces: &[(&'f Face, &Sheet<'_>)],
     sides: &[Vec<Side<'_, '_>>],
     denser: &[u32],
     times: &mut [Vec<f64>],
 ) {
-    let mut pairs: Vec<(Pair<'_>, usize)> = Vec::new();
-    for (face, sheet) in faces.iter().filter(|(_, s)| !s.affine) {
-        let uses: Vec<&EdgeUse> = face.loops.iter().flat_map(|l| &l.uses).collect();
-        if uses.len() > MOST_USES {
-            continue;
-        }
-        let along: Vec<Along<'_>> =
-            uses.iter().filter_map(|u| follow(u, sheet)).filter(|a| a.edge < times.len()).collect();
-        for (i, a) in along.iter().enumerate() {
-            for b in &along[i + 1..] {
-                let near = |x: f64, y: f64| (x - y).abs() <= 1e-6;
-                let same =
-                    a.direction == b.direction && near(a.range[0], b.range[0]) && near(a.range[1], b.range[1]);
-                if same && a.edge != b.edge && !near(a.level, b.level) {
-                    pairs.push(([(a.edge, a.side), (b.edge, b.side)], a.direction));
-                }
-            }
-        }
-    }
+    let bent: Vec<&(&Face, &Sheet<'_>)> = faces.iter().filter(|(_, s)| !s.affine).collect();
+    let of_face = |&&(face, sheet): &&(&'f Face, &Sheet<'_>)| pairs_of(face, sheet, times.len());
+    let each: Vec<Vec<(Pair<'_>, usize)>> = bent.par_iter().with_min_len(8).map(of_face).collect();
+    let pairs: Vec<(Pair<'_>, usize)> = each.into_iter().flatten().collect();
     let mut of: FxHashMap<usize, Vec<usize>> = FxHashMap::default();
     for (k, ([a, b], _)) in pairs.iter().enumerate() {
         of.entry(a.0).or_default().push(k);
@@ -91,6 +77,26 @@ pub(super) fn align(
     }
 }
 
+/// Opposite uses of a face whose edges are among the first `edges`, and the direction in which they run.
+fn pairs_of<'f>(face: &'f Face, sheet: &Sheet<'_>, edges: usize) -> Vec<(Pair<'f>, usize)> {
+    let mut pairs = Vec::new();
+    let uses: Vec<&EdgeUse> = face.loops.iter().flat_map(|l| &l.uses).collect();
+    if uses.len() > MOST_USES {
+        return pairs;
+    }
+    let along: Vec<Along<'_>> = uses.iter().filter_map(|u| follow(u, sheet)).filter(|a| a.edge < edges).collect();
+    for (i, a) in along.iter().enumerate() {
+        for b in &along[i + 1..] {
+            let near = |x: f64, y: f64| (x - y).abs() <= 1e-6;
+            let same = a.direction == b.direction && near(a.range[0], b.range[0]) && near(a.range[1], b.range[1]);
+            if same && a.edge != b.edge && !near(a.level, b.level) {
+                pairs.push(([(a.edge, a.side), (b.edge, b.side)], a.direction));
+            }
+        }
+    }
+    pairs
+}
+
 /// A use as a run along a parameter line, if it is one.
 fn follow<'f>(side: &'f EdgeUse, sheet: &Sheet<'_>) -> Option<Along<'f>> {
     let edge = side.edge?.0 as usize;
@@ -100,6 +106,11 @@ fn follow<'f>(side: &'f EdgeUse, sheet: &Sheet<'_>) -> Option<Along<'f>> {
         let uv = side.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / 8.0);
         [0, 1].map(|d| (uv[d] - domain[d][0]) / (domain[d][1] - domain[d][0]))
     };
+    // Most that do not run along a line show it at both ends.
+    let (from, to) = (at(0), at(8));
+    if (0..2).all(|d| (from[d] - to[d]).abs() > 1e-7) {
+        return None;
+    }
     let looks: Vec<[f64; 2]> = (0..=8).map(at).collect();
     (0..2).find_map(|d| {
         let flat = looks.iter().all(|p| (p[1 - d] - looks[0][1 - d]).abs() <= 1e-7);
