@@ -141,7 +141,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         let at = if exact { xyz } else { uv.map(|x| self.sheet.point(x)) };
         let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
         let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
-        let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
+        let (a, b) = (self.sheet.range(0, lo.x, hi.x), self.sheet.range(1, lo.y, hi.y));
         let fits = |x: &f64| x + off <= limit;
         let quick = self.sheet.bends.bound(a, b, hi - lo).filter(fits);
         if let Some(bound) = quick {
@@ -248,26 +248,17 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// them, and the deviation from that by second derivatives; `None` above the limit.
     fn quick(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
-        let (a, b) = (self.range(0, lo.x, hi.x), self.range(1, lo.y, hi.y));
+        let (a, b) = (self.sheet.range(0, lo.x, hi.x), self.sheet.range(1, lo.y, hi.y));
         let bound = self.sheet.bends.bound(a, b, hi - lo).filter(|&x| x <= limit)?;
         let off = uv.iter().map(|&x| away(self.sheet.point(x))).fold(0.0, f64::max);
         Some(bound + off + self.margin).filter(|&x| x <= limit)
-    }
-
-    /// First and last knot interval that `[x, y]` meets.
-    fn range(&self, d: usize, x: f64, y: f64) -> [usize; 2] {
-        let (a, mut b) = (self.sheet.interval(d, x), self.sheet.interval(d, y));
-        if b > a && self.sheet.breaks[d][b] >= y {
-            b -= 1;
-        }
-        [a, b]
     }
 
     /// Largest result over the knot rectangles that a segment or triangle meets.
     fn pieces(&mut self, uv: &[Uv], mut each: impl FnMut(&mut Self, usize, usize, &[Uv]) -> f64) -> f64 {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let range = |d: usize, x: f64, y: f64| {
-            let [a, b] = self.range(d, x, y);
+            let [a, b] = self.sheet.range(d, x, y);
             a..=b
         };
         let (ra, rb) = (range(0, lo.x, hi.x), range(1, lo.y, hi.y));

@@ -5,6 +5,7 @@ use super::bound::Prover;
 use super::cells::{self, Leaves};
 use super::edges::Division;
 use super::grid::{self, Ground};
+use super::near::Near;
 use super::pair;
 use super::rings::{self, Follows, Rings};
 use super::sheet::Sheet;
@@ -134,12 +135,15 @@ fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, sha
         }
     }
     // A face with a long border would hold up the others.
-    let trim = |&([a, b], u, edge, t): &([u32; 2], &EdgeUse, EdgeId, [f64; 2])| {
+    let trim = |near: &mut Near, &([a, b], u, edge, t): &([u32; 2], &EdgeUse, EdgeId, [f64; 2])| {
         let (x, y) = (out.nodes[a as usize], out.nodes[b as usize]);
         let curve = &part.edges[edge.0 as usize].curve;
-        Trim::new(sheet, curve, u, t, [x.uv, y.uv], [x.place, y.place])
+        let (uv, xyz) = ([x.uv, y.uv], [x.place, y.place]);
+        let mut trim = Trim::new(sheet, curve, u, t, uv, xyz);
+        trim.prove(sheet, near, uv, xyz);
+        trim
     };
-    let trims: Vec<Trim> = followed.par_iter().with_min_len(32).map(trim).collect();
+    let trims: Vec<Trim> = followed.par_iter().with_min_len(32).map_init(Near::default, trim).collect();
     out.trims.extend(followed.iter().map(|f| key(f.0[0], f.0[1])).zip(trims));
     out.followed.extend(followed.iter().map(|f| (key(f.0[0], f.0[1]), f.2)));
     out

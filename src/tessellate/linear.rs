@@ -1,24 +1,40 @@
-//! The linear map of a parameter triangle onto one in space, which the deviation of a facet is measured from.
+//! The linear map from parameters into space that the deviation of a facet, or of the sliver beside its chord, is measured from.
+//!
+//! Beside a chord, S = L + D with L in a plane through it and D = D⊥ + D∥: a point of the sliver is at most
+//! √(|D⊥|² + (reach + |D∥|)²) from the chord.
 
-use crate::math::{Point, Uv};
+use super::flat::from_chord;
+use super::sheet::Sheet;
+use crate::math::{Point, Uv, Vector};
 use crate::nurbs::BezierPatch;
+use smallvec::SmallVec;
 
 /// Triangles with a smaller share of the rectangle around them are left to others: their L is steep.
 const THINNEST: f64 = 0.05;
 
-/// The linear map L from a parameter triangle onto one in space, over the rectangle around it.
+/// What is measured of the deviation from L.
+enum Measure {
+    /// All of it.
+    Whole,
+    /// The distance to a chord in L's plane, from which L goes no farther than `reach` over the region.
+    Beside { normal: Vector, reach: f64 },
+}
+
+/// A linear map L from parameters into space, and a convex region of parameters within a rectangle.
 pub(super) struct Linear {
     pub(super) lo: Uv,
     pub(super) hi: Uv,
-    /// Corners, as shares of the rectangle.
-    x: [Uv; 3],
-    /// L at the rectangle's first corner, and along it, seen from the first corner in space.
+    /// Corners of the region, as shares of the rectangle.
+    region: SmallVec<[Uv; 8]>,
+    /// L at the rectangle's first corner, and along it, seen from a place that L meets.
     l: [Point; 3],
     /// Which way the corners run.
     sign: f64,
+    measure: Measure,
 }
 
 impl Linear {
+    /// The map of a parameter triangle onto one in space, seen from its first corner.
     pub(super) fn new(corners: [Uv; 3], at: [Point; 3]) -> Option<Self> {
         let lo = corners[0].min(corners[1]).min(corners[2]);
         let hi = corners[0].max(corners[1]).max(corners[2]);
@@ -32,7 +48,30 @@ impl Linear {
         let ls = (e1 * d2.y - e2 * d1.y) / det;
         let lt = (e2 * d1.x - e1 * d2.x) / det;
         let l00 = -(ls * x[0].x + lt * x[0].y);
-        Some(Self { lo, hi, x, l: [l00, ls, lt], sign: det.signum() })
+        let region = SmallVec::from_slice(&x);
+        Some(Self { lo, hi, region, l: [l00, ls, lt], sign: det.signum(), measure: Measure::Whole })
+    }
+
+    /// The map that takes a chord of parameters onto its chord in space, seen from there, and goes with the surface across it;
+    /// over a polygon, counter-clockwise, that holds the chord.
+    pub(super) fn beside(sheet: &Sheet<'_>, polygon: &[Uv], chord: [Uv; 2], at: [Point; 2]) -> Option<Self> {
+        let (lo, hi) = polygon.iter().fold((chord[0], chord[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let size = hi - lo;
+        let share = |x: Uv| (x - lo) / size;
+        let a = share(chord[0]);
+        let d = share(chord[1]) - a;
+        let along = at[1] - at[0];
+        let der = sheet.second_derivatives(0.5 * (chord[0] + chord[1]));
+        let across = der.dv * (d.x * size.y) - der.du * (d.y * size.x);
+        let normal = along.cross(across).try_normalize()?;
+        let (ls, lt) =
+            ((along * d.x - across * d.y) / d.length_squared(), (along * d.y + across * d.x) / d.length_squared());
+        let l00 = -(ls * a.x + lt * a.y);
+        let region: SmallVec<[Uv; 8]> = polygon.iter().map(|&x| share(x)).collect();
+        let off = |x: &Uv| from_chord(l00 + ls * x.x + lt * x.y, &[Point::ZERO, along]);
+        let reach = region.iter().map(off).fold(0.0, f64::max);
+        let measure = Measure::Beside { normal, reach };
+        reach.is_finite().then_some(Self { lo, hi, region, l: [l00, ls, lt], sign: 1.0, measure })
     }
 
     /// The part of the rectangle that a patch covers.
@@ -55,13 +94,65 @@ impl Linear {
         [l, l + s, l + t, l + s + t]
     }
 
-    /// Whether a part meets the triangle.
+    /// Whether a part meets the region.
     pub(super) fn touches(&self, from: Uv, share: Uv) -> bool {
-        (0..3).all(|k| {
-            let (a, d) = (self.x[k], (self.x[(k + 1) % 3] - self.x[k]) * self.sign);
+        let n = self.region.len();
+        (0..n).all(|k| {
+            let a = self.region[k];
+            let d = (self.region[(k + 1) % n] - a) * self.sign;
             // The corner that lies farthest to the left of the side.
             let far = from + Uv::new(if d.y < 0.0 { share.x } else { 0.0 }, if d.x > 0.0 { share.y } else { 0.0 });
             d.perp_dot(far - a) >= -1e-12
         })
+    }
+
+    /// Bound of what is measured where the control points of W·(S − L) are these and no weight is smaller.
+    pub(super) fn bound(&self, net: &[Point], lightest: f64) -> f64 {
+        match self.measure {
+            Measure::Whole => net.iter().map(|x| x.length_squared()).fold(0.0, f64::max).sqrt() / lightest,
+            Measure::Beside { normal, reach } => {
+                let (mut up, mut flat) = (0f64, 0f64);
+                for x in net {
+                    let h = x.dot(normal);
+                    up = up.max(h.abs());
+                    flat = flat.max((*x - normal * h).length_squared());
+                }
+                (up / lightest).hypot(reach + flat.sqrt() / lightest)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::math::{Frame, Uv};
+    use crate::nurbs::sweep;
+    use crate::tessellate::flat::from_chord;
+    use crate::tessellate::near::Near;
+    use crate::tessellate::settings::Field;
+    use crate::tessellate::sheet::Sheet;
+
+    #[test]
+    fn slivers_beside_a_chord_stay_within_their_bound() {
+        let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 3.0], [0.2, 2.9]);
+        let sheet = Sheet::new(&s, false, Field::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
+        // Across the knots at which the torus is divided, and within them.
+        for from in [Uv::new(0.3, 0.4), Uv::new(1.4, 1.4)] {
+            let chord = [from, from + Uv::new(0.2, 0.3)];
+            let polygon = [chord[0], from + Uv::new(0.13, 0.15), chord[1]];
+            let at = chord.map(|x| s.evaluate(x));
+            let mut worst = 0f64;
+            for i in 0..=60 {
+                for j in 0..=60 - i {
+                    let (a, b) = (i as f64 / 60.0, j as f64 / 60.0);
+                    let x = polygon[0] * a + polygon[1] * b + polygon[2] * (1.0 - a - b);
+                    worst = worst.max(from_chord(s.evaluate(x), &at));
+                }
+            }
+            let bound = |limit: f64| Near::default().beside(&sheet, &polygon, chord, at, limit);
+            assert!(bound(0.999 * worst).is_none());
+            let bound = bound(1.2 * worst).unwrap();
+            assert!(worst <= bound && bound <= 1.2 * worst, "{worst} {bound}");
+        }
     }
 }

@@ -8,7 +8,7 @@
 //! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `net.rs` decides.
 
 use super::linear::Linear;
-use super::sheet::local;
+use super::sheet::{Sheet, local};
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
 use smallvec::{SmallVec, smallvec};
@@ -76,7 +76,33 @@ impl Near {
         at: [Point; 3],
         limit: f64,
     ) -> Option<f64> {
-        let linear = Linear::new(corners, at)?;
+        self.strays(patches, &Linear::new(corners, at)?, at[0], limit)
+    }
+
+    /// Bound of the distance from the surface over a convex polygon to a chord that the polygon holds, where it is within the limit;
+    /// the chord's parameters lie at `at` in space.
+    pub(super) fn beside(
+        &mut self,
+        sheet: &Sheet<'_>,
+        polygon: &[Uv],
+        chord: [Uv; 2],
+        at: [Point; 2],
+        limit: f64,
+    ) -> Option<f64> {
+        let linear = Linear::beside(sheet, polygon, chord, at)?;
+        let (a, b) = (sheet.range(0, linear.lo.x, linear.hi.x), sheet.range(1, linear.lo.y, linear.hi.y));
+        let patches = (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| sheet.patch(i, j)));
+        self.strays(patches, &linear, at[0], limit)
+    }
+
+    /// What `linear` measures, where it is within the limit over all patches, seen from `origin`.
+    fn strays<'p>(
+        &mut self,
+        patches: impl Iterator<Item = &'p BezierPatch>,
+        linear: &Linear,
+        origin: Point,
+        limit: f64,
+    ) -> Option<f64> {
         let (mut worst, mut halvings) = (0f64, MOST_HALVINGS);
         for patch in patches {
             let [a, b] = linear.meets(patch);
@@ -84,7 +110,7 @@ impl Near {
             if !linear.touches(from, share) {
                 continue;
             }
-            self.restrict(patch, local(patch, a), local(patch, b), at[0]);
+            self.restrict(patch, local(patch, a), local(patch, b), origin);
             let weights = self.weights();
             let mut degree = patch.degree;
             if even(weights) {
@@ -93,19 +119,18 @@ impl Near {
                 self.subtract(degree, linear.over(from, share));
                 degree = degree.map(|d| d + 1);
             }
-            let most = self.halve(&linear, degree, (from, share), limit * weights[0], &mut halvings)?;
-            worst = worst.max(most / weights[0]);
+            worst = worst.max(self.halve(linear, degree, (from, share), [weights[0], limit], &mut halvings)?);
         }
         Some(worst)
     }
 
-    /// The largest coefficient of the deviation where it meets the triangle, halved until all are within the limit.
+    /// The bound over the parts of a rectangle that meet the region, halved until all are within the limit.
     fn halve(
         &mut self,
         linear: &Linear,
         [p, q]: [usize; 2],
         (from, share): (Uv, Uv),
-        limit: f64,
+        [lightest, limit]: [f64; 2],
         halvings: &mut u32,
     ) -> Option<f64> {
         let size = self.deviation.len();
@@ -116,7 +141,7 @@ impl Near {
         while let Some((from, share)) = open.pop() {
             let start = self.stack.len() - size;
             let net = &self.stack[start..];
-            let worst = net.iter().map(|x| x.length_squared()).fold(0.0, f64::max).sqrt();
+            let worst = linear.bound(net, lightest);
             if worst <= limit || !linear.touches(from, share) {
                 most = if worst <= limit { most.max(worst) } else { most };
                 self.stack.truncate(start);

@@ -70,6 +70,15 @@ impl<'a> Sheet<'a> {
         b[1..b.len() - 1].partition_point(|&k| k <= x)
     }
 
+    /// First and last knot interval that `[x, y]` meets.
+    pub(super) fn range(&self, d: usize, x: f64, y: f64) -> [usize; 2] {
+        let (a, mut b) = (self.interval(d, x), self.interval(d, y));
+        if b > a && self.breaks[d][b] >= y {
+            b -= 1;
+        }
+        [a, b]
+    }
+
     pub(super) fn patch(&self, a: usize, b: usize) -> &BezierPatch {
         &self.patches[a * (self.breaks[1].len() - 1) + b]
     }

@@ -2,6 +2,7 @@
 
 use super::bound::Prover;
 use super::flat::from_chord;
+use super::near::Near;
 use super::sheet::Sheet;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::model::EdgeUse;
@@ -21,6 +22,8 @@ pub(super) struct Trim {
     pub(super) gap: f64,
     /// A convex polygon around what lies between the chord and the curve in the parameter plane.
     pub(super) between: Vec<Uv>,
+    /// Bound of the distance from the surface there to the chord, mm, once it is known.
+    beside: Option<f64>,
 }
 
 impl Trim {
@@ -45,19 +48,33 @@ impl Trim {
             None => [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max),
         };
         if a >= b || a.is_nan() || b.is_nan() {
-            return Self { deviation: offset, gap: offset, between: Vec::new() };
+            return Self { deviation: offset, gap: offset, between: Vec::new(), beside: None };
         }
         let deviation = stray(curve, [a, b], &xyz, 0.5 * sheet.field.tightest() - offset);
-        let mut trim = Self { deviation: deviation + offset, gap: offset, between: Vec::new() };
+        let mut trim = Self { deviation: deviation + offset, gap: offset, between: Vec::new(), beside: None };
         if !sheet.affine {
             trim.between = around(sheet, side, [a, b], uv);
         }
         trim
     }
 
+    /// Bounds how far the surface between chord and curve lies from the chord, once for all facets that have the chord.
+    pub(super) fn prove(&mut self, sheet: &Sheet<'_>, near: &mut Near, uv: [Uv; 2], xyz: [Point; 2]) {
+        if self.between.len() < 3 {
+            return;
+        }
+        let at = uv.map(|x| sheet.point(x));
+        let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + 1e-12 * sheet.size;
+        let limit = sheet.tolerance(0.5 * (uv[0] + uv[1]));
+        self.beside = near.beside(sheet, &self.between, uv, at, limit - off).map(|x| x + off);
+    }
+
     /// The part of the bound that the border adds to a triangle of facets.
     pub(super) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
+        if let Some(beside) = self.beside.filter(|&x| x <= limit) {
+            return worst.max(beside);
+        }
         if worst <= limit && self.between.len() > 2 {
             worst = worst.max(prover.polygon(&self.between, xyz, limit));
         }
