@@ -49,8 +49,10 @@ pub(super) struct Leaves {
     pub(super) inside: Vec<Leaf>,
     /// Those that the border cuts or comes near to.
     pub(super) border: Vec<Cell>,
-    /// Whether the budget ended the splitting.
+    /// Whether splitting ended before all cells fitted.
     pub(super) exhausted: bool,
+    /// Whether it did so because a branch had used up its share of the budget.
+    short: bool,
 }
 
 /// Part of a cell's size that it must keep from the border.
@@ -98,9 +100,18 @@ pub(super) fn split(
     let all: Vec<u32> = (0..segments.len() as u32).collect();
     let poles = rings.rings.iter().flatten().map(|v| v.follows == Follows::Pole).collect();
     let tree = Tree { sheet, judge, segments, poles, same: same(lo, hi), ladder, max_angle };
-    let mut branch = Branch { prover: Prover::new(sheet, judge), leaves: Leaves::default(), budget };
-    tree.visit(&mut branch, root, &all, false, 0);
-    branch.leaves
+    // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
+    // leaves at most twice the budget.
+    let mut share = budget;
+    loop {
+        let mut branch = Branch { prover: Prover::new(sheet, judge), leaves: Leaves::default(), budget: share };
+        tree.visit(&mut branch, root, &all, false, 0);
+        let leaves = branch.leaves;
+        if !leaves.short || leaves.inside.len() + leaves.border.len() >= budget || share >> PARALLEL >= budget {
+            return leaves;
+        }
+        share *= 2;
+    }
 }
 
 /// Parameters nearer than this are one, in a face that spans the box.
@@ -123,8 +134,10 @@ impl Tree<'_, '_> {
                 inside = true;
             }
         }
-        if out.leaves.inside.len() + out.leaves.border.len() >= out.budget || depth > 60 {
+        let short = out.leaves.inside.len() + out.leaves.border.len() >= out.budget;
+        if short || depth > 60 {
             out.leaves.exhausted = true;
+            out.leaves.short |= short;
             out.leaves.border.push(cell);
             return;
         }
@@ -174,6 +187,7 @@ impl Tree<'_, '_> {
             out.leaves.inside.extend(part.inside);
             out.leaves.border.extend(part.border);
             out.leaves.exhausted |= part.exhausted;
+            out.leaves.short |= part.short;
         }
     }
 

@@ -77,7 +77,8 @@ pub(super) fn mesh(
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
     let mut out =
         FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
-    let unproved = strip.unproved_chords(&trims);
+    // Where the budget has ended, shorter chords only cost more.
+    let unproved = if leaves.exhausted { Vec::new() } else { strip.unproved_chords(&trims) };
     let coarse = strip.conflicts.iter().chain(&strip.crossed).chain(&unproved);
     out.coarse = coarse.filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };

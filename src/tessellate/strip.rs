@@ -77,6 +77,8 @@ pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
 
 /// Rounds of refinement.
 const ROUNDS: usize = 40;
+/// Triangles that all rounds together go through: each looks at all, which on a strip of 500,000 takes most of a second.
+const MOST_WORK: usize = 8_000_000;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
 pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline<'_>, budget: usize) -> Option<Strip> {
@@ -123,6 +125,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline<'_>,
         let bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
         if bad.is_empty()
             || round == ROUNDS
+            || (round + 1) * triangles.len() > MOST_WORK
             || work.cdt.num_vertices() >= most
             || !work.refine(&bad, outline.trims, &known)
         {
