@@ -18,7 +18,7 @@
 
 use super::flat::{Flat, clip, from_chord, whole};
 use super::near::Near;
-use super::net::Nets;
+use super::net::{Corner, MOST_HALVED, Nets};
 use super::scalar::Scalar;
 use super::settings::Judge;
 use super::sheet::{Sheet, local};
@@ -172,8 +172,22 @@ impl<'s, 'a> Prover<'s, 'a> {
             None => (patch, at, 0.0),
         };
         let limit = limit - off;
-        let net = self.nets.expand(patch, at);
         let n = patch.degree[0] + patch.degree[1];
+        let low = patch.degree.iter().all(|d| (1..=MOST_HALVED).contains(d));
+        let (net, xyz) = match right_angle(&at).filter(|_| low) {
+            Some((r, corner)) => {
+                let turned = [0, 1, 2].map(|k| xyz[(k + r) % 3]);
+                if small.is_some() {
+                    (self.nets.half(&patch.points, patch.degree, corner), turned)
+                } else {
+                    // The look by second derivatives has left this net, seen from the first corner.
+                    let (lo, hi) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
+                    let net = self.near.restrict(patch, lo, hi, xyz[0]);
+                    (self.nets.half(net, patch.degree, corner), turned.map(|x| x - xyz[0]))
+                }
+            }
+            None => (self.nets.expand(patch, at), xyz),
+        };
         let flat = Flat::new(&xyz);
         let mut worst = self.scalar.bound::<3>(net.iter().map(|c| (flat.distance(c.project()), c.w)), n, limit)?;
         for k in 0..3 {
@@ -294,6 +308,21 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         worst
     }
+}
+
+/// Whether a triangle is half of the rectangle around it: the corner before its right angle, and which half it is.
+fn right_angle(at: &[Uv; 3]) -> Option<(usize, Corner)> {
+    (0..3).find_map(|r| {
+        let [a, b, c] = [0, 1, 2].map(|k| at[(k + r) % 3]);
+        let d = if a.y == b.y && b.x == c.x {
+            0
+        } else if a.x == b.x && b.y == c.y {
+            1
+        } else {
+            return None;
+        };
+        Some((r, Corner { direction: d, upper: [a[d] > b[d], b[1 - d] > c[1 - d]] }))
+    })
 }
 
 /// Where in `[lo, hi]` a parameter lies, as a share.
