@@ -159,3 +159,33 @@ fn a_coating_between_glued_bodies_is_met_once_whosever_face_it_is_on() {
         }
     }
 }
+
+/// Eight glued blocks are one block, also for light that passes within the glue distance of the edges where four of them meet.
+#[test]
+fn light_along_the_edges_of_glued_blocks_is_not_lost() {
+    let mut results = Vec::new();
+    for parts in [1, 2] {
+        let mut world = World::default();
+        let mut text = format!("[run]\nrays = 4000\ninterfaces = 'split'\nsplit_floor = 0\n{MEDIA}");
+        let size = 20.0 / f64::from(parts);
+        for k in 0..parts * parts * parts {
+            let at =
+                Point::new(f64::from(k % parts), f64::from(k / parts % parts), f64::from(k / parts / parts)) * size;
+            world.cuboid(&format!("block {k}"), at, at + Point::splat(size));
+            text += &format!("[[material]]\npart = 'block {k}'\nmedium = 'glass'\n");
+        }
+        // Near the edge from (10, 10, 0) to (10, 10, 20): straight along it, and slanted through it at (10, 10, 10).
+        for (at, direction) in
+            [("[10, 10, -5]", "[0, 0, 1]"), ("[8.5, 9.4, -5]", "[0.1, 0.04, 1]"), ("[-5, 10, 10]", "[1, 0, 0]")]
+        {
+            text += &format!(
+                "[[source]]\nkind = 'collimated'\nat = {at}\ndirection = {direction}\nsize = [0.006, 0.006]\n"
+            );
+        }
+        text += FAR;
+        results.push(world.run(&text, |_| ()));
+    }
+    let [whole, glued] = &results[..] else { panic!() };
+    assert_eq!((whole.lost_rays, glued.lost_rays), (0, 0), "{:?}", glued.ledger.first());
+    assert!((whole.power.escaped + whole.power.received - glued.power.escaped - glued.power.received).abs() < 1e-4);
+}

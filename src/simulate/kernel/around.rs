@@ -1,8 +1,8 @@
 //! The bodies around the start of a ray, from geometry, for sources that do not say what they lie in.
 
-use super::{Context, settle};
+use super::{Carry, Context, settle};
 use crate::intersect::Cost;
-use crate::math::{Departure, Ray};
+use crate::math::{Departure, Ray, orthonormal_pair};
 use crate::simulate::bind::{AMBIENT, FaceOptics};
 use crate::simulate::emitter::{Stream, Ticket};
 use smallvec::SmallVec;
@@ -61,9 +61,30 @@ pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
         .collect()
 }
 
-/// The bodies that a ray leaves on its straight way out without having entered them.
+/// The bodies around the start of a ray.
+///
+/// Where solids touch, a way out that comes near an edge of three of them may miss one; then two ways of three decide.
 pub(crate) fn bodies(context: &Context<'_>, ray: &Ray) -> Bodies {
-    let mut crossed = Crossed::default();
+    let (first, certain) = left_by(context, ray);
+    if certain {
+        return first;
+    }
+    let (x, y) = orthonormal_pair(ray.direction);
+    let beside = |a: f64, b: f64| {
+        let direction = (ray.direction + x * a + y * b).normalize();
+        left_by(context, &Ray { direction, ..*ray }).0
+    };
+    let second = beside(0.031, 0.017);
+    if second == first {
+        return first;
+    }
+    let third = beside(-0.013, 0.029);
+    if third == second { second } else { first }
+}
+
+/// The bodies that a ray leaves on its straight way out without having entered them, and whether no two of them touched there.
+fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
+    let (mut crossed, mut certain) = (Crossed::default(), true);
     let mut at = Ray { t_max: f64::INFINITY, ..*ray };
     for _ in 0..DEEP {
         let Some(hit) = context.intersector.intersect(&at, &mut Cost::default()) else { break };
@@ -87,9 +108,22 @@ pub(crate) fn bodies(context: &Context<'_>, ray: &Ray) -> Bodies {
         if let Some(other) = other.filter(meets).filter(|_| entering == (along >= 0.0)) {
             crossed.cross(other.body, entering);
             at.t_min = reach;
+            certain = false;
         }
     }
-    crossed.around()
+    (crossed.around(), certain)
+}
+
+/// What a ray really is in on its way to `end`, when it is in what cannot be and it, or the face it comes to, is where bodies are
+/// glued: it has passed an edge where three or more of them meet, within the glue distance that the crossing of two passes over.
+#[cold]
+pub(super) fn regained<C: Carry>(context: &Context<'_>, carry: &C, ray: &Ray, end: f64, glued: bool) -> Option<C> {
+    if !(context.bound.nested && (glued || ray.t_min > 0.0)) {
+        return None;
+    }
+    let middle = 0.5 * (ray.t_min + end.min(ray.t_min + 1.0));
+    let found = carry.instead(&bodies(context, &Ray::new(ray.at(middle), ray.direction)))?;
+    (found.body() != carry.body()).then_some(found)
 }
 
 #[derive(Default)]

@@ -12,6 +12,10 @@ pub(crate) trait Carry: Copy + Send {
     fn body(&self) -> u16;
     /// The same ray on the other side of the boundary of a body; `None` for a crossing that cannot be.
     fn across(&self, body: u16, entering: bool) -> Option<Self>;
+    /// The same light inside these bodies.
+    fn instead(&self, bodies: &[u16]) -> Option<Self> {
+        Self::inside(bodies)
+    }
     /// Whether it can carry no more bodies.
     fn is_full(&self) -> bool {
         false
@@ -138,6 +142,9 @@ impl Carry for Coloured {
     fn inside(bodies: &[u16]) -> Option<Self> {
         Some(Self { stack: Stack::inside(bodies)?, wavelength: None })
     }
+    fn instead(&self, bodies: &[u16]) -> Option<Self> {
+        Some(Self { stack: Stack::inside(bodies)?, ..*self })
+    }
     fn body(&self) -> u16 {
         self.stack.body()
     }
@@ -170,6 +177,9 @@ impl Carry for Everything {
     }
     fn inside(bodies: &[u16]) -> Option<Self> {
         Some(Self { coloured: Coloured::inside(bodies)?, stokes: Stokes::unpolarised(1.0, Vector::Z) })
+    }
+    fn instead(&self, bodies: &[u16]) -> Option<Self> {
+        Some(Self { coloured: self.coloured.instead(bodies)?, ..*self })
     }
     fn body(&self) -> u16 {
         self.coloured.body()

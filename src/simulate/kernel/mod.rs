@@ -6,6 +6,7 @@
 
 mod around;
 mod carry;
+mod contact;
 mod local;
 mod step;
 mod surface;

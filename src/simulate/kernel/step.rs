@@ -1,5 +1,5 @@
-use super::surface;
 use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex, SCATTERS};
+use super::{around, contact, surface};
 use crate::intersect::Hit;
 use crate::math::{Departure, FaceId, Point, Ray, Vector};
 use crate::optics::polarised::Stokes;
@@ -101,15 +101,15 @@ pub(super) fn step<C: Carry>(
         return false;
     }
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-    let contact = match C::MEDIA && !entering && (face.sealed || face.against && face.body != AMBIENT) {
-        true => surface::contact(context, ray, hit, face, point),
+    let touched = match C::MEDIA && !entering && (face.sealed || face.against && face.body != AMBIENT) {
+        true => contact::contact(context, ray, hit, face, point),
         false => None,
     };
-    let pair = match C::MEDIA && context.bound.dressed && face.touching && contact.is_none() {
-        true => surface::dressed(context, ray, hit, face, point),
+    let pair = match C::MEDIA && context.bound.dressed && face.touching && touched.is_none() {
+        true => contact::dressed(context, ray, hit, face, point),
         false => None,
     };
-    let (hit, face, entering, point) = match (&contact, &pair) {
+    let (hit, face, entering, point) = match (&touched, &pair) {
         (Some((hit, face, point)), _) => (hit, *face, true, *point),
         (None, Some(Ok((hit, face, point)))) => (hit, *face, !entering, *point),
         (None, _) => (hit, face, entering, point),
@@ -344,8 +344,13 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         return;
     }
     if C::MEDIA && path.carry.body() != AMBIENT {
-        record(context, path, ray.at(1.0), Event::Lost, local);
-        return lose(path, ray, Cause::NoExit, None, local);
+        match around::regained(context, &path.carry, ray, f64::INFINITY, false) {
+            Some(found) if found.body() == AMBIENT => path.carry = found,
+            _ => {
+                record(context, path, ray.at(1.0), Event::Lost, local);
+                return lose(path, ray, Cause::NoExit, None, local);
+            }
+        }
     }
     let mut caught = false;
     for &r in &context.far {

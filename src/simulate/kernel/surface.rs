@@ -1,12 +1,13 @@
 //! What happens to a path at a face.
 
+use super::around::regained;
+use super::contact::glued;
 use super::step::{Meeting, caught, key, lose, onward, record, stray};
 use super::{Carry, Cause, Context, Event, Local, Path};
-use crate::intersect::{Cost, Hit};
-use crate::math::{Departure, Point, Ray, Vector};
+use crate::math::{Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
 use crate::optics::{Coating, Split, fresnel, reflect, refract_with_cosine};
-use crate::simulate::bind::{AMBIENT, Coated, FaceOptics, Surface};
+use crate::simulate::bind::{AMBIENT, Coated};
 use crate::simulate::random::Purpose;
 use crate::simulate::scene::Interfaces;
 use crate::simulate::tally::whole;
@@ -186,12 +187,18 @@ fn divide<C: Carry>(
 #[inline(always)]
 fn cross<C: Carry>(
     context: &Context<'_>,
-    path: &Path<C>,
+    path: &mut Path<C>,
     ray: &Ray,
     at: &Meeting<'_>,
     local: &mut Local,
 ) -> Option<C> {
     let mut across = path.carry.across(at.face.body, at.entering);
+    if across.is_none()
+        && let Some(found) = regained(context, &path.carry, ray, at.hit.t, at.face.touching)
+        && let Some(there) = found.across(at.face.body, at.entering)
+    {
+        (path.carry, across) = (found, Some(there));
+    }
     if at.face.touching
         && let Some(other) = glued(context, ray, at)
     {
@@ -212,81 +219,6 @@ fn cross<C: Carry>(
         lose(path, ray, cause, Some(at.hit.face), local);
     }
     across
-}
-
-/// The body on the other side of a face that lies on a face of another body within the glue distance.
-///
-/// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
-/// whether rounding puts it before or behind.
-fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
-    partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
-}
-
-/// That face, with its optics and the place.
-fn partner(
-    context: &Context<'_>,
-    ray: &Ray,
-    hit: &Hit,
-    face: FaceOptics,
-    point: Point,
-) -> Option<(Hit, FaceOptics, Point)> {
-    let along = ray.direction.dot(hit.geometric_normal);
-    let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    let probe = Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
-    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
-    let other = *context.bound.faces.get(found.face.index())?;
-    let opposite = (ray.direction.dot(found.geometric_normal) < 0.0) != (along < 0.0);
-    (other.touching && other.body != face.body && opposite).then(|| (found, other, probe.at(found.t)))
-}
-
-/// Which of two faces at one place says what happens there, when not both are bare: the one that is not, of two such the one that
-/// the light is leaving; so it does not depend on which of them rounding puts first. `Ok` is the partner, `Err` the face itself,
-/// none when there is no such pair.
-#[inline(never)]
-pub(super) fn dressed(
-    context: &Context<'_>,
-    ray: &Ray,
-    hit: &Hit,
-    face: FaceOptics,
-    point: Point,
-) -> Option<Result<(Hit, FaceOptics, Point), ()>> {
-    let (found, other, place) = partner(context, ray, hit, face, point)?;
-    let bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
-    let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-    match [bare(&face), bare(&other)] {
-        [true, true] => None,
-        [true, false] => Some(Ok((found, other, place))),
-        [false, true] => Some(Err(())),
-        [false, false] => Some(if entering { Ok((found, other, place)) } else { Err(()) }),
-    }
-}
-
-/// How far back the front of a solid is looked for, mm, that a ray has slipped into between the facets of two touching faces.
-const SLIP: f64 = 1.0;
-
-/// The face of an opaque solid in front of light that leaves a body there, within the glue distance; or in front of light that
-/// is in a solid where none can be. With its optics and the place.
-#[cold]
-pub(super) fn contact(
-    context: &Context<'_>,
-    ray: &Ray,
-    hit: &Hit,
-    face: FaceOptics,
-    point: Point,
-) -> Option<(Hit, FaceOptics, Point)> {
-    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
-    let reach = context.bound.scene.run.glue_mm / cos;
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    let probe = match face.sealed {
-        // Only light that has just left another face can have slipped in.
-        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction).within(0.0, SLIP).leaving(ray.from?),
-        false => Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from),
-    };
-    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
-    let other = *context.bound.faces.get(found.face.index())?;
-    let entering = ray.direction.dot(found.geometric_normal) < 0.0;
-    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.at(found.t)))
 }
 
 /// The normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these

@@ -1,0 +1,97 @@
+//! Faces of two solids at one place.
+
+use super::Context;
+use super::step::Meeting;
+use crate::intersect::{Cost, Hit};
+use crate::math::{Departure, Point, Ray};
+use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
+
+/// The body on the other side of a face that lies on a face of another body within the glue distance.
+///
+/// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
+/// whether rounding puts it before or behind.
+pub(super) fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
+    partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
+}
+
+/// Faces within the glue distance among which the partner is looked for.
+const NEAR: usize = 6;
+
+/// That face, with its optics and the place.
+fn partner(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<(Hit, FaceOptics, Point)> {
+    let along = ray.direction.dot(hit.geometric_normal);
+    let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+    let mut probe = Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
+    // Near an edge others come in between.
+    for _ in 0..NEAR {
+        let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+        let other = *context.bound.faces.get(found.face.index())?;
+        let place = probe.at(found.t);
+        let opposite = (ray.direction.dot(found.geometric_normal) < 0.0) != (along < 0.0);
+        if other.touching
+            && other.body != face.body
+            && opposite
+            && found.geometric_normal.dot(hit.geometric_normal) < -0.5
+        {
+            return Some((found, other, place));
+        }
+        probe.t_min = found.t.next_up();
+    }
+    None
+}
+
+/// Which of two faces at one place says what happens there, when not both are bare: the one that is not, of two such the one that
+/// the light is leaving; so it does not depend on which of them rounding puts first. `Ok` is the partner, `Err` the face itself,
+/// none when there is no such pair.
+#[inline(never)]
+pub(super) fn dressed(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<Result<(Hit, FaceOptics, Point), ()>> {
+    let (found, other, place) = partner(context, ray, hit, face, point)?;
+    let bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
+    let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
+    match [bare(&face), bare(&other)] {
+        [true, true] => None,
+        [true, false] => Some(Ok((found, other, place))),
+        [false, true] => Some(Err(())),
+        [false, false] => Some(if entering { Ok((found, other, place)) } else { Err(()) }),
+    }
+}
+
+/// How far back the front of a solid is looked for, mm, that a ray has slipped into between the facets of two touching faces.
+const SLIP: f64 = 1.0;
+
+/// The face of an opaque solid in front of light that leaves a body there, within the glue distance; or in front of light that
+/// is in a solid where none can be. With its optics and the place.
+#[cold]
+pub(super) fn contact(
+    context: &Context<'_>,
+    ray: &Ray,
+    hit: &Hit,
+    face: FaceOptics,
+    point: Point,
+) -> Option<(Hit, FaceOptics, Point)> {
+    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
+    let reach = context.bound.scene.run.glue_mm / cos;
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+    let probe = match face.sealed {
+        // Only light that has just left another face can have slipped in.
+        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction).within(0.0, SLIP).leaving(ray.from?),
+        false => Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from),
+    };
+    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+    let other = *context.bound.faces.get(found.face.index())?;
+    let entering = ray.direction.dot(found.geometric_normal) < 0.0;
+    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.at(found.t)))
+}
