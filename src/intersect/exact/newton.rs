@@ -2,6 +2,7 @@
 
 use super::Exact;
 use super::geometry::{self, project};
+use super::trim::Region;
 use crate::math::{FaceId, Ray, Uv, Vector, orthonormal_pair};
 
 /// A point of a face on a ray.
@@ -66,10 +67,13 @@ impl Exact {
                 let normal = record.sign * geometry::normal(&patch.net, patch.degree, local, &jet, patch.rounding);
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
-                let inside = trim.whole || {
-                    let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
-                    let (su, sv) = (du / widths[0], dv / widths[1]);
-                    trim.locate(uv, [su.length_squared(), su.dot(sv), sv.length_squared()], 0.0).inside
+                let inside = match trim.cell_at(uv) {
+                    Region::Border => {
+                        let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
+                        let (su, sv) = (du / widths[0], dv / widths[1]);
+                        trim.locate(uv, [su.length_squared(), su.dot(sv), sv.length_squared()], 0.0).inside
+                    }
+                    decided => decided == Region::Inside,
                 };
                 return Some(SurfacePoint { t, uv, normal, residual, inside, patch: index });
             }

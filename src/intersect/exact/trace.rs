@@ -10,6 +10,7 @@ use super::net::{self, Jet, V4};
 use super::probe::seen;
 use super::query::{Query, Root};
 use super::tree::{LEAF, WIDTH};
+use super::trim::Region;
 use super::{Exact, wide};
 use crate::intersect::Certainty;
 use crate::math::Vector;
@@ -188,6 +189,10 @@ impl Exact {
         let trim = &self.geometry.trims[face.trim as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
         let uv = patch.uv(leaf.in_patch(local));
+        match trim.cell_at(uv) {
+            Region::Border => {}
+            decided => return (decided == Region::Inside, false),
+        }
         let jet = wide::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
         let (_, du, dv) = super::geometry::project(&jet);
         // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the

@@ -98,6 +98,7 @@ impl Node {
 
 fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    let centres: Vec<Vector> = boxes.iter().map(Aabb::center).collect();
     let empty = Binary { bounds: Aabb::EMPTY, first: 0, is_leaf: true };
     let mut nodes = vec![empty];
     let mut stack = vec![(0usize, 0usize, boxes.len(), 0usize)];
@@ -108,7 +109,7 @@ fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
             nodes[me].first = slice[0];
             continue;
         }
-        let middle = if depth < MEDIAN_DEPTH { partition(boxes, slice) } else { slice.len() / 2 };
+        let middle = if depth < MEDIAN_DEPTH { partition(boxes, &centres, slice) } else { slice.len() / 2 };
         let first = nodes.len();
         (nodes[me].first, nodes[me].is_leaf) = (first as u32, false);
         nodes.extend([empty, empty]);
@@ -119,8 +120,8 @@ fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
 }
 
 /// Sorts the slice into two parts by the cheapest of the binned planes; the length of the first part.
-fn partition(boxes: &[Aabb], slice: &mut [u32]) -> usize {
-    let centre = |i: u32| boxes[i as usize].center();
+fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
+    let centre = |i: u32| centres[i as usize];
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
     for &i in slice.iter() {
         (lo, hi) = (lo.min(centre(i)), hi.max(centre(i)));
@@ -129,15 +130,16 @@ fn partition(boxes: &[Aabb], slice: &mut [u32]) -> usize {
     let bin = |i: u32, axis: usize| {
         (((centre(i)[axis] - lo[axis]) / (hi[axis] - lo[axis]) * BINS as f64) as usize).min(BINS - 1)
     };
-    for axis in 0..3 {
-        if !(hi[axis] > lo[axis]) {
-            continue;
-        }
-        let mut bins = [(Aabb::EMPTY, 0usize); BINS];
-        for &i in slice.iter() {
-            let b = &mut bins[bin(i, axis)];
+    let wide = [0, 1, 2].map(|axis| hi[axis] > lo[axis]);
+    let mut all = [[(Aabb::EMPTY, 0usize); BINS]; 3];
+    for &i in slice.iter() {
+        for axis in (0..3).filter(|&axis| wide[axis]) {
+            let b = &mut all[axis][bin(i, axis)];
             *b = (b.0.union(boxes[i as usize]), b.1 + 1);
         }
+    }
+    for axis in (0..3).filter(|&axis| wide[axis]) {
+        let bins = &all[axis];
         let mut right = [(Aabb::EMPTY, 0usize); BINS + 1];
         for s in (0..BINS).rev() {
             right[s] = (right[s + 1].0.union(bins[s].0), right[s + 1].1 + bins[s].1);

@@ -224,19 +224,21 @@ impl Trim {
         found.unwrap_or(Region::Border)
     }
 
-    /// Whether `q` is inside, and what uses pass within `band` mm; `metric` as for [`Piece::nearest`].
-    pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
+    /// What the cell that holds a point is.
+    #[inline]
+    pub(super) fn cell_at(&self, q: Uv) -> Region {
         if self.is_beyond(q) {
-            return Place { inside: false, near: SmallVec::new() };
+            return Region::Outside;
         }
-        let i = *self.cell_range(q.x, q.x, 0).start();
-        let j = *self.cell_range(q.y, q.y, 1).start();
+        let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());
+        self.cells[j * self.count[0] + i]
+    }
+
+    /// Whether `q`, which lies in a border cell, is inside, and what uses pass within `band` mm; `metric` as for
+    /// [`Piece::nearest`].
+    pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
+        let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());
         let cell = j * self.count[0] + i;
-        match self.cells[cell] {
-            Region::Inside => return Place { inside: true, near: SmallVec::new() },
-            Region::Outside => return Place { inside: false, near: SmallVec::new() },
-            Region::Border => {}
-        }
         // How far a millimetre reaches in u and v: from the inverse of the metric.
         let determinant = (metric[0] * metric[2] - metric[1] * metric[1]).max(f64::MIN_POSITIVE);
         let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
