@@ -96,3 +96,46 @@ fn a_gap_of_the_file_is_not_divided() {
     assert_eq!(made.report.faces.failed, 0);
     assert!(made.report.facets < 200, "{}", made.report.facets);
 }
+
+/// A cylinder cut aslant: with an angle of 4 degrees no triangle of the strip along the cut may turn farther from the normals at its corners.
+#[test]
+fn the_angle_holds_along_trims_too() {
+    let turn = [0.0, 2.0];
+    let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, turn, [0.0, 200.0]);
+    let aslant = |f: f64| Uv::new(0.1 + 1.8 * f, 20.0 + 90.0 * f + 15.0 * (9.0 * f).sin());
+    let (a, b, c, d) = (aslant(0.0), aslant(1.0), Uv::new(1.9, 180.0), Uv::new(0.1, 180.0));
+    let line = |n: usize, a: Uv, b: Uv| chain(n, |f| a.lerp(b, f));
+    let loops = vec![vec![chain(256, aslant), line(1, b, c), line(256, c, d), line(1, d, a)]];
+    let model = face(wall, &loops);
+    let most = 4f64;
+    let turned = |angle_deg: Option<f64>| {
+        let made = tessellate(&model, &Settings { angle_deg, ..measured(2.0) });
+        assert_eq!((made.report.faces.failed, made.report.over_tolerance), (0, Some(0)));
+        let angles = (0..made.mesh.facets.len()).flat_map(|f| {
+            let (p, v) = (made.mesh.corners(f), made.mesh.facets[f].vertices);
+            let cuts = if made.mesh.facets[f].is_triangle() { vec![[0, 1, 2]] } else { vec![[0, 1, 2], [0, 2, 3]] };
+            let normal = |k: usize| made.mesh.vertices[v[k] as usize].normal;
+            let of = |t: [usize; 3]| {
+                let n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+                t.into_iter().map(|k| n.angle_between(normal(k)).to_degrees()).fold(0.0, f64::max)
+            };
+            cuts.into_iter().map(of).collect::<Vec<_>>()
+        });
+        angles.fold(0.0, f64::max)
+    };
+    assert!(turned(None) > 2.0 * most);
+    assert!(turned(Some(most)) <= most, "{}", turned(Some(most)));
+}
+
+/// Over a chord the distance to the arc is a parabola, whose mean is two thirds of its top.
+#[test]
+fn the_mean_sag_of_strips_is_that_of_a_parabola() {
+    let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, [0.0, 1.0], [0.0, 200.0]);
+    let c = [Uv::new(0.0, 0.0), Uv::new(1.0, 0.0), Uv::new(1.0, 200.0), Uv::new(0.0, 200.0)];
+    let sides = (0..4).map(|k| chain([256, 1][k % 2], |f| c[k].lerp(c[(k + 1) % 4], f))).collect();
+    let made = tessellate(&face(wall, &[sides]), &measured(0.1));
+    assert_proved(&made);
+    let sag = &made.report.sag_mm;
+    let share = sag.sampled_mean.unwrap() / sag.sampled_max.unwrap();
+    assert!((share - 2.0 / 3.0).abs() < 0.02, "{share}");
+}

@@ -42,7 +42,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
             let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
             let (tolerance, radii) = tolerance(settings, part, f, &placed);
             usable(f).then(|| {
-                let field = Field::new(tolerance, radii, settings.law, scale);
+                let field = Field::new(tolerance, radii, settings.law, scale).with_angle(settings.angle_deg);
                 // Faces that were not read from a file have a gap of zero whether it was measured or not.
                 let mut sheet = Sheet::new(&f.surface, f.reversed, field);
                 sheet.gap = Some(f.gap).filter(|&g| g > 0.0);

@@ -73,6 +73,7 @@ fn chord_tolerance(sheet: &Sheet<'_>, uv: Uv, along: Vector) -> f64 {
     let (x, y) = (across.dot(d.du), across.dot(d.dv));
     let direction = Uv::new((g * x - f * y) / det, (e * y - f * x) / det);
     let sag = forms.along(direction).abs() * (0.25 * sheet.size).powi(2) / 8.0;
+    let xi = xi.min(sheet.field.turning(forms.sharpest()));
     xi * (1.0 - (sag / xi).min(0.5))
 }
 

@@ -18,6 +18,27 @@ pub(super) struct Sampled {
     pub(super) normal_errors: Vec<f32>,
 }
 
+/// Where a triangle's points are measured, with their shares of its mean: D. A. Dunavant, *High degree efficient symmetrical Gaussian
+/// quadrature rules for the triangle*, IJNME 21 (1985), degree 4, and three places more for the largest distance alone. A plain mean of
+/// points that are thicker in the middle was 15 % too high on strips of a cylinder.
+const POINTS: [(f64, [f64; 3]); 9] = {
+    const A: f64 = 0.445948490915965;
+    const B: f64 = 0.091576213509771;
+    const WA: f64 = 0.223381589678011;
+    const WB: f64 = 0.109951743655322;
+    [
+        (WA, [1.0 - 2.0 * A, A, A]),
+        (WA, [A, 1.0 - 2.0 * A, A]),
+        (WA, [A, A, 1.0 - 2.0 * A]),
+        (WB, [1.0 - 2.0 * B, B, B]),
+        (WB, [B, 1.0 - 2.0 * B, B]),
+        (WB, [B, B, 1.0 - 2.0 * B]),
+        (0.0, [0.34, 0.33, 0.33]),
+        (0.0, [0.5, 0.5, 0.0]),
+        (0.0, [0.0, 0.5, 0.5]),
+    ]
+};
+
 /// Surface samples a side of a facet.
 const GRID: usize = 8;
 
@@ -61,16 +82,11 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
             }
         }
     }
-    let (mut sum, mut count) = (0.0, 0.0);
+    let (mut sum, mut area) = (0.0, 0.0);
     for t in triangles {
-        for b in [
-            [0.6, 0.2, 0.2],
-            [0.2, 0.6, 0.2],
-            [0.2, 0.2, 0.6],
-            [0.34, 0.33, 0.33],
-            [0.5, 0.5, 0.0],
-            [0.0, 0.5, 0.5],
-        ] {
+        let share = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).length().max(1e-300);
+        area += share;
+        for (weight, b) in POINTS {
             let x = p[t[0]] * b[0] + p[t[1]] * b[1] + p[t[2]] * b[2];
             // Parameters linear on the triangle start the search; the foot is what counts.
             let start = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];
@@ -85,15 +101,14 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
                 }
             }
             out.sag = out.sag.max(away);
-            sum += away;
-            count += 1.0;
+            sum += share * weight * away;
             let bilinear = interpolated(triangles.len() == 1, t, b, n);
             if let (Some(a), Some(e)) = (bilinear.try_normalize(), surface.normal(foot)) {
                 out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
             }
         }
     }
-    out.mean = sum / count;
+    out.mean = sum / area;
     out
 }
 

@@ -105,6 +105,8 @@ pub(super) struct Field {
     range: [f64; 2],
     radii: [f64; 2],
     law: Law,
+    /// Largest angle between a facet and the normals at its corners, radians.
+    pub(super) angle: Option<f64>,
 }
 
 impl Field {
@@ -113,7 +115,7 @@ impl Field {
         let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { 1e-9 };
         let [a, b] = tolerance.map(clean);
         let [r, s] = radii.map(clean);
-        Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)], law }
+        Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)], law, angle: None }
     }
 
     /// Tolerance where the sharpest normal curvature is `k`.
@@ -130,6 +132,16 @@ impl Field {
             Law::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
             Law::Power => tight * (loose / tight).powf(x),
         }
+    }
+
+    /// The same with the angle condition of [`Settings::angle_deg`].
+    pub(super) fn with_angle(self, degrees: Option<f64>) -> Self {
+        Self { angle: degrees.map(f64::to_radians), ..self }
+    }
+
+    /// Sag at which a chord meets the angle condition where the curvature is `k`: the chord's ends turn by k·L/2 and it sags k·L²/8.
+    pub(super) fn turning(&self, k: f64) -> f64 {
+        self.angle.map_or(f64::INFINITY, |a| a * a / (2.0 * k))
     }
 
     pub(super) fn tightest(&self) -> f64 {

@@ -121,7 +121,7 @@ pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline<'_>,
             )
             .collect();
         known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
-        let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1;
+        let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1 || work.turn(*t).is_some();
         let bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
         if bad.is_empty()
             || round == ROUNDS
@@ -299,6 +299,22 @@ impl Work<'_, '_> {
         self.cdt.inner_faces().filter(|f| state[f.index()] == Some(true)).map(name).collect()
     }
 
+    /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
+    fn turn(&self, t: [u32; 3]) -> Option<usize> {
+        let most = self.sheet.field.angle?;
+        let n = t.map(|i| self.nodes[i as usize]);
+        let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
+        let normals = n.map(|x| self.sheet.surface.normal(x.uv));
+        let steep = normals.iter().flatten().any(|x| flat.angle_between(*x).min((-flat).angle_between(*x)) > most);
+        let between = |k: usize| match (normals[k], normals[(k + 1) % 3]) {
+            (Some(a), Some(b)) => a.angle_between(b),
+            _ => 0.0,
+        };
+        let free = (0..3).filter(|&k| !self.odd.contains_key(&key(t[k], t[(k + 1) % 3])));
+        let side = free.max_by(|&a, &b| between(a).total_cmp(&between(b)))?;
+        (steep && between(side) > most).then_some(side)
+    }
+
     /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
     fn refine(
         &mut self,
@@ -326,6 +342,12 @@ impl Work<'_, '_> {
                 continue;
             }
             let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
+            if let Some(k) = self.turn(*t).filter(|_| known[&sorted(*t)].0 <= xi) {
+                if seen.insert(key(sides[k].0, sides[k].1), ()).is_none() {
+                    wanted.push([middles[k]; 2]);
+                }
+                continue;
+            }
             let free = sides.iter().zip(middles).filter(|&(&(a, b), _)| !self.odd.contains_key(&key(a, b)));
             let best = free
                 .map(|(&(a, b), m)| {
