@@ -41,8 +41,12 @@ impl Border {
         self.bounds.grown(enough).contains(p)
     }
 
-    /// Distance of `p`; some larger number where it is beyond `enough`.
+    /// Distance of `p`; some larger number where it is beyond `enough`, or one that is not the least where it is not.
     pub(super) fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
+        // On parts smaller than the band every sample is near: one of them says all that is asked.
+        if let Some(near) = self.samples.iter().map(|s| s.1.distance(p)).find(|&d| d <= enough) {
+            return near;
+        }
         let mut best = f64::INFINITY;
         for pair in self.samples.windows(2) {
             let ((ta, a), (tb, b)) = (pair[0], pair[1]);
