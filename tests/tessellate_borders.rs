@@ -139,3 +139,14 @@ fn the_mean_sag_of_strips_is_that_of_a_parabola() {
     let share = sag.sampled_mean.unwrap() / sag.sampled_max.unwrap();
     assert!((share - 2.0 / 3.0).abs() < 0.02, "{share}");
 }
+
+/// A face between an arc and its chord that are nearer to each other than the tolerance still is a face.
+#[test]
+fn a_face_between_two_chords_gets_a_facet() {
+    let plane = sweep::plane(&Frame::IDENTITY, [[-1.0, 1.0]; 2]);
+    let arc = chain(32, |f| Uv::new(f - 0.5, 0.02 * (1.0 - (2.0 * f - 1.0).powi(2))));
+    let (a, b) = (arc[0], arc[32]);
+    let made = tessellate(&face(plane, &[vec![chain(1, |f| b.lerp(a, f)), arc]]), &measured(0.1));
+    assert_proved(&made);
+    assert_eq!(made.report.facets, 1);
+}

@@ -49,6 +49,7 @@ pub(super) fn divide(
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };
     let inner: Vec<Vec<Point>> = part.edges.par_iter().zip(&times).with_min_len(16).map(inner).collect();
+    open_lenses(part, faces, &mut times);
     let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();
     for (inner, t) in inner.into_iter().zip(times) {
@@ -56,6 +57,25 @@ pub(super) fn divide(
         positions.extend(inner);
     }
     (divisions, positions)
+}
+
+/// Two edges around a face that both are one chord leave nothing of it: the one that bends more gets a corner.
+fn open_lenses(part: &Part, faces: &[(&Face, &Sheet<'_>)], times: &mut [Vec<f64>]) {
+    for trim in faces.iter().flat_map(|(face, _)| &face.loops) {
+        let [a, b] = trim.uses.as_slice() else { continue };
+        let (Some(a), Some(b)) = (a.edge.map(|e| e.0 as usize), b.edge.map(|e| e.0 as usize)) else { continue };
+        if a == b || [a, b].iter().any(|&e| times.get(e).is_none_or(|t| t.len() != 2)) {
+            continue;
+        }
+        let off = |e: usize| {
+            let (curve, t) = (&part.edges[e].curve, &times[e]);
+            from_chord(curve.evaluate(0.5 * (t[0] + t[1])), &[curve.evaluate(t[0]), curve.evaluate(t[1])])
+        };
+        let (x, y) = (off(a), off(b));
+        if x.max(y) > 0.0 {
+            bisect_all(&mut times[if y > x { b } else { a }]);
+        }
+    }
 }
 
 /// Tolerance for chords of a curve on a face at `uv`, running along `along` there: all of the face's tolerance where
