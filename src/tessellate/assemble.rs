@@ -1,6 +1,6 @@
 //! Parts are meshed once, in parallel over their faces, and copied to where they stand.
 
-use super::edges::{self, Division, Side};
+use super::border::edges::{self, Division, Side};
 use super::face::{self, FaceMesh};
 use super::settings::{Field, Place, Settings};
 use super::sheet::Sheet;

@@ -1,16 +1,16 @@
 //! One face from its border and its surface to facets.
 
 use super::Settings;
-use super::bound::Prover;
-use super::cells::{self, Leaves};
-use super::edges::Division;
-use super::grid::{self, Ground};
-use super::near::Near;
-use super::pair;
-use super::rings::{self, Follows, Rings};
+use super::border::edges::Division;
+use super::border::rings::{self, Follows, Rings};
+use super::border::trim::Trim;
+use super::cells::grid::{self, Ground};
+use super::cells::tree::{self, Leaves};
+use super::proof::bound::Prover;
+use super::proof::near::Near;
 use super::sheet::Sheet;
-use super::strip::{self, Node, Outline, key};
-use super::trim::Trim;
+use super::strip::delaunay::{self, Node, Outline, key};
+use super::strip::pair;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use rayon::prelude::*;
@@ -47,14 +47,14 @@ pub(super) fn mesh(
         return None;
     }
     let angle = settings.angle_deg.map(f64::to_radians);
-    let leaves = cells::split(sheet, settings.judge, &rings, settings.budget, angle);
+    let leaves = tree::split(sheet, settings.judge, &rings, settings.budget, angle);
     let mut prover = Prover::new(sheet, settings.judge);
     let mut border = border(part, &loops, sheet, &rings, shared);
     let fixed: FxHashMap<[u32; 2], ()> = border.segments.iter().map(|s| (key(s[0], s[1]), ())).collect();
     let known = shared.len() + rings.own.len();
     let (lo, hi) = rings.bounds();
     let mut ground =
-        Ground { nodes: &mut border.nodes, trims: &border.trims, same: cells::same(lo, hi), next: known as u32 };
+        Ground { nodes: &mut border.nodes, trims: &border.trims, same: tree::same(lo, hi), next: known as u32 };
     let grid = grid::build(sheet, &mut prover, &leaves, &mut ground);
     let next = ground.next;
     border.divide_poles(&leaves);
@@ -67,7 +67,7 @@ pub(super) fn mesh(
     let trims = border.trims;
     let scale = if segments.is_empty() { Uv::ONE } else { scale(sheet, &rings, &leaves) };
     let outline = Outline { nodes: border.nodes, segments, trims: &trims, scale, next };
-    let mut strip = strip::triangulate(sheet, settings.judge, outline, settings.budget)?;
+    let mut strip = delaunay::triangulate(sheet, settings.judge, outline, settings.budget)?;
     for &(t, bound, tolerance) in &grid.triangles {
         strip.triangles.push(t);
         strip.bounds.push(bound);

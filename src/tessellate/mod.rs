@@ -14,32 +14,15 @@
 //! its surface than the tolerance keeps that gap.
 
 mod assemble;
-mod bend;
-mod bound;
+mod border;
 mod cells;
-mod edges;
 mod face;
-mod flat;
-mod grid;
-mod ladder;
-mod linear;
-mod lines;
-mod look;
-mod matching;
-mod near;
-mod net;
-mod opposite;
-mod pair;
+mod proof;
 mod report;
-mod rings;
 mod sample;
-mod scalar;
-mod sector;
 mod settings;
 mod sheet;
-mod slight;
 mod strip;
-mod trim;
 
 use crate::mesh::FacetMesh;
 use crate::model::Model;

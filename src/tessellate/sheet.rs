@@ -1,4 +1,4 @@
-use super::bend::Bends;
+use super::proof::bend::Bends;
 use super::settings::Field;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};

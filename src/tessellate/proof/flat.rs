@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 type Polygon = SmallVec<[Uv; 8]>;
 
 /// The part of a segment or convex polygon inside a rectangle.
-pub(super) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
+pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
     let mut now: Polygon = uv.into();
     let closed = uv.len() > 2;
     for d in 0..2 {
@@ -36,13 +36,13 @@ pub(super) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
 }
 
 /// Whether a clipped triangle is the whole rectangle.
-pub(super) fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
+pub(in crate::tessellate) fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
     polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
 }
 
 /// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
 /// last bit, and the line through them can lie anywhere.
-pub(super) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
+pub(in crate::tessellate) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (b - a, p - a);
     let l = d.length_squared();
     let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
@@ -50,14 +50,14 @@ pub(super) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
 }
 
 /// A triangle, which may be degenerate, ready to measure distances.
-pub(super) struct Flat {
+pub(in crate::tessellate) struct Flat {
     corners: [Point; 3],
     /// Unit normal, and across each side into the triangle; `None` without area.
     frame: Option<(Vector, [Vector; 3])>,
 }
 
 impl Flat {
-    pub(super) fn new(corners: &[Point; 3]) -> Self {
+    pub(in crate::tessellate) fn new(corners: &[Point; 3]) -> Self {
         let [a, b, c] = *corners;
         let n = (b - a).cross(c - a);
         let frame =
@@ -66,7 +66,7 @@ impl Flat {
     }
 
     /// Distance of a point.
-    pub(super) fn distance(&self, p: Point) -> f64 {
+    pub(in crate::tessellate) fn distance(&self, p: Point) -> f64 {
         let [a, b, c] = self.corners;
         if let Some((n, [x, y, z])) = self.frame
             && x.dot(p - a) >= 0.0

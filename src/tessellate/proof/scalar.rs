@@ -12,7 +12,7 @@ const DEPTH: [u32; 2] = [4, 8];
 
 /// Distances over one piece, and buffers for halving.
 #[derive(Default)]
-pub(super) struct Scalar {
+pub(in crate::tessellate) struct Scalar {
     degree: usize,
     /// Distance and weight of each control point, in the order of `net.rs`.
     of: Vec<(f64, f64)>,
@@ -23,7 +23,7 @@ pub(super) struct Scalar {
 
 impl Scalar {
     /// Takes in distances and weights of the control points of a segment or triangle; the largest distance.
-    pub(super) fn load(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
+    pub(in crate::tessellate) fn load(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
         self.degree = degree;
         self.of.clear();
         self.of.extend(points);
@@ -31,7 +31,7 @@ impl Scalar {
     }
 
     /// The bound of these distances if it is within the limit.
-    pub(super) fn bound<const N: usize>(
+    pub(in crate::tessellate) fn bound<const N: usize>(
         &mut self,
         points: impl Iterator<Item = (f64, f64)>,
         degree: usize,
@@ -42,14 +42,14 @@ impl Scalar {
     }
 
     /// Largest distance of the corners.
-    pub(super) fn at_corners<const N: usize>(&self) -> f64 {
+    pub(in crate::tessellate) fn at_corners<const N: usize>(&self) -> f64 {
         let n = self.degree;
         let second = if N == 2 { n } else { n * (n + 1) / 2 };
         self.of[0].0.max(self.of[second].0).max(self.of[self.of.len() - 1].0)
     }
 
     /// A bound that is within the limit, if halving finds one.
-    pub(super) fn within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
+    pub(in crate::tessellate) fn within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
         let n = self.degree;
         let heaviest = self.of.iter().fold(0.0, |a: f64, x| a.max(x.1));
         self.stack.clear();

@@ -4,8 +4,8 @@
 //! parameter. The one with more samples hands its own on, from face to face, as long as the next has at least half
 //! as many: a strip between unequal sides has as many facets as the longer one anyway.
 
+use super::super::sheet::Sheet;
 use super::edges::{Side, breaks, hold};
-use super::sheet::Sheet;
 use crate::model::{EdgeUse, Face, Part};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -30,7 +30,7 @@ struct Along<'f> {
 type Pair<'f> = [(usize, &'f EdgeUse); 2];
 
 /// Makes samples of opposite edges equal. `times` are the parameters at which each edge is divided.
-pub(super) fn align<'f>(
+pub(in crate::tessellate) fn align<'f>(
     part: &Part,
     faces: &[(&'f Face, &Sheet<'_>)],
     sides: &[Vec<Side<'_, '_>>],

@@ -1,11 +1,11 @@
 //! Between the whole cells and the border: constrained Delaunay in parameters scaled by curvature, refined where a
 //! triangle cannot be proved.
 
-use super::bound::Prover;
+use super::super::border::trim::Trim;
+use super::super::proof::bound::Prover;
+use super::super::settings::Judge;
+use super::super::sheet::Sheet;
 use super::sector;
-use super::settings::Judge;
-use super::sheet::Sheet;
-use super::trim::Trim;
 use crate::math::{Point, Uv};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -13,41 +13,41 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation
 
 /// A corner of the strip.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
-    pub(super) uv: Uv,
-    pub(super) place: Point,
-    /// Shared or own position; see [`super::rings::RingVertex`].
-    pub(super) position: u32,
+pub(in crate::tessellate) struct Node {
+    pub(in crate::tessellate) uv: Uv,
+    pub(in crate::tessellate) place: Point,
+    /// Shared or own position; see [`super::super::border::rings::RingVertex`].
+    pub(in crate::tessellate) position: u32,
 }
 
 /// What is to be triangulated.
-pub(super) struct Outline<'t> {
-    pub(super) nodes: Vec<Node>,
+pub(in crate::tessellate) struct Outline<'t> {
+    pub(in crate::tessellate) nodes: Vec<Node>,
     /// Constraint segments, each turning outside into inside.
-    pub(super) segments: Vec<[u32; 2]>,
+    pub(in crate::tessellate) segments: Vec<[u32; 2]>,
     /// What border segments follow.
-    pub(super) trims: &'t FxHashMap<[u32; 2], Trim>,
+    pub(in crate::tessellate) trims: &'t FxHashMap<[u32; 2], Trim>,
     /// Multiplies parameters before triangulating.
-    pub(super) scale: Uv,
+    pub(in crate::tessellate) scale: Uv,
     /// First free own position.
-    pub(super) next: u32,
+    pub(in crate::tessellate) next: u32,
 }
 
 /// Triangles on the outline's nodes (refinement appends some), counter-clockwise in parameters.
-pub(super) struct Strip {
-    pub(super) nodes: Vec<Node>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    pub(super) bounds: Vec<f64>,
-    pub(super) tolerances: Vec<f64>,
+pub(in crate::tessellate) struct Strip {
+    pub(in crate::tessellate) nodes: Vec<Node>,
+    pub(in crate::tessellate) triangles: Vec<[u32; 3]>,
+    pub(in crate::tessellate) bounds: Vec<f64>,
+    pub(in crate::tessellate) tolerances: Vec<f64>,
     /// Segments that could not be kept because they cross others.
-    pub(super) conflicts: Vec<[u32; 2]>,
+    pub(in crate::tessellate) conflicts: Vec<[u32; 2]>,
     /// Those that are kept and crossed by them.
-    pub(super) crossed: Vec<[u32; 2]>,
+    pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
 }
 
 impl Strip {
     /// Chords of the border beside triangles that are not proved, where shorter ones may help.
-    pub(super) fn unproved_chords(&self, trims: &FxHashMap<[u32; 2], Trim>) -> Vec<[u32; 2]> {
+    pub(in crate::tessellate) fn unproved_chords(&self, trims: &FxHashMap<[u32; 2], Trim>) -> Vec<[u32; 2]> {
         let stands = self.bounds.iter().zip(&self.tolerances);
         let unproved = self.triangles.iter().zip(stands).filter(|(_, (bound, xi))| bound > xi);
         let sides = unproved.flat_map(|(t, (_, &xi))| [0, 1, 2].map(|k| (key(t[k], t[(k + 1) % 3]), xi)));
@@ -71,7 +71,7 @@ impl HasPosition for Vertex {
 type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
 
 /// Sorted pair of nodes.
-pub(super) fn key(a: u32, b: u32) -> [u32; 2] {
+pub(in crate::tessellate) fn key(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }
 
@@ -81,7 +81,12 @@ const ROUNDS: usize = 40;
 const MOST_WORK: usize = 8_000_000;
 
 /// Triangulates; `None` when not even a triangulation of the points exists.
-pub(super) fn triangulate(sheet: &Sheet<'_>, judge: Judge, outline: Outline<'_>, budget: usize) -> Option<Strip> {
+pub(in crate::tessellate) fn triangulate(
+    sheet: &Sheet<'_>,
+    judge: Judge,
+    outline: Outline<'_>,
+    budget: usize,
+) -> Option<Strip> {
     let mut work = Work {
         sheet,
         nodes: outline.nodes,
@@ -142,7 +147,7 @@ fn sorted(mut t: [u32; 3]) -> [u32; 3] {
 }
 
 /// Bound and tolerance of one triangle, the border's own deviation included.
-pub(super) fn prove(
+pub(in crate::tessellate) fn prove(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
     nodes: &[Node],
@@ -352,7 +357,7 @@ impl Work<'_, '_> {
             let best = free
                 .map(|(&(a, b), m)| {
                     let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
-                    let sag = super::flat::from_chord(self.sheet.point(m), &[x.place, y.place]);
+                    let sag = super::super::proof::flat::from_chord(self.sheet.point(m), &[x.place, y.place]);
                     ((a, b), m, sag)
                 })
                 .max_by(|a, b| a.2.total_cmp(&b.2));

@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 const REACH: u32 = 200;
 
 /// The pairs after all such exchanges; pairs that take in a triangle without area stay.
-pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usize]) -> Vec<usize> {
+pub(in crate::tessellate) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usize]) -> Vec<usize> {
     let mut of: Vec<[u32; 3]> = vec![[u32::MAX; 3]; triangles];
     let mut pair: Vec<Option<u32>> = vec![None; triangles];
     for (c, &(score, i, j, _)) in candidates.iter().enumerate().filter(|(_, c)| c.0 >= 0.0) {

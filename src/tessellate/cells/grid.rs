@@ -1,40 +1,40 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
-use super::bound::Prover;
-use super::cells::{Cell, Leaf, Leaves};
-use super::flat::from_chord;
+use super::super::border::trim::Trim;
+use super::super::proof::bound::Prover;
+use super::super::proof::flat::from_chord;
+use super::super::sheet::Sheet;
+use super::super::strip::delaunay::{Node, key, prove};
 use super::lines::Lines;
-use super::sheet::Sheet;
-use super::strip::{Node, key, prove};
-use super::trim::Trim;
+use super::tree::{Cell, Leaf, Leaves};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
 
 /// The cells of a face that became facets.
 #[derive(Default)]
-pub(super) struct Grid {
+pub(in crate::tessellate) struct Grid {
     /// Corners in order of the traced diagonal, counter-clockwise in parameters, with bound and tolerance.
-    pub(super) quads: Vec<([u32; 4], f64, f64)>,
+    pub(in crate::tessellate) quads: Vec<([u32; 4], f64, f64)>,
     /// Pieces of cells with hanging vertices, to be joined in pairs.
-    pub(super) triangles: Vec<([u32; 3], f64, f64)>,
+    pub(in crate::tessellate) triangles: Vec<([u32; 3], f64, f64)>,
     /// Segments between the cells and the rest of the face.
-    pub(super) outline: Vec<[u32; 2]>,
+    pub(in crate::tessellate) outline: Vec<[u32; 2]>,
 }
 
 /// What cells are made on.
-pub(super) struct Ground<'g> {
+pub(in crate::tessellate) struct Ground<'g> {
     /// Those of the border at first; corners of cells are added.
-    pub(super) nodes: &'g mut Vec<Node>,
+    pub(in crate::tessellate) nodes: &'g mut Vec<Node>,
     /// What border segments follow.
-    pub(super) trims: &'g FxHashMap<[u32; 2], Trim>,
+    pub(in crate::tessellate) trims: &'g FxHashMap<[u32; 2], Trim>,
     /// Parameters nearer than this are one.
-    pub(super) same: Uv,
+    pub(in crate::tessellate) same: Uv,
     /// First free position.
-    pub(super) next: u32,
+    pub(in crate::tessellate) next: u32,
 }
 
 /// Makes facets of the inside leaves; cells that cannot be resolved within their tolerance are left to the strip.
-pub(super) fn build(
+pub(in crate::tessellate) fn build(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
     leaves: &Leaves,

@@ -3,8 +3,8 @@
 //! Beside a chord, S = L + D with L in a plane through it and D = D⊥ + D∥: a point of the sliver is at most
 //! √(|D⊥|² + (reach + |D∥|)²) from the chord.
 
+use super::super::sheet::Sheet;
 use super::flat::from_chord;
-use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::BezierPatch;
 use smallvec::SmallVec;
@@ -21,9 +21,9 @@ enum Measure {
 }
 
 /// A linear map L from parameters into space, and a convex region of parameters within a rectangle.
-pub(super) struct Linear {
-    pub(super) lo: Uv,
-    pub(super) hi: Uv,
+pub(in crate::tessellate) struct Linear {
+    pub(in crate::tessellate) lo: Uv,
+    pub(in crate::tessellate) hi: Uv,
     /// Corners of the region, as shares of the rectangle.
     region: SmallVec<[Uv; 8]>,
     /// L at the rectangle's first corner, and along it, seen from a place that L meets.
@@ -35,7 +35,7 @@ pub(super) struct Linear {
 
 impl Linear {
     /// The map of a parameter triangle onto one in space, seen from its first corner.
-    pub(super) fn new(corners: [Uv; 3], at: [Point; 3]) -> Option<Self> {
+    pub(in crate::tessellate) fn new(corners: [Uv; 3], at: [Point; 3]) -> Option<Self> {
         let lo = corners[0].min(corners[1]).min(corners[2]);
         let hi = corners[0].max(corners[1]).max(corners[2]);
         let x = corners.map(|c| (c - lo) / (hi - lo));
@@ -54,7 +54,12 @@ impl Linear {
 
     /// The map that takes a chord of parameters onto its chord in space, seen from there, and goes with the surface across it;
     /// over a polygon, counter-clockwise, that holds the chord.
-    pub(super) fn beside(sheet: &Sheet<'_>, polygon: &[Uv], chord: [Uv; 2], at: [Point; 2]) -> Option<Self> {
+    pub(in crate::tessellate) fn beside(
+        sheet: &Sheet<'_>,
+        polygon: &[Uv],
+        chord: [Uv; 2],
+        at: [Point; 2],
+    ) -> Option<Self> {
         let (lo, hi) = polygon.iter().fold((chord[0], chord[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let size = hi - lo;
         let share = |x: Uv| (x - lo) / size;
@@ -75,19 +80,19 @@ impl Linear {
     }
 
     /// The part of the rectangle that a patch covers.
-    pub(super) fn meets(&self, patch: &BezierPatch) -> [Uv; 2] {
+    pub(in crate::tessellate) fn meets(&self, patch: &BezierPatch) -> [Uv; 2] {
         let [[u0, u1], [v0, v1]] = patch.domain;
         [self.lo.max(Uv::new(u0, v0)), self.hi.min(Uv::new(u1, v1))]
     }
 
     /// Where a part of the rectangle starts and how large it is, as shares.
-    pub(super) fn shares(&self, [a, b]: [Uv; 2]) -> [Uv; 2] {
+    pub(in crate::tessellate) fn shares(&self, [a, b]: [Uv; 2]) -> [Uv; 2] {
         let size = self.hi - self.lo;
         [(a - self.lo) / size, (b - a) / size]
     }
 
     /// L at the corners (0,0), (1,0), (0,1), (1,1) of a part.
-    pub(super) fn over(&self, from: Uv, share: Uv) -> [Point; 4] {
+    pub(in crate::tessellate) fn over(&self, from: Uv, share: Uv) -> [Point; 4] {
         let [l00, ls, lt] = self.l;
         let l = l00 + ls * from.x + lt * from.y;
         let (s, t) = (ls * share.x, lt * share.y);
@@ -95,7 +100,7 @@ impl Linear {
     }
 
     /// Whether a part meets the region.
-    pub(super) fn touches(&self, from: Uv, share: Uv) -> bool {
+    pub(in crate::tessellate) fn touches(&self, from: Uv, share: Uv) -> bool {
         let n = self.region.len();
         (0..n).all(|k| {
             let a = self.region[k];
@@ -107,7 +112,7 @@ impl Linear {
     }
 
     /// Bound of what is measured where the control points of W·(S − L) are these and no weight is smaller.
-    pub(super) fn bound(&self, net: &[Point], lightest: f64) -> f64 {
+    pub(in crate::tessellate) fn bound(&self, net: &[Point], lightest: f64) -> f64 {
         match self.measure {
             Measure::Whole => net.iter().map(|x| x.length_squared()).fold(0.0, f64::max).sqrt() / lightest,
             Measure::Beside { normal, reach } => {

@@ -11,14 +11,14 @@ use crate::nurbs::BezierPatch;
 const KEPT: usize = 3;
 
 /// Whether there is anything to gain.
-pub(super) fn is_high(patch: &BezierPatch) -> bool {
+pub(in crate::tessellate) fn is_high(patch: &BezierPatch) -> bool {
     patch.degree[0].max(patch.degree[1]) > KEPT
 }
 
 /// Makes and holds the cubics.
-pub(super) struct Slight {
+pub(in crate::tessellate) struct Slight {
     /// The last one, over the parameters from 0 to 1.
-    pub(super) patch: BezierPatch,
+    pub(in crate::tessellate) patch: BezierPatch,
     line: Vec<Homogeneous>,
     cubic: Vec<Homogeneous>,
 }
@@ -33,7 +33,7 @@ impl Default for Slight {
 impl Slight {
     /// Fills in `patch` from the net of a patch of this degree, seen from `origin`; a bound of the distance between the two, point by
     /// point, infinite where there is none.
-    pub(super) fn make(&mut self, net: &[Homogeneous], degree: [usize; 2], origin: Point) -> f64 {
+    pub(in crate::tessellate) fn make(&mut self, net: &[Homogeneous], degree: [usize; 2], origin: Point) -> f64 {
         let [p, q] = degree;
         // Along u first, line by line; then along v. The differences of both add up.
         let (mut first, mut second) = ([0f64; 2], [0f64; 2]);

@@ -1,7 +1,7 @@
 //! The parameter lines on which sides of cells lie, and the nodes on them.
 
-use super::cells::{Cell, Leaves};
-use super::strip::{Node, key};
+use super::super::strip::delaunay::{Node, key};
+use super::tree::{Cell, Leaves};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
 
@@ -9,16 +9,16 @@ use rustc_hash::FxHashMap;
 const LONGEST: usize = 3;
 
 /// The nodes on the lines that sides of cells lie on.
-pub(super) struct Lines {
+pub(in crate::tessellate) struct Lines {
     /// Parameters of the lines across u and v, ascending.
     at: [Vec<f64>; 2],
     /// On each of them, the nodes in order of the other parameter.
-    pub(super) on: [Vec<Vec<(f64, u32)>>; 2],
+    pub(in crate::tessellate) on: [Vec<Vec<(f64, u32)>>; 2],
     same: Uv,
 }
 
 impl Lines {
-    pub(super) fn new(leaves: &Leaves, same: Uv) -> Self {
+    pub(in crate::tessellate) fn new(leaves: &Leaves, same: Uv) -> Self {
         let at = [0, 1].map(|d| {
             let mut x: Vec<f64> = leaves.inside.iter().flat_map(|l| [l.cell.lo[d], l.cell.hi[d]]).collect();
             x.sort_unstable_by(f64::total_cmp);
@@ -30,7 +30,7 @@ impl Lines {
     }
 
     /// The line at a parameter.
-    pub(super) fn find(&self, d: usize, x: f64) -> Option<usize> {
+    pub(in crate::tessellate) fn find(&self, d: usize, x: f64) -> Option<usize> {
         let l = &self.at[d];
         let i = l.partition_point(|&y| y < x);
         let near = |i: &usize| l.get(*i).is_some_and(|y| (y - x).abs() <= self.same[d]);
@@ -53,7 +53,7 @@ impl Lines {
     }
 
     /// Nodes inside the four sides of a cell, in counter-clockwise order.
-    pub(super) fn sides(&self, cell: &Cell) -> [Vec<u32>; 4] {
+    pub(in crate::tessellate) fn sides(&self, cell: &Cell) -> [Vec<u32>; 4] {
         let (lo, hi) = (cell.lo, cell.hi);
         [
             self.between(1, lo.y, lo.x, hi.x),
@@ -65,7 +65,11 @@ impl Lines {
 
     /// Places for further nodes, each on the side `s` of a cell at a parameter: where one hanging vertex faces another across a
     /// few cells, the sides between get one too, so that all of them fall into quads.
-    pub(super) fn bridges(&self, cells: &[(Cell, [u32; 4])], nodes: &[Node]) -> Vec<(usize, usize, f64)> {
+    pub(in crate::tessellate) fn bridges(
+        &self,
+        cells: &[(Cell, [u32; 4])],
+        nodes: &[Node],
+    ) -> Vec<(usize, usize, f64)> {
         let mut beside: FxHashMap<[u32; 2], Vec<(usize, usize)>> = FxHashMap::default();
         let name = |i: usize, s: usize| key(cells[i].1[s], cells[i].1[(s + 1) % 4]);
         for i in 0..cells.len() {

@@ -16,12 +16,12 @@
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
 
+use super::super::settings::Judge;
+use super::super::sheet::{Sheet, local};
 use super::flat::{Flat, clip, from_chord, whole};
 use super::near::Near;
 use super::net::{Corner, MOST_HALVED, Nets};
 use super::scalar::Scalar;
-use super::settings::Judge;
-use super::sheet::{Sheet, local};
 use super::slight::{self, Slight};
 use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
@@ -38,8 +38,8 @@ const MOST_HULL: usize = 1000;
 const SLIGHT: f64 = 0.02;
 
 /// Bounds facets of one face.
-pub(super) struct Prover<'s, 'a> {
-    pub(super) sheet: &'s Sheet<'a>,
+pub(in crate::tessellate) struct Prover<'s, 'a> {
+    pub(in crate::tessellate) sheet: &'s Sheet<'a>,
     judge: Judge,
     nets: Nets,
     near: Near,
@@ -49,7 +49,7 @@ pub(super) struct Prover<'s, 'a> {
 }
 
 impl<'s, 'a> Prover<'s, 'a> {
-    pub(super) fn new(sheet: &'s Sheet<'a>, judge: Judge) -> Self {
+    pub(in crate::tessellate) fn new(sheet: &'s Sheet<'a>, judge: Judge) -> Self {
         Self {
             sheet,
             judge,
@@ -64,7 +64,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space.
     ///
     /// Stops refining as soon as the answer is at most `limit`, or clearly is not.
-    pub(super) fn piece(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
+    pub(in crate::tessellate) fn piece(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
         if self.sheet.affine {
             let off = [0, 1, 2].map(|i| Flat::new(&xyz).distance(self.sheet.point(uv[i])));
             return off[0].max(off[1]).max(off[2]) + self.margin;
@@ -113,7 +113,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// Bound of the distance from the surface over a convex parameter polygon to a triangle in space.
-    pub(super) fn polygon(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
+    pub(in crate::tessellate) fn polygon(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
         let flat = Flat::new(&xyz);
         let bounded = !self.sheet.affine && self.judge == Judge::Bound;
         if bounded && let Some(quick) = self.quick(uv, limit, |p| flat.distance(p)) {
@@ -134,7 +134,13 @@ impl<'s, 'a> Prover<'s, 'a> {
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
     /// quick look; `None` when that does not show it to be within the limit. `exact`: the corners are known to lie on the surface.
-    pub(super) fn facet(&mut self, uv: [Uv; 3], xyz: [Point; 3], exact: bool, limit: f64) -> Option<f64> {
+    pub(in crate::tessellate) fn facet(
+        &mut self,
+        uv: [Uv; 3],
+        xyz: [Point; 3],
+        exact: bool,
+        limit: f64,
+    ) -> Option<f64> {
         if self.sheet.affine || self.judge == Judge::Sampled {
             return None;
         }
@@ -217,7 +223,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// Bound of the distance from the curve over a parameter segment to the line of a chord.
-    pub(super) fn side(&mut self, uv: [Uv; 2], xyz: [Point; 2], limit: f64) -> f64 {
+    pub(in crate::tessellate) fn side(&mut self, uv: [Uv; 2], xyz: [Point; 2], limit: f64) -> f64 {
         if self.sheet.affine {
             return self.margin;
         }

@@ -1,17 +1,17 @@
 //! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
 
-use super::bound::Prover;
-use super::cells::Cell;
-use super::flat::from_chord;
-use super::sheet::Sheet;
+use super::super::proof::bound::Prover;
+use super::super::proof::flat::from_chord;
+use super::super::sheet::Sheet;
+use super::tree::Cell;
 use crate::math::{Point, Uv};
 use smallvec::SmallVec;
 
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
-pub(super) type Corners = [(Uv, Point); 4];
+pub(in crate::tessellate) type Corners = [(Uv, Point); 4];
 
 /// Bound of a quad's two triangles, edges and diagonal included; its corners lie on the surface.
-pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
+pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
     let mut worst = 0f64;
     let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
     for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
@@ -40,14 +40,14 @@ pub(super) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -
 }
 
 /// Nine points of a cell and what they show.
-pub(super) struct Look {
+pub(in crate::tessellate) struct Look {
     p: [[Point; 3]; 3],
     /// Largest distance of a middle from its chord, for lines along u and along v.
-    pub(super) sag: [f64; 2],
+    pub(in crate::tessellate) sag: [f64; 2],
 }
 
 impl Look {
-    pub(super) fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
+    pub(in crate::tessellate) fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
         let middle = cell.center();
         let p = sheet.lattice([cell.lo.x, middle.x, cell.hi.x], [cell.lo.y, middle.y, cell.hi.y]);
         let u = (0..3).map(|j| from_chord(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
@@ -55,7 +55,7 @@ impl Look {
         Self { p, sag: [u, v] }
     }
 
-    pub(super) fn direction(&self) -> usize {
+    pub(in crate::tessellate) fn direction(&self) -> usize {
         let [u, v] = self.sag;
         let p = &self.p;
         let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
@@ -68,18 +68,18 @@ impl Look {
     }
 
     /// Places of the corners, in the order of [`Cell::corners`].
-    pub(super) fn places(&self) -> [Point; 4] {
+    pub(in crate::tessellate) fn places(&self) -> [Point; 4] {
         [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]]
     }
 
     /// The corner at which the better diagonal starts, the one that lies nearer to the surface: 0 or 1.
-    pub(super) fn first(&self) -> usize {
+    pub(in crate::tessellate) fn first(&self) -> usize {
         let (p, m) = (self.places(), self.p[1][1]);
         if from_chord(m, &[p[1], p[3]]) < from_chord(m, &[p[0], p[2]]) * (1.0 - 1e-9) { 1 } else { 0 }
     }
 
     /// The cell as a facet, cut along the better diagonal.
-    pub(super) fn facet(&self, cell: Cell) -> Corners {
+    pub(in crate::tessellate) fn facet(&self, cell: Cell) -> Corners {
         let (p, uv, r) = (self.places(), cell.corners(), self.first());
         std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4]))
     }

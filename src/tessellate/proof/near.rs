@@ -7,8 +7,8 @@
 //! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
 //! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `net.rs` decides.
 
+use super::super::sheet::{Sheet, local};
 use super::linear::Linear;
-use super::sheet::{Sheet, local};
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
 use smallvec::{SmallVec, smallvec};
@@ -20,7 +20,7 @@ const MOST_HALVINGS: u32 = 24;
 
 /// Buffers reused from facet to facet.
 #[derive(Default)]
-pub(super) struct Near {
+pub(in crate::tessellate) struct Near {
     net: Vec<Homogeneous>,
     deviation: Vec<Point>,
     line: Vec<Homogeneous>,
@@ -33,7 +33,7 @@ pub(super) struct Near {
 impl Near {
     /// Bound of |S − L| over the triangle with these corners in the surface's parameters, which lie at `at` in space. The patches
     /// cover it, and where there are several, S and its weight are C1 from one to the next: Taylor's theorem needs no more.
-    pub(super) fn bound<'p>(
+    pub(in crate::tessellate) fn bound<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
         corners: [Uv; 3],
@@ -69,7 +69,7 @@ impl Near {
     /// Bound of |S − L| where it is within the limit, by the control points of S − L over rectangles that are halved while that is not
     /// so; the patches need not be smooth from one to the next. One facet of a spline through hundreds of points is proved in
     /// microseconds where the hulls of its pieces took a millisecond.
-    pub(super) fn hull<'p>(
+    pub(in crate::tessellate) fn hull<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
         corners: [Uv; 3],
@@ -81,7 +81,7 @@ impl Near {
 
     /// Bound of the distance from the surface over a convex polygon to a chord that the polygon holds, where it is within the limit;
     /// the chord's parameters lie at `at` in space.
-    pub(super) fn beside(
+    pub(in crate::tessellate) fn beside(
         &mut self,
         sheet: &Sheet<'_>,
         polygon: &[Uv],
@@ -178,7 +178,13 @@ impl Near {
     /// The patch's net over a rectangle of its local parameters, seen from `origin`. It is kept: both triangles of a cell have the same.
     ///
     /// The patches handed in must live as long as this does.
-    pub(super) fn restrict(&mut self, patch: &BezierPatch, lo: Uv, hi: Uv, origin: Point) -> &[Homogeneous] {
+    pub(in crate::tessellate) fn restrict(
+        &mut self,
+        patch: &BezierPatch,
+        lo: Uv,
+        hi: Uv,
+        origin: Point,
+    ) -> &[Homogeneous] {
         let [p, q] = patch.degree;
         let name = Some((std::ptr::from_ref(patch).addr(), lo, hi, origin));
         if self.held == name {

@@ -1,9 +1,9 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
-use super::bound::Prover;
-use super::flat::from_chord;
-use super::near::Near;
-use super::sheet::Sheet;
+use super::super::proof::bound::Prover;
+use super::super::proof::flat::from_chord;
+use super::super::proof::near::Near;
+use super::super::sheet::Sheet;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
@@ -14,20 +14,20 @@ const NEGLIGIBLE: f64 = 1e-3;
 
 /// One chord of a border edge.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Trim {
+pub(in crate::tessellate) struct Trim {
     /// Bound of the distance between the edge's curve and the line of the chord, mm, with the offset of the chord's ends
     /// from the surface.
-    pub(super) deviation: f64,
+    pub(in crate::tessellate) deviation: f64,
     /// The file's own gap between edge and face here, mm, which no shorter chord closes.
-    pub(super) gap: f64,
+    pub(in crate::tessellate) gap: f64,
     /// A convex polygon around what lies between the chord and the curve in the parameter plane.
-    pub(super) between: Vec<Uv>,
+    pub(in crate::tessellate) between: Vec<Uv>,
     /// Bound of the distance from the surface there to the chord, mm, once it is known.
     beside: Option<f64>,
 }
 
 impl Trim {
-    pub(super) fn new(
+    pub(in crate::tessellate) fn new(
         sheet: &Sheet<'_>,
         curve: &Curve,
         side: &EdgeUse,
@@ -59,7 +59,13 @@ impl Trim {
     }
 
     /// Bounds how far the surface between chord and curve lies from the chord, once for all facets that have the chord.
-    pub(super) fn prove(&mut self, sheet: &Sheet<'_>, near: &mut Near, uv: [Uv; 2], xyz: [Point; 2]) {
+    pub(in crate::tessellate) fn prove(
+        &mut self,
+        sheet: &Sheet<'_>,
+        near: &mut Near,
+        uv: [Uv; 2],
+        xyz: [Point; 2],
+    ) {
         if self.between.len() < 3 {
             return;
         }
@@ -70,7 +76,7 @@ impl Trim {
     }
 
     /// The part of the bound that the border adds to a triangle of facets.
-    pub(super) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
+    pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
         if let Some(beside) = self.beside.filter(|&x| x <= limit) {
             return worst.max(beside);

@@ -1,24 +1,24 @@
 //! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
 
-use super::bound::Prover;
+use super::super::proof::bound::Prover;
+use super::super::sheet::Sheet;
+use super::delaunay::{Node, Strip, key};
 use super::matching;
 use super::sector;
-use super::sheet::Sheet;
-use super::strip::{Node, Strip, key};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
 
 /// A facet of the strip; a triangle repeats its third corner.
-pub(super) struct StripFacet {
-    pub(super) nodes: [u32; 4],
-    pub(super) bound: f64,
-    pub(super) tolerance: f64,
+pub(in crate::tessellate) struct StripFacet {
+    pub(in crate::tessellate) nodes: [u32; 4],
+    pub(in crate::tessellate) bound: f64,
+    pub(in crate::tessellate) tolerance: f64,
     /// Other parameters for a corner: a pole, seen in the middle of its facet.
-    pub(super) pole: Option<(usize, Uv)>,
+    pub(in crate::tessellate) pole: Option<(usize, Uv)>,
 }
 
 /// How far from square (negative: a triangle without area is taken in), two triangles, and the quad they make.
-pub(super) type Candidate = (f64, usize, usize, [u32; 4]);
+pub(in crate::tessellate) type Candidate = (f64, usize, usize, [u32; 4]);
 
 /// Cosine of the sharpest and bluntest corner that a quad may have.
 const SHARPEST: f64 = 0.9995;
@@ -26,7 +26,11 @@ const SHARPEST: f64 = 0.9995;
 const GOOD: f64 = 0.5;
 
 /// Pairs greedily, squarest first. `fixed` edges are not crossed; triangles without area go into their neighbours.
-pub(super) fn join(strip: &Strip, fixed: &FxHashMap<[u32; 2], ()>, prover: &mut Prover<'_, '_>) -> Vec<StripFacet> {
+pub(in crate::tessellate) fn join(
+    strip: &Strip,
+    fixed: &FxHashMap<[u32; 2], ()>,
+    prover: &mut Prover<'_, '_>,
+) -> Vec<StripFacet> {
     let t = &strip.triangles;
     let node = |n: u32| strip.nodes[n as usize];
     let collapsed: Vec<bool> = t.iter().map(|t| flat(t.map(node))).collect();

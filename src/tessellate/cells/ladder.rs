@@ -1,13 +1,13 @@
 //! Preferred parameters for the cuts of the tree: samples of border edges that run along parameter lines, or lines spread evenly in
 //! curvature.
 
-use super::cells::Cell;
-use super::rings::{Follows, Rings};
-use super::sheet::Sheet;
+use super::super::border::rings::{Follows, Rings};
+use super::super::sheet::Sheet;
+use super::tree::Cell;
 use crate::math::Uv;
 
 /// Preferred cuts in direction `d`.
-pub(super) fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> Vec<f64> {
+pub(in crate::tessellate) fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> Vec<f64> {
     let other = 1 - d;
     let (lo, hi) = (root.lo[d], root.hi[d]);
     let flat = 1e-7 * (root.hi[other] - root.lo[other]);

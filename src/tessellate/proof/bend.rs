@@ -14,7 +14,7 @@ use crate::nurbs::{BezierPatch, Surface};
 const MOST: usize = 64;
 
 /// Bounds of the second derivatives of each patch.
-pub(super) struct Bends {
+pub(in crate::tessellate) struct Bends {
     /// For uu, uv and vv in the surface's own parameters, patch by patch.
     of: Vec<[f64; 3]>,
     /// Whether the parametrisation is C1 across each distinct knot.
@@ -23,7 +23,7 @@ pub(super) struct Bends {
 }
 
 impl Bends {
-    pub(super) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
+    pub(in crate::tessellate) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
         let smooth = [0, 1].map(|d| {
             let times = |k: &f64| surface.knots[d].iter().filter(|x| *x == k).count();
             breaks[d].iter().map(|k| times(k) < surface.degree[d]).collect()
@@ -32,14 +32,14 @@ impl Bends {
     }
 
     /// Whether the surface and its weight are C1 through these knot intervals (first and last).
-    pub(super) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
+    pub(in crate::tessellate) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
         let through = |d: usize, r: [usize; 2]| (r[0] + 1..=r[1]).all(|k| self.smooth[d][k]);
         through(0, a) && through(1, b)
     }
 
     /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
     /// `b` (first and last); `None` where it does not hold or costs too much.
-    pub(super) fn bound(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
+    pub(in crate::tessellate) fn bound(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
         if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST || !self.is_smooth(a, b) {
             return None;
         }

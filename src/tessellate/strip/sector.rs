@@ -6,10 +6,10 @@
 //! their pieces meet; a triangle with two corners on the pole has no piece. On the tip of a cone of 10 m that is 320 facets in place
 //! of 160 000.
 
-use super::bound::Prover;
-use super::sheet::Sheet;
-use super::strip::key;
-use super::trim::Trim;
+use super::super::border::trim::Trim;
+use super::super::proof::bound::Prover;
+use super::super::sheet::Sheet;
+use super::delaunay::key;
 use crate::math::{Point, Uv};
 use rustc_hash::FxHashMap;
 
@@ -34,7 +34,7 @@ fn corner(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
 }
 
 /// Middles of the sides of a triangle, those into a pole along parameter lines.
-pub(super) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] {
+pub(in crate::tessellate) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] {
     let mut at = [0, 1, 2].map(|i| 0.5 * (uv[i] + uv[(i + 1) % 3]));
     if let Some((k, across)) = corner(sheet, &uv) {
         let (a, b) = (uv[(k + 1) % 3], uv[(k + 2) % 3]);
@@ -46,7 +46,7 @@ pub(super) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] {
 
 /// The corner of a facet at a pole, with parameters there that keep each of its triangles within its sector: opposite the
 /// diagonal those of the diagonal's other end, else those between its neighbours.
-pub(super) fn seen(sheet: &Sheet<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
+pub(in crate::tessellate) fn seen(sheet: &Sheet<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
     let n = uv.len();
     let (k, across) = uv.iter().enumerate().find_map(|(k, &x)| Some((k, sheet.pole(x)?)))?;
     let from = if n == 4 && k % 2 == 0 { uv[(k + 2) % 4] } else { 0.5 * (uv[(k + 1) % n] + uv[(k + n - 1) % n]) };
@@ -54,12 +54,12 @@ pub(super) fn seen(sheet: &Sheet<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
 }
 
 /// Whether a triangle is proved by its sector.
-pub(super) fn applies(sheet: &Sheet<'_>, uv: [Uv; 3]) -> bool {
+pub(in crate::tessellate) fn applies(sheet: &Sheet<'_>, uv: [Uv; 3]) -> bool {
     corner(sheet, &uv).is_some()
 }
 
 /// Bound for a triangle at a pole; `None` for others. `sides` are what its sides follow, the one from corner 0 to 1 first.
-pub(super) fn bound(
+pub(in crate::tessellate) fn bound(
     prover: &mut Prover<'_, '_>,
     uv: [Uv; 3],
     xyz: [Point; 3],
@@ -99,7 +99,12 @@ pub(super) fn bound(
 }
 
 /// Bound for a triangle with two corners on one pole: nothing, but where a border runs aslant into it.
-pub(super) fn line(sheet: &Sheet<'_>, uv: [Uv; 3], t: [u32; 3], trims: &FxHashMap<[u32; 2], Trim>) -> Option<f64> {
+pub(in crate::tessellate) fn line(
+    sheet: &Sheet<'_>,
+    uv: [Uv; 3],
+    t: [u32; 3],
+    trims: &FxHashMap<[u32; 2], Trim>,
+) -> Option<f64> {
     let k = (0..3).find(|&k| sheet.pole(uv[k]).is_none())?;
     let across = sheet.pole(uv[(k + 1) % 3])?;
     if sheet.pole(uv[(k + 2) % 3]) != Some(across) {

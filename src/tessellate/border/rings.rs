@@ -1,23 +1,23 @@
 //! The border of a face as polygons in its parameter plane, on the shared samples of its edges.
 
+use super::super::sheet::Sheet;
 use super::edges::{self, Division};
-use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 use crate::model::{EdgeUse, Face, Part, TrimLoop};
 use crate::nurbs::UvCurve;
 
 /// A vertex of a border polygon, and what the polygon's edge that starts there follows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RingVertex {
-    pub(super) uv: Uv,
+pub(in crate::tessellate) struct RingVertex {
+    pub(in crate::tessellate) uv: Uv,
     /// Below the number of shared positions: one of those; otherwise one of the face's own.
-    pub(super) position: u32,
-    pub(super) follows: Follows,
+    pub(in crate::tessellate) position: u32,
+    pub(in crate::tessellate) follows: Follows,
 }
 
 /// What one edge of a border polygon follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Follows {
+pub(in crate::tessellate) enum Follows {
     /// The part's edge of use `side` (counted through all loops) over a parameter interval.
     Edge { side: u32, t: [f64; 2] },
     /// A straight line of the parameter plane whose two sides are one in space, or a free border.
@@ -28,22 +28,22 @@ pub(super) enum Follows {
 
 /// All polygons of a face.
 #[derive(Default)]
-pub(super) struct Rings {
-    pub(super) rings: Vec<Vec<RingVertex>>,
+pub(in crate::tessellate) struct Rings {
+    pub(in crate::tessellate) rings: Vec<Vec<RingVertex>>,
     /// Positions that are not shared with other faces.
-    pub(super) own: Vec<Point>,
+    pub(in crate::tessellate) own: Vec<Point>,
 }
 
 impl Rings {
     /// The box around all polygons.
-    pub(super) fn bounds(&self) -> (Uv, Uv) {
+    pub(in crate::tessellate) fn bounds(&self) -> (Uv, Uv) {
         let all = self.rings.iter().flatten();
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
     }
 }
 
 /// The loops of a face; of an untrimmed one, the rim of its domain.
-pub(super) fn loops(face: &Face) -> Vec<TrimLoop> {
+pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
     if !face.loops.is_empty() {
         return face.loops.clone();
     }
@@ -62,7 +62,7 @@ pub(super) fn loops(face: &Face) -> Vec<TrimLoop> {
 }
 
 /// Builds the polygons; shared positions are `positions`.
-pub(super) fn build(
+pub(in crate::tessellate) fn build(
     part: &Part,
     loops: &[TrimLoop],
     sheet: &Sheet<'_>,

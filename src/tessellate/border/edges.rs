@@ -1,8 +1,8 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
-use super::flat::from_chord;
+use super::super::proof::flat::from_chord;
+use super::super::sheet::Sheet;
 use super::opposite;
-use super::sheet::Sheet;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Edge, EdgeUse, Face, Part};
 use crate::nurbs::Curve;
@@ -16,21 +16,21 @@ const LOOKS: usize = 64;
 const MOST: usize = 20_000;
 
 /// One side of an edge on a face.
-pub(super) struct Side<'s, 'a> {
-    pub(super) sheet: &'s Sheet<'a>,
-    pub(super) side: &'s EdgeUse,
+pub(in crate::tessellate) struct Side<'s, 'a> {
+    pub(in crate::tessellate) sheet: &'s Sheet<'a>,
+    pub(in crate::tessellate) side: &'s EdgeUse,
 }
 
 /// Where an edge is divided: parameters ascending, ends included.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Division {
-    pub(super) t: Vec<f64>,
+pub(in crate::tessellate) struct Division {
+    pub(in crate::tessellate) t: Vec<f64>,
     /// Index of the first inner point among the part's shared positions.
-    pub(super) first: u32,
+    pub(in crate::tessellate) first: u32,
 }
 
 /// Divides all edges of a part (`alone` keeps how often each was asked for more and what it then had by itself), and returns the shared positions: vertices, then inner points edge by edge.
-pub(super) fn divide(
+pub(in crate::tessellate) fn divide(
     part: &Part,
     faces: &[(&Face, &Sheet<'_>)],
     sides: &[Vec<Side<'_, '_>>],
@@ -121,7 +121,7 @@ fn edge_parameters(curve: &Curve, sides: &[Side<'_, '_>], denser: u32) -> Vec<f6
 }
 
 /// Divides further where a chord of given samples is too long.
-pub(super) fn hold(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
+pub(in crate::tessellate) fn hold(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     shorten(&mut t, |t| curve.evaluate(t), |t, along| tightest(sides, denser, t, along));
     beside(curve, sides, denser, t)
 }
@@ -176,7 +176,7 @@ fn nearest_on(at: &impl Fn(f64) -> Point, a: f64, b: f64, p: Point) -> Point {
 }
 
 /// The ends of a curve and the kinks between them, with enough looks in each piece.
-pub(super) fn breaks(curve: &Curve) -> Vec<f64> {
+pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     let b = curve.breakpoints();
     let n = b.len();
     let kink = |i: usize| {
@@ -195,7 +195,7 @@ pub(super) fn breaks(curve: &Curve) -> Vec<f64> {
 }
 
 /// Parameters so that chords stay within the tolerance, spread evenly in `√(curvature / tolerance)`.
-pub(super) fn parameters(
+pub(in crate::tessellate) fn parameters(
     breaks: &[f64],
     at: impl Fn(f64) -> Point,
     tolerance: impl Fn(f64, Vector) -> f64,

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 
 /// Buffers reused from piece to piece.
 #[derive(Default)]
-pub(super) struct Nets {
+pub(in crate::tessellate) struct Nets {
     /// Nets of one step and of the next, one after another.
     work: [Vec<Homogeneous>; 2],
     /// What the first direction leaves.
@@ -29,7 +29,7 @@ pub(super) struct Nets {
 }
 
 /// Degree up to which halves of rectangles have tables.
-pub(super) const MOST_HALVED: usize = 3;
+pub(in crate::tessellate) const MOST_HALVED: usize = 3;
 static HALVES: [OnceLock<Half>; MOST_HALVED * MOST_HALVED] = [const { OnceLock::new() }; MOST_HALVED * MOST_HALVED];
 
 /// How the net of a rectangle makes that of a half of it, for one pair of degrees: along the sides at the right angle.
@@ -42,11 +42,11 @@ struct Half {
 
 /// Which half of a rectangle a triangle with corners A, B, C and its right angle at B is.
 #[derive(Clone, Copy)]
-pub(super) struct Corner {
+pub(in crate::tessellate) struct Corner {
     /// The parameter that changes from A to B.
-    pub(super) direction: usize,
+    pub(in crate::tessellate) direction: usize,
     /// Whether A in that direction, and B in the other, lie at the rectangle's upper end.
-    pub(super) upper: [bool; 2],
+    pub(in crate::tessellate) upper: [bool; 2],
 }
 
 /// Coefficients of degree `d` over a simplex with `corners` corners.
@@ -56,7 +56,11 @@ const fn size(corners: usize, d: usize) -> usize {
 
 impl Nets {
     /// Control points over the simplex with 2 or 3 corners, given in local parameters.
-    pub(super) fn expand<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) -> &[Homogeneous] {
+    pub(in crate::tessellate) fn expand<const N: usize>(
+        &mut self,
+        patch: &BezierPatch,
+        corners: [Uv; N],
+    ) -> &[Homogeneous] {
         let degree = patch.degree[0] + patch.degree[1];
         if self.of != (N, degree) {
             self.of = (N, degree);
@@ -74,7 +78,12 @@ impl Nets {
 
     /// Control points over half of the rectangle that a net of these degrees, 1 to [`MOST_HALVED`], stands for. Of cells cut along a diagonal it takes a
     /// seventh of the time: each coefficient is a mean of few control points, with weights that are the same for all.
-    pub(super) fn half(&mut self, net: &[Homogeneous], degree: [usize; 2], corner: Corner) -> &[Homogeneous] {
+    pub(in crate::tessellate) fn half(
+        &mut self,
+        net: &[Homogeneous],
+        degree: [usize; 2],
+        corner: Corner,
+    ) -> &[Homogeneous] {
         let (d, e) = (corner.direction, 1 - corner.direction);
         let [p, q] = [degree[d], degree[e]];
         let half = HALVES[(p - 1) * MOST_HALVED + q - 1].get_or_init(|| Half::new([p, q]));

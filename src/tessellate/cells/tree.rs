@@ -3,54 +3,54 @@
 //! Cuts fall on a ladder of preferred parameters, so that neighbouring cells and the border line up; below the ladder they
 //! halve. A cell is kept whole when it is clear of the border, or when the border runs along its sides, corner on sample.
 
-use super::bound::Prover;
+use super::super::border::rings::{Follows, Rings};
+use super::super::proof::bound::Prover;
+use super::super::settings::Judge;
+use super::super::sheet::Sheet;
+use super::super::strip::sector;
 use super::ladder::ladder;
 use super::look::{Look, quad_bound};
-use super::rings::{Follows, Rings};
-use super::sector;
-use super::settings::Judge;
-use super::sheet::Sheet;
 use crate::math::{Point, Uv};
 
 /// A rectangle `[lo, hi]` of the parameter plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Cell {
-    pub(super) lo: Uv,
-    pub(super) hi: Uv,
+pub(in crate::tessellate) struct Cell {
+    pub(in crate::tessellate) lo: Uv,
+    pub(in crate::tessellate) hi: Uv,
 }
 
 impl Cell {
-    pub(super) fn corners(&self) -> [Uv; 4] {
+    pub(in crate::tessellate) fn corners(&self) -> [Uv; 4] {
         [self.lo, Uv::new(self.hi.x, self.lo.y), self.hi, Uv::new(self.lo.x, self.hi.y)]
     }
 
-    pub(super) fn center(&self) -> Uv {
+    pub(in crate::tessellate) fn center(&self) -> Uv {
         0.5 * (self.lo + self.hi)
     }
 }
 
 /// A cell that is proved.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Leaf {
-    pub(super) cell: Cell,
-    pub(super) bound: f64,
+pub(in crate::tessellate) struct Leaf {
+    pub(in crate::tessellate) cell: Cell,
+    pub(in crate::tessellate) bound: f64,
     /// The tolerance that it was held to.
-    pub(super) tolerance: f64,
+    pub(in crate::tessellate) tolerance: f64,
     /// The corner at which the traced diagonal starts: 0 or 1.
-    pub(super) first: usize,
+    pub(in crate::tessellate) first: usize,
     /// Where its corners lie.
-    pub(super) places: [Point; 4],
+    pub(in crate::tessellate) places: [Point; 4],
 }
 
 /// The leaves.
 #[derive(Default)]
-pub(super) struct Leaves {
+pub(in crate::tessellate) struct Leaves {
     /// Wholly inside, not cut by the border, and proved.
-    pub(super) inside: Vec<Leaf>,
+    pub(in crate::tessellate) inside: Vec<Leaf>,
     /// Those that the border cuts or comes near to.
-    pub(super) border: Vec<Cell>,
+    pub(in crate::tessellate) border: Vec<Cell>,
     /// Whether splitting ended before all cells fitted.
-    pub(super) exhausted: bool,
+    pub(in crate::tessellate) exhausted: bool,
     /// Whether it did so because a branch had used up its share of the budget.
     short: bool,
 }
@@ -81,7 +81,7 @@ struct Branch<'s, 'a> {
 }
 
 /// Splits the box around the rings until every cell fits.
-pub(super) fn split(
+pub(in crate::tessellate) fn split(
     sheet: &Sheet<'_>,
     judge: Judge,
     rings: &Rings,
@@ -115,7 +115,7 @@ pub(super) fn split(
 }
 
 /// Parameters nearer than this are one, in a face that spans the box.
-pub(super) fn same(lo: Uv, hi: Uv) -> Uv {
+pub(in crate::tessellate) fn same(lo: Uv, hi: Uv) -> Uv {
     1e-7 * (hi - lo)
 }
 
