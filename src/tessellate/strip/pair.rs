@@ -113,10 +113,12 @@ fn kites(strip: &Strip, prover: &mut Prover<'_, '_>, facets: Vec<StripFacet>) ->
     let heads = (0..facets.len()).filter(|&i| !led[i]).chain((0..facets.len()).filter(|&i| led[i]));
     let mut into: Vec<Option<(usize, Uv, f64)>> = vec![None; facets.len()];
     let mut gone = vec![false; facets.len()];
+    // Facets that were looked at: sectors all around a pole follow each other for ever.
+    let mut seen = vec![false; facets.len()];
     for head in heads {
         let mut at = Some(head);
         while let Some(i) = at {
-            if gone[i] || into[i].is_some() {
+            if gone[i] || into[i].is_some() || std::mem::replace(&mut seen[i], true) {
                 break;
             }
             at = follows[i];
