@@ -6,5 +6,6 @@ pub(in crate::tessellate) mod flat;
 pub(in crate::tessellate) mod linear;
 pub(in crate::tessellate) mod near;
 pub(in crate::tessellate) mod net;
+mod refine;
 pub(in crate::tessellate) mod scalar;
 pub(in crate::tessellate) mod slight;

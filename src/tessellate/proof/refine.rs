@@ -1,0 +1,52 @@
+//! The hull bound, sharpened: a Bézier simplex is cut into halves or quarters while that may bring it below the limit.
+
+use super::net::Nets;
+use super::scalar::Scalar;
+use crate::math::{Point, Uv};
+use crate::nurbs::BezierPatch;
+
+/// How often a piece is cut into four before the bound is taken as it is.
+pub(super) const LEVELS: u32 = 3;
+
+/// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
+pub(super) fn refine<const N: usize>(
+    (nets, scalar): (&mut Nets, &mut Scalar),
+    patch: &BezierPatch,
+    at: [Uv; N],
+    limit: f64,
+    levels: u32,
+    f: &impl Fn(Point) -> f64,
+) -> f64 {
+    let net = nets.expand(patch, at);
+    let degree = patch.degree[0] + patch.degree[1];
+    let bound = scalar.load(net.iter().map(|c| (f(c.project()), c.w)), degree);
+    // Corners lie on the surface: there the distance is no bound but true.
+    if bound <= limit || scalar.at_corners::<N>() > limit {
+        return bound;
+    }
+    // Each level brings the bound at most four times closer to the truth; no hope is no work.
+    if bound > 8.0 * limit && levels < LEVELS {
+        return bound;
+    }
+    if let Some(bound) = scalar.within::<N>(limit) {
+        return bound;
+    }
+    if levels == 0 {
+        return bound;
+    }
+    let mut worst = 0f64;
+    let mut take = |sub: [Uv; N]| {
+        worst = worst.max(refine((nets, scalar), patch, sub, limit, levels - 1, f));
+        worst > limit
+    };
+    if N == 2 {
+        let m = 0.5 * (at[0] + at[1]);
+        let _ = take([at[0], m].as_slice().try_into().expect("two"))
+            || take([m, at[1]].as_slice().try_into().expect("two"));
+    } else {
+        let (a, b, c) = (0.5 * (at[0] + at[1]), 0.5 * (at[1] + at[2]), 0.5 * (at[2] + at[0]));
+        let subs = [[a, b, c], [at[0], a, c], [a, at[1], b], [c, b, at[2]]];
+        let _ = subs.iter().any(|s| take(s.as_slice().try_into().expect("three")));
+    }
+    worst
+}
