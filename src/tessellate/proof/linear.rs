@@ -132,8 +132,8 @@ impl Linear {
 mod tests {
     use crate::math::{Frame, Uv};
     use crate::nurbs::sweep;
-    use crate::tessellate::flat::from_chord;
-    use crate::tessellate::near::Near;
+    use crate::tessellate::proof::flat::from_chord;
+    use crate::tessellate::proof::near::Near;
     use crate::tessellate::settings::Field;
     use crate::tessellate::sheet::Sheet;
 
