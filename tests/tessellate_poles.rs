@@ -4,22 +4,14 @@
 //! piece is the sector between the parameter lines of the facet's other corners into the pole. One side of the claim is sampled here:
 //! the spline over the sector against the facet.
 
+mod tessellate_support;
+
 use lampyris::math::{Homogeneous, Point, Uv};
 use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::Surface;
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
-
-fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
-    let mut t = vec![0.0; degree + 1];
-    let mut at = 0.0;
-    for &(step, times) in inner {
-        at += 0.25 + step as f64 / 256.0;
-        t.extend(std::iter::repeat_n(at, 1 + times as usize % degree));
-    }
-    t.extend(std::iter::repeat_n(at + 1.0, degree + 1));
-    t
-}
+use tessellate_support::knots;
 
 /// A fan of rational surface with the side at the first (or last) parameter of one direction in one point; weights run over four decades.
 fn fans() -> impl Strategy<Value = (Surface, usize, bool)> {

@@ -1,11 +1,14 @@
 //! The bound against sampling: what it costs in facets, how errors converge, and that nothing proved is ever over.
 
+mod tessellate_support;
+
 use lampyris::math::{Frame, Homogeneous, Point, Uv, Vector};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Judge, Settings, Tessellation, tessellate};
 use proptest::prelude::*;
 use std::f64::consts::PI;
+use tessellate_support::knots;
 
 fn model(surface: Surface, closed: bool) -> Model {
     let face = Face::whole(surface);
@@ -92,17 +95,6 @@ fn normal_errors_converge_as_theory_says() {
     let slope = |a: f64, b: f64| (a / b).log2() / 4.0;
     assert!((slope(b0, b1) - 1.0).abs() < 0.2, "{}", slope(b0, b1));
     assert!((slope(f0, f1) - 0.5).abs() < 0.1, "{}", slope(f0, f1));
-}
-
-fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
-    let mut t = vec![0.0; degree + 1];
-    let mut at = 0.0;
-    for &(step, times) in inner {
-        at += 0.25 + step as f64 / 256.0;
-        t.extend(std::iter::repeat_n(at, 1 + times as usize % degree));
-    }
-    t.extend(std::iter::repeat_n(at + 1.0, degree + 1));
-    t
 }
 
 fn surfaces() -> impl Strategy<Value = Surface> {

@@ -14,6 +14,14 @@ pub(super) fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Optio
     partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
 }
 
+/// The piece of a ray around its hit that lies within the glue distance of the face, that face left out.
+fn beside(context: &Context<'_>, ray: &Ray, hit: &Hit, point: Point) -> Ray {
+    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
+    let reach = context.bound.scene.run.glue_mm / cos;
+    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+    Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from)
+}
+
 /// Faces within the glue distance among which the partner is looked for.
 const NEAR: usize = 6;
 
@@ -26,9 +34,7 @@ fn partner(
     point: Point,
 ) -> Option<(Hit, FaceOptics, Point)> {
     let along = ray.direction.dot(hit.geometric_normal);
-    let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    let mut probe = Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from);
+    let mut probe = beside(context, ray, hit, point);
     // Near an edge others come in between.
     for _ in 0..NEAR {
         let found = context.intersector.intersect(&probe, &mut Cost::default())?;
@@ -82,13 +88,10 @@ pub(super) fn contact(
     face: FaceOptics,
     point: Point,
 ) -> Option<(Hit, FaceOptics, Point)> {
-    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
-    let reach = context.bound.scene.run.glue_mm / cos;
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
     let probe = match face.sealed {
         // Only light that has just left another face can have slipped in.
         true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction).within(0.0, SLIP).leaving(ray.from?),
-        false => Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from),
+        false => beside(context, ray, hit, point),
     };
     let found = context.intersector.intersect(&probe, &mut Cost::default())?;
     let other = *context.bound.faces.get(found.face.index())?;
