@@ -10,7 +10,7 @@ use super::witness::Witness;
 use super::{Failure, cells, files, look};
 use crate::formats::{ColourMap, Facets, Polylines, write_facets, write_vtp};
 use crate::intersect::bvh::Bvh;
-use crate::intersect::exact::Exact;
+use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::Octree;
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
@@ -179,7 +179,7 @@ impl Prepared<'_> {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let spinner = context.spinner("building BVH and spline for the cross-check");
         let bvh = Bvh::build(mesh, &Default::default());
-        let exact = Exact::build(model, &Default::default());
+        let exact = Exact::build(model, &exact::Settings::for_few_rays());
         // The court is about facets: a run on the spline, or polished to it, is no witness for the octree.
         let facets = self.choice.intersector == IntersectorKind::Octree && self.choice.normals != NormalMode::Exact;
         let own = (!facets).then(|| Octree::build(mesh, &Default::default()));

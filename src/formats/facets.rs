@@ -64,7 +64,7 @@ impl<'a> Facets<'a> {
     }
 
     /// The facets of each group, in the mesh's order.
-    pub(super) fn by_group(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn by_group(&self) -> Vec<Vec<usize>> {
         let mut lists = vec![Vec::new(); self.groups.len()];
         for (i, facet) in self.mesh.facets.iter().enumerate() {
             lists[self.group_of(facet.face)].push(i);

@@ -1,4 +1,4 @@
-use crate::formats::{ColourMap, Facets, Polylines};
+use crate::formats::{ColourMap, Facets, Group, Polylines};
 use crate::math::Point;
 use rustc_hash::FxHashMap;
 
@@ -76,20 +76,17 @@ impl View {
         let mut view = Self { name: name.into(), title: title.into(), caption: String::new(), shapes: Vec::new() };
         let mut merged = 0.0f64;
         let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
-        for (g, group) in facets.groups.iter().enumerate() {
-            let (points, triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
-            if triangles.is_empty() {
-                continue;
-            }
+        for shown in shown(facets) {
+            let (points, triangles) = triangles_of(facets, &shown.facets);
             let limit = (SHOWN * triangles.len()).div_ceil(total.max(1)).max(2000);
             let (points, triangles, cell) = simplified(points, triangles, limit);
             merged = merged.max(cell);
             view.shapes.push(Shape::Surface {
-                name: group.name.clone(),
+                name: shown.name,
                 points,
                 triangles,
-                colour: group.colour,
-                opacity: group.opacity,
+                colour: shown.group.colour,
+                opacity: shown.group.opacity,
                 values: None,
             });
         }
@@ -119,16 +116,13 @@ impl View {
         };
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
-        for (g, group) in facets.groups.iter().enumerate() {
-            let (mut points, mut triangles) = triangles_of(facets, |face| facets.group_of(face) == g);
-            if triangles.is_empty() {
-                continue;
-            }
-            let own = facets.mesh.facets.iter().enumerate().filter(|(_, f)| facets.group_of(f.face) == g);
+        for shown in shown(facets) {
+            let (mut points, mut triangles) = triangles_of(facets, &shown.facets);
             let mut per_triangle: Vec<f32> = Vec::with_capacity(triangles.len());
-            for (i, facet) in own {
+            for &i in &shown.facets {
                 let value = values.get(i).map_or(f32::NAN, |v| *v as f32);
-                per_triangle.extend(std::iter::repeat_n(value, if facet.is_triangle() { 1 } else { 2 }));
+                let count = if facets.mesh.facets[i].is_triangle() { 1 } else { 2 };
+                per_triangle.extend(std::iter::repeat_n(value, count));
             }
             if step > 1 {
                 triangles = triangles.into_iter().step_by(step).collect();
@@ -136,9 +130,9 @@ impl View {
                 (points, triangles) = used(&points, &triangles);
             }
             let values = Some(Values { label: label.into(), values: per_triangle, map });
-            let opacity = if group.opacity < 1.0 { 0.4 } else { 1.0 };
+            let opacity = if shown.group.opacity < 1.0 { 0.4 } else { 1.0 };
             view.shapes.push(Shape::Surface {
-                name: group.name.clone(),
+                name: shown.name,
                 points,
                 triangles,
                 colour: [0.6; 3],
@@ -207,12 +201,50 @@ impl View {
 
 type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
-/// The traced triangles of some faces, positions shared.
-fn triangles_of(facets: &Facets, wanted: impl Fn(crate::math::FaceId) -> bool) -> Triangles {
+/// Parts that are shown under names of their own; of more, those that look the same are one surface, for a thousand entries of a
+/// legend tell nothing and took 20 s.
+const NAMED: usize = 40;
+
+/// One surface of a view.
+struct Shown<'a> {
+    name: String,
+    group: &'a Group,
+    facets: Vec<usize>,
+}
+
+/// The facets of a view, by part or, where there are many, by look.
+fn shown<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
+    let lists = facets.by_group().into_iter().zip(&facets.groups).filter(|(list, _)| !list.is_empty());
+    let mut all: Vec<Shown> =
+        lists.map(|(facets, group)| Shown { name: group.name.clone(), group, facets }).collect();
+    if all.len() <= NAMED {
+        return all;
+    }
+    let mut looks: Vec<(Shown, usize)> = Vec::new();
+    for part in all.drain(..) {
+        let same = |s: &Shown| (s.group.colour, s.group.opacity) == (part.group.colour, part.group.opacity);
+        match looks.iter_mut().find(|(s, _)| same(s)) {
+            Some((s, more)) => {
+                s.facets.extend(part.facets);
+                *more += 1;
+            }
+            None => looks.push((part, 0)),
+        }
+    }
+    let named = |(s, more): (Shown<'a>, usize)| match more {
+        0 => s,
+        _ => Shown { name: format!("{} and {} more", s.name, super::grouped(more as u64)), ..s },
+    };
+    looks.into_iter().map(named).collect()
+}
+
+/// The traced triangles of some facets, positions shared.
+fn triangles_of(facets: &Facets, wanted: &[usize]) -> Triangles {
     let mesh = facets.mesh;
     let mut index = FxHashMap::default();
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    for (i, facet) in mesh.facets.iter().enumerate().filter(|(_, f)| wanted(f.face)) {
+    for &i in wanted {
+        let facet = &mesh.facets[i];
         let [a, b, c, d] = mesh.corner_positions(i).map(|p| {
             *index.entry(p).or_insert_with(|| {
                 points.push(mesh.positions[p as usize].as_vec3().to_array());
@@ -282,6 +314,38 @@ fn simplified(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{FaceId, Uv, Vector};
+    use crate::mesh::{Facet, FacetMesh, MeshVertex};
+
+    #[test]
+    fn many_parts_of_one_look_are_one_surface() {
+        let part_count = 100;
+        let mut mesh = FacetMesh::default();
+        for k in 0..part_count {
+            let first = mesh.vertices.len() as u32;
+            for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)] {
+                let position = mesh.positions.len() as u32;
+                mesh.positions.push(Point::new(x, y, f64::from(k)));
+                mesh.vertices.push(MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO });
+            }
+            mesh.facets.push(Facet { vertices: [first, first + 1, first + 2, first + 2], face: FaceId(k as u32) });
+        }
+        let look = |k: i32| if k % 2 == 0 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let groups = |n: i32| (0..n).map(|k| Group::solid(&format!("p{k}"), look(k))).collect();
+        let of = |n: i32| {
+            let group_of_face = (0..part_count).map(|k| (k % n) as u32).collect();
+            let facets = Facets { groups: groups(n), group_of_face, ..Facets::plain(&mesh, "") };
+            let view = View::of_facets("v", "V", &facets);
+            let named = |s: &Shape| match s {
+                Shape::Surface { name, triangles, .. } => (name.clone(), triangles.len()),
+                _ => panic!(),
+            };
+            view.shapes.iter().map(named).collect::<Vec<_>>()
+        };
+        assert_eq!(of(100), [("p0 and 49 more".to_owned(), 50), ("p1 and 49 more".to_owned(), 50)]);
+        let few = of(20);
+        assert!(few.len() == 20 && few.iter().all(|(_, n)| *n == 5), "{few:?}");
+    }
 
     #[test]
     fn simplifying_keeps_the_extent_within_a_cell() {
