@@ -121,3 +121,39 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
         assert!(e.to_string().contains(says) && e.line().is_some(), "{text}: {e}");
     }
 }
+
+/// Light of wavelengths that a table or a formula was not made for is used at the table's ends, and this is said by name.
+#[test]
+fn light_beyond_a_table_is_named() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
+    let model = step::read(&file, &step::Settings::default()).unwrap().model;
+    let index = "index_table = [[420, 1.53], [700, 1.51]]";
+    let clear = "index = 1.5\nabsorption_per_mm = [[420, 0.01], [700, 0.02]]";
+    let coat = |from: f64| {
+        format!("coating = [[0, {from:?}, 0.1, 0.8], [0, 700, 0.1, 0.8], [90, {from:?}, 1, 0], [90, 700, 1, 0]]")
+    };
+    for (medium, coating, spectrum, says) in [
+        (index, String::new(), "kind = 'lines', values = [[450, 1], [650, 1]]", &[][..]),
+        (index, String::new(), "kind = 'lines', values = [[450, 1], [750, 1]]", &["index_table", "750"]),
+        (clear, String::new(), "kind = 'd65'", &["absorption_per_mm", "360 to 830"]),
+        ("index = 1.5", coat(400.0), "kind = 'white_led'", &["coating", "400 to 700", "380 to 780"]),
+        ("index = 1.5", coat(400.0), "kind = 'table', values = [[400, 1], [700, 2]]", &[]),
+        (
+            "index = 1.5",
+            "reflectance = [[0, 500, 0.5], [0, 600, 0.7]]".into(),
+            "kind = 'black_body', kelvin = 3000",
+            &["reflectance"],
+        ),
+        ("catalogue = 'PMMA'", String::new(), "values = [[405, 1]]", &["'PMMA'", "436.8", "405 nm", "formula"]),
+        ("catalogue = 'fused silica'", String::new(), "values = [[405, 1]]", &[]),
+    ] {
+        let surface = if coating.is_empty() { String::new() } else { format!("surface = 'coating'\n{coating}\n") };
+        let text = format!(
+            "[[medium]]\nname = 'g'\n{medium}\n[[material]]\npart = '*'\nmedium = 'g'\n{surface}{REST}    name = 'lamp'\n    spectrum = {{ {spectrum} }}\n"
+        );
+        let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
+        let notes = scene.bind(&model).expect(&text).notes().join("; ");
+        assert_eq!(notes.is_empty(), says.is_empty(), "{text}: {notes}");
+        assert!(says.iter().all(|word| notes.contains(word)), "{text}: {notes}");
+    }
+}

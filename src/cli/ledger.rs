@@ -52,15 +52,9 @@ pub(super) fn write(folder: &Path, results: &Results, prepared: &Prepared) -> Re
     Ok(true)
 }
 
-/// Says which bodies are open: light that goes in by a face and out by the opening is lost.
-pub(super) fn warn_of_openings(prepared: &Prepared, context: &Context) {
-    let open = prepared.bound.open_bodies(&prepared.job.loaded.model);
-    let Some([first, medium]) = open.first() else { return };
-    let others = if open.len() > 1 { format!(" (and {} more)", open.len() - 1) } else { String::new() };
-    context.say(format_args!(
-        "'{first}'{others} has the medium '{medium}' but no closed shell: light that passes its opening is lost; close it in the \
-         model, or give it a surface instead of a medium"
-    ));
+/// Says what is open in the scene, or beyond its tables.
+pub(super) fn warn(prepared: &Prepared, context: &Context) {
+    prepared.bound.notes().iter().for_each(|note| context.say(note));
 }
 
 /// Why rays were lost and where, the most frequent first.

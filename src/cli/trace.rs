@@ -41,11 +41,11 @@ pub(super) fn run(
         Job { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, recheck: RECHECKED, aimed };
     let mut prepared = job::prepare(job, context)?;
     let until = extra.until_error.as_deref().map(|text| until::Until::new(text, &scene)).transpose()?;
+    ledger::warn(&prepared, context);
     if extra.dry_run {
         return dry_run(&prepared, folder, context);
     }
     let refused = load::account(&loaded.reports, extra.limits.max_refused, context);
-    ledger::warn_of_openings(&prepared, context);
     if !replay.is_empty() {
         ledger::run(&prepared, &replay, folder, context)?;
         return Ok(refused);

@@ -176,7 +176,8 @@ impl Light<'_> {
     }
 
     fn light(&self) -> Section {
-        let mut section = Section::new("Light");
+        let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
+        let mut section = notes.fold(Section::new("Light"), |s, note| s.with(note.as_str()));
         let mut maps: Vec<(&ReceiverResult, Grid)> =
             (self.results.receivers.iter()).filter_map(|r| Some((r, receiver_grid(r)?))).collect();
         // Directions first: what a lamp is judged by.

@@ -29,6 +29,8 @@ pub struct Results {
     pub threads: usize,
     /// What was simulated and what not.
     pub effects: EffectsUsed,
+    /// What a reader must know: bodies that are open, light beyond the wavelengths of a table.
+    pub notes: Vec<String>,
     /// Where the power went.
     pub power: Power,
     /// Paths that were lost.
@@ -213,6 +215,7 @@ impl Results {
                 not_simulated: required.not_simulated.clone(),
                 kernel: kernel.name(),
             },
+            notes: bound.notes.clone(),
             power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },
             lost_rays: lost,
             cut_off_rays: cut_off,

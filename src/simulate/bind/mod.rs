@@ -2,6 +2,7 @@
 
 mod bodies;
 mod nearest;
+mod notes;
 mod select;
 
 use super::emitter::{self, Area, Emitter, Loaded};
@@ -84,6 +85,8 @@ pub struct BoundScene {
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,
     pub(crate) instance_of_face: Vec<u32>,
+    /// Sentences about what in the scene is open or beyond its tables.
+    pub(crate) notes: Vec<String>,
 }
 
 impl Scene {
@@ -96,6 +99,7 @@ impl Scene {
         let loaded: Vec<Option<Loaded>> =
             self.sources.iter().enumerate().map(|(i, s)| emitter::load(self, i, s)).collect::<Result<_, _>>()?;
         let light = light(self, &loaded);
+        let spectra = notes::wavelengths(self, &loaded);
         let chosen = chosen_rules(self, model)?;
         let mut surfaces = vec![Surface::Absorber, Surface::Interface];
         let default = Material { surface: Some(self.default_surface), ..Material::default() };
@@ -139,10 +143,11 @@ impl Scene {
             };
             receivers.push(Receiver::new(r, faces));
         }
+        let notes = notes::beyond_tables(self, &chosen, &spectra);
         let faces_box = model.placed_faces().map(|f| nearest::bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
         let region = faces_box.union(Aabb::around(emitters.iter().flat_map(Emitter::reach)));
         let region = if region.is_empty() { region } else { region.grown(1e-3 * region.diagonal()) };
-        Ok(BoundScene {
+        let mut bound = BoundScene {
             scene: self.clone(),
             faces,
             surfaces,
@@ -155,7 +160,10 @@ impl Scene {
             region,
             instances: model.instances.iter().map(|i| i.name.clone()).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
-        })
+            notes,
+        };
+        bound.notes.extend(notes::openings(&bound, model));
+        Ok(bound)
     }
 }
 
@@ -165,17 +173,9 @@ impl BoundScene {
         self.bodies.get(usize::from(body)).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 
-    /// Instance and medium of every body that has faces in no closed shell.
-    pub fn open_bodies(&self, model: &Model) -> Vec<[&str; 2]> {
-        let open =
-            |f: &PlacedFace<'_>| f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed);
-        let mut bodies: Vec<u16> = (model.placed_faces().filter(open))
-            .filter_map(|f| Some(self.faces.get(f.id.index())?.body))
-            .filter(|body| *body != AMBIENT)
-            .collect();
-        bodies.sort_unstable();
-        bodies.dedup();
-        bodies.into_iter().filter_map(|body| self.body(body)).collect()
+    /// What someone who reads the results must know: bodies that are open, light beyond the wavelengths of a table.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// The instance of a face, by the face's index in the model.

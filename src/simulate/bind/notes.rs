@@ -1,0 +1,123 @@
+//! What someone who reads the results must know about the scene: bodies that are open, and light of wavelengths that a table or a
+//! formula was not made for.
+
+use super::{AMBIENT, BoundScene, Chosen, Loaded};
+use crate::model::{Model, PlacedFace};
+use crate::optics::catalogue;
+use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
+use std::collections::BTreeSet;
+
+/// First and last wavelength of each source, nm.
+pub(super) fn wavelengths(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
+    let run = [scene.run.wavelength_nm; 2];
+    let range = |i: &f64| [*i, *i];
+    (scene.sources.iter().zip(loaded))
+        .map(|(source, loaded)| match (&source.spectrum, loaded) {
+            (Some(key), _) => {
+                key.optics().and_then(|s| s.sampler().map_err(|e| e.to_string())).map_or(run, |s| s.range_nm())
+            }
+            (None, Some(Loaded::Rays(list))) => {
+                let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
+                all.fold(None, |r: Option<[f64; 2]>, nm| {
+                    r.map_or(Some(range(&nm)), |[a, b]| Some([a.min(nm), b.max(nm)]))
+                })
+                .unwrap_or(run)
+            }
+            _ => run,
+        })
+        .collect()
+}
+
+/// Something that is known between two wavelengths alone.
+struct Known {
+    what: String,
+    range: [f64; 2],
+    /// What is taken beyond them.
+    beyond: &'static str,
+}
+
+const ENDS: &str = "its first and last values are used there";
+const FORMULA: &str = "the formula is used all the same there";
+
+/// One sentence for each table in use that some source's light lies outside of.
+pub(super) fn beyond_tables(scene: &Scene, chosen: &Chosen, light: &[[f64; 2]]) -> Vec<String> {
+    let media = chosen.iter().filter_map(|(_, rule)| scene.materials.get((*rule)?)?.medium.as_deref());
+    let media: BTreeSet<&str> = media.chain(scene.ambient.as_deref()).collect();
+    let surfaces: BTreeSet<usize> = chosen.iter().filter_map(|(rule, _)| *rule).collect();
+    let mut known: Vec<Known> = media.iter().flat_map(|name| of_medium(scene, name)).collect();
+    for rule in surfaces {
+        let Some(material) = scene.materials.get(rule) else { continue };
+        known.extend(of_surface(material).map(|(key, range)| Known {
+            what: format!("`{key}` of [[material]] {}", rule + 1),
+            range,
+            beyond: ENDS,
+        }));
+    }
+    known.iter().filter_map(|k| sentence(scene, k, light)).collect()
+}
+
+fn sentence(scene: &Scene, known: &Known, light: &[[f64; 2]]) -> Option<String> {
+    let [from, to] = known.range;
+    let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - 1e-9) || *b > to * (1.0 + 1e-9);
+    let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
+    let whose = match scene.sources.get(source).map(|s| s.name.as_str()) {
+        Some(name) if !name.is_empty() => format!("the source '{name}'"),
+        _ => format!("[[source]] {}", source + 1),
+    };
+    let light = if a == b { format!("{a} nm") } else { format!("{a} to {b} nm") };
+    let known_for = if from == to { format!("{from} nm alone") } else { format!("{from} to {to} nm") };
+    Some(format!("{} is known for {known_for}, but {whose} has light of {light}: {}", known.what, known.beyond))
+}
+
+fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
+    let first = nm.next()?;
+    Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))
+}
+
+fn of_medium(scene: &Scene, name: &str) -> Vec<Known> {
+    let mut known = Vec::new();
+    let mut add = |what: String, range: Option<[f64; 2]>, beyond| {
+        known.extend(range.map(|range| Known { what, range, beyond }))
+    };
+    let own = scene.media.iter().find(|m| m.name == name);
+    let entry = own.map_or(Some(name), |m| m.catalogue.as_deref());
+    if let Some(entry) = entry {
+        add(format!("the index of '{entry}'"), catalogue::range_nm(entry), FORMULA);
+    }
+    if let Some(medium::Medium { index_table, absorption_per_mm, .. }) = own {
+        // A single point is a constant.
+        let range = |t: &Vec<[f64; 2]>| if t.len() > 1 { ends(t.iter().map(|p| p[0])) } else { None };
+        add(format!("`index_table` of the medium '{name}'"), index_table.as_ref().and_then(range), ENDS);
+        if let Some(ByWavelength::Table(t)) = absorption_per_mm {
+            add(format!("`absorption_per_mm` of the medium '{name}'"), range(t), ENDS);
+        }
+    }
+    known
+}
+
+fn of_surface(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
+    let coating = m.coating.as_ref().and_then(|rows| ends(rows.iter().filter_map(|r| r.get(1).copied())));
+    let reflectance = match &m.reflectance {
+        Some(Reflectance::ByAngleAndWavelength(rows)) => ends(rows.iter().map(|r| r[1])),
+        _ => None,
+    };
+    [("coating", coating), ("reflectance", reflectance)].into_iter().filter_map(|(key, range)| Some((key, range?)))
+}
+
+/// One sentence about the bodies that have faces in no closed shell.
+pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
+    let open =
+        |f: &PlacedFace<'_>| f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed);
+    let mut bodies: Vec<u16> = (model.placed_faces().filter(open))
+        .filter_map(|f| Some(bound.faces.get(f.id.index())?.body))
+        .filter(|body| *body != AMBIENT)
+        .collect();
+    bodies.sort_unstable();
+    bodies.dedup();
+    let [first, medium] = bound.body(*bodies.first()?)?;
+    let others = if bodies.len() > 1 { format!(" (and {} more)", bodies.len() - 1) } else { String::new() };
+    Some(format!(
+        "'{first}'{others} has the medium '{medium}' but no closed shell: light that passes its opening is lost; close it in the \
+         model, or give it a surface instead of a medium"
+    ))
+}
