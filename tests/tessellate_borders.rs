@@ -1,9 +1,13 @@
 //! Borders that were hard to mesh, built here: nothing over its tolerance, everything proved.
 
+mod tessellate_support;
+
 use lampyris::math::{Frame, Point, Uv};
 use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
+use std::collections::HashSet;
+use tessellate_support::judge;
 
 /// A face between chains of points in the parameter plane, one chain an edge; each edge follows the surface from point to point.
 fn face(surface: Surface, loops: &[Vec<Vec<Uv>>]) -> Model {
@@ -149,4 +153,43 @@ fn a_face_between_two_chords_gets_a_facet() {
     let made = tessellate(&face(plane, &[vec![chain(1, |f| b.lerp(a, f)), arc]]), &measured(0.1));
     assert_proved(&made);
     assert_eq!(made.report.facets, 1);
+}
+
+/// A hole that touches the outer loop in one place, where the file has a vertex for each of them: one corner for both, and the lid in the
+/// hole has the same.
+#[test]
+fn loops_that_touch_in_two_vertices_have_one_corner_there() {
+    let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, [0.0, 1.0], [0.0, 60.0]);
+    let touch = Uv::new(0.45, 10.0);
+    let c = [Uv::new(0.1, 10.0), touch, Uv::new(0.9, 10.0), Uv::new(0.9, 50.0), Uv::new(0.1, 50.0)];
+    let outer = (0..5).map(|k| chain(64, |f| c[k].lerp(c[(k + 1) % 5], f))).collect();
+    let ring = |f: f64| {
+        let (sin, cos) = (std::f64::consts::TAU * if f == 1.0 { 0.0 } else { f }).sin_cos();
+        touch + Uv::new(-0.25 * sin, 9.0 - 9.0 * cos)
+    };
+    let hole = vec![chain(256, ring)];
+    let mut model = face(wall, &[outer, hole]);
+    let faces = &mut model.parts[0].shells[0].faces;
+    let mut lid = faces[0].clone();
+    let mut around = lid.loops[1].clone();
+    around.uses[0].reversed = true;
+    lid.loops = vec![around];
+    faces.push(lid);
+    let made = tessellate(&model, &measured(0.1));
+    assert_proved(&made);
+    let found = judge::judge(&model, &made, 2e-3).unwrap();
+    assert_eq!(found.proved, found.facets);
+    let sides = |f: usize| {
+        let p = made.mesh.corner_positions(f);
+        (0..4).map(move |k| [p[k], p[(k + 1) % 4]]).filter(|s| s[0] != s[1])
+    };
+    let all: HashSet<[u32; 2]> = (0..made.mesh.facets.len()).flat_map(sides).collect();
+    let open = all.iter().filter(|s| !all.contains(&[s[1], s[0]]));
+    let rim = open.map(|s| s.map(|p| made.mesh.positions[p as usize]));
+    // What is open lies on the outer loop: on one of its four sides.
+    let level = |p: &Point| [p.z - 10.0, p.z - 50.0, p.y.atan2(p.x) - 0.1, p.y.atan2(p.x) - 0.9];
+    for [a, b] in rim {
+        let on = level(&a).iter().zip(level(&b)).any(|(x, y)| x.abs().max(y.abs()) < 1e-2);
+        assert!(on, "{a} {b}");
+    }
 }

@@ -1,11 +1,14 @@
 //! Closed shells of two random rational sheets over one rim: watertight to the bit, outward, and of the right volume.
 
+mod tessellate_support;
+
 use lampyris::math::{Homogeneous, Point, Uv};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Surface, UvCurve};
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
 use std::collections::HashMap;
+use tessellate_support::cases;
 
 /// A knot vector from 0 to 1 whose inner knots have any multiplicity up to the degree.
 fn knots(degree: usize, inner: &[u8]) -> Vec<f64> {
@@ -102,13 +105,8 @@ fn volume_below(surface: &Surface) -> f64 {
     us.iter().map(|u| vs.iter().map(|v| at(u, v)).sum::<f64>()).sum()
 }
 
-/// Few by default; `PROPTEST_CASES` asks for more.
-fn cases() -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(32)
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(32), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn two_sheets_over_one_rim_close(sheets in sheets()) {

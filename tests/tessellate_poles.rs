@@ -11,7 +11,8 @@ use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::Surface;
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
-use tessellate_support::knots;
+use tessellate_support::judge::to_triangle;
+use tessellate_support::{cases, knots};
 
 /// A fan of rational surface with the side at the first (or last) parameter of one direction in one point; weights run over four decades.
 fn fans() -> impl Strategy<Value = (Surface, usize, bool)> {
@@ -40,20 +41,6 @@ fn fans() -> impl Strategy<Value = (Surface, usize, bool)> {
             (Surface { degree, knots, points }, across, last)
         },
     )
-}
-
-/// Distance of a point to a triangle: to its plane over its inside, else to the nearest of its sides.
-fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let side = |x: Point, y: Point| {
-        let t = ((p - x).dot(y - x) / (y - x).length_squared().max(1e-300)).clamp(0.0, 1.0);
-        (x + (y - x) * t - p).length()
-    };
-    let sides = side(a, b).min(side(b, c)).min(side(c, a));
-    let (e, f, g) = (b - a, c - a, p - a);
-    let (ee, ef, ff, ge, gf) = (e.dot(e), e.dot(f), f.dot(f), g.dot(e), g.dot(f));
-    let det = ee * ff - ef * ef;
-    let (s, t) = ((ff * ge - ef * gf) / det, (ee * gf - ef * ge) / det);
-    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 { sides.min((g - e * s - f * t).length()) } else { sides }
 }
 
 /// Largest distance of the spline over each facet's piece to the facet, in tolerances, of certified facets at the pole and of others.
@@ -105,7 +92,7 @@ fn worst(surface: &Surface, across: usize, last: bool, tolerance: f64) -> ([f64;
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: std::env::var("CASES").ok().and_then(|c| c.parse().ok()).unwrap_or(12), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(12), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn certified_facets_at_a_pole_are_never_over((surface, across, last) in fans(), fine in any::<bool>()) {

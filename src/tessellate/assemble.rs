@@ -88,7 +88,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         };
         let coarse: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.coarse).map(|e| e.0 as usize).collect();
         if coarse.is_empty() || tries == TRIES {
-            return PartMesh { shared, faces: meshes };
+            return joined(PartMesh { shared, faces: meshes });
         }
         tries += 1;
         for e in coarse {
@@ -96,6 +96,32 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         }
         before = Some(Before { divisions, shared: shared.len(), meshes });
     }
+}
+
+/// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there, the
+/// faces beyond must have the same.
+fn joined(mut mesh: PartMesh) -> PartMesh {
+    let all: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.same.iter().copied()).collect();
+    if all.is_empty() {
+        return mesh;
+    }
+    let mut first: Vec<u32> = (0..mesh.shared.len() as u32).collect();
+    let find = |first: &[u32], mut p: u32| {
+        while first[p as usize] != p {
+            p = first[p as usize];
+        }
+        p
+    };
+    for [a, b] in all {
+        let (a, b) = (find(&first, a), find(&first, b));
+        first[a.max(b) as usize] = a.min(b);
+    }
+    for (p, _, _) in mesh.faces.iter_mut().flatten().flat_map(|f| &mut f.corners) {
+        if (*p as usize) < first.len() {
+            *p = find(&first, *p);
+        }
+    }
+    mesh
 }
 
 /// What a part looked like before some of its edges were sampled more densely.
@@ -136,6 +162,7 @@ impl Moved {
             let own = (*p as usize).checked_sub(self.to.len());
             *p = own.map_or_else(|| self.to[*p as usize], |own| (shared + own) as u32);
         }
+        mesh.same.iter_mut().flatten().for_each(|p| *p = self.to[*p as usize]);
         mesh
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct FaceMesh {
     pub(super) tolerances: Vec<f64>,
     /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
     pub(super) coarse: Vec<EdgeId>,
+    /// Shared positions that are one: vertices of the file in one place, where loops touch.
+    pub(super) same: Vec<[u32; 2]>,
     /// Whether something was given up: crossing borders, an exhausted budget.
     pub(super) repaired: bool,
 }
@@ -75,8 +77,12 @@ pub(super) fn mesh(
     }
     let mut own = rings.own;
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
-    let mut out =
-        FaceMesh { own, repaired: leaves.exhausted || !strip.conflicts.is_empty(), ..FaceMesh::default() };
+    let mut out = FaceMesh {
+        own,
+        same: border.same,
+        repaired: leaves.exhausted || !strip.conflicts.is_empty(),
+        ..FaceMesh::default()
+    };
     // Where the budget has ended, shorter chords only cost more.
     let unproved = if leaves.exhausted { Vec::new() } else { strip.unproved_chords(&trims) };
     let coarse = strip.conflicts.iter().chain(&strip.crossed).chain(&unproved);
@@ -100,6 +106,8 @@ struct Border {
     followed: FxHashMap<[u32; 2], EdgeId>,
     /// Segments that are one point in space.
     poles: Vec<[u32; 2]>,
+    /// Positions of vertices that the file has twice, where loops touch.
+    same: Vec<[u32; 2]>,
 }
 
 fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, shared: &[Point]) -> Border {
@@ -113,15 +121,38 @@ fn border(part: &Part, loops: &[TrimLoop], sheet: &Sheet<'_>, rings: &Rings, sha
         trims: FxHashMap::default(),
         followed: FxHashMap::default(),
         poles: Vec::new(),
+        same: Vec::new(),
     };
+    let (lo, hi) = rings.bounds();
+    let near = 1e-9 * (hi - lo);
+    let mut vertices: FxHashMap<[u64; 3], u32> = FxHashMap::default();
     let sides: Vec<_> = loops.iter().flat_map(|l| &l.uses).collect();
     let mut followed: Vec<([u32; 2], &EdgeUse, EdgeId, [f64; 2])> = Vec::new();
     for ring in &rings.rings {
-        let first = out.nodes.len() as u32;
-        let n = ring.len() as u32;
-        out.nodes.extend(ring.iter().map(|v| Node { uv: v.uv, place: place(v.position), position: v.position }));
-        for (k, v) in (0..n).zip(ring) {
-            let (a, b) = (first + k, first + (k + 1) % n);
+        // Loops that touch in a vertex have one corner there, or what follows its chords would be known of one of them alone.
+        let ids: Vec<u32> = ring
+            .iter()
+            .map(|v| {
+                let (id, at) = (out.nodes.len() as u32, place(v.position));
+                if (v.position as usize) < part.vertices.len() {
+                    let first = *vertices.entry(at.to_array().map(f64::to_bits)).or_insert(id);
+                    let met = out.nodes.get(first as usize);
+                    if let Some(met) = met.filter(|m| (m.uv - v.uv).abs().cmple(near).all()) {
+                        if met.position != v.position {
+                            out.same.push([met.position, v.position]);
+                        }
+                        return first;
+                    }
+                }
+                out.nodes.push(Node { uv: v.uv, place: at, position: v.position });
+                id
+            })
+            .collect();
+        for (k, v) in ring.iter().enumerate() {
+            let (a, b) = (ids[k], ids[(k + 1) % ids.len()]);
+            if a == b {
+                continue;
+            }
             match v.follows {
                 Follows::Pole => out.poles.push([a, b]),
                 Follows::Seam => out.segments.push([a, b]),

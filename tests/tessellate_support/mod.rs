@@ -1,4 +1,8 @@
 //! What the property tests of meshing share.
+#![allow(dead_code)]
+
+pub(crate) mod judge;
+pub(crate) mod shells;
 
 /// A clamped knot vector with uneven spans, inner knots of any multiplicity up to the degree.
 pub(crate) fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
@@ -10,4 +14,26 @@ pub(crate) fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
     }
     t.extend(std::iter::repeat_n(at + 1.0, degree + 1));
     t
+}
+
+/// How many random models a property is tried on: `few` by default, `PROPTEST_CASES` where that asks for more.
+pub(crate) fn cases(few: u32) -> u32 {
+    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(few)
+}
+
+/// The value that a strategy makes of a seed: a failure names a number instead of a thousand control points.
+pub(crate) fn seeded<S: proptest::strategy::Strategy>(strategy: S, seed: u64) -> S::Value {
+    use proptest::strategy::ValueTree;
+    use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+    let mut bytes = [0; 32];
+    bytes[..8].copy_from_slice(&seed.to_le_bytes());
+    let mut runner = TestRunner::new_with_rng(Config::default(), TestRng::from_seed(RngAlgorithm::ChaCha, &bytes));
+    strategy.new_tree(&mut runner).expect("a strategy that rejects nothing").current()
+}
+
+/// Seeds to try: `SEED` alone where it is set.
+pub(crate) fn seeds() -> impl proptest::strategy::Strategy<Value = u64> {
+    use proptest::prelude::*;
+    let one = std::env::var("SEED").ok().and_then(|s| s.parse().ok());
+    any::<u32>().prop_map(move |s| one.unwrap_or(u64::from(s)))
 }

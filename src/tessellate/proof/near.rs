@@ -295,6 +295,18 @@ mod tests {
     use crate::math::Frame;
     use crate::nurbs::{Surface, sweep};
 
+    /// Largest deviation from the linear map over a triangle at places of a lattice with `n` steps a side.
+    fn sampled(s: &Surface, corners: [Uv; 3], n: usize) -> f64 {
+        let at = corners.map(|x| s.evaluate(x));
+        let places = (0..=n).flat_map(|i| (0..=n - i).map(move |j| [i, j].map(|k| k as f64 / n as f64)));
+        let off = |[a, b]: [f64; 2]| {
+            let c = 1.0 - a - b;
+            let x = corners[0] * a + corners[1] * b + corners[2] * c;
+            (s.evaluate(x) - (at[0] * a + at[1] * b + at[2] * c)).length()
+        };
+        places.map(off).fold(0.0, f64::max)
+    }
+
     /// Bound and largest sampled deviation of a triangle.
     fn both(s: &Surface, corners: [Uv; 3]) -> (f64, f64) {
         let at = corners.map(|x| s.evaluate(x));
@@ -306,16 +318,7 @@ mod tests {
             u0 < hi.x && lo.x < u1 && v0 < hi.y && lo.y < v1
         };
         let bound = Near::default().bound(patches.iter().filter(meets), corners, at).unwrap();
-        let mut worst = 0f64;
-        for i in 0..=20 {
-            for j in 0..=20 - i {
-                let (a, b) = (i as f64 / 20.0, j as f64 / 20.0);
-                let c = 1.0 - a - b;
-                let x = corners[0] * a + corners[1] * b + corners[2] * c;
-                worst = worst.max((s.evaluate(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
-            }
-        }
-        (bound, worst)
+        (bound, sampled(s, corners, 20))
     }
 
     #[test]
@@ -367,15 +370,7 @@ mod tests {
             [Uv::new(0.1, 3.9), Uv::new(0.2, 0.1), Uv::new(0.8, 2.2)],
         ] {
             let at = corners.map(|x| s.evaluate(x));
-            let mut worst = 0f64;
-            for i in 0..=60 {
-                for j in 0..=60 - i {
-                    let (a, b) = (i as f64 / 60.0, j as f64 / 60.0);
-                    let c = 1.0 - a - b;
-                    let x = corners[0] * a + corners[1] * b + corners[2] * c;
-                    worst = worst.max((s.evaluate(x) - (at[0] * a + at[1] * b + at[2] * c)).length());
-                }
-            }
+            let worst = sampled(&s, corners, 60);
             assert!(Near::default().hull(patches.iter(), corners, at, 0.99 * worst).is_none());
             let bound = Near::default().hull(patches.iter(), corners, at, 2.0 * worst).unwrap();
             assert!(worst <= bound && bound <= 2.0 * worst, "{worst} {bound}");

@@ -1,0 +1,37 @@
+//! All promises of meshing on random closed shells of trimmed rational faces, looked at by sampling that shares nothing with the bound.
+//!
+//! Degrees 1 to 5, weights from 1e-2 to 1e2, inner knots up to full multiplicity, holes, cuts that leave slivers, sizes from a
+//! micrometre to a hundred metres, up to a thousand sizes off the origin. `PROPTEST_CASES` asks for more models, `SEED` for one.
+
+mod tessellate_support;
+
+use lampyris::tessellate::{Settings, tessellate};
+use proptest::prelude::*;
+use tessellate_support::{cases, judge, seeded, seeds, shells};
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(12), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::default() })]
+
+    #[test]
+    fn trimmed_shells_keep_all_promises(seed in seeds()) {
+        let ((sheets, cuts), fine, range) = seeded((shells::sheets(), 0.0015f64..0.03, prop_oneof![Just(1f64), 1f64..8.0]), seed);
+        let size = sheets[0].bounds().diagonal();
+        let tolerance = fine * size;
+        let (model, gap) = shells::pillow(&sheets, &cuts, 1e-4 * tolerance);
+        // What it strays between places that were looked at is no more than that.
+        let gap = 2.0 * gap;
+        let radii = [0.05 * size, 2.0 * size];
+        let settings = Settings { tolerance: [tolerance, range * tolerance], radii, budget: 1500, ..Settings::default() };
+        let made = tessellate(&model, &settings);
+        let start = std::time::Instant::now();
+        let found = judge::judge(&model, &made, gap);
+        if std::env::var("SHOW").is_ok() { println!("{seed} {cuts:?} degree {:?} size {size:.2e} {found:?} {:.2} {:.2}", sheets[0].degree, made.report.seconds.tessellate, start.elapsed().as_secs_f64()); }
+        prop_assert!(found.is_ok(), "{}", found.unwrap_err());
+        // The same bits on any number of threads.
+        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| tessellate(&model, &settings));
+        prop_assert!(alone.mesh == made.mesh && alone.quality == made.quality);
+        for q in &made.quality {
+            prop_assert!(q.tolerance >= tolerance * (1.0 - 1e-12) && q.tolerance <= range * tolerance * (1.0 + 1e-12));
+        }
+    }
+}
