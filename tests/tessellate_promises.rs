@@ -5,9 +5,17 @@
 
 mod tessellate_support;
 
-use lampyris::tessellate::{Settings, tessellate};
+use lampyris::model::Model;
+use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use proptest::prelude::*;
-use tessellate_support::{cases, judge, seeded, seeds, shells};
+use tessellate_support::{cases, judge, rounds, seeded, seeds, shells};
+
+/// Whether one thread makes the same bits.
+fn same_alone(model: &Model, settings: &Settings, made: &Tessellation) -> bool {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let alone = one.install(|| tessellate(model, settings));
+    alone.mesh == made.mesh && alone.quality == made.quality
+}
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(12), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::default() })]
@@ -27,11 +35,26 @@ proptest! {
         let found = judge::judge(&model, &made, gap);
         if std::env::var("SHOW").is_ok() { println!("{seed} {cuts:?} degree {:?} size {size:.2e} {found:?} {:.2} {:.2}", sheets[0].degree, made.report.seconds.tessellate, start.elapsed().as_secs_f64()); }
         prop_assert!(found.is_ok(), "{}", found.unwrap_err());
-        // The same bits on any number of threads.
-        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| tessellate(&model, &settings));
-        prop_assert!(alone.mesh == made.mesh && alone.quality == made.quality);
+        prop_assert!(same_alone(&model, &settings, &made));
         for q in &made.quality {
             prop_assert!(q.tolerance >= tolerance * (1.0 - 1e-12) && q.tolerance <= range * tolerance * (1.0 + 1e-12));
         }
+    }
+
+    #[test]
+    fn trimmed_rounds_keep_all_promises(seed in seeds()) {
+        let (round, fine, range) = seeded((rounds::rounds(), -3.5f64..-0.5, prop_oneof![Just(1f64), 1f64..8.0]), seed);
+        let tolerance = 10f64.powf(fine) * round.size();
+        let (model, gap) = round.model(1e-4 * tolerance);
+        let gap = 2.0 * gap;
+        let radii = [0.05 * round.size(), 2.0 * round.size()];
+        let settings = Settings { tolerance: [tolerance, range * tolerance], radii, budget: 20_000, ..Settings::default() };
+        let made = tessellate(&model, &settings);
+        let start = std::time::Instant::now();
+        let found = judge::judge(&model, &made, gap);
+        if std::env::var("SHOW").is_ok() { println!("{seed} {round:?} {found:?} {:.2} {:.2}", made.report.seconds.tessellate, start.elapsed().as_secs_f64()); }
+        prop_assert!(found.is_ok(), "{}", found.unwrap_err());
+        prop_assert!(found.unwrap().proved == made.mesh.facets.len());
+        prop_assert!(same_alone(&model, &settings, &made));
     }
 }

@@ -90,6 +90,26 @@ mod tests {
         assert!((n - f.x).length() < 1e-12, "outward on the outer equator");
     }
 
+    /// Rounding leaves a derivative around the apex, which grows with the cone.
+    #[test]
+    fn the_normal_at_the_apex_of_a_long_cone_is_that_of_its_meridian() {
+        let f = Frame::from_axis(Point::ZERO, Vector::new(-0.0566, 0.1699, 0.9838), None);
+        for half_angle in [0.0306f64, 0.5] {
+            for r in [1.0, 25_970.769_083] {
+                let (turn, apex) = ([0.0, 2.0 * PI], -r / half_angle.tan());
+                let c = cone(&f, r, half_angle, turn, [apex, 0.5 * r]);
+                for k in 0..40 {
+                    let u = 2.0 * PI * k as f64 / 40.0;
+                    let (sin, cos) = conic::angle_of_parameter(turn, u).sin_cos();
+                    let out = f.vector(Vector::new(cos, sin, 0.0)) * half_angle.cos();
+                    let want = out - f.vector(Vector::Z) * half_angle.sin();
+                    let off = c.normal(Uv::new(u, apex)).unwrap().angle_between(want);
+                    assert!(off < 1e-6, "{r} {half_angle} {u}: {off}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn an_extruded_line_is_a_plane() {
         let e = extrusion(&Curve::line(Point::ZERO, Point::X, [0.0, 1.0]), Vector::Y, [0.0, 2.0]);

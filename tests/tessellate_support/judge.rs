@@ -120,7 +120,42 @@ fn outlines(face: &Face) -> Vec<Vec<Uv>> {
         p.pop();
         p
     };
+    if face.loops.is_empty() {
+        let [[u0, u1], [v0, v1]] = face.surface.domain();
+        return vec![vec![Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)]];
+    }
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
+}
+
+/// The sides of the domain that are one point in space.
+pub(crate) struct Poles {
+    domain: [[f64; 2]; 2],
+    at: [[bool; 2]; 2],
+}
+
+impl Poles {
+    pub(crate) fn new(s: &Surface) -> Self {
+        let domain = [0, 1].map(|d| [s.knots[d][0], s.knots[d][s.knots[d].len() - 1]]);
+        let is = |d: usize, end: usize| {
+            let on = |f: f64| {
+                let [a, b] = domain[1 - d];
+                let mut uv = Uv::splat(a + (b - a) * f);
+                uv[d] = domain[d][end];
+                place(s, uv)
+            };
+            (0..=16).all(|k| (on(k as f64 / 16.0) - on(0.0)).length() <= 1e-9 * extent(s))
+        };
+        Self { domain, at: [0, 1].map(|d| [0, 1].map(|end| is(d, end))) }
+    }
+
+    /// The parameter that is constant on the pole where `uv` lies.
+    pub(crate) fn of(&self, uv: Uv) -> Option<usize> {
+        let near = |d: usize, end: usize| {
+            let [a, b] = self.domain[d];
+            (uv[d] - self.domain[d][end]).abs() <= 1e-9 * (b - a)
+        };
+        (0..2).find(|&d| (0..2).any(|end| self.at[d][end] && near(d, end)))
+    }
 }
 
 /// Where on a closed polygon a point lies: index of the side and the share of it, and how far off, in shares of the extent.
@@ -242,6 +277,7 @@ fn watertight(model: &Model, made: &Tessellation) -> Result<(), String> {
 fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap: f64) -> Result<(), String> {
     let s = &face.surface;
     let rounding = 1e-9 * extent(s);
+    let poles = Poles::new(s);
     for f in facets {
         for v in made.mesh.facets[f].vertices {
             let v = made.mesh.vertices[v as usize];
@@ -252,6 +288,18 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
             }
             if (v.normal.length() - 1.0).abs() > 1e-12 {
                 return Err(format!("normal {:?} of facet {f}", v.normal));
+            }
+            // At a pole the limit along the parameter line.
+            if let Some(d) = poles.of(v.uv) {
+                let [a, b] = poles.domain[d];
+                let mut beside = v.uv;
+                beside[d] += 1e-6 * (0.5 * (a + b) - beside[d]);
+                let (_, [du, dv]) = look(s, beside, [false; 2]);
+                let n = du.cross(dv) * if face.reversed { -1.0 } else { 1.0 };
+                if n.length() > 1e-3 * du.length() * dv.length() && n.angle_between(v.normal) > 0.03 {
+                    return Err(format!("normal at the pole {:?}: {} for {}", v.uv, v.normal, n.normalize()));
+                }
+                continue;
             }
             // On a crease the normal of any side will do; where there is none, or one that rounding decides, any at all.
             let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
@@ -273,8 +321,9 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
 /// The pieces of the facets of a face, as triangles of parameters, the trim's curve in place of a chord; an error where facets do not
 /// cover what the loops enclose once.
 fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> Result<Vec<Vec<[Uv; 3]>>, String> {
-    let outlines = outlines(face);
+    let (outlines, poles) = (outlines(face), Poles::new(&face.surface));
     let domain = face.surface.domain().map(|[a, b]| b - a);
+    let polar = poles.at.as_flattened().contains(&true);
     let extent = Uv::from_array(domain);
     let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
     for f in facets.clone() {
@@ -294,8 +343,19 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
         for t in cuts {
             let x = t.map(|k| uv[k]);
             let area = ((x[1] - x[0]) / extent).perp_dot((x[2] - x[0]) / extent);
-            if (area < 0.0) != face.reversed && area.abs() > 1e-13 {
+            if (area < 0.0) != face.reversed && area.abs() > 1e-13 && x.iter().all(|&x| poles.of(x).is_none()) {
                 return Err(format!("facet {f} is turned in the parameter plane: {area}"));
+            }
+            // At a pole the piece lies between the parameter lines into it; a triangle with two corners there has none.
+            match [0, 1, 2].map(|k| poles.of(x[k])) {
+                [None, None, None] => {}
+                [Some(d), None, None] => piece.extend(sector(&outlines, [x[0], x[1], x[2]], d, extent)),
+                [None, Some(d), None] => piece.extend(sector(&outlines, [x[1], x[2], x[0]], d, extent)),
+                [None, None, Some(d)] => piece.extend(sector(&outlines, [x[2], x[0], x[1]], d, extent)),
+                _ => {}
+            }
+            if x.iter().any(|&x| poles.of(x).is_some()) {
+                continue;
             }
             let mut whole = true;
             for k in 0..3 {
@@ -328,11 +388,29 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
         out.push(piece);
     }
     for (o, c) in outlines.iter().zip(covered) {
-        if (c - o.len() as f64).abs() > 1e-6 * o.len() as f64 {
+        if !polar && (c - o.len() as f64).abs() > 1e-6 * o.len() as f64 {
             return Err(format!("chords cover {c} of {} sides of a loop", o.len()));
         }
     }
     Ok(out)
+}
+
+/// The piece of a triangle with a pole as its first corner: between the parameter lines of both others, down to the trim where they are the
+/// ends of one of its chords.
+fn sector(outlines: &[Vec<Uv>], [pole, a, b]: [Uv; 3], d: usize, extent: Uv) -> Vec<[Uv; 3]> {
+    let foot = |mut x: Uv| {
+        x[d] = pole[d];
+        x
+    };
+    let on = |o: &Vec<Uv>| {
+        let ((from, x), (to, y)) = (locate(o, a, extent), locate(o, b, extent));
+        (x.max(y) <= 1e-9).then(|| path(o, [from, to], [a, b]))
+    };
+    // A chord is short: what goes around the face the other way is none.
+    let length = |p: &[Uv]| p.windows(2).map(|w| ((w[1] - w[0]) / extent).length()).sum::<f64>();
+    let chord = |p: &(Vec<Uv>, f64)| length(&p.0) <= 1.5 * ((b - a) / extent).length();
+    let base = outlines.iter().filter_map(on).find(chord).map_or(vec![a, b], |p| p.0);
+    base.windows(2).flat_map(|w| [[w[0], w[1], foot(w[1])], [w[0], foot(w[1]), foot(w[0])]]).collect()
 }
 
 /// Largest distance of the piece to the facet, and of the facet to the piece.

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub(crate) mod judge;
+pub(crate) mod rounds;
 pub(crate) mod shells;
 
 /// A clamped knot vector with uneven spans, inner knots of any multiplicity up to the degree.
