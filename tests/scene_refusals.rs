@@ -75,6 +75,25 @@ fn what_means_nothing_is_refused_by_name() {
         ("[[source]]\nkind = 'ies'\nfile = 'a.ies'".into(), "lumens", 3),
         ("[[source]]\nkind = 'rays'\nfile = 'a.csv'\nradius = 3".into(), "radius", 4),
         ("[source]\nkind = 'point'".into(), "[[source]]", 1),
+        (
+            "[[material]]\npart = 'x'\nsurface = 'coating'\ncoating = 'ideal'".into(),
+            "`transmittance` in its place",
+            4,
+        ),
+        ("[[material]]\npart = 'x'\nscatter = { lobe = 'abg', abg = 0.1 }".into(), "A, B and g", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = 1.5".into(), "index_table = [[450", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = [[450, 1.5], 3]".into(), "index_table = [[450", 3),
+        ("[[medium]]\nname = 'g'\ngradient_index = [1, 2]".into(), "gradient index is not simulated", 3),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nGRIN = 0.1".into(), "gradient index is not simulated", 4),
+        ("[[medium]]\nname = 'g'\nextraordinary_index = 1.5".into(), "birefringence is not simulated", 3),
+        (
+            "[[medium]]\nname = 'g'\nfluorescence = { quantum_yield = 0.9 }".into(),
+            "fluorescence is not simulated",
+            3,
+        ),
+        ("[[fluorescence]]\nmedium = 'g'".into(), "fluorescence is not simulated", 1),
+        ("[[material]]\npart = 'x'\nsurface = 'fluorescent'".into(), "fluorescence is not simulated", 3),
+        ("[[material]]\npart = 'x'\nsurface = 'grating'".into(), "diffraction is not simulated", 3),
     ] {
         let text = if head.contains("[source]") && !head.contains("[[") {
             head.clone()

@@ -4,15 +4,46 @@ use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
-/// Effects that a user may ask for by key and that are not simulated.
-const REFUSED: [(&str, &str); 7] = [
-    ("fluorescence", "fluorescence"),
+/// Effects that a user may ask for by key or kind and that are not simulated: what such words start with.
+const REFUSED: [(&str, &str); 15] = [
+    ("fluoresc", "fluorescence"),
     ("phosphor", "fluorescence"),
-    ("birefringence", "birefringence"),
-    ("gradient_index", "gradient index"),
+    ("luminesc", "fluorescence"),
+    ("quantum_yield", "fluorescence"),
+    ("birefring", "birefringence"),
+    ("extraordinary", "birefringence"),
+    ("uniaxial", "birefringence"),
+    ("waveplate", "birefringence"),
+    ("retarder", "birefringence"),
+    ("gradient", "gradient index"),
     ("grin", "gradient index"),
-    ("diffraction", "diffraction"),
+    ("diffract", "diffraction"),
+    ("grating", "diffraction"),
     ("interference", "interference of paths"),
+    ("coheren", "interference of paths"),
+];
+
+/// The effect that a word asks for and that is not simulated.
+fn refused(word: &str) -> Option<&'static str> {
+    let word = word.to_lowercase().replace('-', "_");
+    REFUSED.iter().find(|(start, _)| word.starts_with(start)).map(|(_, effect)| *effect)
+}
+
+/// What to write where a list belongs.
+const LISTS: [(&str, &str); 9] = [
+    (
+        "coating",
+        "`coating` takes rows [angle_deg, nm, R, T], as in coating = [[0, 550, 0.1, 0.9], [90, 550, 1, 0]]; for the same shares \
+         everywhere give `reflectance` and `transmittance` in its place",
+    ),
+    ("values", "write pairs of nm and power, as in values = [[450, 1], [620, 2]]"),
+    ("index_table", "write pairs of nm and index, as in index_table = [[450, 1.53], [650, 1.51]]"),
+    ("sellmeier", "write pairs of B and C (µm²), as in sellmeier = [[1.18, 0.0113]]"),
+    ("cauchy", "write the coefficients, as in cauchy = [1.5, 0.004]"),
+    ("bins_nm", "write the edges, as in bins_nm = [400, 500, 600, 700]"),
+    ("abg", "write A, B and g, as in abg = [0.01, 0.001, 2]"),
+    ("metal", "write n and k, as in metal = [1.2, 7.0]"),
+    ("tolerance_mm", "write tolerance_mm = [0.05, 0.2]"),
 ];
 
 /// The bytes of the value at a path; of the deepest table on the way when the value itself is not there.
@@ -47,8 +78,12 @@ const TABLES: [(&str, &str); 8] = [
 ];
 
 /// A value of the wrong type, in words that do not speak of the program's own types.
-fn typed(message: &str) -> Error {
+fn typed(message: &str, key: &str) -> Error {
     let message = message.trim();
+    if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
+        let message = message.replace("a sequence", "a list").replace("an array", "a list");
+        return Error::new(ErrorKind::Syntax, message).help(*help);
+    }
     if let Some((form, example)) = TABLES.iter().find(|(form, _)| message.ends_with(&format!("expected {form}"))) {
         let what = if form.starts_with("struct") { "a table" } else { "a list" };
         let message = message.replace(form, what).replace("invalid type: map", "a single table");
@@ -73,13 +108,21 @@ fn typed(message: &str) -> Error {
     )
 }
 
+/// The key whose value stands at a byte of a line, or around it.
+fn key_of(text: &str, at: usize) -> &str {
+    let before = text.get(..at).unwrap_or("");
+    let line = before.rsplit('\n').next().unwrap_or("");
+    let key = line.rsplit_once('=').map_or("", |(key, _)| key);
+    key.rsplit(['{', ',', '.']).next().unwrap_or("").trim()
+}
+
 /// An error of the TOML reader with its place, and the key that was probably meant.
 pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
     let message = e.message();
     let mut words = message.split('`').skip(1).step_by(2);
     let error = if message.starts_with("unknown field") {
         let word = words.next().unwrap_or("");
-        if let Some((_, effect)) = REFUSED.iter().find(|(key, _)| *key == word) {
+        if let Some(effect) = refused(word) {
             let message = format!("`{word}`: {effect} is not simulated");
             Error::new(ErrorKind::Unsupported, message)
                 .help("remove the key; the result would be wrong if it were ignored")
@@ -94,7 +137,7 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
     } else if message.starts_with("unknown variant") {
         let word = words.next().unwrap_or("");
         let known: Vec<&str> = words.collect();
-        if let Some((_, effect)) = REFUSED.iter().find(|(key, _)| *key == word) {
+        if let Some(effect) = refused(word) {
             Error::new(ErrorKind::Unsupported, format!("`{word}`: {effect} is not simulated"))
         } else {
             let error = Error::new(ErrorKind::Syntax, format!("`{word}` is none of {}", known.join(", ")));
@@ -104,7 +147,7 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
             }
         }
     } else {
-        typed(message)
+        typed(message, e.span().map_or("", |span| key_of(text, span.start)))
     };
     error.at(file, text, e.span())
 }
