@@ -8,6 +8,7 @@ use simulate_support::World;
 
 const MEDIA: &str =
     "[[medium]]\nname = 'glass'\nindex = 1.5\n[[medium]]\nname = 'wet'\nindex = 1.3333333333333333\n";
+const GREY: &str = "[[medium]]\nname = 'grey'\nindex = 1.5\nabsorption_per_mm = 0.03\n";
 const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
 
 fn nest() -> World {
@@ -188,4 +189,42 @@ fn light_along_the_edges_of_glued_blocks_is_not_lost() {
     let [whole, glued] = &results[..] else { panic!() };
     assert_eq!((whole.lost_rays, glued.lost_rays), (0, 0), "{:?}", glued.ledger.first());
     assert!((whole.power.escaped + whole.power.received - glued.power.escaped - glued.power.received).abs() < 1e-4);
+}
+
+/// Twenty-seven glued blocks are one block, for light that slips past an edge of four and goes on through further blocks.
+#[test]
+fn light_that_slips_past_an_edge_goes_on_through_further_blocks() {
+    let mut results = Vec::new();
+    for parts in [1, 3] {
+        let mut world = World::default();
+        let mut text = format!("[run]\nrays = 3000\npower_floor = 1e-3\n{GREY}");
+        let size = 21.0 / f64::from(parts);
+        for k in 0..parts * parts * parts {
+            let at =
+                Point::new(f64::from(k % parts), f64::from(k / parts % parts), f64::from(k / parts / parts)) * size;
+            world.cuboid(&format!("block {k}"), at, at + Point::splat(size));
+            text += &format!("[[material]]\npart = 'block {k}'\nmedium = 'grey'\n");
+        }
+        // Towards (7, 7, 10), (7, 9, 7) and (8, 7, 7), on edges where four of the 27 meet, from 4 mm before.
+        for (edge, direction) in [
+            ([7.0, 7.0, 10.0], [1.0, 0.6, 0.3]),
+            ([7.0, 9.0, 7.0], [0.4, 0.2, 1.1]),
+            ([8.0, 7.0, 7.0], [0.3, -1.0, 0.8]),
+            ([7.0, 7.0, 10.0], [0.3, -0.02, 1.0]),
+        ] {
+            let (edge, direction) = (Point::from_array(edge), Point::from_array(direction));
+            let at = edge - 4.0 * direction;
+            text += &format!(
+                "[[source]]\nkind = 'collimated'\nat = {:?}\ndirection = {:?}\nsize = [0.005, 0.005]\n",
+                at.to_array(),
+                direction.to_array()
+            );
+        }
+        text += FAR;
+        results.push(world.run(&text, |_| ()));
+    }
+    let [whole, glued] = &results[..] else { panic!() };
+    assert_eq!((whole.lost_rays, glued.lost_rays), (0, 0), "{:?}", glued.ledger.first());
+    let [a, b] = [whole, glued].map(|r| r.power.absorbed);
+    assert!((a - b).abs() < 0.02 * a, "{a} {b}");
 }

@@ -207,7 +207,14 @@ fn cross<C: Carry>(
         across = match across {
             // Through both faces at once, whichever the ray met first.
             Some(first) if !(at.entering && path.carry.body() == at.face.body) => {
-                Some(first.across(other, !at.entering).unwrap_or(first))
+                let both = first.across(other, !at.entering).or_else(|| {
+                    // The other body is not where the light should be: it has passed an edge of three or more unseen.
+                    let found = regained(context, &path.carry, ray, at.hit.t, true)?;
+                    let both = found.across(at.face.body, at.entering)?.across(other, !at.entering)?;
+                    path.carry = found;
+                    Some(both)
+                });
+                Some(both.unwrap_or(first))
             }
             // The second face of an interface that was crossed at the first.
             _ => Some(path.carry),
