@@ -144,15 +144,17 @@ fn the_mean_sag_of_strips_is_that_of_a_parabola() {
     assert!((share - 2.0 / 3.0).abs() < 0.02, "{share}");
 }
 
-/// A face between an arc and its chord that are nearer to each other than the tolerance still is a face.
+/// A face between an arc and its chord that are nearer to each other than the tolerance still is a face, with a corner on its arc.
 #[test]
 fn a_face_between_two_chords_gets_a_facet() {
-    let plane = sweep::plane(&Frame::IDENTITY, [[-1.0, 1.0]; 2]);
-    let arc = chain(32, |f| Uv::new(f - 0.5, 0.02 * (1.0 - (2.0 * f - 1.0).powi(2))));
+    let plane = sweep::plane(&Frame::IDENTITY, [[-1.0, 1.0], [2.0, 4.0]]);
+    let arc = chain(32, |f| Uv::new(f - 0.5, 3.0 + 0.02 * (1.0 - (2.0 * f - 1.0).powi(2))));
     let (a, b) = (arc[0], arc[32]);
     let made = tessellate(&face(plane, &[vec![chain(1, |f| b.lerp(a, f)), arc]]), &measured(0.1));
     assert_proved(&made);
     assert_eq!(made.report.facets, 1);
+    // A triangle of base 1 and height 0.02.
+    assert!((made.report.area_mm2 - 0.01).abs() < 1e-12, "{}", made.report.area_mm2);
 }
 
 /// A hole that touches the outer loop in one place, where the file has a vertex for each of them: one corner for both, and the lid in the

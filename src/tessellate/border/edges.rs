@@ -45,11 +45,12 @@ pub(in crate::tessellate) fn divide(
     *alone = part.edges.par_iter().zip(sides).enumerate().map(fresh).collect();
     let mut times: Vec<Vec<f64>> = alone.iter().map(|(_, t)| t.clone()).collect();
     opposite::align(part, faces, sides, denser, &mut times);
+    open_lenses(part, faces, &mut times);
+    part_twins(part, sides, &mut times);
     let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };
     let inner: Vec<Vec<Point>> = part.edges.par_iter().zip(&times).with_min_len(16).map(inner).collect();
-    open_lenses(part, faces, &mut times);
     let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();
     for (inner, t) in inner.into_iter().zip(times) {
@@ -74,6 +75,28 @@ fn open_lenses(part: &Part, faces: &[(&Face, &Sheet<'_>)], times: &mut [Vec<f64>
         let (x, y) = (off(a), off(b));
         if x.max(y) > 0.0 {
             bisect_all(&mut times[if y > x { b } else { a }]);
+        }
+    }
+}
+
+/// Several edges between the same two vertices that all are one chord would be one edge of the mesh with more than two facets: all but
+/// the straightest get a corner.
+fn part_twins(part: &Part, sides: &[Vec<Side<'_, '_>>], times: &mut [Vec<f64>]) {
+    let chord = |e: usize| {
+        let [a, b] = part.edges[e].vertices;
+        [a.0.min(b.0), a.0.max(b.0)]
+    };
+    let mut single: Vec<usize> = (0..times.len()).filter(|&e| times[e].len() == 2 && !sides[e].is_empty()).collect();
+    single.sort_unstable_by_key(|&e| (chord(e), e));
+    for twins in single.chunk_by(|&a, &b| chord(a) == chord(b)).filter(|t| t.len() > 1) {
+        let off = |e: usize| {
+            let (curve, t) = (&part.edges[e].curve, &times[e]);
+            from_chord(curve.evaluate(0.5 * (t[0] + t[1])), &[curve.evaluate(t[0]), curve.evaluate(t[1])])
+        };
+        let mut bent: Vec<(f64, usize)> = twins.iter().map(|&e| (off(e), e)).collect();
+        bent.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for &(_, e) in bent[1..].iter().filter(|x| x.0 > 0.0) {
+            bisect_all(&mut times[e]);
         }
     }
 }
