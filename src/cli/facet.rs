@@ -192,7 +192,12 @@ fn described(r: &Report) -> String {
             r.shells.closed, r.shells.open, r.open_edges, r.nonmanifold_edges
         ),
     );
-    line("faces", format!("{} with facets, {} without", n(r.faces.meshed), r.faces.failed));
+    let mended = r.repaired.iter().map(|f| f.reached_mm).fold(0.0, f64::max);
+    let mended = match r.repaired.len() {
+        0 => String::new(),
+        count => format!("; {count} repaired, at most {} mm from the surface", figures(mended, 3)),
+    };
+    line("faces", format!("{} with facets, {} without{mended}", n(r.faces.meshed), r.faces.failed));
     let peak = r.peak_bytes.map_or(String::new(), |b| format!("; {} at most", bytes(b)));
     line("time", format!("read {}, tessellate {}{peak}", seconds(r.seconds.read), seconds(r.seconds.tessellate)));
     text

@@ -2,6 +2,8 @@
 
 use super::border::edges::{self, Division, Side};
 use super::face::{self, FaceMesh};
+use super::fallback;
+use super::repairs::Repair;
 use super::settings::{Field, Place, Settings};
 use super::sheet::Sheet;
 use super::{FacetQuality, Tessellation};
@@ -177,7 +179,12 @@ fn one(
 ) -> Option<FaceMesh> {
     let known = |e: Option<crate::model::EdgeId>| e.is_none_or(|e| (e.0 as usize) < part.edges.len());
     let complete = face.loops.iter().flat_map(|l| &l.uses).all(|u| known(u.edge));
-    complete.then(|| face::mesh(part, face, sheet, divisions, shared, settings)).flatten()
+    if !complete {
+        return None;
+    }
+    let numbers = face.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.points.iter().all(|p| p.is_finite()));
+    let whole = if numbers { face::mesh(part, face, sheet, divisions, shared, settings) } else { None };
+    whole.or_else(|| fallback::boundary(part, face, sheet, divisions, shared))
 }
 
 /// Whether all numbers of a face are numbers.
@@ -200,9 +207,12 @@ fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -
 }
 
 /// Puts every instance's facets where they belong.
-pub(super) fn place(model: &Model, parts: &[Option<PartMesh>]) -> (Tessellation, Vec<FaceId>) {
+pub(super) fn place(
+    model: &Model,
+    parts: &[Option<PartMesh>],
+) -> (Tessellation, Vec<FaceId>, Vec<(FaceId, Repair)>) {
     let mut out = Tessellation::default();
-    let mut failed = Vec::new();
+    let (mut failed, mut repairs) = (Vec::new(), Vec::new());
     for (i, instance) in model.instances.iter().enumerate() {
         let first = model.first_face(i);
         let part = model.part(instance.part);
@@ -212,7 +222,10 @@ pub(super) fn place(model: &Model, parts: &[Option<PartMesh>]) -> (Tessellation,
         for (k, face) in mesh.faces.iter().enumerate() {
             let id = FaceId(first.0 + k as u32);
             match face {
-                Some(face) => place_face(&mut out, instance, mesh, shared, face, id),
+                Some(face) => {
+                    repairs.extend(face.repaired.map(|how| (id, how)));
+                    place_face(&mut out, instance, mesh, shared, face, id);
+                }
                 None => failed.push(id),
             }
         }
@@ -221,7 +234,7 @@ pub(super) fn place(model: &Model, parts: &[Option<PartMesh>]) -> (Tessellation,
         }
     }
     drop_unused(&mut out.mesh);
-    (out, failed)
+    (out, failed, repairs)
 }
 
 fn place_face(
@@ -249,7 +262,6 @@ fn place_face(
         out.mesh.sag.push(if proved { bound } else { f64::INFINITY });
         out.quality.push(FacetQuality { tolerance, bound, certified: proved });
     }
-    out.report.faces.repaired += face.repaired as usize;
 }
 
 /// A mirrored placement turns facets around, so that they stay counter-clockwise from outside.

@@ -8,6 +8,7 @@ use super::cells::grid::{self, Ground};
 use super::cells::tree::{self, Leaves};
 use super::proof::bound::Prover;
 use super::proof::near::Near;
+use super::repairs::Repair;
 use super::sheet::Sheet;
 use super::strip::delaunay::{self, Node, Outline, key};
 use super::strip::pair;
@@ -30,8 +31,8 @@ pub(super) struct FaceMesh {
     pub(super) coarse: Vec<EdgeId>,
     /// Shared positions that are one: vertices of the file in one place, where loops touch.
     pub(super) same: Vec<[u32; 2]>,
-    /// Whether something was given up: crossing borders, an exhausted budget.
-    pub(super) repaired: bool,
+    /// What was given up.
+    pub(super) repaired: Option<Repair>,
 }
 
 /// Meshes a face; `None` when nothing can be made of it.
@@ -77,12 +78,12 @@ pub(super) fn mesh(
     }
     let mut own = rings.own;
     own.extend(strip.nodes.iter().filter(|n| n.position as usize >= known).map(|n| n.place));
-    let mut out = FaceMesh {
-        own,
-        same: border.same,
-        repaired: leaves.exhausted || !strip.conflicts.is_empty(),
-        ..FaceMesh::default()
+    let repaired = match (strip.conflicts.is_empty(), leaves.exhausted) {
+        (false, _) => Some(Repair::CrossingBorder),
+        (true, true) => Some(Repair::CoarserCells),
+        (true, false) => None,
     };
+    let mut out = FaceMesh { own, same: border.same, repaired, ..FaceMesh::default() };
     // Where the budget has ended, shorter chords only cost more.
     let unproved = if leaves.exhausted { Vec::new() } else { strip.unproved_chords(&trims) };
     let coarse = strip.conflicts.iter().chain(&strip.crossed).chain(&unproved);

@@ -17,7 +17,9 @@ mod assemble;
 mod border;
 mod cells;
 mod face;
+mod fallback;
 mod proof;
+mod repairs;
 mod report;
 mod sample;
 mod settings;
@@ -26,6 +28,7 @@ mod strip;
 
 use crate::mesh::FacetMesh;
 use crate::model::Model;
+pub use repairs::{Repair, RepairedFace};
 pub use report::{FaceCounts, Percentiles, Report, Sag, ShellCounts, ToleranceRange, sampled_sag};
 pub use settings::{Judge, Law, Override, Place, Settings};
 
@@ -79,8 +82,8 @@ pub struct FacetQuality {
 pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
     let parts = assemble::parts(model, settings);
-    let (mut made, failed) = assemble::place(model, &parts);
+    let (mut made, failed, repairs) = assemble::place(model, &parts);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
-    report::fill(&mut made, model, settings, failed);
+    report::fill(&mut made, model, settings, failed, &repairs);
     made
 }

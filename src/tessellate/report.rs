@@ -1,5 +1,6 @@
 //! What came out, in the words of `facet --json`.
 
+use super::repairs::{self, Repair, RepairedFace};
 use super::{Settings, Tessellation, sample};
 use crate::math::FaceId;
 use crate::mesh::{FacetMesh, Topology};
@@ -32,6 +33,8 @@ pub struct Report {
     pub certified: usize,
     /// Faces with facets that are not, and how many of each: indices of placed faces.
     pub not_certified: Vec<NotCertified>,
+    /// Faces of which something was given up, and what was reached there.
+    pub repaired: Vec<RepairedFace>,
     /// Share of the area that is in facets with four corners.
     pub quad_area_share: f64,
     /// Area of the facets as traced.
@@ -110,7 +113,7 @@ pub struct FaceCounts {
     pub meshed: usize,
     /// Without.
     pub failed: usize,
-    /// Of those meshed: with something given up (crossing borders, an exhausted budget).
+    /// Of those meshed: with something given up; see [`Report::repaired`].
     pub repaired: usize,
 }
 
@@ -124,7 +127,13 @@ pub struct Seconds {
 }
 
 /// Fills in everything but the times.
-pub(super) fn fill(made: &mut Tessellation, model: &Model, settings: &Settings, failed: Vec<FaceId>) {
+pub(super) fn fill(
+    made: &mut Tessellation,
+    model: &Model,
+    settings: &Settings,
+    failed: Vec<FaceId>,
+    repairs: &[(FaceId, Repair)],
+) {
     let mut report = std::mem::take(&mut made.report);
     let mesh = &made.mesh;
     report.facets = mesh.facets.len();
@@ -140,6 +149,8 @@ pub(super) fn fill(made: &mut Tessellation, model: &Model, settings: &Settings, 
     let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
     report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
     report.faces.failed = failed.len();
+    report.faces.repaired = repairs.len();
+    report.repaired = repairs::named(made, model, repairs);
     report.faces.meshed = model.placed_face_count() - failed.len();
     name_uncertified(&mut report, made, model);
     let all_closed = shells(&mut report, made, model);

@@ -44,10 +44,16 @@ const GRID: usize = 8;
 
 /// Samples every facet; facets of ready meshes give zeros.
 pub(super) fn all(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
+    let facets: Vec<usize> = (0..mesh.facets.len()).collect();
+    some(mesh, model, &facets)
+}
+
+/// Samples some facets.
+pub(super) fn some(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sampled> {
     let faces: Vec<_> = model.placed_faces().collect();
-    (0..mesh.facets.len())
-        .into_par_iter()
-        .map(|f| {
+    facets
+        .par_iter()
+        .map(|&f| {
             let placed = &faces[mesh.facets[f].face.index()];
             let Some(face) = placed.face else { return Sampled::default() };
             let scale = placed.placement.scale;
@@ -80,6 +86,12 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
                 let at = uv[t[0]] * b[0] + uv[t[1]] * b[1] + uv[t[2]] * b[2];
                 out.sag = out.sag.max(to_facet(surface.evaluate(at)));
             }
+        }
+    }
+    // Corners lie on the surface, but not where the file's own edges do not.
+    for (&x, &at) in p.iter().zip(&uv) {
+        if (surface.evaluate(at) - x).length() > out.sag {
+            out.sag = out.sag.max((surface.evaluate(project(surface, x, at)) - x).length());
         }
     }
     let (mut sum, mut area) = (0.0, 0.0);
@@ -156,6 +168,15 @@ fn search(surface: &Surface, x: Point, uv: [Uv; 3]) -> Uv {
         }
     }
     best.1
+}
+
+/// Parameters of a near point of the whole surface.
+pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    let [a, b, c, d] = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v));
+    let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search(surface, x, half)));
+    let away = found.map(|u| (surface.evaluate(u) - x).length());
+    if away[1] < away[0] { found[1] } else { found[0] }
 }
 
 /// Parameters of a near point of the surface, by damped Gauss–Newton from a start; never farther away than the start.

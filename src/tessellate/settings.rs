@@ -16,7 +16,8 @@ pub struct Settings {
     pub angle_deg: Option<f64>,
     /// Other tolerances for some places; of several that match a face, the last counts.
     pub overrides: Vec<Override>,
-    /// Most facets for one face; beyond it, cells are left as large as they are and counted as not certified.
+    /// Most cells of one face that are held to its tolerance; beyond it, cells are coarser, a few times as many at most, counted as
+    /// not certified, and the face as repaired.
     pub budget: usize,
     /// What decides whether a facet is good enough.
     pub judge: Judge,

@@ -86,16 +86,18 @@ fn part_twins(part: &Part, sides: &[Vec<Side<'_, '_>>], times: &mut [Vec<f64>]) 
         let [a, b] = part.edges[e].vertices;
         [a.0.min(b.0), a.0.max(b.0)]
     };
-    let mut single: Vec<usize> = (0..times.len()).filter(|&e| times[e].len() == 2 && !sides[e].is_empty()).collect();
+    let mut single: Vec<usize> =
+        (0..times.len()).filter(|&e| times[e].len() == 2 && !sides[e].is_empty()).collect();
     single.sort_unstable_by_key(|&e| (chord(e), e));
     for twins in single.chunk_by(|&a, &b| chord(a) == chord(b)).filter(|t| t.len() > 1) {
-        let off = |e: usize| {
-            let (curve, t) = (&part.edges[e].curve, &times[e]);
-            from_chord(curve.evaluate(0.5 * (t[0] + t[1])), &[curve.evaluate(t[0]), curve.evaluate(t[1])])
-        };
+        let middle = |e: usize| part.edges[e].curve.evaluate(0.5 * (times[e][0] + times[e][1]));
+        let off = |e: usize| from_chord(middle(e), &[0, 1].map(|i| part.edges[e].curve.evaluate(times[e][i])));
         let mut bent: Vec<(f64, usize)> = twins.iter().map(|&e| (off(e), e)).collect();
         bent.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        for &(_, e) in bent[1..].iter().filter(|x| x.0 > 0.0) {
+        // One edge that stands twice in a file stays one.
+        let straightest = middle(bent[0].1);
+        bent.retain(|&(off, e)| off > 0.0 && (middle(e) - straightest).length() > 1e-3 * off);
+        for (_, e) in bent {
             bisect_all(&mut times[e]);
         }
     }

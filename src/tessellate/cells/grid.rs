@@ -100,16 +100,16 @@ pub(in crate::tessellate) fn build(
             (0..4).flat_map(|k| std::iter::once(corners[k]).chain(inner[k].iter().copied())).collect();
         let at_border = polygon.iter().any(|&n| n < border);
         let made = if polygon.len() > 4 {
-            match lattice(sheet, prover, corners, &inner, ground) {
+            match lattice(sheet, prover, leaf.slack, corners, &inner, ground) {
                 Some(pieces) => {
                     grid.quads.extend(pieces);
                     Some(())
                 }
-                None => resolve(sheet, prover, &polygon, ground).map(|t| grid.triangles.extend(t)),
+                None => resolve(sheet, prover, leaf.slack, &polygon, ground).map(|t| grid.triangles.extend(t)),
             }
         } else if at_border {
             as_proved(sheet, prover, leaf, corners, ground)
-                .or_else(|| beside(sheet, prover, *corners, ground))
+                .or_else(|| beside(sheet, prover, leaf.slack, *corners, ground))
                 .map(|q| grid.quads.push(q))
         } else {
             let q = std::array::from_fn(|k| corners[(k + leaf.first) % 4]);
@@ -136,6 +136,7 @@ pub(in crate::tessellate) fn build(
 fn beside(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
+    slack: f64,
     corners: [u32; 4],
     ground: &Ground<'_>,
 ) -> Option<([u32; 4], f64, f64)> {
@@ -148,10 +149,10 @@ fn beside(
     let better = if off(1, 3) < off(0, 2) * (1.0 - 1e-9) { 1 } else { 0 };
     [better, better + 1].into_iter().find_map(|r| {
         let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
-        let [x, y] =
-            [[q[0], q[1], q[2]], [q[0], q[2], q[3]]].map(|t| prove(sheet, prover, ground.nodes, t, ground.trims));
+        let [x, y] = [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]
+            .map(|t| prove(sheet, prover, slack, ground.nodes, t, ground.trims));
         let (bound, xi) = (x.0.max(y.0), x.1.min(y.1));
-        (bound <= xi).then_some((q, bound, xi))
+        (bound <= xi * slack).then_some((q, bound, xi))
     })
 }
 
@@ -176,6 +177,7 @@ fn as_proved(
         moved = moved.max((n[k].place - place).length());
     }
     // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
+    let limit = xi * leaf.slack;
     if moved > 1e-6 * xi {
         return None;
     }
@@ -185,11 +187,11 @@ fn as_proved(
         let xyz = t.map(|i| ground.nodes[i as usize].place);
         for k in 0..3 {
             if let Some(trim) = ground.trims.get(&key(t[k], t[(k + 1) % 3])) {
-                worst = worst.max(trim.bound(prover, xyz, xi));
+                worst = worst.max(trim.bound(prover, xyz, limit));
             }
         }
     }
-    (worst <= xi).then_some((q, worst, xi))
+    (worst <= limit).then_some((q, worst, xi))
 }
 
 /// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
@@ -199,6 +201,7 @@ const MOST_PIECES: usize = 16;
 fn lattice(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
+    slack: f64,
     corners: &[u32; 4],
     inner: &[Vec<u32>; 4],
     ground: &mut Ground<'_>,
@@ -244,7 +247,7 @@ fn lattice(
     }
     let pieces = (0..nx * ny).map(|k| {
         let (i, j) = (k / ny, k % ny);
-        beside(sheet, prover, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]], ground)
+        beside(sheet, prover, slack, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]], ground)
     });
     let made: Option<Vec<_>> = pieces.collect();
     if made.is_none() {
@@ -261,6 +264,7 @@ const MOST_CORNERS: usize = 24;
 fn resolve(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
+    slack: f64,
     polygon: &[u32],
     ground: &Ground<'_>,
 ) -> Option<Vec<([u32; 3], f64, f64)>> {
@@ -315,8 +319,8 @@ fn resolve(
         if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
             return None;
         }
-        let (bound, xi) = prove(sheet, prover, ground.nodes, t, ground.trims);
-        if bound > xi {
+        let (bound, xi) = prove(sheet, prover, slack, ground.nodes, t, ground.trims);
+        if bound > xi * slack {
             return None;
         }
         made.push((t, bound, xi));

@@ -77,6 +77,8 @@ pub(in crate::tessellate) fn key(a: u32, b: u32) -> [u32; 2] {
 
 /// Rounds of refinement.
 const ROUNDS: usize = 40;
+/// Share of the largest excess from which triangles are refined once the budget has ended.
+const WORST: f64 = 0.25;
 /// Triangles that all rounds together go through: each looks at all, which on a strip of 500,000 takes most of a second.
 const MOST_WORK: usize = 8_000_000;
 
@@ -122,16 +124,22 @@ pub(in crate::tessellate) fn triangulate(
             .with_min_len(16)
             .map_init(
                 || Prover::new(sheet, judge),
-                |prover, &t| prove(sheet, prover, &work.nodes, t, outline.trims),
+                |prover, &t| prove(sheet, prover, 1.0, &work.nodes, t, outline.trims),
             )
             .collect();
         known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
         let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1 || work.turn(*t).is_some();
-        let bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
+        let mut bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
+        if work.cdt.num_vertices() >= most {
+            // Where all cannot hold, the worst come first.
+            let excess = |t: &[u32; 3]| known[&sorted(*t)].0 / known[&sorted(*t)].1;
+            let worst = bad.iter().map(excess).fold(0.0, f64::max);
+            bad.retain(|t| excess(t) >= WORST * worst);
+        }
         if bad.is_empty()
             || round == ROUNDS
             || (round + 1) * triangles.len() > MOST_WORK
-            || work.cdt.num_vertices() >= most
+            || work.cdt.num_vertices() >= most + most / 4
             || !work.refine(&bad, outline.trims, &known)
         {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
@@ -141,15 +149,16 @@ pub(in crate::tessellate) fn triangulate(
     None
 }
 
-fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+pub(super) fn sorted(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
     t
 }
 
-/// Bound and tolerance of one triangle, the border's own deviation included.
+/// Bound and tolerance of one triangle, the border's own deviation included; a bound above `slack` tolerances may be none.
 pub(in crate::tessellate) fn prove(
     sheet: &Sheet<'_>,
     prover: &mut Prover<'_, '_>,
+    slack: f64,
     nodes: &[Node],
     t: [u32; 3],
     trims: &FxHashMap<[u32; 2], Trim>,
@@ -162,8 +171,9 @@ pub(in crate::tessellate) fn prove(
     } else {
         uv.iter().fold(sheet.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(sheet.tolerance(p)))
     };
+    let limit = xi * slack;
     let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (i, j, trims.get(&key(t[i], t[j]))));
-    if let Some(bound) = sector::bound(prover, uv, xyz, sides.map(|s| s.2), xi) {
+    if let Some(bound) = sector::bound(prover, uv, xyz, sides.map(|s| s.2), limit) {
         return (bound, xi);
     }
     if let Some(bound) = sector::line(sheet, uv, t, trims) {
@@ -174,37 +184,37 @@ pub(in crate::tessellate) fn prove(
     let line = sides.iter().any(|&(i, j, _)| n[i].position == n[j].position);
     let mut worst = 0f64;
     for trim in sides.iter().filter_map(|s| s.2) {
-        worst = worst.max(trim.bound(prover, xyz, xi));
-        if worst > xi {
+        worst = worst.max(trim.bound(prover, xyz, limit));
+        if worst > limit {
             return (worst, xi);
         }
     }
-    if !line && let Some(bound) = prover.facet(uv, xyz, false, xi) {
+    if !line && let Some(bound) = prover.facet(uv, xyz, false, limit) {
         return (worst.max(bound), xi);
     }
     for (i, j, _) in sides.into_iter().filter(|s| s.2.is_none()) {
-        worst = worst.max(prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], xi));
+        worst = worst.max(prover.side([uv[i], uv[j]], [xyz[i], xyz[j]], limit));
     }
-    if worst > xi || line {
+    if worst > limit || line {
         return (worst, xi);
     }
-    (worst.max(prover.piece(uv, xyz, xi)), xi)
+    (worst.max(prover.piece(uv, xyz, limit)), xi)
 }
 
-struct Work<'s, 'a> {
-    sheet: &'s Sheet<'a>,
-    nodes: Vec<Node>,
+pub(super) struct Work<'s, 'a> {
+    pub(super) sheet: &'s Sheet<'a>,
+    pub(super) nodes: Vec<Node>,
     scale: Uv,
-    next: u32,
+    pub(super) next: u32,
     cdt: Cdt,
     /// How often each constraint edge of the triangulation turns outside into inside.
-    odd: FxHashMap<[u32; 2], u32>,
+    pub(super) odd: FxHashMap<[u32; 2], u32>,
     /// Of those nodes that are in the triangulation.
-    handles: Vec<Option<spade::handles::FixedVertexHandle>>,
+    pub(super) handles: Vec<Option<spade::handles::FixedVertexHandle>>,
 }
 
 impl Work<'_, '_> {
-    fn insert(&mut self, n: u32) -> Option<spade::handles::FixedVertexHandle> {
+    pub(super) fn insert(&mut self, n: u32) -> Option<spade::handles::FixedVertexHandle> {
         let at = self.scaled(self.nodes[n as usize].uv)?;
         let before = self.cdt.num_vertices();
         let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
@@ -223,7 +233,7 @@ impl Work<'_, '_> {
     }
 
     /// Whether a point can be added without splitting a constraint or meeting a vertex.
-    fn is_free(&self, uv: Uv) -> bool {
+    pub(super) fn is_free(&self, uv: Uv) -> bool {
         use spade::PositionInTriangulation as At;
         self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
             At::OnFace(_) => true,
@@ -302,94 +312,5 @@ impl Work<'_, '_> {
             }
         }
         self.cdt.inner_faces().filter(|f| state[f.index()] == Some(true)).map(name).collect()
-    }
-
-    /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
-    fn turn(&self, t: [u32; 3]) -> Option<usize> {
-        let most = self.sheet.field.angle?;
-        let n = t.map(|i| self.nodes[i as usize]);
-        let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
-        let normals = n.map(|x| self.sheet.surface.normal(x.uv));
-        let steep = normals.iter().flatten().any(|x| flat.angle_between(*x).min((-flat).angle_between(*x)) > most);
-        let between = |k: usize| match (normals[k], normals[(k + 1) % 3]) {
-            (Some(a), Some(b)) => a.angle_between(b),
-            _ => 0.0,
-        };
-        let free = (0..3).filter(|&k| !self.odd.contains_key(&key(t[k], t[(k + 1) % 3])));
-        let side = free.max_by(|&a, &b| between(a).total_cmp(&between(b)))?;
-        (steep && between(side) > most).then_some(side)
-    }
-
-    /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
-    fn refine(
-        &mut self,
-        bad: &[[u32; 3]],
-        trims: &FxHashMap<[u32; 2], Trim>,
-        known: &FxHashMap<[u32; 3], (f64, f64)>,
-    ) -> bool {
-        let mut wanted: Vec<[Uv; 2]> = Vec::new();
-        let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
-        for t in bad {
-            let xi = known[&sorted(*t)].1;
-            let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
-            // A chord stays as it is: where it strays farther than its own ends allow, no triangle on it can hold. The third corner does not
-            // count: towards a cone's apex the tolerance tightens, and points between bring it back.
-            let lost = |&(a, b): &(u32, u32)| {
-                trims.get(&key(a, b)).is_some_and(|trim| {
-                    let at = |n: u32| self.sheet.tolerance(self.nodes[n as usize].uv);
-                    trim.deviation > xi && trim.deviation > at(a).min(at(b))
-                })
-            };
-            // Nor does a corner move that the file puts beside the surface.
-            let off =
-                |&n: &u32| (self.sheet.point(self.nodes[n as usize].uv) - self.nodes[n as usize].place).length();
-            if sides.iter().any(lost) || t.iter().any(|n| off(n) > xi) {
-                continue;
-            }
-            let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
-            if let Some(k) = self.turn(*t).filter(|_| known[&sorted(*t)].0 <= xi) {
-                if seen.insert(key(sides[k].0, sides[k].1), ()).is_none() {
-                    wanted.push([middles[k]; 2]);
-                }
-                continue;
-            }
-            let free = sides.iter().zip(middles).filter(|&(&(a, b), _)| !self.odd.contains_key(&key(a, b)));
-            let best = free
-                .map(|(&(a, b), m)| {
-                    let (x, y) = (self.nodes[a as usize], self.nodes[b as usize]);
-                    let sag = super::super::proof::flat::from_chord(self.sheet.point(m), &[x.place, y.place]);
-                    ((a, b), m, sag)
-                })
-                .max_by(|a, b| a.2.total_cmp(&b.2));
-            let corners = t.map(|n| self.nodes[n as usize]);
-            let center = (corners[0].uv + corners[1].uv + corners[2].uv) / 3.0;
-            match best {
-                Some(((a, b), m, sag)) if sag > 0.2 * xi => {
-                    if seen.insert(key(a, b), ()).is_none() {
-                        wanted.push([m, center]);
-                    }
-                }
-                _ => wanted.push([center; 2]),
-            }
-        }
-        let mut done = false;
-        for places in wanted {
-            // The middle of a parameter line into a pole may be a corner already.
-            let Some(uv) = places.into_iter().find(|&uv| self.is_free(uv)) else { continue };
-            let n = self.nodes.len() as u32;
-            let place = self.sheet.point(uv);
-            self.nodes.push(Node { uv, place, position: self.next });
-            match self.insert(n) {
-                Some(h) => {
-                    self.handles.push(Some(h));
-                    self.next += 1;
-                    done = true;
-                }
-                None => {
-                    self.nodes.pop();
-                }
-            }
-        }
-        done
     }
 }

@@ -1,0 +1,212 @@
+//! Faces that cannot be meshed as asked: something is made of them all the same, named, with the distance that was reached.
+
+use lampyris::math::{Frame, Point, Uv};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::nurbs::{Curve, Surface, UvCurve, sweep};
+use lampyris::tessellate::{Repair, Settings, Tessellation, tessellate};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+/// A face between polygons, each corner given in the parameter plane and in space, each side an edge.
+fn face(surface: Surface, loops: &[Vec<(Uv, Point)>]) -> Model {
+    let mut part = Part::default();
+    let mut trims = Vec::new();
+    for corners in loops {
+        let first = part.vertices.len() as u32;
+        let n = corners.len() as u32;
+        let line = |a: Point, b: Point| Curve {
+            degree: 1,
+            knots: vec![0.0, 0.0, 1.0, 1.0],
+            points: vec![a.extend(1.0), b.extend(1.0)],
+        };
+        let mut uses = Vec::new();
+        for k in 0..n {
+            let (a, b) = (corners[k as usize], corners[((k + 1) % n) as usize]);
+            part.vertices.push(a.1);
+            let edge = Some(EdgeId(part.edges.len() as u32));
+            uses.push(EdgeUse { edge, reversed: false, uv: UvCurve::line(a.0, b.0, [0.0, 1.0]) });
+            let vertices = [VertexId(first + k), VertexId(first + (k + 1) % n)];
+            part.edges.push(Edge { curve: line(a.1, b.1), vertices, entity: None });
+        }
+        trims.push(TrimLoop { uses });
+    }
+    part.shells = vec![Shell { faces: vec![Face { loops: trims, ..Face::whole(surface) }], ..Shell::default() }];
+    Model::from_part(part)
+}
+
+fn plane() -> Surface {
+    sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2])
+}
+
+/// Corners in the plane z = 0, whose parameters are lengths.
+fn flat(corners: &[[f64; 2]]) -> Vec<(Uv, Point)> {
+    corners.iter().map(|&[x, y]| (Uv::new(x, y), Point::new(x, y, 0.0))).collect()
+}
+
+fn square(lo: f64, hi: f64) -> Vec<[f64; 2]> {
+    vec![[lo, lo], [hi, lo], [hi, hi], [lo, hi]]
+}
+
+fn measured(tolerance: f64) -> Settings {
+    Settings { measure: true, ..Settings::uniform(tolerance) }
+}
+
+/// The sides that have one facet, each as its two places.
+fn rim(made: &Tessellation) -> Vec<[[f64; 3]; 2]> {
+    let mut sides: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
+    for f in 0..made.mesh.facets.len() {
+        let c = made.mesh.corners(f).map(|p| p.to_array().map(|x| (x + 0.0).to_bits()));
+        for k in (0..4).filter(|&k| c[k] != c[(k + 1) % 4]) {
+            let (a, b) = (c[k], c[(k + 1) % 4]);
+            *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    assert!(sides.values().all(|&n| n <= 2));
+    sides.into_iter().filter(|s| s.1 == 1).map(|s| s.0.map(|p| p.map(f64::from_bits))).collect()
+}
+
+/// Every side of the polygons is a side of one facet, and no other side is.
+fn assert_rim(made: &Tessellation, loops: &[Vec<(Uv, Point)>]) {
+    let sides = |c: &Vec<(Uv, Point)>| -> Vec<[[f64; 3]; 2]> {
+        (0..c.len()).map(|k| [c[k].1.to_array(), c[(k + 1) % c.len()].1.to_array()]).collect()
+    };
+    let wanted: Vec<_> = loops.iter().flat_map(sides).collect();
+    let found = rim(made);
+    assert_eq!(found.len(), wanted.len(), "{found:?}");
+    for [a, b] in wanted {
+        assert!(found.contains(&[a, b]) || found.contains(&[b, a]), "{a:?} to {b:?}");
+    }
+}
+
+/// A sphere that would take ten times the facets it may have: cells grow instead, all of them alike.
+#[test]
+fn a_face_beyond_its_budget_has_coarser_cells() {
+    let (radius, budget) = (1000.0, 20_000);
+    let ball = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+    let shell = Shell { faces: vec![Face::whole(ball)], closed: true, ..Shell::default() };
+    let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+    let made = tessellate(&model, &Settings { budget, ..measured(0.01) });
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired, r.shells.closed), (0, 1, 1));
+    assert!(r.facets < 3 * budget, "{}", r.facets);
+    let repaired = r.repaired[0];
+    let sampled = r.sag_mm.sampled_max.unwrap();
+    assert_eq!((repaired.face, repaired.how), (0, Repair::CoarserCells));
+    assert!((repaired.reached_mm - sampled).abs() <= 1e-9 * sampled, "{repaired:?} {sampled}");
+    // N squares of side a cover 4 π R²; a square's diagonal a √2 sags a² / (4 R), so π R / N at best. Halving may leave the
+    // worst facet with four times the area of the mean, and the last steps coarsen by two.
+    let best = PI * radius / budget as f64;
+    assert!(sampled < 16.0 * best, "{sampled} {best}");
+}
+
+/// Trims that lie beside the surface's domain: no parameters there, but the border is in space.
+#[test]
+fn trims_beside_the_surface_leave_the_border() {
+    let loops = [flat(&[[12.0, 0.0], [20.0, 0.0], [20.0, 10.0], [12.0, 10.0]])];
+    let made = tessellate(&face(plane(), &loops), &measured(0.1));
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired, r.certified), (0, 1, 0));
+    assert!((r.area_mm2 - 80.0).abs() < 1e-9);
+    assert_rim(&made, &loops);
+    let repaired = r.repaired[0];
+    // The farthest corner is 10 mm from the side of the domain.
+    assert_eq!(repaired.how, Repair::BorderOnly);
+    assert!((repaired.reached_mm - 10.0).abs() < 1e-9, "{repaired:?}");
+    // Seen from outside the facets run counter-clockwise, as the normals of the plane say.
+    let normal = made.mesh.vertices[made.mesh.facets[0].vertices[0] as usize].normal;
+    let [a, b, c, _] = made.mesh.corners(0);
+    assert!((b - a).cross(c - a).dot(normal) > 0.0 && normal.z == 1.0);
+}
+
+#[test]
+fn trims_that_leave_the_domain_keep_the_border_and_say_how_far_it_is() {
+    let loops = [flat(&[[5.0, 0.0], [15.0, 0.0], [15.0, 10.0], [5.0, 10.0]])];
+    let made = tessellate(&face(plane(), &loops), &measured(0.1));
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.certified), (0, 0));
+    assert!((r.area_mm2 - 100.0).abs() < 1e-9);
+    assert_rim(&made, &loops);
+    assert!((r.sag_mm.sampled_max.unwrap() - 5.0).abs() < 1e-9, "{:?}", r.sag_mm);
+}
+
+/// Trims that are one line, one point or no numbers at all in the parameter plane, on a border that is a square in space, flat or not.
+#[test]
+fn trims_without_area_or_numbers_leave_the_border() {
+    for lift in [0.0, 3.0] {
+        let places = [[2.0, 2.0, lift], [8.0, 2.0, 0.0], [8.0, 8.0, lift], [2.0, 8.0, 0.0]].map(Point::from_array);
+        let line = |k: usize| Uv::new(2.0 + k as f64, 2.0);
+        let back = |k: usize| Uv::new(4.0 + (k % 2) as f64, 4.0);
+        let nothing = |k: usize| if k.is_multiple_of(2) { Uv::NAN } else { Uv::new(2.0, 2.0) };
+        for uv in [line as fn(usize) -> Uv, back, nothing] {
+            let loops = [(0..4).map(|k| (uv(k), places[k])).collect::<Vec<_>>()];
+            let made = tessellate(&face(plane(), &loops), &measured(0.1));
+            let r = &made.report;
+            assert_eq!(
+                (r.faces.failed, r.faces.repaired, r.facets),
+                (0, 1, 2),
+                "lift {lift} {:?} {:?}",
+                uv(2),
+                r.repaired
+            );
+            assert_rim(&made, &loops);
+            let reached = r.repaired[0].reached_mm;
+            assert!((reached - lift).abs() < 1e-9, "{reached} {lift}");
+        }
+    }
+}
+
+#[test]
+fn a_face_of_one_point_is_the_only_one_that_fails() {
+    let point = (Uv::new(1.0, 1.0), Point::new(1.0, 1.0, 0.0));
+    let made = tessellate(&face(plane(), &[vec![point; 3]]), &measured(0.1));
+    assert_eq!((made.report.faces.failed, made.report.facets), (1, 0));
+}
+
+/// Holes that touch the outer loop in a corner, and each other; a loop that passes one point twice.
+#[test]
+fn trims_that_touch_themselves_need_no_repair() {
+    let hole = |c: [[f64; 2]; 3]| flat(&c);
+    let touching = [
+        (vec![flat(&square(0.0, 10.0)), hole([[10.0, 10.0], [4.0, 6.0], [6.0, 4.0]])], 100.0 - 10.0),
+        (
+            vec![
+                flat(&square(0.0, 10.0)),
+                hole([[5.0, 5.0], [3.0, 7.0], [2.0, 4.0]]),
+                hole([[5.0, 5.0], [7.0, 3.0], [8.0, 6.0]]),
+            ],
+            100.0 - 8.0,
+        ),
+        (vec![flat(&[[0.0, 0.0], [5.0, 5.0], [0.0, 10.0], [10.0, 10.0], [5.0, 5.0], [10.0, 0.0]])], 50.0),
+    ];
+    for (loops, area) in touching {
+        let made = tessellate(&face(plane(), &loops), &measured(0.1));
+        let r = &made.report;
+        assert_eq!((r.faces.failed, r.faces.repaired, r.over_tolerance), (0, 0, Some(0)));
+        assert!((r.area_mm2 - area).abs() < 1e-9, "{} {area}", r.area_mm2);
+        assert_rim(&made, &loops);
+    }
+}
+
+/// A loop that crosses itself is filled by parity: two triangles of 25 mm².
+#[test]
+fn a_loop_that_crosses_itself_is_named() {
+    let loops = [flat(&[[0.0, 0.0], [10.0, 10.0], [10.0, 0.0], [0.0, 10.0]])];
+    let made = tessellate(&face(plane(), &loops), &measured(0.1));
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired), (0, 1));
+    assert_eq!(r.repaired[0].how, Repair::CrossingBorder);
+    assert!((r.area_mm2 - 50.0).abs() < 1e-9, "{}", r.area_mm2);
+}
+
+/// Slivers far thinner than the tolerance, straight and around a cylinder.
+#[test]
+fn slivers_are_faces() {
+    for width in [1e-3, 1e-6, 1e-9] {
+        let loops = [flat(&[[0.0, 3.0], [10.0, 3.0], [10.0, 3.0 + width], [0.0, 3.0 + width]])];
+        let made = tessellate(&face(plane(), &loops), &measured(0.1));
+        let r = &made.report;
+        assert_eq!((r.faces.failed, r.faces.repaired, r.over_tolerance), (0, 0, Some(0)), "{width}");
+        assert_rim(&made, &loops);
+        assert!((r.area_mm2 / (10.0 * width) - 1.0).abs() < 1e-5, "{width}: {}", r.area_mm2);
+    }
+}
