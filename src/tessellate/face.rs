@@ -85,7 +85,7 @@ pub(super) fn mesh(
     };
     let mut out = FaceMesh { own, same: border.same, repaired, ..FaceMesh::default() };
     // Where the budget has ended, shorter chords only cost more.
-    let unproved = if leaves.exhausted { Vec::new() } else { strip.unproved_chords(&trims) };
+    let unproved = if leaves.exhausted { Vec::new() } else { strip.unproved_chords(&trims, &border.followed) };
     let coarse = strip.conflicts.iter().chain(&strip.crossed).chain(&unproved);
     out.coarse = coarse.filter_map(|s| border.followed.get(&key(s[0], s[1])).copied()).collect();
     let mut emit = Emit { sheet, nodes: &strip.nodes, ids: FxHashMap::default(), out };

@@ -95,6 +95,8 @@ pub struct NotCertified {
     pub entity: Option<u64>,
     /// How many of its facets.
     pub facets: usize,
+    /// How far the file itself has the face's edges from it, mm: beside a gap wider than the tolerance no facet can be proved.
+    pub gap_mm: f64,
 }
 
 /// Shells that the file calls closed.
@@ -165,13 +167,17 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     for (facet, _) in made.mesh.facets.iter().zip(&made.quality).filter(|(_, q)| !q.certified) {
         match report.not_certified.last_mut() {
             Some(last) if last.face == facet.face.0 => last.facets += 1,
-            _ => report.not_certified.push(NotCertified { face: facet.face.0, entity: None, facets: 1 }),
+            _ => {
+                report.not_certified.push(NotCertified { face: facet.face.0, entity: None, facets: 1, gap_mm: 0.0 })
+            }
         }
     }
     if !report.not_certified.is_empty() {
-        let entities: Vec<Option<u64>> = model.placed_faces().map(|f| f.entity()).collect();
+        let faces: Vec<_> = model.placed_faces().collect();
         for n in &mut report.not_certified {
-            n.entity = entities[n.face as usize];
+            let placed = &faces[n.face as usize];
+            n.entity = placed.entity();
+            n.gap_mm = placed.face.map_or(0.0, |f| f.gap * placed.placement.scale.abs());
         }
     }
 }

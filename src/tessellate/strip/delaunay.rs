@@ -7,6 +7,7 @@ use super::super::settings::Judge;
 use super::super::sheet::Sheet;
 use super::sector;
 use crate::math::{Point, Uv};
+use crate::model::EdgeId;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -46,12 +47,26 @@ pub(in crate::tessellate) struct Strip {
 }
 
 impl Strip {
-    /// Chords of the border beside triangles that are not proved, where shorter ones may help.
-    pub(in crate::tessellate) fn unproved_chords(&self, trims: &FxHashMap<[u32; 2], Trim>) -> Vec<[u32; 2]> {
+    /// Chords of the border beside triangles that are not proved, where shorter ones may help: not on edges that the file has farther
+    /// from the face than the tolerance somewhere.
+    pub(in crate::tessellate) fn unproved_chords(
+        &self,
+        trims: &FxHashMap<[u32; 2], Trim>,
+        followed: &FxHashMap<[u32; 2], EdgeId>,
+    ) -> Vec<[u32; 2]> {
         let stands = self.bounds.iter().zip(&self.tolerances);
         let unproved = self.triangles.iter().zip(stands).filter(|(_, (bound, xi))| bound > xi);
         let sides = unproved.flat_map(|(t, (_, &xi))| [0, 1, 2].map(|k| (key(t[k], t[(k + 1) % 3]), xi)));
-        sides.filter(|(s, xi)| trims.get(s).is_some_and(|trim| trim.gap < 0.5 * xi)).map(|(s, _)| s).collect()
+        let beside: Vec<([u32; 2], f64)> = sides.filter(|(s, _)| trims.contains_key(s)).collect();
+        let mut gaps: FxHashMap<EdgeId, f64> = FxHashMap::default();
+        if !beside.is_empty() {
+            for (side, edge) in followed {
+                let gap = gaps.entry(*edge).or_insert(0.0);
+                *gap = gap.max(trims.get(side).map_or(0.0, |t| t.gap));
+            }
+        }
+        let gap = |side: &[u32; 2]| followed.get(side).and_then(|e| gaps.get(e)).copied().unwrap_or(f64::INFINITY);
+        beside.into_iter().filter(|(side, xi)| gap(side) < WIDEST * xi).map(|(side, _)| side).collect()
     }
 }
 
@@ -77,6 +92,8 @@ pub(in crate::tessellate) fn key(a: u32, b: u32) -> [u32; 2] {
 
 /// Rounds of refinement.
 const ROUNDS: usize = 40;
+/// Share of a tolerance that the file's own gap may take for shorter chords to help.
+const WIDEST: f64 = 0.97;
 /// Share of the largest excess from which triangles are refined once the budget has ended.
 const WORST: f64 = 0.25;
 /// Triangles that all rounds together go through: each looks at all, which on a strip of 500,000 takes most of a second.
@@ -116,6 +133,7 @@ pub(in crate::tessellate) fn triangulate(
     let mut known: FxHashMap<[u32; 3], (f64, f64)> = FxHashMap::default();
     let (initial, budget) = (work.cdt.num_vertices(), budget.max(work.cdt.num_vertices()));
     let most = (initial * 6 + 4000).min(budget);
+    let mut before = 0;
     for round in 0..=ROUNDS {
         let triangles = work.inside(rings);
         let fresh: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
@@ -130,7 +148,11 @@ pub(in crate::tessellate) fn triangulate(
         known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
         let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1 || work.turn(*t).is_some();
         let mut bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
-        if work.cdt.num_vertices() >= most {
+        // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
+        // 12 times the corners of its border.
+        let (corners, falls) = (work.cdt.num_vertices(), 5 * bad.len() < 4 * before);
+        before = bad.len();
+        if corners >= most && !falls {
             // Where all cannot hold, the worst come first.
             let excess = |t: &[u32; 3]| known[&sorted(*t)].0 / known[&sorted(*t)].1;
             let worst = bad.iter().map(excess).fold(0.0, f64::max);
@@ -139,7 +161,7 @@ pub(in crate::tessellate) fn triangulate(
         if bad.is_empty()
             || round == ROUNDS
             || (round + 1) * triangles.len() > MOST_WORK
-            || work.cdt.num_vertices() >= most + most / 4
+            || corners >= if falls { budget } else { most + most / 4 }
             || !work.refine(&bad, outline.trims, &known)
         {
             let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
