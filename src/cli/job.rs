@@ -164,12 +164,6 @@ impl Prepared<'_> {
 
     /// Completes results by what was done before tracing.
     fn stamp(&self, results: &mut Results, build_seconds: f64) {
-        let model = &self.job.loaded.model;
-        for absorbed in &mut results.absorbed {
-            if let Some(k) = model.instances.iter().position(|i| i.name == absorbed.name) {
-                absorbed.name = look::shown_name(model, k);
-            }
-        }
         results.seconds.read = self.job.loaded.seconds;
         results.seconds.tessellate = self.seconds;
         results.seconds.build = build_seconds;

@@ -31,7 +31,7 @@ pub(super) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scen
         .map(|(k, instance)| {
             let part = &model.part(instance.part).name;
             let colour = colours[k].map_or(PALETTE[k % PALETTE.len()], |c| c.0);
-            let name = shown_name(model, k);
+            let name = model.label(k);
             match scene.and_then(|s| medium(s, part, &instance.name)) {
                 Some(index) => {
                     Group { opacity: 0.2, index_ratio: 1.0 / index, ..Group::solid(&name, [0.62, 0.80, 0.95]) }
@@ -46,17 +46,6 @@ pub(super) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scen
         facets.groups = groups;
     }
     facets
-}
-
-/// What to call an instance: its own name, or its part's where some program made one up (`=>[0:1:1:2]`) or gave none.
-pub(super) fn shown_name(model: &Model, instance: usize) -> String {
-    let own = &model.instances[instance].name;
-    let part = &model.part(model.instances[instance].part).name;
-    match (own.is_empty() || own.starts_with("=>["), part.is_empty()) {
-        (false, _) => own.clone(),
-        (true, false) => part.clone(),
-        (true, true) => format!("part {}", instance + 1),
-    }
 }
 
 /// Index of the medium that a rule of the scene gives a part or instance by its very name; 1.5 for one without a constant index.

@@ -57,6 +57,18 @@ impl Model {
         &self.parts[id.0 as usize]
     }
 
+    /// What to call an instance: its own name, or its part's where some program made one up (`=>[0:1:1:2]`) or gave none, or its
+    /// number.
+    pub fn label(&self, instance: usize) -> String {
+        let own = &self.instances[instance].name;
+        let part = &self.part(self.instances[instance].part).name;
+        match (own.is_empty() || own.starts_with("=>["), part.is_empty()) {
+            (false, _) => own.clone(),
+            (true, false) => part.clone(),
+            (true, true) => format!("part {}", instance + 1),
+        }
+    }
+
     /// Every placed face in the order that defines [`FaceId`]: instance by instance, in each the faces shell by shell,
     /// then the tessellated faces.
     pub fn placed_faces(&self) -> impl Iterator<Item = PlacedFace<'_>> {

@@ -97,7 +97,7 @@ pub(super) fn find(
             Some(&body) => body,
             None => {
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
-                let instance = model.instances[f.instance].name.clone();
+                let instance = model.label(f.instance);
                 let body = Body::new(medium::find(scene, name, &at)?, instance, light);
                 if !(body.index > 0.0 && body.index.is_finite()) {
                     let message = format!("'{name}' has no index at {} nm", light.wavelength);

@@ -158,7 +158,7 @@ impl Scene {
             emitters,
             receivers,
             region,
-            instances: model.instances.iter().map(|i| i.name.clone()).collect(),
+            instances: (0..model.instances.len()).map(|k| model.label(k)).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             notes,
         };

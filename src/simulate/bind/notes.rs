@@ -106,18 +106,23 @@ fn of_surface(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
 
 /// One sentence about the bodies that have faces in no closed shell.
 pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
-    let open =
-        |f: &PlacedFace<'_>| f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed);
-    let mut bodies: Vec<u16> = (model.placed_faces().filter(open))
-        .filter_map(|f| Some(bound.faces.get(f.id.index())?.body))
-        .filter(|body| *body != AMBIENT)
-        .collect();
-    bodies.sort_unstable();
-    bodies.dedup();
-    let [first, medium] = bound.body(*bodies.first()?)?;
+    let open = |f: &PlacedFace<'_>| {
+        f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
+            && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
+    };
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(|f| f.face.is_some()).filter(open).collect();
+    let first = faces.first()?;
+    let [instance, medium] = bound.body(bound.faces[first.id.index()].body)?;
+    let bodies: BTreeSet<u16> = faces.iter().map(|f| bound.faces[f.id.index()].body).collect();
     let others = if bodies.len() > 1 { format!(" (and {} more)", bodies.len() - 1) } else { String::new() };
+    let sheet = match (first.name(), first.entity()) {
+        ("", Some(entity)) => format!(" (face #{entity})"),
+        ("", None) => String::new(),
+        (name, Some(entity)) => format!(" (face '{name}', #{entity})"),
+        (name, None) => format!(" (face '{name}')"),
+    };
     Some(format!(
-        "'{first}'{others} has the medium '{medium}' but no closed shell: light that passes its opening is lost; close it in the \
-         model, or give it a surface instead of a medium"
+        "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
+         the model, or give it a surface instead of a medium"
     ))
 }
