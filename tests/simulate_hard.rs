@@ -2,9 +2,9 @@
 
 mod simulate_support;
 
-use lampyris::math::Point;
+use lampyris::math::{Frame, Point, Vector};
 use lampyris::simulate::Results;
-use simulate_support::World;
+use simulate_support::{Shape, World};
 
 const LAYERS: [f64; 3] = [1.5, 1.7, 1.33];
 
@@ -101,4 +101,85 @@ fn grazing_light_on_a_thin_plate() {
     let through = (1.0 - r) / (1.0 + r);
     assert!((results.receivers[0].power - through).abs() < 1e-6, "{} {through}", results.receivers[0].power);
     assert_eq!(results.lost_rays, 0);
+}
+
+/// Receivers in the faces of a tilted plate far from the origin: one that ends light is met before its face, one that lets it pass
+/// counts what comes to its face once, wherever rounding puts the two.
+#[test]
+fn receivers_that_lie_in_faces_are_met_once() {
+    let (n, sin_i) = (1.5, 0.3 / 1.09f64.sqrt());
+    let (cos_i, cos_t) = ((1.0 - sin_i * sin_i).sqrt(), (1.0 - (sin_i / n).powi(2)).sqrt());
+    let rs = ((cos_i - n * cos_t) / (cos_i + n * cos_t)).powi(2);
+    let rp = ((cos_t - n * cos_i) / (cos_t + n * cos_i)).powi(2);
+    let r = 0.5 * (rs + rp);
+    for (z, at) in [([0.3, -0.4, 0.7], [211.0, -97.0, 33.0]), ([-0.9, 0.1, 0.2], [-5e4, 12.0, 7e3])] {
+        let z = Vector::from_array(z).normalize();
+        let x = z.cross(Vector::X).normalize();
+        let y = z.cross(x);
+        let place = |p: [f64; 3]| Point::from_array(at) + x * p[0] + y * p[1] + z * p[2];
+        let way = |d: [f64; 3]| (x * d[0] + y * d[1] + z * d[2]).to_array();
+        let side = |p: [f64; 3], frame: [Vector; 3], half: [f64; 2]| {
+            let [x, y, z] = frame;
+            Shape::Rectangle { frame: Frame { x, y, z, ..Frame::translation(place(p)) }, half }
+        };
+        let mut world = World::default();
+        world.part(
+            "slab",
+            true,
+            &[
+                ("z0", side([0.0, 0.0, 0.0], [y, x, -z], [50.0, 50.0])),
+                ("z1", side([0.0, 0.0, 10.0], [x, y, z], [50.0, 50.0])),
+                ("x0", side([-50.0, 0.0, 5.0], [z, y, -x], [5.0, 50.0])),
+                ("x1", side([50.0, 0.0, 5.0], [y, z, x], [50.0, 5.0])),
+                ("y0", side([0.0, -50.0, 5.0], [x, z, -y], [50.0, 5.0])),
+                ("y1", side([0.0, 50.0, 5.0], [z, x, y], [5.0, 50.0])),
+            ],
+        );
+        for (height, absorbs, expected) in [
+            (0.0, true, 1.0),
+            (10.0, true, 1.0 - r),
+            (0.0, false, 1.0 + (1.0 - r) * r / (1.0 - r * r)),
+            (10.0, false, (1.0 - r) / (1.0 - r * r)),
+        ] {
+            let text = format!(
+                "[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\npower_floor = 1e-9\n[[medium]]\nname = 'glass'\nindex = 1.5
+                [[material]]\npart = 'slab'\nmedium = 'glass'
+                [[source]]\nkind = 'collimated'\nat = {:?}\ndirection = {:?}\nsize = [5, 5]
+                [[receiver]]\nname = 'in the face'\nat = {:?}\nnormal = {:?}\nsize = [90, 90]\nabsorbs = {absorbs}\n",
+                place([-6.0, 0.0, -20.0]).to_array(),
+                way([0.3, 0.0, 1.0]),
+                place([0.0, 0.0, height]).to_array(),
+                z.to_array()
+            );
+            let results = world.run(&text, |_| ());
+            let found = results.receivers[0].power;
+            assert!((found - expected).abs() < 1e-8, "{at:?} {height} {absorbs}: {found} {expected}");
+            assert_eq!(results.lost_rays, 0);
+        }
+    }
+}
+
+/// Two overlapping blocks of one glass with sides in the same planes are one block.
+#[test]
+fn blocks_that_overlap_and_share_planes_are_one_block() {
+    let mut results = Vec::new();
+    for blocks in [&[(0.0, 15.0)][..], &[(0.0, 10.0), (5.0, 15.0)], &[(5.0, 15.0), (0.0, 10.0)]] {
+        let mut world = World::default();
+        let mut text = String::from("[run]\nrays = 20000\n[[medium]]\nname = 'glass'\nindex = 1.5\n");
+        for (k, &(from, to)) in blocks.iter().enumerate() {
+            world.cuboid(&format!("block {k}"), Point::new(-10.0, -10.0, from), Point::new(10.0, 10.0, to));
+            text += &format!("[[material]]\npart = 'block {k}'\nmedium = 'glass'\n");
+        }
+        text += "[[source]]\nkind = 'point'\nat = [1, 2, -12]\n[[source]]\nkind = 'point'\nat = [25, 3, 6]
+            [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
+        results.push(world.run(&text, |_| ()));
+    }
+    let [whole, others @ ..] = &results[..] else { panic!() };
+    for other in others {
+        assert_eq!(other.lost_rays, 0, "{:?}", other.ledger.first());
+        for axis in 0..2 {
+            let [a, b] = [whole, other].map(|r| r.receivers[0].rms[axis]);
+            assert!((a - b).abs() < 0.01 * a, "{axis}: {a} {b}");
+        }
+    }
 }

@@ -105,7 +105,9 @@ fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let other = context.bound.faces.get(second.face.index());
         let meets =
             |o: &&FaceOptics| o.body != face.body && (o.touching && face.touching || o.against && face.against);
-        if let Some(other) = other.filter(meets).filter(|_| entering == (along >= 0.0)) {
+        // Overlapping bodies that end at one plane look the same way there, touching ones against each other.
+        let fits = entering == (along >= 0.0) || second.geometric_normal.dot(hit.geometric_normal) > 0.5;
+        if let Some(other) = other.filter(meets).filter(|_| fits) {
             crossed.cross(other.body, entering);
             at.t_min = reach;
             certain = false;

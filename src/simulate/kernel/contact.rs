@@ -14,6 +14,27 @@ pub(super) fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Optio
     partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
 }
 
+/// Another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
+/// entered or left at once, wherever rounding puts the second face.
+#[inline(never)]
+pub(super) fn alike(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Option<u16> {
+    let mut probe = beside(context, ray, at.hit, at.point);
+    for _ in 0..NEAR {
+        let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+        let other = context.bound.faces.get(found.face.index())?;
+        let same = (ray.direction.dot(found.geometric_normal) < 0.0) == at.entering;
+        if other.touching
+            && other.body != at.face.body
+            && same
+            && found.geometric_normal.dot(at.hit.geometric_normal) > 0.5
+        {
+            return Some(other.body);
+        }
+        probe.t_min = found.t.next_up();
+    }
+    None
+}
+
 /// The piece of a ray around its hit that lies within the glue distance of the face, that face left out.
 fn beside(context: &Context<'_>, ray: &Ray, hit: &Hit, point: Point) -> Ray {
     let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);

@@ -23,10 +23,17 @@ pub(super) fn aim<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut
     }
     for &r in &context.blocking {
         if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, ray.t_max) {
-            ray.t_max = t;
+            // One that lies in a face is met before the face.
+            ray.t_max = (t - in_front(ray, t)).max(ray.t_min);
             path.receiver = r;
         }
     }
+}
+
+/// How far in front of a face a receiver that lies in it is met, mm: more than both are off by rounding.
+#[inline(always)]
+fn in_front(ray: &Ray, t: f64) -> f64 {
+    1e-9 + 1e-12 * (t + ray.origin.abs().max_element())
 }
 
 /// Ends the ray at the nearest receiver that stops light and stands outside the scene's box, unless a face comes first.
@@ -290,8 +297,8 @@ pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
 /// Counts the light on receivers that let it pass.
 fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, local: &mut Local) {
     for &r in &context.passing {
-        // A receiver that lies in a face, or in another receiver, is reached.
-        let (mut after, end) = (ray.t_min, end.next_up());
+        // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
+        let (mut after, end) = (ray.t_min + in_front(ray, 0.0), end + in_front(ray, end.min(1e12)));
         // A sphere may be crossed twice.
         while let Some(t) = context.bound.receivers[r as usize].crossing(ray, after, end) {
             receive(context, path, r, ray.at(t), local);

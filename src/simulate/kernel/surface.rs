@@ -1,7 +1,7 @@
 //! What happens to a path at a face.
 
 use super::around::regained;
-use super::contact::glued;
+use super::contact::{alike, glued};
 use super::step::{Meeting, caught, key, lose, onward, record, stray};
 use super::{Carry, Cause, Context, Event, Local, Path};
 use crate::math::{Ray, Vector};
@@ -219,6 +219,21 @@ fn cross<C: Carry>(
             // The second face of an interface that was crossed at the first.
             _ => Some(path.carry),
         };
+    } else if at.face.touching
+        && let Some(other) = alike(context, ray, at)
+    {
+        let [first, second] = [at.face.body.min(other), at.face.body.max(other)];
+        let holds = |body: u16| path.carry.across(body, false).is_some();
+        let both = path.carry.across(first, at.entering).and_then(|c| c.across(second, at.entering));
+        match [holds(first), holds(second)] {
+            // What looks the same way but is not passed here, as beyond an edge.
+            [a, b] if a != b => {}
+            [inside, _] => {
+                at.skip.set(context.bound.scene.run.glue_mm);
+                // The second of two faces that were passed at the first.
+                across = if inside == at.entering { Some(path.carry) } else { both };
+            }
+        }
     }
     if across.is_none() {
         record(context, path, at.point, Event::Lost, local);
