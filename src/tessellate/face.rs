@@ -11,7 +11,7 @@ use super::proof::near::Near;
 use super::repairs::Repair;
 use super::sheet::Sheet;
 use super::strip::delaunay::{self, Node, Outline, key};
-use super::strip::pair;
+use super::strip::{crease, pair};
 use crate::math::{Point, Uv, Vector};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use rayon::prelude::*;
@@ -69,7 +69,8 @@ pub(super) fn mesh(
     segments.extend(all.filter(|s| met[&key(s[0], s[1])] % 2 == 1));
     let trims = border.trims;
     let scale = if segments.is_empty() { Uv::ONE } else { scale(sheet, &rings, &leaves) };
-    let outline = Outline { nodes: border.nodes, segments, trims: &trims, scale, next };
+    let creases = crease::lines(sheet, &border.nodes, &segments);
+    let outline = Outline { nodes: border.nodes, segments, creases, trims: &trims, scale, next };
     let mut strip = delaunay::triangulate(sheet, settings.judge, outline, settings.budget)?;
     for &(t, bound, tolerance) in &grid.triangles {
         strip.triangles.push(t);
@@ -217,26 +218,34 @@ impl Border {
 struct Emit<'e, 's, 'a> {
     sheet: &'s Sheet<'a>,
     nodes: &'e [Node],
-    ids: FxHashMap<u32, u32>,
+    /// Corners by node and the side of a crease on which their facet lies.
+    ids: FxHashMap<(u32, u8), u32>,
     out: FaceMesh,
 }
 
 impl Emit<'_, '_, '_> {
     fn facet(&mut self, nodes: [u32; 4], pole: Option<(usize, Uv)>, bound: f64, tolerance: f64) {
+        let creased = self.sheet.is_creased();
+        let all = nodes.map(|n| self.nodes[n as usize].uv);
+        let inside = 0.25 * (all[0] + all[1] + all[2] + all[3]);
         let corner = [0, 1, 2, 3].map(|k| {
             if k == 3 && nodes[3] == nodes[2] {
                 return u32::MAX;
             }
             match pole {
-                Some((at, uv)) if k == at => self.corner(nodes[at], uv),
-                _ => match self.ids.get(&nodes[k]) {
-                    Some(&id) => id,
-                    None => {
-                        let id = self.corner(nodes[k], self.nodes[nodes[k] as usize].uv);
-                        self.ids.insert(nodes[k], id);
-                        id
+                Some((at, uv)) if k == at => self.corner(nodes[at], uv, inside),
+                _ => {
+                    let uv = all[k];
+                    let name = (nodes[k], if creased { side(self.sheet.on_creases(uv), inside) } else { 0 });
+                    match self.ids.get(&name) {
+                        Some(&id) => id,
+                        None => {
+                            let id = self.corner(nodes[k], uv, inside);
+                            self.ids.insert(name, id);
+                            id
+                        }
                     }
-                },
+                }
             }
         });
         let [a, b, c, d] =
@@ -266,11 +275,17 @@ impl Emit<'_, '_, '_> {
         }
     }
 
-    fn corner(&mut self, node: u32, uv: Uv) -> u32 {
-        let normal = self.sheet.normal(uv).unwrap_or(Vector::ZERO);
+    fn corner(&mut self, node: u32, uv: Uv, inside: Uv) -> u32 {
+        let normal = self.sheet.normal_towards(uv, inside).unwrap_or(Vector::ZERO);
         self.out.corners.push((self.nodes[node as usize].position, normal, uv));
         (self.out.corners.len() - 1) as u32
     }
+}
+
+/// The side of each crease on which `inside` lies.
+fn side(on: [Option<f64>; 2], inside: Uv) -> u8 {
+    let of = |d: usize| on[d].map_or(0, |crease| if inside[d] < crease { 1 } else { 2 });
+    of(0) + 3 * of(1)
 }
 
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that

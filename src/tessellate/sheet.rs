@@ -6,6 +6,13 @@ use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};
 /// Share of the domain, and of the surface's size, within which a place is a pole; borders end there up to their rounding.
 const POLE: f64 = 1e-9;
 
+/// Sine of the angle between tangents from which a knot is a crease, and from which it is one that nothing may lie across: shallower
+/// ones, as between arcs that were fitted together, took twice the facets on a connecting rod.
+const BENT: f64 = 1e-3;
+const SHARP: f64 = 0.05;
+/// Share of the domain within which a place is on a crease.
+const CREASE: f64 = 1e-7;
+
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct Sheet<'a> {
     pub(super) surface: &'a Surface,
@@ -20,6 +27,8 @@ pub(super) struct Sheet<'a> {
     pub(super) breaks: [Vec<f64>; 2],
     /// Parameters with a crease or corner of the surface, in u and v.
     pub(super) creases: [Vec<f64>; 2],
+    /// Those at which nothing may lie across.
+    pub(super) sharp: [Vec<f64>; 2],
     /// Diagonal of the box around the surface, mm.
     pub(super) size: f64,
     /// Whether the sides of the domain are points: at both ends of u, of v.
@@ -38,14 +47,30 @@ impl<'a> Sheet<'a> {
             b.dedup();
             b
         });
-        let creases = [creases(surface, 0, &breaks), creases(surface, 1, &breaks)];
+        let sharper = |least: f64| [0, 1].map(|d| creases(surface, d, &breaks, least));
+        let creases = sharper(BENT);
+        let sharp = if creases.iter().all(|c| c.is_empty()) { creases.clone() } else { sharper(SHARP) };
         let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
         let bends = Bends::new(surface, &patches, &breaks);
         let least = POLE * size;
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
         let affine = is_affine(surface, size);
-        Self { surface, field, flip, affine, patches, bends, breaks, creases, size, poles, gap: None, pole_size }
+        Self {
+            surface,
+            field,
+            flip,
+            affine,
+            patches,
+            bends,
+            breaks,
+            creases,
+            sharp,
+            size,
+            poles,
+            gap: None,
+            pole_size,
+        }
     }
 
     /// Where `uv` lies on a pole: the parameter that is constant along it.
@@ -115,6 +140,38 @@ impl<'a> Sheet<'a> {
         self.surface.normal(uv).map(|n| if self.flip { -n } else { n })
     }
 
+    /// Whether the surface has creases.
+    pub(super) fn is_creased(&self) -> bool {
+        self.creases.iter().any(|c| !c.is_empty())
+    }
+
+    /// Whether some of them are sharp.
+    pub(super) fn is_sharp(&self) -> bool {
+        self.sharp.iter().any(|c| !c.is_empty())
+    }
+
+    /// For each direction the crease that a place lies on.
+    pub(super) fn on_creases(&self, uv: Uv) -> [Option<f64>; 2] {
+        let near = CREASE * self.extent();
+        [0, 1].map(|d| self.creases[d].iter().copied().find(|c| (c - uv[d]).abs() <= near[d]))
+    }
+
+    /// Outward unit normal, on a crease that of the side on which `inside` lies.
+    pub(super) fn normal_towards(&self, uv: Uv, inside: Uv) -> Option<Vector> {
+        let on = self.on_creases(uv);
+        if on == [None; 2] {
+            return self.normal(uv);
+        }
+        let [a, b] = [0, 1].map(|d| match on[d] {
+            Some(crease) => self.interval(d, crease) - usize::from(inside[d] < crease),
+            None => self.interval(d, uv[d]),
+        });
+        let patch = self.patch(a, b);
+        let d = patch.second_derivatives(local(patch, uv).clamp(Uv::ZERO, Uv::ONE));
+        let n = d.du.cross(d.dv).try_normalize();
+        n.map(|n| if self.flip { -n } else { n }).or_else(|| self.normal(uv))
+    }
+
     /// Whether facets run clockwise in the parameter plane.
     pub(super) fn flipped(&self) -> bool {
         self.flip
@@ -172,7 +229,7 @@ fn is_affine(s: &Surface, size: f64) -> bool {
 }
 
 /// Interior knots at which the surface may be bent: multiplicity of at least the degree and a jump of the tangent.
-fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2]) -> Vec<f64> {
+fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64> {
     let b = &breaks[d];
     let knots = &s.knots[d];
     let inner = b[1..b.len() - 1].iter().enumerate();
@@ -189,7 +246,7 @@ fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2]) -> Vec<f64> {
                     if d == 0 { der.du } else { der.dv }
                 };
                 match (tangent(k - step).try_normalize(), tangent(k + step).try_normalize()) {
-                    (Some(a), Some(c)) => a.cross(c).length() > 1e-3 || a.dot(c) < 0.0,
+                    (Some(a), Some(c)) => a.cross(c).length() > least || a.dot(c) < 0.0,
                     _ => false,
                 }
             })

@@ -26,6 +26,8 @@ pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) nodes: Vec<Node>,
     /// Constraint segments, each turning outside into inside.
     pub(in crate::tessellate) segments: Vec<[u32; 2]>,
+    /// Lines inside that no triangle crosses; refinement may divide them.
+    pub(in crate::tessellate) creases: Vec<[u32; 2]>,
     /// What border segments follow.
     pub(in crate::tessellate) trims: &'t FxHashMap<[u32; 2], Trim>,
     /// Multiplies parameters before triangulating.
@@ -128,6 +130,9 @@ pub(in crate::tessellate) fn triangulate(
             conflicts.push([a, b]);
             crossed.extend(work.crossed(a, b));
         }
+    }
+    for &[a, b] in &outline.creases {
+        work.hold(a, b);
     }
     let rings = (!conflicts.is_empty()).then_some(&outline.segments);
     let mut known: FxHashMap<[u32; 3], (f64, f64)> = FxHashMap::default();
@@ -259,7 +264,11 @@ impl Work<'_, '_> {
         use spade::PositionInTriangulation as At;
         self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
             At::OnFace(_) => true,
-            At::OnEdge(e) => !self.cdt.directed_edge(e).is_constraint_edge(),
+            At::OnEdge(e) => {
+                let e = self.cdt.directed_edge(e);
+                let border = || self.odd.contains_key(&key(e.from().data().node, e.to().data().node));
+                !e.is_constraint_edge() || !border()
+            }
             _ => false,
         })
     }
@@ -275,6 +284,15 @@ impl Work<'_, '_> {
             *self.odd.entry(key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
         }
         !made.is_empty()
+    }
+
+    /// Keeps triangles from crossing a line that bounds nothing, where the border leaves it.
+    fn hold(&mut self, a: u32, b: u32) {
+        if let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize])
+            && from != to
+        {
+            self.cdt.try_add_constraint(from, to);
+        }
     }
 
     /// The constraints that keep a segment out.

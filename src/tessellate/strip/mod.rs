@@ -1,5 +1,6 @@
 //! Between the cells and the border: constrained Delaunay, sectors at poles, and pairs of triangles joined to quads.
 
+pub(in crate::tessellate) mod crease;
 pub(in crate::tessellate) mod delaunay;
 mod finer;
 pub(in crate::tessellate) mod matching;

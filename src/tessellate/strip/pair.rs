@@ -3,8 +3,8 @@
 use super::super::proof::bound::Prover;
 use super::super::sheet::Sheet;
 use super::delaunay::{Node, Strip, key};
-use super::matching;
 use super::sector;
+use super::{crease, matching};
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
 
@@ -40,7 +40,7 @@ pub(in crate::tessellate) fn join(
         for k in 0..3 {
             let (c, a) = (tri[k], tri[(k + 1) % 3]);
             let name = key(a, c);
-            if fixed.contains_key(&name) {
+            if fixed.contains_key(&name) || crease::along(prover.sheet, node(a).uv, node(c).uv) {
                 continue;
             }
             let Some(&(j, m)) = sides.get(&name) else {
