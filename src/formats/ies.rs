@@ -26,13 +26,16 @@ pub fn read_ies(path: &Path) -> Result<Photometry, Error> {
 /// As [`read_ies`].
 pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
     let mut keywords: Vec<(String, String)> = Vec::new();
+    // Old files end their lines by a carriage return alone.
+    let text = if text.contains('\n') { text.to_owned() } else { text.replace('\r', "\n") };
     let mut lines = text.lines().enumerate();
     let (tilt_line, tilt) = loop {
         let Some((n, line)) = lines.next() else {
             return Err(Error::at_line(path, 1, "no line starts with TILT=; this is not an IES LM-63 file"));
         };
         let line = line.trim();
-        if let Some(tilt) = line.strip_prefix("TILT=") {
+        let tilt = line.split_once('=').filter(|(key, _)| key.trim().eq_ignore_ascii_case("TILT"));
+        if let Some((_, tilt)) = tilt {
             break (n + 1, tilt.trim());
         }
         if let Some((name, value)) = line.strip_prefix('[').and_then(|l| l.split_once(']')) {
@@ -270,6 +273,20 @@ mod tests {
             }
         }
         assert_eq!(other.g_angles, p.vertical_deg);
+    }
+
+    #[test]
+    fn headers_may_be_spelt_as_old_programs_did() {
+        let whole = parse(TEXT).unwrap();
+        for odd in [
+            TEXT.replace("TILT=", "TILT = "),
+            TEXT.replace("TILT=", "Tilt="),
+            TEXT.replace('\r', "").replace('\n', "\r"),
+            TEXT.replace('\r', "").replace('\n', "\r\n"),
+            format!("\u{feff}{TEXT}\u{1a}"),
+        ] {
+            assert_eq!(parse(&odd).unwrap().candela, whole.candela, "{odd}");
+        }
     }
 
     #[test]

@@ -115,30 +115,47 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     let mut rays = Vec::new();
     // Position of each of `COLUMNS` in a line.
     let mut order: Option<Vec<usize>> = None;
-    for (n, line) in text.lines().enumerate() {
+    let mut wanted = 0;
+    for (n, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
         let fail = |message: String| Error::at_line(path, n + 1, message);
-        let cells: Vec<&str> = if line.contains([',', ';']) {
-            line.split([',', ';']).map(str::trim).collect()
+        // Where semicolons part the cells, a comma is a decimal point.
+        let (separators, points): (&[char], bool) =
+            if line.contains(';') { (&[';'], true) } else { (&[','], false) };
+        let mut cells: Vec<&str> = if line.contains(separators) {
+            line.split(separators).map(str::trim).collect()
         } else {
             line.split_whitespace().collect()
         };
+        while cells.last().is_some_and(|c| c.is_empty()) {
+            cells.pop();
+        }
         if order.is_none() {
             let header = cells.iter().any(|c| COLUMNS.contains(&c.to_lowercase().as_str()));
             order = Some(columns(&cells, header).map_err(&fail)?);
+            wanted = cells.len();
             if header {
                 continue;
             }
         }
         let order = order.as_deref().unwrap_or_default();
+        let last = order.iter().max().map_or(0, |k| k + 1);
+        if cells.len() < last || cells.len() > wanted {
+            let message = match cells.len() {
+                1 => "1 value in this line".to_owned(),
+                n => format!("{n} values in this line"),
+            };
+            return Err(fail(format!("{message}, but {wanted} in the first one")));
+        }
         let numbers: Vec<f64> = order
             .iter()
             .map(|&k| {
                 let cell = cells.get(k).copied().unwrap_or_default();
-                cell.parse::<f64>().map_err(|_| fail(format!("'{cell}' is not a number (column {})", k + 1)))
+                let number = if points { cell.replace(',', ".").parse::<f64>() } else { cell.parse() };
+                number.map_err(|_| fail(format!("'{cell}' is not a number (column {})", k + 1)))
             })
             .collect::<Result<_, Error>>()?;
         rays.push(LightRay::from_numbers(&numbers).map_err(fail)?);
@@ -284,8 +301,15 @@ pub(super) mod tests {
         let expected =
             LightRay { origin: Point::new(1.0, 2.0, 3.0), direction: Vector::Z, power: 2.0, wavelength_nm: None };
         assert_eq!(rays, [expected]);
-        let plain = parse_csv(Path::new("r.csv"), "1 2 3 0 0 2 2\n1 2 3 0 0 1 2\n").unwrap();
-        assert_eq!(plain, [expected; 2]);
+        for text in [
+            "1 2 3 0 0 2 2\n1 2 3 0 0 1 2\n",
+            // As spreadsheets write them.
+            "\u{feff}x,y,z,dx,dy,dz,power\r\n1,2,3,0,0,2,2\r\n\r\n1,2,3,0,0,1,2\r\n",
+            "x;y;z;dx;dy;dz;power\n1,0;2,0;3,0;0,0;0,0;1,5;2,0\n1;2;3;0;0;1;2e0\n",
+            "1,2,3,0,0,1,2,\n1,2,3,0,0,1,2,\n",
+        ] {
+            assert_eq!(parse_csv(Path::new("r.csv"), text).unwrap(), [expected; 2], "{text}");
+        }
     }
 
     #[test]
@@ -295,6 +319,8 @@ pub(super) mod tests {
             ("0,0,0,0,0,1,1\n0,0,0,0,0,0,1\n", "r.csv:2: the direction has no length"),
             ("0,0,0,0,0,1,1\n\n0,0,0,0,0,1,-1\n", "r.csv:3: a power of -1"),
             ("0,0,0,0,0,1,one\n", "r.csv:1: 'one' is not a number"),
+            ("0,0,0,0,0,1,1\n0,0,0,0,1\n", "r.csv:2: 5 values in this line, but 7 in the first one"),
+            ("0,0,0,0,0,1,1\n0,0,0,0,1,0,0,5\n", "r.csv:2: 8 values in this line, but 7 in the first one"),
             ("0,0,0\n", "r.csv:1: 3 columns"),
             ("0,0,0,0,0,1,inf\n", "r.csv:1: inf is no finite number"),
         ] {
