@@ -164,3 +164,31 @@ fn loops_that_touch_in_two_vertices_have_one_corner_there() {
         assert!(on, "{a} {b}");
     }
 }
+
+/// A crescent thinner than the sag of its chords, whose edges are sampled at different places: their chords cross, and only dividing both
+/// further takes them apart.
+#[test]
+fn a_crescent_between_two_arcs_is_divided_on_both_sides() {
+    let plane = sweep::plane(&Frame::IDENTITY, [[-20.0, 20.0]; 2]);
+    let arc = |height: f64, bend: f64| {
+        move |f: f64| {
+            // Through (-8, 0) and (8, 0), as high in the middle; `bend` crowds its parameters to one side.
+            let f = f + bend * f * (1.0 - f);
+            let x = 16.0 * f - 8.0;
+            let r = (64.0 + height * height) / (2.0 * height);
+            Uv::new(x, (r * r - x * x).sqrt() - (r - height))
+        }
+    };
+    for (low, high, bend) in [(6.0, 6.02, 0.0), (6.0, 6.02, 0.1), (6.0, 6.1, 0.1)] {
+        let (a, b) = (chain(2000, arc(low, bend)), chain(2000, |f| arc(high, 0.0)(1.0 - f)));
+        let made = tessellate(&face(plane.clone(), &[vec![b, a]]), &measured(0.2));
+        assert_proved(&made);
+        // Facets turn none of the plane over and cover what lies between the chords of both arcs, which sag no more than 0.2 each.
+        let segment = |h: f64| {
+            let r = (64.0 + h * h) / (2.0 * h);
+            r * r * (8.0 / r).asin() - 8.0 * (r - h)
+        };
+        let off = (made.report.area_mm2 - (segment(high) - segment(low))).abs();
+        assert!(off < 0.2 * 20.0, "{off}");
+    }
+}

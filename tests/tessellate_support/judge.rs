@@ -231,9 +231,10 @@ pub(crate) fn judge(model: &Model, made: &Tessellation, gap: f64) -> Result<Foun
                 let ratio = off.map(|x| (x - gap - 1e-9 * extent(&face.surface)).max(0.0) / q.tolerance);
                 found.worst = [found.worst[0].max(ratio[0]), found.worst[1].max(ratio[1])];
                 if ratio[0].max(ratio[1]) > 1.0 + 1e-6 {
+                    let uv = made.mesh.facets[f].vertices.map(|v| made.mesh.vertices[v as usize].uv.to_array());
+                    let asked = q.tolerance;
                     return Err(format!(
-                        "facet {f} of face {i} is proved within {} and off by {off:?}",
-                        q.tolerance
+                        "facet {f} of face {i} at {uv:?} is proved within {asked} and off by {off:?}"
                     ));
                 }
             }
@@ -347,12 +348,14 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
                 return Err(format!("facet {f} is turned in the parameter plane: {area}"));
             }
             // At a pole the piece lies between the parameter lines into it; a triangle with two corners there has none.
-            match [0, 1, 2].map(|k| poles.of(x[k])) {
-                [None, None, None] => {}
-                [Some(d), None, None] => piece.extend(sector(&outlines, [x[0], x[1], x[2]], d, extent)),
-                [None, Some(d), None] => piece.extend(sector(&outlines, [x[1], x[2], x[0]], d, extent)),
-                [None, None, Some(d)] => piece.extend(sector(&outlines, [x[2], x[0], x[1]], d, extent)),
-                _ => {}
+            let at = [0, 1, 2].map(|k| poles.of(x[k]));
+            if let Some(k) =
+                (0..3).find(|&k| at[k].is_some() && at[(k + 1) % 3].is_none() && at[(k + 2) % 3].is_none())
+            {
+                let (i, j) = (t[(k + 1) % 3], t[(k + 2) % 3]);
+                let inside = [i.min(j), i.max(j)] == [0, 2] && cuts.len() == 2 || sides.contains_key(&[v[j], v[i]]);
+                let along = if inside { &[][..] } else { &outlines[..] };
+                piece.extend(sector(along, [x[k], uv[i], uv[j]], at[k].unwrap_or(0), extent));
             }
             if x.iter().any(|&x| poles.of(x).is_some()) {
                 continue;
@@ -395,9 +398,9 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
     Ok(out)
 }
 
-/// The piece of a triangle with a pole as its first corner: between the parameter lines of both others, down to the trim where they are the
-/// ends of one of its chords.
-fn sector(outlines: &[Vec<Uv>], [pole, a, b]: [Uv; 3], d: usize, extent: Uv) -> Vec<[Uv; 3]> {
+/// The piece of a triangle with a pole as its first corner: between the parameter lines of both others, down to the trim that its base is a
+/// chord of, if any.
+fn sector(trims: &[Vec<Uv>], [pole, a, b]: [Uv; 3], d: usize, extent: Uv) -> Vec<[Uv; 3]> {
     let foot = |mut x: Uv| {
         x[d] = pole[d];
         x
@@ -409,7 +412,7 @@ fn sector(outlines: &[Vec<Uv>], [pole, a, b]: [Uv; 3], d: usize, extent: Uv) -> 
     // A chord is short: what goes around the face the other way is none.
     let length = |p: &[Uv]| p.windows(2).map(|w| ((w[1] - w[0]) / extent).length()).sum::<f64>();
     let chord = |p: &(Vec<Uv>, f64)| length(&p.0) <= 1.5 * ((b - a) / extent).length();
-    let base = outlines.iter().filter_map(on).find(chord).map_or(vec![a, b], |p| p.0);
+    let base = trims.iter().filter_map(on).find(chord).map_or(vec![a, b], |p| p.0);
     base.windows(2).flat_map(|w| [[w[0], w[1], foot(w[1])], [w[0], foot(w[1]), foot(w[0])]]).collect()
 }
 
