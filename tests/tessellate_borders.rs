@@ -192,3 +192,24 @@ fn a_crescent_between_two_arcs_is_divided_on_both_sides() {
         assert!(off < 0.2 * 20.0, "{off}");
     }
 }
+
+/// Towards the apex of a cone the tolerance tightens, and chords of the rim that hold where they are do not hold for sectors that reach there.
+/// Shorter chords make one sector each; places between rim and apex would make several rings.
+#[test]
+fn the_rim_of_a_cone_is_divided_for_the_tolerance_of_its_apex() {
+    let (r, half_angle, wide) = (400.0, 0.6f64, 2.0);
+    let cone = sweep::cone(&Frame::IDENTITY, 0.0, half_angle, [0.0, wide], [0.0, r / half_angle.tan()]);
+    let [_, [_, top]] = cone.domain();
+    let c = [Uv::new(0.0, top), Uv::new(0.0, 0.0), Uv::new(wide, 0.0), Uv::new(wide, top)];
+    let sides = (0..4).map(|k| chain([1, 1, 1, 512][k], |f| c[k].lerp(c[(k + 1) % 4], f))).collect();
+    let mut model = face(cone, &[sides]);
+    // The side that is a point has no edge, and both that end there the same vertex.
+    let part = &mut model.parts[0];
+    part.shells[0].faces[0].loops[0].uses[1].edge = None;
+    part.edges[2].vertices[0] = part.edges[0].vertices[1];
+    let made = tessellate(&model, &Settings { measure: true, ..Settings::default() });
+    assert_proved(&made);
+    // A chord of sag 0.05, the tight tolerance, spans 2 acos(1 - 0.05 / r).
+    let sectors = wide / (2.0 * (1.0 - 0.05 / r).acos());
+    assert!((made.report.facets as f64) < 2.0 * sectors, "{} facets, {sectors} sectors", made.report.facets);
+}

@@ -36,14 +36,9 @@ impl Work<'_, '_> {
         for t in bad {
             let xi = known[&sorted(*t)].1;
             let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
-            // A chord stays as it is: where it strays farther than its own ends allow, no triangle on it can hold. The third corner does not
-            // count: towards a cone's apex the tolerance tightens, and points between bring it back.
-            let lost = |&(a, b): &(u32, u32)| {
-                trims.get(&key(a, b)).is_some_and(|trim| {
-                    let at = |n: u32| self.sheet.tolerance(self.nodes[n as usize].uv);
-                    trim.deviation > xi && trim.deviation > at(a).min(at(b))
-                })
-            };
+            // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which at
+            // a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
+            let lost = |&(a, b): &(u32, u32)| trims.get(&key(a, b)).is_some_and(|trim| trim.deviation > xi);
             // Nor does a corner move that the file puts beside the surface.
             let off =
                 |&n: &u32| (self.sheet.point(self.nodes[n as usize].uv) - self.nodes[n as usize].place).length();
