@@ -106,7 +106,8 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
             let mut away = (surface.evaluate(foot) - x).length();
             if away > out.sag {
                 // A single start may end beside the nearest point: uneven weights bend the parameters.
-                let other = project(surface, x, search(surface, x, t.map(|k| uv[k])));
+                let pieces: Vec<[Uv; 3]> = triangles.iter().map(|t| t.map(|k| uv[k])).collect();
+                let other = project(surface, x, search(surface, x, &pieces));
                 let nearer = (surface.evaluate(other) - x).length();
                 if nearer < away {
                     (foot, away) = (other, nearer);
@@ -137,13 +138,13 @@ fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Ve
 const FOLLOWED: usize = 8;
 const LEVELS: usize = 40;
 
-/// Parameters of a point near `x` on a piece of the surface: those of its parts go on whose flat triangles lie nearest, so that none
+/// Parameters of a point near `x` on a piece of the surface, the whole one of a facet, given in triangles: those of its parts go on whose flat triangles lie nearest, so that none
 /// is lost where weights crowd most of the parameters into one place and a step of any length leaps over the surface.
-fn search(surface: &Surface, x: Point, uv: [Uv; 3]) -> Uv {
+fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     let at = |u: Uv| (u, surface.evaluate(u));
     let off = |p: &[(Uv, Point); 3]| (x - closest(x, p.map(|q| q.1))).length();
-    let mut best = (f64::INFINITY, uv[0]);
-    let mut pieces = vec![uv.map(at)];
+    let mut best = (f64::INFINITY, over[0][0]);
+    let mut pieces: Vec<[(Uv, Point); 3]> = over.iter().map(|uv| uv.map(at)).collect();
     for _ in 0..LEVELS {
         let mut parts = Vec::with_capacity(4 * pieces.len());
         for [a, b, c] in pieces {
@@ -174,7 +175,7 @@ fn search(surface: &Surface, x: Point, uv: [Uv; 3]) -> Uv {
 pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let [a, b, c, d] = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v));
-    let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search(surface, x, half)));
+    let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search(surface, x, &[half])));
     let away = found.map(|u| (surface.evaluate(u) - x).length());
     if away[1] < away[0] { found[1] } else { found[0] }
 }

@@ -9,7 +9,7 @@ use super::super::settings::Judge;
 use super::super::sheet::Sheet;
 use super::super::strip::sector;
 use super::ladder::ladder;
-use super::look::{Look, quad_bound};
+use super::look::Look;
 use crate::math::{Point, Uv};
 
 /// A rectangle `[lo, hi]` of the parameter plane.
@@ -165,8 +165,7 @@ impl Tree<'_, '_> {
             let limit = xi * out.slack;
             // A cell at the border is only a measure of size, but a look alone leaves them larger: 6 % more facets on a lens.
             let prover = &mut out.prover;
-            let bound =
-                at_pole(prover, cell, limit).unwrap_or_else(|| quad_bound(prover, &look.facet(cell), limit));
+            let bound = at_pole(prover, cell, limit).unwrap_or_else(|| look.bound(prover, cell, limit));
             if bound <= limit {
                 if inside || self.aligned(cell, &near) && self.contains(cell.center()) {
                     let (first, places) = (look.first(), look.places());

@@ -11,6 +11,7 @@
 //!   curve has a point on x's side line farther out, and x is no farther from it than it is from the line of its edge. So
 //!   the distance is at most the larger of P to T and the distance of the boundary curves to the lines of their edges.
 //!
+//! Cells are proved as one quad where that holds (`quad.rs`), which their diagonal then is no boundary of.
 //! Both are tried by second derivatives first (`bend.rs`): the piece and its boundary are near the linear map onto the triangle.
 //!
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
@@ -21,6 +22,7 @@ use super::super::sheet::{Sheet, local};
 use super::flat::{Flat, clip, from_chord, whole};
 use super::near::Near;
 use super::net::{Corner, MOST_HALVED, Nets};
+use super::quad::Halving;
 use super::refine::{LEVELS, refine};
 use super::scalar::Scalar;
 use super::slight::{self, Slight};
@@ -35,16 +37,19 @@ const MOST_NEAR: usize = 16;
 const MOST_HULL: usize = 1000;
 /// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
 const SLIGHT: f64 = 0.02;
+/// Where a triangle is looked at before it is proved.
+const PROBES: [[f64; 3]; 4] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [1.0 / 3.0; 3]];
 
 /// Bounds facets of one face.
 pub(in crate::tessellate) struct Prover<'s, 'a> {
     pub(in crate::tessellate) sheet: &'s Sheet<'a>,
-    judge: Judge,
+    pub(super) judge: Judge,
     nets: Nets,
-    near: Near,
+    pub(super) near: Near,
     slight: Slight,
-    scalar: Scalar,
-    margin: f64,
+    pub(super) scalar: Scalar,
+    pub(super) halving: Halving,
+    pub(super) margin: f64,
 }
 
 impl<'s, 'a> Prover<'s, 'a> {
@@ -56,6 +61,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             near: Near::default(),
             slight: Slight::default(),
             scalar: Scalar::default(),
+            halving: Halving::default(),
             margin: 1e-12 * sheet.size,
         }
     }
@@ -74,19 +80,26 @@ impl<'s, 'a> Prover<'s, 'a> {
         {
             return quick;
         }
-        let third = 1.0 / 3.0;
-        let probes = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [third; 3]];
-        let mut sampled = 0f64;
-        for [a, b, c] in probes {
-            sampled = sampled.max(flat.distance(self.sheet.point(uv[0] * a + uv[1] * b + uv[2] * c)));
-            if sampled > limit {
-                return sampled;
-            }
+        let sampled = self.probed(&uv, &flat, limit, &PROBES);
+        if sampled > limit {
+            return sampled;
         }
         if self.judge == Judge::Sampled {
             return self.sampled(uv, &flat).max(sampled);
         }
         self.hulls(uv, &flat, limit)
+    }
+
+    /// Largest distance of the surface at a few places of a parameter triangle to a triangle in space; the first one above the limit.
+    fn probed(&self, uv: &[Uv; 3], flat: &Flat, limit: f64, places: &[[f64; 3]]) -> f64 {
+        let mut most = 0f64;
+        for [a, b, c] in places {
+            most = most.max(flat.distance(self.sheet.point(uv[0] * *a + uv[1] * *b + uv[2] * *c)));
+            if most > limit {
+                break;
+            }
+        }
+        most
     }
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space, by hulls.
@@ -132,7 +145,8 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
-    /// quick look; `None` when that does not show it to be within the limit. `exact`: the corners are known to lie on the surface.
+    /// quick look; `None` when that does not show it to be within the limit. Above the limit it is a sample of the surface, which no
+    /// bound can be below. `exact`: the corners are known to lie on the surface.
     pub(in crate::tessellate) fn facet(
         &mut self,
         uv: [Uv; 3],
@@ -160,6 +174,12 @@ impl<'s, 'a> Prover<'s, 'a> {
             if let Some(bound) = near {
                 return Some(bound + off);
             }
+        }
+        // Proofs that must fail are the dearest.
+        let places = if exact { &PROBES[3..] } else { &PROBES[..] };
+        let probed = self.probed(&uv, &Flat::new(&xyz), limit, places);
+        if probed > limit {
+            return Some(probed);
         }
         if count > 1 {
             let hull = if count <= MOST_HULL { self.near.hull(patches(), uv, at, limit - off) } else { None };

@@ -6,6 +6,7 @@ pub(in crate::tessellate) mod flat;
 pub(in crate::tessellate) mod linear;
 pub(in crate::tessellate) mod near;
 pub(in crate::tessellate) mod net;
+pub(in crate::tessellate) mod quad;
 mod refine;
 pub(in crate::tessellate) mod scalar;
 pub(in crate::tessellate) mod slight;

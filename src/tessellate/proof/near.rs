@@ -28,6 +28,8 @@ pub(in crate::tessellate) struct Near {
     stack: Vec<Point>,
     /// What `net` holds: which patch (by place), over which rectangle, seen from where.
     held: Option<(usize, Uv, Uv, Point)>,
+    /// Bounds of its second derivatives where they are known.
+    seconds: Option<[f64; 3]>,
 }
 
 impl Near {
@@ -53,9 +55,15 @@ impl Near {
             lightest = lightest.min(w_min);
             let [p, q] = patch.degree;
             let second = if even([w_min, w_max]) {
-                self.deviation.clear();
-                self.deviation.extend(self.net.iter().map(|c| c.truncate()));
-                seconds(&self.deviation, [p, q])
+                // L has no second derivatives: both triangles of a cell have the same.
+                match self.seconds {
+                    Some(known) => known,
+                    None => {
+                        self.deviation.clear();
+                        self.deviation.extend(self.net.iter().map(|c| c.truncate()));
+                        *self.seconds.insert(seconds(&self.deviation, [p, q]))
+                    }
+                }
             } else {
                 self.subtract([p, q], linear.over(from, share));
                 seconds(&self.deviation, [p + 1, q + 1])
@@ -191,6 +199,7 @@ impl Near {
             return &self.net;
         }
         self.held = name;
+        self.seconds = None;
         self.net.clear();
         self.net.extend(patch.points.iter().map(|c| (c.truncate() - origin * c.w).extend(c.w)));
         for row in self.net.chunks_exact_mut(q + 1) {

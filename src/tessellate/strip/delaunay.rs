@@ -141,7 +141,10 @@ pub(in crate::tessellate) fn triangulate(
     let mut before = 0;
     for round in 0..=ROUNDS {
         let triangles = work.inside(rings);
-        let fresh: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
+        let mut stands: Vec<Option<(f64, f64)>> =
+            triangles.iter().map(|&t| known.get(&sorted(t)).copied()).collect();
+        let new = triangles.iter().zip(&stands).filter(|(_, s)| s.is_none());
+        let fresh: Vec<[u32; 3]> = new.map(|(&t, _)| t).collect();
         let proved: Vec<(f64, f64)> = fresh
             .par_iter()
             .with_min_len(16)
@@ -150,16 +153,19 @@ pub(in crate::tessellate) fn triangulate(
                 |prover, &t| prove(sheet, prover, 1.0, &work.nodes, t, outline.trims),
             )
             .collect();
-        known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved));
-        let over = |t: &[u32; 3]| known[&sorted(*t)].0 > known[&sorted(*t)].1 || work.turn(*t).is_some();
-        let mut bad: Vec<[u32; 3]> = triangles.iter().copied().filter(over).collect();
+        known.extend(fresh.iter().map(|&t| sorted(t)).zip(proved.iter().copied()));
+        stands.iter_mut().filter(|s| s.is_none()).zip(proved).for_each(|(s, new)| *s = Some(new));
+        let over = |&(t, s): &(&[u32; 3], (f64, f64))| s.0 > s.1 || work.turn(*t).is_some();
+        let stands = || stands.iter().flatten().copied();
+        let mut bad: Vec<([u32; 3], (f64, f64))> =
+            triangles.iter().zip(stands()).filter(over).map(|(&t, s)| (t, s)).collect();
         // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
         // 12 times the corners of its border.
         let (corners, falls) = (work.cdt.num_vertices(), 5 * bad.len() < 4 * before);
         before = bad.len();
         if corners >= most && !falls {
             // Where all cannot hold, the worst come first.
-            let excess = |t: &[u32; 3]| known[&sorted(*t)].0 / known[&sorted(*t)].1;
+            let excess = |(_, (bound, xi)): &([u32; 3], (f64, f64))| bound / xi;
             let worst = bad.iter().map(excess).fold(0.0, f64::max);
             bad.retain(|t| excess(t) >= WORST * worst);
         }
@@ -167,9 +173,9 @@ pub(in crate::tessellate) fn triangulate(
             || round == ROUNDS
             || (round + 1) * triangles.len() > MOST_WORK
             || corners >= if falls { budget } else { most + most / 4 }
-            || !work.refine(&bad, outline.trims, &known)
+            || !work.refine(&bad, outline.trims)
         {
-            let (bounds, tolerances) = triangles.iter().map(|&t| known[&sorted(t)]).unzip();
+            let (bounds, tolerances) = stands().unzip();
             return Some(Strip { nodes: work.nodes, triangles, bounds, tolerances, conflicts, crossed });
         }
     }

@@ -2,7 +2,7 @@
 
 use super::super::border::trim::Trim;
 use super::super::proof::flat::from_chord;
-use super::delaunay::{Node, Work, key, sorted};
+use super::delaunay::{Node, Work, key};
 use super::sector;
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
@@ -25,16 +25,10 @@ impl Work<'_, '_> {
     }
 
     /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
-    pub(super) fn refine(
-        &mut self,
-        bad: &[[u32; 3]],
-        trims: &FxHashMap<[u32; 2], Trim>,
-        known: &FxHashMap<[u32; 3], (f64, f64)>,
-    ) -> bool {
+    pub(super) fn refine(&mut self, bad: &[([u32; 3], (f64, f64))], trims: &FxHashMap<[u32; 2], Trim>) -> bool {
         let mut wanted: Vec<[Uv; 2]> = Vec::new();
         let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
-        for t in bad {
-            let xi = known[&sorted(*t)].1;
+        for &(t, (bound, xi)) in bad {
             let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
             // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which at
             // a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
@@ -46,7 +40,7 @@ impl Work<'_, '_> {
                 continue;
             }
             let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
-            if let Some(k) = self.turn(*t).filter(|_| known[&sorted(*t)].0 <= xi) {
+            if let Some(k) = self.turn(t).filter(|_| bound <= xi) {
                 if seen.insert(key(sides[k].0, sides[k].1), ()).is_none() {
                     wanted.push([middles[k]; 2]);
                 }

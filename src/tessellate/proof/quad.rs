@@ -1,0 +1,316 @@
+//! The proof of a cell as one quad: the net of its piece of the surface against a flat quad.
+//!
+//! Two triangles that share a diagonal are nearly flat where a cell is small. Let Q be the flat quad on which the four corners of the
+//! cell project along n, the normal to both diagonals; the corners stand a height h above or below Q in turn, so the traced triangles
+//! T lie within h of it. With d the distance of the piece P from Q, and e that of the curves over the cell's four sides from
+//! their chords:
+//!
+//! * P to T: at most δ = d + h. The distance to the convex Q is convex, so d is bounded by the hulls of the nets over all patches that the
+//!   cell meets; their distances are halved as a scalar function while that helps.
+//! * T to P: T is a graph over Q with slopes of at most tan θ. Where the projection of P along n covers that of a point x of T, the
+//!   piece has a point p above or below x; p is within δ of a point of T, so it is within δ/cos θ of x. Where it does not, the curves around P do not wind
+//!   around x in projection; drawn straight onto their chords they do, so one has crossed x on the way, and a point of that curve is
+//!   within e/cos θ of x.
+//!
+//! The curve over the diagonal plays no part, where the proof of each triangle by itself must hold it to the traced diagonal: on a surface
+//! that is uneven or twisted in its own plane that alone cuts cells. And one net takes the place of the nets of two triangles.
+
+use super::super::settings::Judge;
+use super::super::sheet::local;
+use super::bound::Prover;
+use super::flat::from_chord;
+use crate::math::{Point, Uv, Vector};
+
+/// Knot rectangles up to which a cell is looked at as one quad.
+const MOST_PATCHES: usize = 16;
+/// Halvings for one cell.
+const MOST_HALVINGS: u32 = 24;
+/// Least cosine between the quad and its triangles, so that little is lost.
+const FLATTEST: f64 = 0.9;
+
+/// A convex flat quad that measures distances, and what its corners have lost.
+struct Quad {
+    corners: [Point; 4],
+    normal: Vector,
+    /// Across each side into the quad.
+    inward: [Vector; 4],
+    /// How far the true corners stand from it.
+    height: f64,
+    /// Least cosine between it and the triangles on the true corners.
+    cosine: f64,
+}
+
+impl Quad {
+    /// The quad under corners in their order, with the traced diagonal from corner `first`; `None` unless it is convex and nearly flat.
+    fn new(c: &[Point; 4], first: usize) -> Option<Self> {
+        let normal = (c[2] - c[0]).cross(c[3] - c[1]).try_normalize()?;
+        let height = 0.5 * (c[1] - c[0]).dot(normal);
+        let corners = [0, 1, 2, 3].map(|k| c[k] + normal * if k % 2 == 0 { height } else { -height });
+        let side = |k: usize| corners[(k + 1) % 4] - corners[k];
+        let inward = [0, 1, 2, 3].map(|k| normal.cross(side(k)));
+        // A corner that is nearly straight or folded has no normal to speak of.
+        let convex = (0..4).all(|k| {
+            let next = side((k + 1) % 4);
+            inward[k].dot(next) > 1e-6 * inward[k].length() * next.length()
+        });
+        let at = |k: usize| c[(k + first) % 4];
+        let cosines = [[0, 1, 2], [0, 2, 3]].map(|[i, j, k]| {
+            let n = (at(j) - at(i)).cross(at(k) - at(i));
+            n.dot(normal) / n.length()
+        });
+        let cosine = cosines[0].min(cosines[1]);
+        (convex && cosine >= FLATTEST).then_some(Self { corners, normal, inward, height: height.abs(), cosine })
+    }
+
+    /// Distance of a point.
+    fn distance(&self, p: Point) -> f64 {
+        let c = &self.corners;
+        if (0..4).all(|k| self.inward[k].dot(p - c[k]) >= 0.0) {
+            return (p - c[0]).dot(self.normal).abs();
+        }
+        (0..4).map(|k| from_chord(p, &[c[k], c[(k + 1) % 4]])).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Buffers reused from cell to cell.
+#[derive(Default)]
+pub(in crate::tessellate) struct Halving {
+    /// Nets of W·(d − limit) that wait for halving, one after another.
+    stack: Vec<f64>,
+}
+
+impl Halving {
+    /// Bound of Σ dᵢwᵢBᵢ / Σ wᵢBᵢ over the unit square for distances and weights of a net of these degrees, where it is within the limit.
+    fn bound(
+        &mut self,
+        net: impl Iterator<Item = (f64, f64)>,
+        [p, q]: [usize; 2],
+        limit: f64,
+        left: &mut u32,
+    ) -> Option<f64> {
+        let mut heaviest = 0f64;
+        self.stack.clear();
+        self.stack.extend(net.map(|(d, w)| {
+            heaviest = heaviest.max(w);
+            w * (d - limit)
+        }));
+        let size = self.stack.len();
+        let mut most = f64::NEG_INFINITY;
+        while !self.stack.is_empty() {
+            let start = self.stack.len() - size;
+            let net = &self.stack[start..];
+            let worst = net.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+            if worst <= 0.0 {
+                most = most.max(worst);
+                self.stack.truncate(start);
+                continue;
+            }
+            // At corners the value itself is taken.
+            if [0, q, p * (q + 1), size - 1].iter().any(|&k| net[k] > 0.0) {
+                return None;
+            }
+            *left = left.checked_sub(1)?;
+            let bend = |i: usize, step: usize| (net[i + 2 * step] - 2.0 * net[i + step] + net[i]).abs();
+            let along_u = (0..size.saturating_sub(2 * (q + 1))).map(|i| bend(i, q + 1)).fold(0.0, f64::max);
+            let rows = (0..=p).flat_map(|i| (0..q.saturating_sub(1)).map(move |j| i * (q + 1) + j));
+            let along_v = rows.map(|i| bend(i, 1)).fold(0.0, f64::max);
+            let (lines, n, step, across) =
+                if along_u >= along_v { (q + 1, p, q + 1, 1) } else { (p + 1, q, 1, q + 1) };
+            self.stack.extend_from_within(start..);
+            let (low, high) = self.stack[start..].split_at_mut(size);
+            for line in 0..lines {
+                let at = |k: usize| line * across + k * step;
+                for r in 0..=n {
+                    low[at(r)] = high[at(0)];
+                    for k in 0..n - r {
+                        high[at(k)] = 0.5 * (high[at(k)] + high[at(k + 1)]);
+                    }
+                }
+            }
+        }
+        Some(limit + most / heaviest)
+    }
+}
+
+impl Prover<'_, '_> {
+    /// Bound of the distance between the surface over a cell and its two triangles, both ways, where it is within the limit. The corners
+    /// lie on the surface, counter-clockwise from the lowest; the traced diagonal starts at corner `first`.
+    pub(in crate::tessellate) fn quad(
+        &mut self,
+        [lo, hi]: [Uv; 2],
+        corners: &[Point; 4],
+        first: usize,
+        limit: f64,
+    ) -> Option<f64> {
+        let sheet = self.sheet;
+        let (a, b) = (sheet.range(0, lo.x, hi.x), sheet.range(1, lo.y, hi.y));
+        if sheet.affine || self.judge == Judge::Sampled {
+            return None;
+        }
+        let bent = sheet.bends.bound(a, b, hi - lo).map(|x| x + self.margin);
+        if let Some(bound) = bent.filter(|&x| x <= limit) {
+            return Some(bound);
+        }
+        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST_PATCHES {
+            return None;
+        }
+        let origin = corners[first];
+        let c = corners.map(|x| x - origin);
+        let quad = Quad::new(&c, first)?;
+        let sides = limit * quad.cosine - self.margin;
+        let flat = sides - quad.height;
+        if flat <= 0.0 {
+            return None;
+        }
+        let (mut away, mut aside, mut left) = (0f64, 0f64, MOST_HALVINGS);
+        for i in a[0]..=a[1] {
+            for j in b[0]..=b[1] {
+                let patch = sheet.patch(i, j);
+                let [p, q] = patch.degree;
+                let [[u0, u1], [v0, v1]] = patch.domain;
+                let from = local(patch, lo.max(Uv::new(u0, v0)));
+                let to = local(patch, hi.min(Uv::new(u1, v1)));
+                let net = self.near.restrict(patch, from, to, origin);
+                let distances = net.iter().map(|c| (quad.distance(c.project()), c.w));
+                away = away.max(self.halving.bound(distances, [p, q], flat, &mut left)?);
+                // The rows of the net over the cell's own sides.
+                let last = p * (q + 1);
+                let rows: [(bool, usize, usize, usize, [usize; 2]); 4] = [
+                    (j == b[0], 0, q + 1, p, [0, 1]),
+                    (i == a[1], last, 1, q, [1, 2]),
+                    (j == b[1], q, q + 1, p, [3, 2]),
+                    (i == a[0], 0, 1, q, [0, 3]),
+                ];
+                for (outer, start, step, n, ends) in rows {
+                    if outer {
+                        let chord = ends.map(|k| c[k]);
+                        let row = (0..=n).map(|k| &net[start + k * step]);
+                        let row = row.map(|x| (from_chord(x.project(), &chord), x.w));
+                        aside = aside.max(self.scalar.bound::<2>(row, n, sides)?);
+                    }
+                }
+            }
+        }
+        Some(((away + quad.height).max(aside) + self.margin) / quad.cosine)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Frame, Homogeneous};
+    use crate::nurbs::{Surface, conic, sweep};
+    use crate::tessellate::settings::Field;
+    use crate::tessellate::sheet::Sheet;
+    use proptest::prelude::*;
+
+    fn cell([lo, hi]: [Uv; 2]) -> [Uv; 4] {
+        [lo, Uv::new(hi.x, lo.y), hi, Uv::new(lo.x, hi.y)]
+    }
+
+    fn bound(s: &Surface, box_: [Uv; 2], first: usize, limit: f64) -> Option<f64> {
+        let sheet = Sheet::new(s, false, Field::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
+        let mut prover = Prover::new(&sheet, Judge::Bound);
+        prover.quad(box_, &cell(box_).map(|x| s.evaluate(x)), first, limit)
+    }
+
+    #[test]
+    fn a_strip_of_a_cylinder_has_its_closed_form_sag() {
+        let s = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 40.0]);
+        // Across the knot at 1.5 and within one patch.
+        for (from, to) in [(0.3, 0.9), (1.2, 1.9)] {
+            let [a, b] = [from, to].map(|phi| conic::parameter_of_angle([0.0, 3.0], phi));
+            let sag = 10.0 * (1.0 - (0.5 * (to - from) as f64).cos());
+            let cell = [Uv::new(a, 0.0), Uv::new(b, 40.0)];
+            assert!(bound(&s, cell, 0, 0.999 * sag).is_none());
+            let found = bound(&s, cell, 0, 1.05 * sag).unwrap();
+            assert!(sag <= found && found <= 1.05 * sag, "{found} {sag}");
+        }
+    }
+
+    #[test]
+    fn the_parameters_along_a_plane_do_not_matter() {
+        // Twisted in its own plane: the curve over the diagonal strays 125 mm from it, the triangles lie in the surface.
+        let points = [(-500.0, 0.0), (-1.0, 1000.0), (500.0, 0.0), (1.0, 1000.0)];
+        let points = points.map(|(x, y)| Homogeneous::new(x, y, 0.0, 1.0)).to_vec();
+        let knots = [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+        let s = Surface { degree: [1, 1], knots, points };
+        assert!(bound(&s, [Uv::ZERO, Uv::ONE], 0, 1e-6).is_some_and(|x| x <= 1e-6));
+    }
+
+    /// Distance of a point to a triangle, by the nearest of a fine grid of its points after a few rounds around the best.
+    fn off(p: Point, [a, b, c]: [Point; 3]) -> f64 {
+        let at = |u: f64, v: f64| (a + (b - a) * u + (c - a) * v - p).length();
+        let (mut best, mut step) = ((0.0, 0.0), 0.25);
+        for _ in 0..14 {
+            let (x, y) = best;
+            for i in -4..=4 {
+                for j in -4..=4 {
+                    let (u, v) = ((x + step * f64::from(i)).clamp(0.0, 1.0), y + step * f64::from(j));
+                    let v = v.clamp(0.0, 1.0 - u);
+                    if at(u, v) < at(best.0, best.1) {
+                        best = (u, v);
+                    }
+                }
+            }
+            step *= 0.4;
+        }
+        at(best.0, best.1)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+        #[test]
+        fn bounds_are_never_below_what_is_sampled(
+            heights in prop::collection::vec(-1.0..1.0f64, 25),
+            weights in prop::collection::vec(0.3..3.0f64, 25),
+            degree in 1..4usize,
+            from in (0.0..1.2f64, 0.0..1.2f64),
+            size in (0.05..0.8f64, 0.05..0.8f64),
+            rough in -3.0..0.0f64,
+            first in 0..2usize,
+        ) {
+            let knots: Vec<f64> = match degree {
+                1 => vec![0.0, 0.0, 0.5, 1.0, 1.5, 2.0, 2.0],
+                2 => vec![0.0, 0.0, 0.0, 0.7, 1.2, 2.0, 2.0, 2.0],
+                _ => vec![0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 2.0],
+            };
+            let points = (0..25).map(|k| {
+                let (x, y) = ((k / 5) as f64, (k % 5) as f64);
+                let z = 10f64.powf(rough) * heights[k];
+                let w = if heights[0] > 0.0 { weights[k] } else { 1.0 };
+                (Point::new(x + 0.2 * heights[24 - k], y + 0.2 * heights[(k + 7) % 25], z) * w).extend(w)
+            }).collect();
+            let s = Surface { degree: [degree; 2], knots: [knots.clone(), knots], points };
+            let lo = Uv::new(from.0, from.1);
+            let hi = lo + Uv::new(size.0, size.1);
+            let corner = cell([lo, hi]).map(|x| s.evaluate(x));
+            let at = |k: usize| corner[(k + first) % 4];
+            let traced = [[at(0), at(1), at(2)], [at(0), at(2), at(3)]];
+            let n = 24;
+            let grid: Vec<Point> = (0..=n * n + 2 * n).map(|k| {
+                let share = Uv::new((k / (n + 1)) as f64, (k % (n + 1)) as f64) / n as f64;
+                s.evaluate(lo + share * (hi - lo))
+            }).collect();
+            let sampled = grid.iter().map(|&p| off(p, traced[0]).min(off(p, traced[1]))).fold(0.0, f64::max);
+            // Neighbours on the surface are no farther apart than this: as much is lost by looking at the grid alone.
+            let apart = (0..n * (n + 1)).map(|k| (grid[k + n + 1] - grid[k]).length()).fold(0.0, f64::max)
+                + (0..grid.len() - 1).filter(|k| k % (n + 1) < n).map(|k| (grid[k + 1] - grid[k]).length()).fold(0.0, f64::max);
+            for limit in [1.02 * sampled, 1.5 * sampled, 4.0 * sampled, 0.3] {
+                let Some(found) = bound(&s, [lo, hi], first, limit) else { continue };
+                prop_assert!(found <= limit);
+                prop_assert!(sampled <= found + 1e-9, "{sampled} {found}");
+                for t in traced {
+                    for i in 0..=10 {
+                        for j in 0..=10 - i {
+                            let (u, v) = (i as f64 / 10.0, j as f64 / 10.0);
+                            let x = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
+                            let near = grid.iter().map(|&p| (p - x).length()).fold(f64::INFINITY, f64::min);
+                            prop_assert!(near <= found + apart, "{near} {found} {apart}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
