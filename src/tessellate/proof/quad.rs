@@ -218,9 +218,9 @@ mod tests {
     fn a_strip_of_a_cylinder_has_its_closed_form_sag() {
         let s = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 40.0]);
         // Across the knot at 1.5 and within one patch.
-        for (from, to) in [(0.3, 0.9), (1.2, 1.9)] {
+        for (from, to) in [(0.3, 0.9), (1.2, 1.9f64)] {
             let [a, b] = [from, to].map(|phi| conic::parameter_of_angle([0.0, 3.0], phi));
-            let sag = 10.0 * (1.0 - (0.5 * (to - from) as f64).cos());
+            let sag = 10.0 * (1.0 - (0.5 * (to - from)).cos());
             let cell = [Uv::new(a, 0.0), Uv::new(b, 40.0)];
             assert!(bound(&s, cell, 0, 0.999 * sag).is_none());
             let found = bound(&s, cell, 0, 1.05 * sag).unwrap();
