@@ -326,9 +326,17 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
     let domain = face.surface.domain().map(|[a, b]| b - a);
     let polar = poles.at.as_flattened().contains(&true);
     let extent = Uv::from_array(domain);
-    let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
+    // On a crease each side has corners of its own, in one place.
+    let corners = |f: usize| {
+        made.mesh.facets[f].vertices.map(|v| {
+            let v = made.mesh.vertices[v as usize];
+            (v.position, v.uv.to_array().map(|x| (x + 0.0).to_bits()))
+        })
+    };
+    type Corner = (u32, [u64; 2]);
+    let mut sides: HashMap<[Corner; 2], usize> = HashMap::new();
     for f in facets.clone() {
-        let v = made.mesh.facets[f].vertices;
+        let v = corners(f);
         for k in 0..4 {
             *sides.entry([v[k], v[(k + 1) % 4]]).or_default() += 1;
         }
@@ -336,8 +344,8 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
     let mut covered = vec![0f64; outlines.len()];
     let mut out = Vec::new();
     for f in facets {
-        let v = made.mesh.facets[f].vertices;
-        let uv = v.map(|v| made.mesh.vertices[v as usize].uv);
+        let v = corners(f);
+        let uv = made.mesh.facets[f].vertices.map(|v| made.mesh.vertices[v as usize].uv);
         let cuts: &[[usize; 3]] =
             if made.mesh.facets[f].is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
         let mut piece = Vec::new();
