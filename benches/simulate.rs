@@ -13,7 +13,7 @@
 
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::intersect::{Cost, Footprint, Hit, Intersector};
+use lampyris::intersect::{Cost, Expected, Footprint, Hit, Intersector};
 use lampyris::math::Ray;
 use lampyris::mesh::FacetMesh;
 use lampyris::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};
@@ -54,8 +54,8 @@ impl Intersector for Probe<'_> {
         self.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
     }
 
-    fn expect(&self, rays: u64, threads: usize) {
-        self.inner.expect(rays, threads);
+    fn expect(&self, expected: &Expected<'_>) {
+        self.inner.expect(expected);
     }
 
     fn is_gone(&self, ray: &Ray) -> bool {

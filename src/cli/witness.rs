@@ -1,6 +1,6 @@
 //! A fair sample of the very rays of a run, to be asked again of other intersectors.
 
-use crate::intersect::{Cost, Footprint, Hit, Intersector};
+use crate::intersect::{Cost, Expected, Footprint, Hit, Intersector};
 use crate::math::{Point, Ray};
 use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
@@ -65,8 +65,8 @@ impl Intersector for Witness<'_> {
         self.inner.intersect_batch(rays, hits, cost);
     }
 
-    fn expect(&self, rays: u64, threads: usize) {
-        self.inner.expect(rays, threads);
+    fn expect(&self, expected: &Expected<'_>) {
+        self.inner.expect(expected);
     }
 
     /// A ray that is gone is not asked about any more: it is noted here.

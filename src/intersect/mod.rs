@@ -10,7 +10,7 @@ pub mod octree;
 pub mod polish;
 mod prefetch;
 
-use crate::math::{FaceId, Ray, Uv, Vector};
+use crate::math::{FaceId, Point, Ray, Uv, Vector};
 
 /// Finds the nearest hit of a ray.
 pub trait Intersector: Sync {
@@ -24,8 +24,8 @@ pub trait Intersector: Sync {
         }
     }
 
-    /// Tells that so many rays are going to be asked, on so many threads: what helps them all may be worked out now.
-    fn expect(&self, _rays: u64, _threads: usize) {}
+    /// Tells which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
+    fn expect(&self, _expected: &Expected<'_>) {}
 
     /// Whether it is known, without looking for a hit, that a ray which leaves a surface meets nothing, however far it goes;
     /// `false` says nothing.
@@ -35,6 +35,31 @@ pub trait Intersector: Sync {
 
     /// What the structure holds and what it took to build.
     fn footprint(&self) -> Footprint;
+}
+
+/// Rays that are going to be asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Expected<'a> {
+    /// How many, without those that start on a face.
+    pub rays: u64,
+    /// On how many threads.
+    pub threads: usize,
+    /// Those of them that have a place or a direction in common, with their number.
+    pub beams: &'a [(Beam, u64)],
+}
+
+/// What rays of a source have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Beam {
+    /// They start at one point.
+    Point(Point),
+    /// They start in one plane, in the direction across it.
+    Along {
+        /// A point of the plane; starts may stray from it by rounding.
+        origin: Point,
+        /// Where the rays run, and the normal of the plane.
+        direction: Vector,
+    },
 }
 
 /// The nearest intersection.

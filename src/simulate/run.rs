@@ -1,13 +1,14 @@
 use super::bind::BoundScene;
 use super::effects::{self, KernelKind};
+use super::emitter::Emitter;
 use super::gather::{Gather, Own};
-use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, PathSink, Stack, Which};
+use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, PathSink, Plain, Stack, Which};
 use super::portion::Portion;
 use super::receiver::Shape;
 use super::results::Results;
 use super::scene::{Interfaces, Run, Sampling};
 use super::tally::QUANTA;
-use crate::intersect::{Cost, Intersector};
+use crate::intersect::{Cost, Expected, Intersector};
 use crate::optics::Effects;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -173,6 +174,11 @@ impl Plan {
         self.record_mask.is_some_and(|m| ray & m == 0)
     }
 
+    /// Whether any ray is recorded.
+    pub(crate) fn records_any(&self) -> bool {
+        self.record_mask.is_some()
+    }
+
     /// Whether the path of a ray belongs to the sample that is kept.
     pub(crate) fn samples(&self, ray: u64) -> bool {
         self.sample_mask.is_some_and(|m| ray & m == 0)
@@ -256,7 +262,10 @@ pub fn trace(
         n => n,
     };
     let kind = kernel_of(bound, settings);
-    intersector.expect(context.plan.rays / u64::from(shards.max(1)), threads);
+    let own = |rays: u64| rays / u64::from(shards.max(1));
+    let beam = |(e, s): (&Emitter, &SourceShare)| Some((e.beam()?, own(s.rays)));
+    let beams: Vec<_> = bound.emitters.iter().zip(&context.plan.shares).filter_map(beam).collect();
+    intersector.expect(&Expected { rays: own(context.plan.rays), threads, beams: &beams });
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let share = context.plan.rays * u64::from(last.saturating_sub(first)) / u64::from(replicates);
@@ -326,7 +335,9 @@ pub(crate) fn kernel_of(bound: &BoundScene, settings: &RunSettings) -> KernelKin
 
 fn dispatch(kind: KernelKind, context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
     match kind {
+        KernelKind::Opaque if context.plain() => kernel::trace::<Plain<Nothing>>(context, which, local),
         KernelKind::Opaque => kernel::trace::<Nothing>(context, which, local),
+        KernelKind::Clear if context.plain() => kernel::trace::<Plain<OneBody>>(context, which, local),
         KernelKind::Clear => kernel::trace::<OneBody>(context, which, local),
         KernelKind::Nested => kernel::trace::<Stack>(context, which, local),
         KernelKind::Coloured => kernel::trace::<Coloured>(context, which, local),

@@ -4,15 +4,16 @@
 //! [`WIDTH`] rays under way and does all steps of one kind in a row, without branches that depend on a ray: what the
 //! processor guesses wrong about a ray costs as much as a whole node. After a step the ray asks for the memory of its next one.
 
-use super::Octree;
 use super::node::{Block, Link, Node, Target};
 use super::state::{BoxRay, SiftRay, State};
+use super::{BATCH, Octree, light};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::intersect::prefetch::{prefetch, prefetch_either};
 use crate::math::Ray;
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
+use std::sync::PoisonError;
 
 /// Rays under way at a time.
 pub(super) const WIDTH: usize = 32;
@@ -89,7 +90,15 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
         alone::<L>(tree, state, cost);
         hits[0] = state.best.hit();
     } else {
-        together::<L>(tree, root, &mut states, rays, hits, cost);
+        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            let mut order: [u16; BATCH] = std::array::from_fn(|i| i as u16);
+            let maps = tree.maps.read().unwrap_or_else(PoisonError::into_inner);
+            let walkers = match maps.is_empty() {
+                true => rays.len(),
+                false => light::answer(tree, &maps, rays, hits, &mut order, cost),
+            };
+            together::<L>(tree, root, &mut states, (rays, &order[..walkers]), hits, cost);
+        }
     }
     STATES.set(Some(states));
 }
@@ -125,15 +134,16 @@ fn together<L: Lanes>(
     tree: &Octree,
     root: Link,
     states: &mut States,
-    rays: &[Ray],
+    (rays, order): (&[Ray], &[u16]),
     hits: &mut [Option<FacetHit>],
     cost: &mut Cost,
 ) {
     let mut agenda = Agenda::default();
-    let mut live = rays.len().min(WIDTH);
+    let mut live = order.len().min(WIDTH);
     let mut next = live;
-    for (ray, state) in states.iter_mut().enumerate().take(live) {
-        state.start(tree, root, &rays[ray], ray);
+    for (ray, (state, &place)) in states.iter_mut().zip(order).enumerate().take(live) {
+        let place = usize::from(place);
+        state.start(tree, root, &rays[place], place);
         agenda.put(state.at.kind(), ray as u8);
     }
     while live > 0 {
@@ -176,8 +186,9 @@ fn together<L: Lanes>(
         for &ray in &list[..n] {
             let s = &mut states[usize::from(ray) % WIDTH];
             hits[s.index] = s.best.hit();
-            if next < rays.len() {
-                s.start(tree, root, &rays[next], next);
+            if let Some(&place) = order.get(next) {
+                let place = usize::from(place);
+                s.start(tree, root, &rays[place], place);
                 agenda.put(s.at.kind(), ray);
                 next += 1;
             } else {

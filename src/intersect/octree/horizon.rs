@@ -15,18 +15,28 @@ use super::Octree;
 use super::node::{Link, Target};
 use crate::math::{Aabb, Point, Vector, orthonormal_pair};
 use std::f64::consts::FRAC_PI_8;
-use std::sync::Mutex;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Rays for each facet from which on it pays to know the horizons: to find one takes some 40 µs, and it saves a ray that leaves less
-/// than 0.1 µs.
-const WORTH: u64 = 1000;
+/// Rays of a run for each facet below which no facet is watched.
+const WORTH: u64 = 64;
+/// Rays that leave a facet before its horizon is found: to find one takes some 20 µs, and it saves a ray that leaves 0.1 µs.
+const PATIENCE: u32 = 200;
+/// The same where the rays of the run suffice for all facets.
+const IMPATIENCE: u32 = 32;
+/// A horizon is not found more closely than this share of the least slope of the rays so far, and only in the sectors where they
+/// ran: what stands lower or elsewhere is not looked at.
+const BELOW: f64 = 0.125;
 /// Slope above which a horizon is of no use.
 const STEEP: f64 = 8.0;
-/// Facets whose horizons are found at a time.
-const CHUNK: usize = 64;
-
 /// Sectors around a triangle: a ray is in one by the signs and the order of its two coordinates in the plane.
 const SECTORS: usize = 8;
+
+/// The sector of a ray with these coordinates in the plane.
+#[inline(always)]
+fn sector(x: f32, y: f32) -> usize {
+    usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(y.abs() > x.abs()) << 2
+}
 
 /// What is asked of a ray that leaves a facet, which may do so from either triangle.
 #[derive(Clone, Copy, Debug)]
@@ -54,18 +64,15 @@ impl Skyline {
     fn is_below(&self, d: [f32; 3]) -> bool {
         let dot = |a: [f32; 3]| a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
         let (up, x, y) = (dot(self.normal), dot(self.x), dot(self.y));
-        let sector = usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(y.abs() > x.abs()) << 2;
         let flat2 = x * x + y * y;
         // Nearly upright the sector is a matter of rounding.
         let upright = flat2 < 1e-6;
-        let slope2 = if upright { self.steepest } else { self.slope2[sector] };
+        let slope2 = if upright { self.steepest } else { self.slope2[sector(x, y)] };
         up > 0.0 && up * up > slope2 * flat2 && slope2 < f32::INFINITY
     }
 }
 
 impl Horizon {
-    const UNKNOWN: Self = Self([Skyline::UNKNOWN; 2]);
-
     #[inline(always)]
     pub(super) fn is_below(&self, d: Vector) -> bool {
         let d = d.to_array().map(|x| x as f32);
@@ -73,41 +80,93 @@ impl Horizon {
     }
 }
 
-/// Whether so many rays are worth the search.
-pub(super) fn pays(tree: &Octree, rays: u64) -> bool {
-    rays / WORTH >= tree.around.mesh.facets.len() as u64
+/// The horizons of the facets that many rays have left.
+pub(super) struct Horizons {
+    facets: Vec<Watched>,
+    patience: u32,
 }
 
-/// The horizons of all facets.
-pub(super) fn find(tree: &Octree, threads: usize) -> Vec<Horizon> {
-    let mut horizons = vec![Horizon::UNKNOWN; tree.around.mesh.facets.len()];
-    let chunks = Mutex::new(horizons.chunks_mut(CHUNK).enumerate());
-    let work = || {
-        let mut open = Vec::new();
-        loop {
-            let taken = chunks.lock().unwrap_or_else(|e| e.into_inner()).next();
-            let Some((k, chunk)) = taken else { return };
-            for (i, horizon) in chunk.iter_mut().enumerate() {
-                *horizon = of_facet(tree, k * CHUNK + i, &mut open);
+/// A facet, with the rays that left it while its horizon was not known.
+struct Watched {
+    left: AtomicU32,
+    /// The least slope of these rays, as bits of an f32, and the sectors that they lie in, one bit each.
+    least: AtomicU32,
+    sectors: AtomicU32,
+    horizon: OnceLock<Box<Horizon>>,
+}
+
+impl Watched {
+    fn new() -> Self {
+        Self {
+            left: AtomicU32::new(0),
+            least: AtomicU32::new(f32::INFINITY.to_bits()),
+            sectors: AtomicU32::new(0),
+            horizon: OnceLock::new(),
+        }
+    }
+
+    /// Watches a ray; after enough of them one thread finds the horizon, the others walk on.
+    #[cold]
+    fn watch(&self, tree: &Octree, facet: usize, direction: Vector, patience: u32) {
+        let [a, b, c, _] = tree.around.mesh.corners(facet);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let up = normal.dot(direction);
+        let slope = up / (direction - normal * up).length();
+        // What goes into the body is not free; NaN neither.
+        if slope.is_nan() || slope <= 0.0 {
+            return;
+        }
+        let (x, y) = orthonormal_pair(normal);
+        // The bits of positive numbers are in their order.
+        self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
+        self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
+        if self.left.fetch_add(1, Ordering::Relaxed) == patience {
+            let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
+            let sectors = self.sectors.load(Ordering::Relaxed);
+            let floor = std::array::from_fn(|s| if sectors >> s & 1 == 1 { least * BELOW } else { f64::INFINITY });
+            let _ = self.horizon.set(Box::new(of_facet(tree, facet, &floor)));
+        }
+    }
+}
+
+impl Horizons {
+    /// None yet, for a run of so many rays; `None` when they are too few for the search.
+    pub(super) fn expecting(rays: u64, tree: &Octree) -> Option<Self> {
+        let facets = tree.around.mesh.facets.len();
+        let each = rays / facets.max(1) as u64;
+        let patience = if each >= 2 * u64::from(PATIENCE) { IMPATIENCE } else { PATIENCE };
+        (each >= WORTH).then(|| Self { facets: (0..facets).map(|_| Watched::new()).collect(), patience })
+    }
+
+    /// Whether a ray that leaves this facet is known to meet nothing.
+    #[inline]
+    pub(super) fn clear(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
+        let Some(watched) = self.facets.get(facet) else { return false };
+        match watched.horizon.get() {
+            Some(horizon) => horizon.is_below(direction),
+            None => {
+                watched.watch(tree, facet, direction, self.patience);
+                false
             }
         }
-    };
-    std::thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(work)));
-        work();
-    });
-    horizons
+    }
 }
 
-fn of_facet(tree: &Octree, facet: usize, open: &mut Vec<Link>) -> Horizon {
+/// The horizon of a facet, in each sector no lower than the slope `floor`.
+fn of_facet(tree: &Octree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
     let mesh = tree.around.mesh;
     let [a, b, c, d] = mesh.corners(facet);
     let [first, second] = [[a, b, c], [a, c, d]];
-    let mut of = |own: [Point; 3], other: [Point; 3]| {
-        Base::new(own, tree.around.reach).map_or(Skyline::UNKNOWN, |base| base.skyline(tree, facet, other, open))
+    let of = |own: [Point; 3], other: [Point; 3]| {
+        let base = Base::new(own, tree.around.reach)?;
+        let rise = base.rise(&other);
+        Some(base.skyline(tree, facet, std::array::from_fn(|s| rise[s].max(floor[s]))))
     };
-    let one = of(first, second);
-    if mesh.facets[facet].is_triangle() { Horizon([one; 2]) } else { Horizon([one, of(second, first)]) }
+    let one = of(first, second).unwrap_or(Skyline::UNKNOWN);
+    match mesh.facets[facet].is_triangle() {
+        true => Horizon([one; 2]),
+        false => Horizon([one, of(second, first).unwrap_or(Skyline::UNKNOWN)]),
+    }
 }
 
 /// A triangle that rays leave, with the lines in its plane through its sides and corners.
@@ -156,12 +215,13 @@ impl Base {
         Some(Self { normal, x, y, origin: a, lines, toward, reach })
     }
 
-    /// How steeply anything stands over the plane, seen from the triangle.
-    fn skyline(&self, tree: &Octree, facet: usize, other: [Point; 3], open: &mut Vec<Link>) -> Skyline {
+    /// How steeply anything stands over the plane, seen from the triangle, at least `slopes`.
+    fn skyline(&self, tree: &Octree, facet: usize, mut slopes: [f64; SECTORS]) -> Skyline {
         let mesh = tree.around.mesh;
-        let mut slopes = self.rise(&other);
-        open.clear();
-        open.extend(tree.root);
+        let higher = |slopes: &[f64; SECTORS], rise: &[f64; SECTORS]| {
+            slopes.iter().zip(rise).any(|(slope, rise)| *slope <= STEEP && rise > slope)
+        };
+        let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
             if slopes.iter().all(|s| *s > STEEP) {
                 return Skyline::UNKNOWN;
@@ -172,11 +232,7 @@ impl Base {
                     for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
                         let b = node.child(slot);
                         let b = Aabb { min: b.min + tree.center, max: b.max + tree.center };
-                        let higher = || {
-                            let rise = self.rise(&b.corners());
-                            (0..SECTORS).any(|k| slopes[k] <= STEEP && rise[k] > slopes[k])
-                        };
-                        if self.stands_out(&b) && higher() {
+                        if higher(&slopes, &self.rise_of_box(&b)) {
                             open.push(Link(node.children[slot]));
                         }
                     }
@@ -184,8 +240,11 @@ impl Base {
                 Target::Block(index, count) => {
                     let block = &tree.blocks[index];
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
-                        let rise = self.rise(&block.positions[k].map(|p| mesh.positions[p as usize]));
-                        slopes = std::array::from_fn(|k| slopes[k].max(rise[k]));
+                        let corners = block.positions[k].map(|p| mesh.positions[p as usize]);
+                        if higher(&slopes, &self.rise_of_box(&Aabb::around(corners))) {
+                            let rise = self.rise(&corners);
+                            slopes = std::array::from_fn(|k| slopes[k].max(rise[k]));
+                        }
                     }
                 }
                 Target::End => {}
@@ -197,10 +256,23 @@ impl Base {
         Skyline { normal, x, y, slope2, steepest: slope2.into_iter().fold(0.0, f32::max) }
     }
 
-    /// Whether anything of a box can lie above the plane.
-    fn stands_out(&self, b: &Aabb) -> bool {
-        let highest = (b.center() - self.origin).dot(self.normal) + 0.5 * b.size().dot(self.normal.abs());
-        highest > -1e-6 * b.size().max_element()
+    /// No less than [`Self::rise`] of its corners, from the highest of them and those nearest to the lines.
+    fn rise_of_box(&self, b: &Aabb) -> [f64; SECTORS] {
+        let (middle, half) = (b.center() - self.origin, 0.5 * b.size());
+        let room = 1e-6 * half.max_element();
+        let height = middle.dot(self.normal) + half.dot(self.normal.abs()) + room;
+        if height <= self.reach {
+            return [0.0; SECTORS];
+        }
+        let mut rise = [f64::INFINITY; SECTORS];
+        for ((across, at), toward) in self.lines.iter().zip(&self.toward) {
+            let beyond = middle.dot(*across) - half.dot(across.abs()) - at - room;
+            if beyond > 0.0 {
+                let steepest = height / beyond;
+                (0..SECTORS).for_each(|s| rise[s] = rise[s].min(steepest * toward[s]));
+            }
+        }
+        rise
     }
 
     /// The steepest rays, by sector, that can meet the hull of these points.

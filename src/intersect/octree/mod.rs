@@ -24,6 +24,7 @@ mod engine;
 mod flatten;
 mod horizon;
 mod huge;
+mod light;
 mod node;
 mod pack;
 mod portable;
@@ -31,13 +32,14 @@ mod state;
 mod statistics;
 
 use super::facet::{FacetHit, Surroundings};
-use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
+use super::{Cost, Expected, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::intersect::prefetch::prefetch;
 use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
+use horizon::Horizons;
 use node::{Block, Node};
 pub use statistics::Statistics;
-use std::sync::OnceLock;
+use std::sync::{OnceLock, PoisonError, RwLock};
 use std::time::Instant;
 
 /// How the tree is built and walked.
@@ -116,8 +118,10 @@ pub struct Octree<'m> {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
     root: Option<node::Link>,
-    /// Of all facets, once it paid to find them.
-    horizons: OnceLock<Vec<horizon::Horizon>>,
+    /// Of the facets that many rays leave, once a run pays for it.
+    horizons: OnceLock<Horizons>,
+    /// Of the sources whose rays are expected.
+    maps: RwLock<Vec<light::Map>>,
     statistics: Statistics,
     build_seconds: f64,
 }
@@ -149,6 +153,7 @@ impl<'m> Octree<'m> {
             blocks,
             root,
             horizons,
+            maps: RwLock::default(),
             statistics,
             build_seconds,
         }
@@ -244,16 +249,19 @@ impl Intersector for Octree<'_> {
         }
     }
 
-    fn expect(&self, rays: u64, threads: usize) {
-        if horizon::pays(self, rays) {
-            self.horizons.get_or_init(|| horizon::find(self, threads));
+    fn expect(&self, expected: &Expected<'_>) {
+        if let Some(horizons) = Horizons::expecting(expected.rays, self).filter(|_| self.horizons.get().is_none()) {
+            // Whoever came first has as good ones.
+            let _ = self.horizons.set(horizons);
         }
+        let mut maps = self.maps.write().unwrap_or_else(PoisonError::into_inner);
+        *maps = light::find(self, expected, &maps);
     }
 
     #[inline]
     fn is_gone(&self, ray: &Ray) -> bool {
         let (Some(horizons), Some(from)) = (self.horizons.get(), ray.from) else { return false };
-        horizons.get(from.primitive as usize).is_some_and(|h| h.is_below(ray.direction))
+        horizons.clear(self, from.primitive as usize, ray.direction)
     }
 
     fn footprint(&self) -> Footprint {

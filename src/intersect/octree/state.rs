@@ -205,10 +205,11 @@ impl State {
         self.index = index;
     }
 
-    /// Boxes that begin after the nearest hit are of no interest; rounded up, so that ties are seen.
+    /// Boxes that begin after the nearest hit are of no interest; rounded up, so that ties are seen, and never to zero, since the lowest
+    /// bits of a distance are not its own.
     #[inline(always)]
     pub(super) fn cap(&mut self) {
-        self.boxes.t_max = ((self.best.t - self.shift) * (1.0 + 1e-6)) as f32;
+        self.boxes.t_max = (((self.best.t - self.shift) * (1.0 + 1e-6)) as f32).max(1e-30);
     }
 
     /// Writes the children of a node that the ray may meet above the top of the stack; gives their number.

@@ -8,6 +8,7 @@ use super::bind::{Body, Light};
 use super::scene::{self, Scene, SourceKind};
 use super::{Error, ErrorKind};
 use crate::formats::PhotometricType;
+use crate::intersect::Beam;
 use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
 use crate::optics::{IntensitySampler, Spectrum, Wavelengths};
@@ -147,6 +148,16 @@ impl Emitter {
     pub(crate) fn pairs(&self) -> [bool; 3] {
         let (list, point) = (matches!(self.shape, Shape::List(_)), matches!(self.shape, Shape::Point));
         [!(list || point), !(list || matches!(self.lobe, Lobe::Collimated)), self.wavelengths.is_some()]
+    }
+
+    /// What its rays have in common.
+    pub(crate) fn beam(&self) -> Option<Beam> {
+        let (origin, direction) = (self.frame.origin, self.frame.z);
+        match (&self.shape, &self.lobe) {
+            (Shape::Point, _) => Some(Beam::Point(origin)),
+            (Shape::Disc(_) | Shape::Rectangle(_), Lobe::Collimated) => Some(Beam::Along { origin, direction }),
+            _ => None,
+        }
     }
 
     /// Points around the places it shines from, faces and lists of rays left out.

@@ -6,6 +6,9 @@ use crate::simulate::bind::AMBIENT;
 pub(crate) trait Carry: Copy + Send {
     /// Whether there are media at all; without, a face is opaque and nothing is absorbed on the way.
     const MEDIA: bool;
+    /// Whether nothing is asked about a ray on its way but where it ends: no paths are recorded, and no receiver lets light pass,
+    /// asks for colours or counts some bounces only.
+    const PLAIN: bool = false;
     /// A ray that starts inside these bodies, outermost first; `None` when it cannot carry so many.
     fn inside(bodies: &[u16]) -> Option<Self>;
     /// The innermost body.
@@ -52,6 +55,46 @@ impl Carry for Nothing {
     }
     fn across(&self, _: u16, _: bool) -> Option<Self> {
         None
+    }
+}
+
+/// The same light where nothing is asked about it but where it ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plain<C>(C);
+
+impl<C: Carry> Carry for Plain<C> {
+    const MEDIA: bool = C::MEDIA;
+    const PLAIN: bool = true;
+    const COLOURED: bool = C::COLOURED;
+    fn inside(bodies: &[u16]) -> Option<Self> {
+        C::inside(bodies).map(Self)
+    }
+    #[inline]
+    fn body(&self) -> u16 {
+        self.0.body()
+    }
+    #[inline]
+    fn across(&self, body: u16, entering: bool) -> Option<Self> {
+        self.0.across(body, entering).map(Self)
+    }
+    fn instead(&self, bodies: &[u16]) -> Option<Self> {
+        self.0.instead(bodies).map(Self)
+    }
+    fn is_full(&self) -> bool {
+        self.0.is_full()
+    }
+    #[inline]
+    fn moved(&self, across: Self) -> Self {
+        Self(self.0.moved(across.0))
+    }
+    fn wavelength(&self) -> Option<f64> {
+        self.0.wavelength()
+    }
+    fn stokes(&mut self) -> Option<&mut Stokes> {
+        self.0.stokes()
+    }
+    fn light(&mut self, wavelength: Option<f64>, stokes: impl FnOnce() -> Stokes) {
+        self.0.light(wavelength, stokes);
     }
 }
 

@@ -13,13 +13,14 @@ mod surface;
 mod wide;
 
 pub(crate) use around::{Around, sources as around_sources};
-pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Stack};
+pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Plain, Stack};
 pub(crate) use local::Local;
 pub use local::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
 use super::emitter::{Emission, Stream, Ticket};
+use super::receiver::Receiver;
 use super::run::{Plan, RunSettings};
 use super::tally::count;
 use crate::intersect::{Cost, Hit, Intersector};
@@ -82,6 +83,12 @@ pub(crate) const NO_RECEIVER: u32 = u32::MAX;
 pub(crate) const SCATTERS: u32 = u32::MAX - 1;
 
 impl Context<'_> {
+    /// Whether nothing is asked about a ray on its way but where it ends.
+    pub(crate) fn plain(&self) -> bool {
+        let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;
+        self.passing.is_empty() && !self.plan.records_any() && !self.bound.receivers.iter().any(extra)
+    }
+
     /// Whether the polarisation of rays is followed.
     #[inline]
     pub(crate) fn polarised(&self) -> bool {
@@ -109,7 +116,7 @@ fn trace_rays<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) 
                 wave.ended.push(i as u32);
             }
         }
-        if local.paths.len() >= STREAMED {
+        if !C::PLAIN && local.paths.len() >= STREAMED {
             local.stream(context);
         }
     }

@@ -65,8 +65,14 @@ fn late<'h, C: Carry>(
 
 /// Notes a vertex of a path that is recorded.
 #[inline(always)]
-pub(super) fn record<C>(context: &Context<'_>, path: &Path<C>, point: Point, event: Event, local: &mut Local) {
-    if context.plan.records(path.ray) {
+pub(super) fn record<C: Carry>(
+    context: &Context<'_>,
+    path: &Path<C>,
+    point: Point,
+    event: Event,
+    local: &mut Local,
+) {
+    if !C::PLAIN && context.plan.records(path.ray) {
         let (ray, branch, bounce) = (path.ray, path.branch, path.bounce);
         local.paths.push(PathVertex { ray, branch, bounce, point, power: path.quanta / QUANTA, event });
     }
@@ -84,7 +90,7 @@ pub(super) fn step<C: Carry>(
 ) -> bool {
     let hit = late(context, path, ray, hit);
     let end = hit.map_or(ray.t_max, |h| h.t);
-    if !context.passing.is_empty() {
+    if !C::PLAIN && !context.passing.is_empty() {
         pass(context, path, ray, end, local);
     }
     if C::MEDIA {
@@ -162,7 +168,7 @@ pub(super) fn go<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut 
     }
     local.counts.segments += 1;
     late(context, path, ray, None);
-    if !context.passing.is_empty() {
+    if !C::PLAIN && !context.passing.is_empty() {
         pass(context, path, ray, ray.t_max, local);
     }
     if C::MEDIA {
@@ -310,7 +316,7 @@ fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, end: f64, lo
 #[inline(always)]
 fn receive<C: Carry>(context: &Context<'_>, path: &Path<C>, r: u32, point: Point, local: &mut Local) {
     let receiver = &context.bound.receivers[r as usize];
-    if receiver.interactions.is_some_and(|n| n != path.bounce) {
+    if !C::PLAIN && receiver.interactions.is_some_and(|n| n != path.bounce) {
         return;
     }
     if let Some(spot) = receiver.spot(point) {
@@ -331,7 +337,7 @@ fn deposit<C: Carry>(
     local.receivers[r].add(spot.cell, path.quanta);
     local.receiver_totals[r] += count(path.quanta);
     local.moments[r].add(path.quanta, spot.at, spot.radius2);
-    if receiver.channels.count() > 0 {
+    if !C::PLAIN && receiver.channels.count() > 0 {
         let cells = receiver.cell_count();
         let nm = path.carry.wavelength().unwrap_or(context.bound.light.wavelength);
         receiver.channels.weigh(nm, |channel, weight| {
@@ -364,7 +370,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         let receiver = &context.bound.receivers[r as usize];
         if let Some(spot) = receiver.direction(ray.direction) {
             caught = true;
-            if receiver.interactions.is_none_or(|n| n == path.bounce) {
+            if C::PLAIN || receiver.interactions.is_none_or(|n| n == path.bounce) {
                 deposit(context, receiver, path, r, &spot, local);
             }
         }

@@ -1,0 +1,316 @@
+//! Drawing facets into the squares of a map.
+//!
+//! A square of the map is a pyramid, or a prism, in space; a facet is put into it unless all its corners lie beyond one of its
+//! sides, or, where the facet is wholly in front, its two triangles as the map shows them pass the square by. Squares are wider than
+//! they are by far more than a ray's place can be wrong.
+
+use super::{DIVIDED, Entry, FINE, Map, Square, View};
+use crate::intersect::facet::usable;
+use crate::math::Point;
+use crate::mesh::FacetMesh;
+use rustc_hash::FxHashMap;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Room around a square, in units of the half side of the map.
+const ROOM: f64 = 1e-8;
+/// Facets in a square that is not divided further: four meet at a corner of a grid of quads, however small the squares.
+const FEW: usize = 6;
+/// How often a square of the map may be divided.
+const DEEPEST: u32 = 3;
+/// Parts along a side of a map that are drawn at the same time.
+const SHEETS: usize = 4;
+/// Squares of the whole map for each facet before any is divided.
+const SQUARES: usize = 16;
+/// Squares and entries for each facet at which dividing ends.
+const ROOMY: usize = 64;
+
+/// A square of the map with the room around it.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Window {
+    const WHOLE: Self = Self { low: [-1.0 - ROOM; 2], high: [1.0 + ROOM; 2] };
+
+    fn misses(&self, o: &Self) -> bool {
+        (self.low[0] > o.high[0])
+            | (self.low[1] > o.high[1])
+            | (o.low[0] > self.high[0])
+            | (o.low[1] > self.high[1])
+    }
+
+    /// One of `n` × `n` parts.
+    fn part(&self, n: usize, [i, j]: [usize; 2]) -> Self {
+        let edge = |a: usize, k: usize| {
+            let (low, high) = (self.low[a] + ROOM, self.high[a] - ROOM);
+            low + (high - low) * (k as f64 / n as f64)
+        };
+        Self { low: [edge(0, i) - ROOM, edge(1, j) - ROOM], high: [edge(0, i + 1) + ROOM, edge(1, j + 1) + ROOM] }
+    }
+}
+
+/// A facet as a map shows it.
+#[derive(Clone, Copy, Debug)]
+struct Shadow {
+    facet: u32,
+    /// Homogeneous places of the corners: `[x, y, w]` stands at `[x/w, y/w]`.
+    corners: [[f64; 3]; 4],
+    /// Their places, for facets wholly in front.
+    places: Option<[[f64; 2]; 4]>,
+    /// A window around the places.
+    bounds: Window,
+    /// Depths between which it lies.
+    near: f64,
+    far: f64,
+    /// Whether all rays start before it.
+    whole: bool,
+}
+
+impl Shadow {
+    fn new(facet: u32, corners: [Point; 4], view: &View, side: usize) -> Option<Self> {
+        let mut depths = [0.0; 4];
+        let corners: [[f64; 3]; 4] = std::array::from_fn(|k| {
+            let p = corners[k];
+            match view {
+                View::Point(origin) => {
+                    let kz = side / 2;
+                    let [kx, ky] = [[1, 2], [2, 0], [0, 1]][kz];
+                    let p = p.to_array();
+                    let sign = if side.is_multiple_of(2) { 1.0 } else { -1.0 };
+                    let w = sign * (p[kz] - origin[kz]);
+                    depths[k] = w;
+                    [p[kx] - origin[kx], p[ky] - origin[ky], w]
+                }
+                View::Along { direction, across, middle, .. } => {
+                    depths[k] = p.dot(*direction);
+                    [p.dot(across[0]) - middle[0], p.dot(across[1]) - middle[1], 1.0]
+                }
+            }
+        });
+        let size = corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let front = corners.iter().all(|c| c[2] > 1e-6 * size);
+        let places = front.then(|| corners.map(|[x, y, w]| [x / w, y / w]));
+        let (near, far) =
+            depths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), d| (l.min(*d), h.max(*d)));
+        let (start, stray) = match view {
+            View::Point(_) => (0.0, 1e-9 * far.abs()),
+            View::Along { start, stray, .. } => (*start, *stray),
+        };
+        let bounds = places.map_or(Window::WHOLE, |places| Window {
+            low: [0, 1].map(|a| places.iter().fold(f64::INFINITY, |m, p| m.min(p[a]))),
+            high: [0, 1].map(|a| places.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p[a]))),
+        });
+        // Room for the rounding of depths.
+        let (near, far) = (near - 2.0 * stray, far + 2.0 * stray);
+        let shadow = Self { facet, corners, places, bounds, near, far, whole: near > start };
+        (far >= start && shadow.meets(&Window::WHOLE)).then_some(shadow)
+    }
+
+    /// Whether a ray through the window may meet it.
+    fn meets(&self, window: &Window) -> bool {
+        if self.bounds.misses(window) {
+            return false;
+        }
+        let Some([a, b, c, d]) = self.places else { return self.is_around(window) };
+        triangle_meets([a, b, c], window) || (c != d && triangle_meets([a, c, d], window))
+    }
+
+    /// Whether its corners do not all lie beyond one side of the window, nor behind.
+    fn is_around(&self, window: &Window) -> bool {
+        let size = self.corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let beyond = |value: &dyn Fn(&[f64; 3]) -> f64| self.corners.iter().all(|c| value(c) < -1e-12 * size);
+        let out = |a: usize| beyond(&|c| c[a] - window.low[a] * c[2]) || beyond(&|c| window.high[a] * c[2] - c[a]);
+        !(out(0) || out(1) || beyond(&|c| c[2]))
+    }
+
+    /// Whether every ray through the window meets it.
+    fn fills(&self, window: &Window) -> bool {
+        let Some(p) = self.places.filter(|_| self.whole) else { return false };
+        let turn = |[a, b, c]: [usize; 3]| {
+            (p[b][0] - p[a][0]) * (p[c][1] - p[a][1]) - (p[b][1] - p[a][1]) * (p[c][0] - p[a][0])
+        };
+        let (first, second) = (turn([0, 1, 2]), turn([0, 2, 3]));
+        let triangle = p[2] == p[3];
+        // Both triangles must lie side by side: then the half-planes of the outline share only what the facet fills.
+        if first == 0.0 || (!triangle && first * second <= 0.0) {
+            return false;
+        }
+        let edges: &[[usize; 2]] =
+            if triangle { &[[0, 1], [1, 2], [2, 0]] } else { &[[0, 1], [1, 2], [2, 3], [3, 0]] };
+        edges.iter().all(|&[i, j]| least(p[i], p[j], first.signum(), window) > 0.0)
+    }
+}
+
+/// The least of the edge function of a line over the window, times `sign`.
+fn least(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
+    let [dx, dy] = [sign * (q[0] - p[0]), sign * (q[1] - p[1])];
+    let x = if dy > 0.0 { window.high[0] } else { window.low[0] };
+    let y = if dx > 0.0 { window.low[1] } else { window.high[1] };
+    dx * (y - p[1]) - dy * (x - p[0])
+}
+
+fn triangle_meets(t: [[f64; 2]; 3], window: &Window) -> bool {
+    for a in 0..2 {
+        let beyond = |past: &dyn Fn(f64) -> bool| t.iter().all(|p| past(p[a]));
+        if beyond(&|x| x < window.low[a]) || beyond(&|x| x > window.high[a]) {
+            return false;
+        }
+    }
+    let turn = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
+    // The greatest of an edge function is the least of its negative.
+    turn == 0.0 || [[0, 1], [1, 2], [2, 0]].iter().all(|&[i, j]| least(t[i], t[j], -turn.signum(), window) <= 0.0)
+}
+
+/// Draws all facets of a mesh, with so many threads; the map does not depend on their number.
+pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> Map {
+    let facets = mesh.facets.len();
+    let squares = (SQUARES * facets) as f64 / view.sides() as f64;
+    let side = (squares.sqrt() as usize).next_power_of_two().clamp(8, 1024);
+    let shadows: Vec<Vec<Shadow>> = (0..view.sides()).map(|face| shadows(mesh, &view, face)).collect();
+    let sheets: Vec<OnceLock<Sheet>> = (0..view.sides() * SHEETS * SHEETS).map(|_| OnceLock::new()).collect();
+    let next = AtomicUsize::new(0);
+    let room = ROOMY * facets.max(64) / 8;
+    let work = || {
+        while let Some((k, sheet)) = sheets.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) {
+            let shadows = &shadows[k / (SHEETS * SHEETS)];
+            let window = Window::WHOLE.part(SHEETS, [k % SHEETS, k / SHEETS % SHEETS]);
+            let _ = sheet.set(Sheet::draw(mesh, shadows, &window, side / SHEETS, room));
+        }
+    };
+    std::thread::scope(|scope| {
+        (1..threads).for_each(|_| drop(scope.spawn(work)));
+        work();
+    });
+    let mut map =
+        Map { view, side, squares: vec![Square::default(); view.sides() * side * side], entries: Vec::new() };
+    for (k, sheet) in sheets.into_iter().enumerate() {
+        if let Some(sheet) = sheet.into_inner() {
+            sheet.paste(&mut map, k);
+        }
+    }
+    map
+}
+
+/// All facets that a map shows, the nearest first.
+fn shadows(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Shadow> {
+    let shadow = |f: usize| {
+        let corners = mesh.corners(f);
+        corners.iter().all(|p| usable(*p)).then(|| Shadow::new(f as u32, corners, view, face)).flatten()
+    };
+    let mut shadows: Vec<Shadow> = (0..mesh.facets.len()).filter_map(shadow).collect();
+    shadows.sort_by(|a, b| a.near.total_cmp(&b.near).then(a.facet.cmp(&b.facet)));
+    shadows
+}
+
+/// A part of a map, drawn by itself: its squares row by row, then those of divided squares.
+struct Sheet {
+    side: usize,
+    squares: Vec<Square>,
+    entries: Vec<Entry>,
+}
+
+impl Sheet {
+    fn draw(mesh: &FacetMesh, shadows: &[Shadow], window: &Window, side: usize, room: usize) -> Self {
+        let sheet = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
+        let mut drawing = Drawing { mesh, sheet, written: FxHashMap::default(), shadows, room };
+        let all: Vec<u32> = (0..shadows.len() as u32).collect();
+        drawing.quarter(drawing.seen(&all, window), window, [0, 0], side);
+        drawing.sheet
+    }
+
+    /// Puts it into its place in the map.
+    fn paste(self, map: &mut Map, k: usize) {
+        let (face, i, j) = (k / (SHEETS * SHEETS), k % SHEETS, k / SHEETS % SHEETS);
+        let own = self.side * self.side;
+        let (squares, entries) = (map.squares.len(), map.entries.len());
+        let moved = |s: &Square| match s.count & DIVIDED != 0 {
+            true => Square { first: (s.first as usize - own + squares) as u32, ..*s },
+            false => Square { first: (s.first as usize + entries) as u32, ..*s },
+        };
+        for (row, own) in self.squares[..own].chunks(self.side).enumerate() {
+            let at = (face * map.side + j * self.side + row) * map.side + i * self.side;
+            map.squares[at..at + self.side].iter_mut().zip(own).for_each(|(to, from)| *to = moved(from));
+        }
+        map.squares.extend(self.squares[own..].iter().map(moved));
+        map.entries.extend(self.entries);
+    }
+}
+
+struct Drawing<'a> {
+    mesh: &'a FacetMesh,
+    /// The nearest first.
+    shadows: &'a [Shadow],
+    sheet: Sheet,
+    /// Where lists of facets stand, which several squares share.
+    written: FxHashMap<Vec<u32>, u32>,
+    /// Squares and entries at which dividing ends.
+    room: usize,
+}
+
+impl Drawing<'_> {
+    /// Those of `list` that a ray through the window may meet first, in their order.
+    fn seen(&self, list: &[u32], window: &Window) -> Vec<u32> {
+        let mut seen = Vec::new();
+        let mut end = f64::INFINITY;
+        for &k in list {
+            let shadow = &self.shadows[k as usize];
+            if shadow.near > end {
+                break;
+            }
+            if shadow.meets(window) {
+                seen.push(k);
+                if shadow.fills(window) {
+                    end = end.min(shadow.far);
+                }
+            }
+        }
+        seen.retain(|&k| self.shadows[k as usize].near <= end);
+        seen
+    }
+
+    /// Goes down to the squares of the sheet, `side` of which lie along a side of this window.
+    fn quarter(&mut self, list: Vec<u32>, window: &Window, at: [usize; 2], side: usize) {
+        if list.is_empty() {
+            return;
+        }
+        if side == 1 {
+            return self.settle(list, window, at[1] * self.sheet.side + at[0], 0);
+        }
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let part = window.part(2, [i, j]);
+            self.quarter(self.seen(&list, &part), &part, [at[0] + i * side / 2, at[1] + j * side / 2], side / 2);
+        }
+    }
+
+    /// Writes the facets of a square, or divides it.
+    fn settle(&mut self, list: Vec<u32>, window: &Window, place: usize, depth: u32) {
+        let sheet = &mut self.sheet;
+        if list.len() <= FEW || depth == DEEPEST || sheet.squares.len() + sheet.entries.len() > self.room {
+            let count = list.len() as u32;
+            let first = *self.written.entry(list).or_insert_with_key(|list| {
+                let first = sheet.entries.len() as u32;
+                sheet.entries.extend(list.iter().map(|&k| {
+                    let shadow = &self.shadows[k as usize];
+                    let corners = self.mesh.corner_positions(shadow.facet as usize);
+                    Entry { near: (shadow.near as f32).next_down(), facet: shadow.facet, corners }
+                }));
+                first
+            });
+            sheet.squares[place] = Square { first, count };
+            return;
+        }
+        let first = sheet.squares.len();
+        sheet.squares[place] = Square { first: first as u32, count: DIVIDED };
+        sheet.squares.resize(first + FINE * FINE, Square::default());
+        for j in 0..FINE {
+            for i in 0..FINE {
+                let part = window.part(FINE, [i, j]);
+                let seen = self.seen(&list, &part);
+                self.settle(seen, &part, first + j * FINE + i, depth + 1);
+            }
+        }
+    }
+}
