@@ -301,49 +301,91 @@ impl Intersector for Facets<'_> {
     }
 }
 
-/// Root-mean-square miss of the focus in mm over the facets of a uniform tolerance, flat and bilinear, and the mean sag
-/// that these facets reach: a coarse tolerance is often kept with room to spare.
-fn misses(model: &Model, tolerance: f64, rays: &[Ray], acts: &[Act], focus: Point) -> ([f64; 2], f64) {
+/// Where each ray must pass.
+type Focus<'a> = &'a dyn Fn(&Ray) -> Point;
+
+/// Median miss of the focus in mm over the facets of a uniform tolerance, flat and bilinear, the root mean square of the latter, and
+/// the mean sag that these facets reach: a coarse tolerance is often kept with room to spare.
+fn misses(model: &Model, tolerance: f64, rays: &[Ray], acts: &[Act], focus: Focus) -> ([f64; 3], f64) {
     let settings =
         tessellate::Settings { tolerance: [tolerance; 2], measure: true, ..tessellate::Settings::default() };
     let made = tessellate(model, &settings);
     let mesh = made.mesh;
     let missed = [false, true].map(|bilinear| {
         let scene = Facets { mesh: &mesh, bilinear };
-        let (mut sum, mut count) = (0.0, 0.0);
-        for ray in rays {
-            let Some((end, ..)) = follow(&scene, *ray, acts) else { continue };
-            sum += miss(&end, focus).powi(2);
-            count += 1.0;
-        }
-        assert!(count > 0.98 * rays.len() as f64, "rays are found on the facets too");
-        (sum / count).sqrt()
+        let found = rays.iter().filter_map(|ray| Some(miss(&follow(&scene, *ray, acts)?.0, focus(ray))));
+        let mut found: Vec<f64> = found.collect();
+        assert!(found.len() as f64 > 0.98 * rays.len() as f64, "rays are found on the facets too");
+        found.sort_by(f64::total_cmp);
+        let square: f64 = found.iter().map(|m| m * m).sum();
+        [found[found.len() / 2], (square / found.len() as f64).sqrt()]
     });
+    let missed = [missed[0][0], missed[1][0], missed[1][1]];
     (missed, made.report.sag_mm.sampled_mean.expect("measured"))
 }
 
 /// The error falls as the square root of the sag with flat normals and in proportion to it with interpolated ones.
 ///
-/// The root mean square follows the few rays that meet slivers along a trim: 300 rays leave its order uncertain by 0.2.
-fn check_orders(model: &Model, rays: &[Ray], acts: &[Act], focus: Point) {
+/// The root mean square of the latter follows the few rays that meet slivers along a trim, whose normals are interpolated over a
+/// triangle; its order is lower, and uncertain by 0.2 with 300 rays.
+fn check_orders(model: &Model, rays: &[Ray], acts: &[Act], focus: Focus) {
     let [(coarse, coarse_sag), (fine, fine_sag)] =
         [0.32, 0.02].map(|tolerance| misses(model, tolerance, rays, acts, focus));
     let errors = [coarse, fine];
     let order = |k: usize| (coarse[k] / fine[k]).ln() / (coarse_sag / fine_sag).ln();
-    assert!((0.4..0.6).contains(&order(0)), "flat: order {} of {errors:?}", order(0));
-    assert!((0.85..1.2).contains(&order(1)), "bilinear: order {} of {errors:?}", order(1));
+    assert!((0.45..0.57).contains(&order(0)), "flat: order {} of {errors:?}", order(0));
+    assert!((0.95..1.15).contains(&order(1)), "bilinear: order {} of {errors:?}", order(1));
+    assert!(order(2) > 0.8, "bilinear, root mean square: order {} of {errors:?}", order(2));
 }
 
 #[test]
 fn on_facets_of_a_paraboloid_the_error_falls_at_the_orders_of_theory() {
     let model = model(vec![turned(&conic(50.0, -1.0, 0.0, 60.0))]);
     let rays: Vec<Ray> = aperture(55.0, 3000).map(|(x, y)| down(x, y, 100.0)).collect();
-    check_orders(&model, &rays, &[Act::Mirror], Point::new(0.0, 0.0, 25.0));
+    check_orders(&model, &rays, &[Act::Mirror], &|_| Point::new(0.0, 0.0, 25.0));
 }
 
 #[test]
 fn on_facets_of_a_hyperbolic_lens_the_error_falls_at_the_orders_of_theory() {
     let model = model(vec![disk(0.0, 22.0), turned(&conic(-25.0, -2.25, 20.0, 22.0))]);
     let rays: Vec<Ray> = aperture(20.0, 3000).map(|(x, y)| up(x, y, -5.0)).collect();
-    check_orders(&model, &rays, &[Act::Refract(1.0 / 1.5), Act::Refract(1.5)], Point::new(0.0, 0.0, 70.0));
+    check_orders(&model, &rays, &[Act::Refract(1.0 / 1.5), Act::Refract(1.5)], &|_| Point::new(0.0, 0.0, 70.0));
+}
+
+#[test]
+fn on_facets_of_ellipsoids_the_error_falls_at_the_orders_of_theory() {
+    let sphere = sweep::sphere(&Frame::IDENTITY, 30.0, TURN, [-FRAC_PI_2, FRAC_PI_2]);
+    let mirror = model(vec![sphere.transformed(|p| Point::new(p.x * 5.0 / 3.0, p.y, p.z))]);
+    let away = aperture(1.0, 3000).map(|(y, z)| {
+        let s = y.hypot(z);
+        let d = Vector::new(1.0 - 2.0 * s * s, 2.0 * y * (1.0 - s * s).sqrt(), 2.0 * z * (1.0 - s * s).sqrt());
+        Ray::new(Point::new(-40.0, 0.0, 0.0), d.normalize())
+    });
+    check_orders(&mirror, &away.collect::<Vec<_>>(), &[Act::Mirror], &|_| Point::new(40.0, 0.0, 0.0));
+    let front = model(vec![turned(&conic(20.0, -1.0 / 2.25, 0.0, 18.0))]);
+    let rays: Vec<Ray> = aperture(16.0, 3000).map(|(x, y)| up(x, y, -5.0)).collect();
+    check_orders(&front, &rays, &[Act::Refract(1.0 / 1.5)], &|_| Point::new(0.0, 0.0, 60.0));
+}
+
+#[test]
+fn on_facets_of_spheres_the_error_falls_at_the_orders_of_theory() {
+    let mirror = model(vec![sweep::sphere(&Frame::IDENTITY, 100.0, TURN, [-FRAC_PI_2, 0.0])]);
+    let rays: Vec<Ray> = aperture(60.0, 3000).map(|(x, y)| down(x, y, 10.0)).collect();
+    let height = |ray: &Ray| ray.origin.truncate().length();
+    check_orders(&mirror, &rays, &[Act::Mirror], &|ray| {
+        Point::new(0.0, 0.0, -50.0 / (height(ray) / 100.0).asin().cos())
+    });
+    // Ball and aplanatic point ten times as large as on the spline: a tolerance of 0.32 mm is coarse on 10 mm.
+    let ball = model(vec![sweep::sphere(&Frame::IDENTITY, 50.0, TURN, [-FRAC_PI_2, FRAC_PI_2])]);
+    let rays: Vec<Ray> = aperture(35.0, 3000).map(|(x, y)| up(x, y, -200.0)).collect();
+    check_orders(&ball, &rays, &[Act::Refract(1.0 / 1.5), Act::Refract(1.5)], &|ray| {
+        let h = height(ray);
+        Point::new(0.0, 0.0, h / (2.0 * ((h / 50.0).asin() - (h / 75.0).asin())).sin())
+    });
+    let rays = aperture(1.0, 3000).map(|(y, z)| {
+        let cos = 1.0 - 0.5 * (y * y + z * z);
+        let across = Vector::new(0.0, y, z).normalize() * (1.0 - cos * cos).sqrt();
+        Ray::new(Point::new(50.0 / 1.5, 0.0, 0.0), (across - Vector::X * cos).normalize())
+    });
+    check_orders(&ball, &rays.collect::<Vec<_>>(), &[Act::Refract(1.5)], &|_| Point::new(75.0, 0.0, 0.0));
 }

@@ -175,7 +175,7 @@ fn a_diffuse_enclosure_is_lit_by_itself() {
     let radius = (96e6 / (4.0 * PI)).sqrt();
     let mut world = World::default();
     world.part("wall", false, &[("", Shape::Sphere { centre: Point::ZERO, radius, outward: false })]);
-    for (rho, lux) in [(0.2, 26.04), (0.5, 104.17), (0.8, 416.67)] {
+    for (rho, lux) in [(0.2, 26.04), (0.5, 104.17), (0.8, 416.67), (0.9, 937.50), (0.95, 1979.17)] {
         let text = format!(
             "[run]\nrays = 20_000\nunit = 'lm'\npower_floor = 1e-8\n[[material]]\npart = 'wall'\nsurface = 'diffuse'\nreflectance = {rho}
             [[source]]\nkind = 'point'\npower = 10_000

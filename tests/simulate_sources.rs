@@ -136,6 +136,45 @@ fn stated_errors_are_honest() {
     }
 }
 
+/// The error of every cell of a map, over 200 seeds: cells of one run are not independent, so the share is that of all together.
+#[test]
+fn errors_of_cells_are_honest() {
+    let world = World::default();
+    let source = "[[source]]\nkind = 'lambertian'\nat = [0.3, 0.1, -20]\n";
+    let receiver = "[[receiver]]\nname = 'map'\nat = [5, 5, -10]\nsize = [12, 12]\ncells = [4, 4]\n";
+    let p = Vector::new(0.3, 0.1, -20.0);
+    let truth = |k: usize| {
+        let [x, y] = [(k % 4) as f64, (k / 4) as f64].map(|i| 3.0 * i - 1.0);
+        let corners = [[x, y], [x + 3.0, y], [x + 3.0, y + 3.0], [x, y + 3.0]]
+            .map(|[x, y]| (Vector::new(x, y, -10.0) - p).normalize());
+        let edge = |i: usize| {
+            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+            a.cross(b).normalize().z * a.dot(b).acos()
+        };
+        // W/m² on 9 mm².
+        (0..4).map(edge).sum::<f64>() / (2.0 * PI) / 9e-6
+    };
+    for sampling in ["random", "sobol"] {
+        let text = format!("[run]\nrays = 16384\nsampling = '{sampling}'\n{source}{receiver}");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let (mut one, mut two, mut all) = (0.0, 0.0, 0.0);
+        for seed in 0..200 {
+            let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
+            let r = &simulate(&bound, &world, &settings, &|_| true).receivers[0];
+            for k in 0..16 {
+                let away = (r.cells[k] - truth(k)).abs() / r.errors[k];
+                one += f64::from(away < 1.0);
+                two += f64::from(away < 2.0);
+                all += 1.0;
+            }
+        }
+        // 3200 of them: ±0.025 and ±0.011 at three sigma were they independent; cells of one seed are nearly so.
+        assert!((one / all - 0.6827f64).abs() < 0.03, "{sampling}: {} within one standard error", one / all);
+        assert!((two / all - 0.9545f64).abs() < 0.015, "{sampling}: {} within two standard errors", two / all);
+    }
+}
+
 /// Solid angle of a triangle seen from the origin (Van Oosterom and Strackee 1983).
 fn solid_angle([a, b, c]: [Vector; 3]) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
