@@ -11,7 +11,7 @@ const POLE: f64 = 1e-9;
 const BENT: f64 = 1e-3;
 const SHARP: f64 = 0.05;
 /// Share of the domain within which a place is on a crease.
-const CREASE: f64 = 1e-7;
+pub(super) const CREASE: f64 = 1e-7;
 
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct Sheet<'a> {

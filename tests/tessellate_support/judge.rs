@@ -303,8 +303,13 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
                 continue;
             }
             // On a crease the normal of any side will do; where there is none, or one that rounding decides, any at all.
+            let domain = s.domain().map(|[a, b]| b - a);
+            let snapped = Uv::from_array([0, 1].map(|d| {
+                let near = s.knots[d].iter().copied().find(|k| (k - v.uv[d]).abs() <= 1e-7 * domain[d]);
+                near.unwrap_or(v.uv[d])
+            }));
             let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
-                let (_, [du, dv]) = look(s, v.uv, left);
+                let (_, [du, dv]) = look(s, snapped, left);
                 let n = du.cross(dv);
                 (n.length() > 1e-6 * du.length() * dv.length())
                     .then(|| if face.reversed { -n } else { n }.normalize())

@@ -1,7 +1,7 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
 use super::super::proof::flat::from_chord;
-use super::super::sheet::Sheet;
+use super::super::sheet::{CREASE, Sheet};
 use super::opposite;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Edge, EdgeUse, Face, Part};
@@ -154,7 +154,7 @@ pub(in crate::tessellate) fn hold(curve: &Curve, sides: &[Side<'_, '_>], denser:
 /// In the parameter plane the chord must stay by its curve too, or loops would cross; closer still where facets beside it could not
 /// be proved. What the file's own gap takes no division gives back: a gap of 9 mm once made 67,000 chords.
 fn beside(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
-    cross_creases(sides, &mut t);
+    cross_creases(curve, sides, &mut t);
     let at = |t: f64| curve.evaluate(t);
     let slack = |s: &Side<'_, '_>| 2.0 * s.sheet.field.tightest() / 4f64.powi(denser as i32);
     bisect(&mut t, |a, b| {
@@ -182,11 +182,11 @@ fn beside(curve: &Curve, sides: &[Side<'_, '_>], denser: u32, mut t: Vec<f64>) -
 }
 
 /// Adds corners where the edge crosses sharp creases of its faces.
-fn cross_creases(sides: &[Side<'_, '_>], t: &mut Vec<f64>) {
+fn cross_creases(curve: &Curve, sides: &[Side<'_, '_>], t: &mut Vec<f64>) {
     let mut found: Vec<f64> = Vec::new();
     for s in sides.iter().filter(|s| s.sheet.is_sharp()) {
         for (d, creases) in s.sheet.sharp.iter().enumerate() {
-            let near = 1e-9 * s.sheet.extent()[d];
+            let near = CREASE * s.sheet.extent()[d];
             let at = |t: f64| s.side.uv.evaluate(t)[d];
             for (pair, &crease) in t.windows(2).flat_map(|pair| creases.iter().map(move |c| (pair, c))) {
                 let (mut lo, mut hi) = (pair[0], pair[1]);
@@ -198,13 +198,21 @@ fn cross_creases(sides: &[Side<'_, '_>], t: &mut Vec<f64>) {
                     let m = 0.5 * (lo + hi);
                     if (at(m) < crease) == (x < 0.0) { lo = m } else { hi = m }
                 }
-                found.push(0.5 * (lo + hi));
+                // Uneven weights crowd parameters: far from both ends there, it may be in the very place of one.
+                let (m, least) = (0.5 * (lo + hi), 1e-3 * s.sheet.field.tightest());
+                let p = curve.evaluate(m);
+                if pair.iter().all(|&end| (curve.evaluate(end) - p).length() > least) {
+                    found.push(m);
+                }
             }
         }
     }
+    // Both faces may have the same crease there.
+    found.sort_by(f64::total_cmp);
+    let least = sides.iter().map(|s| 1e-3 * s.sheet.field.tightest()).fold(f64::INFINITY, f64::min);
+    found.dedup_by(|b, a| (curve.evaluate(*a) - curve.evaluate(*b)).length() <= least);
     t.extend(found);
     t.sort_by(f64::total_cmp);
-    t.dedup();
 }
 
 /// Distance-wise nearest of a few points of the curve over `[a, b]`, refined once.

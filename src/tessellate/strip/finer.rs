@@ -7,6 +7,9 @@ use super::sector;
 use crate::math::Uv;
 use rustc_hash::FxHashMap;
 
+/// Share of the tolerance within which places are one.
+const LEAST: f64 = 1e-6;
+
 impl Work<'_, '_> {
     /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
     pub(super) fn turn(&self, t: [u32; 3]) -> Option<usize> {
@@ -26,7 +29,7 @@ impl Work<'_, '_> {
 
     /// Puts a point on the worst free edge of each bad triangle; `false` when nothing can be done.
     pub(super) fn refine(&mut self, bad: &[([u32; 3], (f64, f64))], trims: &FxHashMap<[u32; 2], Trim>) -> bool {
-        let mut wanted: Vec<[Uv; 2]> = Vec::new();
+        let mut wanted: Vec<([Uv; 2], [u32; 3], f64)> = Vec::new();
         let mut seen: FxHashMap<[u32; 2], ()> = FxHashMap::default();
         for &(t, (bound, xi)) in bad {
             let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (t[i], t[j]));
@@ -42,7 +45,7 @@ impl Work<'_, '_> {
             let middles = sector::middles(self.sheet, t.map(|n| self.nodes[n as usize].uv));
             if let Some(k) = self.turn(t).filter(|_| bound <= xi) {
                 if seen.insert(key(sides[k].0, sides[k].1), ()).is_none() {
-                    wanted.push([middles[k]; 2]);
+                    wanted.push(([middles[k]; 2], t, xi));
                 }
                 continue;
             }
@@ -59,18 +62,22 @@ impl Work<'_, '_> {
             match best {
                 Some(((a, b), m, sag)) if sag > 0.2 * xi => {
                     if seen.insert(key(a, b), ()).is_none() {
-                        wanted.push([m, center]);
+                        wanted.push(([m, center], t, xi));
                     }
                 }
-                _ => wanted.push([center; 2]),
+                _ => wanted.push(([center; 2], t, xi)),
             }
         }
         let mut done = false;
-        for places in wanted {
+        for (places, t, xi) in wanted {
             // The middle of a parameter line into a pole may be a corner already.
             let Some(uv) = places.into_iter().find(|&uv| self.is_free(uv)) else { continue };
             let n = self.nodes.len() as u32;
             let place = self.sheet.point(uv);
+            // What does not hold down to such a size does not for its size.
+            if t.iter().any(|&n| (self.nodes[n as usize].place - place).length() <= LEAST * xi) {
+                continue;
+            }
             self.nodes.push(Node { uv, place, position: self.next });
             match self.insert(n) {
                 Some(h) => {
