@@ -11,6 +11,7 @@
 mod basis;
 pub mod conic;
 mod curvature;
+mod cut;
 mod patch;
 pub mod project;
 pub mod sanitise;

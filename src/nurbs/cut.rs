@@ -1,0 +1,101 @@
+//! Parts of curves by blossoms: knot insertion, clamping and cutting in one.
+
+use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, find_span};
+use super::spline::{ControlPoint, Spline};
+use smallvec::SmallVec;
+
+impl<P: ControlPoint> Spline<P> {
+    /// The blossom (polar form) of the polynomial piece over knot span `span` at `degree` arguments.
+    pub(super) fn blossom(&self, span: usize, arguments: &[f64]) -> P {
+        match self.degree {
+            0..NARROW => self.blossom_in::<NARROW>(span, arguments),
+            NARROW..MIDDLE => self.blossom_in::<MIDDLE>(span, arguments),
+            MIDDLE..BROAD => self.blossom_in::<BROAD>(span, arguments),
+            _ => self.blossom_in::<WIDE>(span, arguments),
+        }
+    }
+
+    /// As [`Spline::blossom`], with room for `W` points.
+    fn blossom_in<const W: usize>(&self, span: usize, arguments: &[f64]) -> P {
+        let p = self.degree;
+        let mut d = [P::ZERO; W];
+        d[..=p].copy_from_slice(&self.points[span - p..=span]);
+        for (r, &u) in arguments.iter().enumerate() {
+            for j in 0..p - r {
+                let (lo, hi) = (self.knots[span - p + j + r + 1], self.knots[span + j + 1]);
+                let s = (u - lo) / (hi - lo);
+                d[j] = d[j] * (1.0 - s) + d[j + 1] * s;
+            }
+        }
+        d[0]
+    }
+
+    /// The same curve over another knot vector that refines this one on `[knots[degree], knots[n]]`.
+    ///
+    /// New knots may start and end inside the domain (the curve is then cut there) and must hold every old knot
+    /// between, at least as often. This is knot insertion, clamping and cutting in one (Oslo algorithm by blossoms).
+    pub fn refined(&self, knots: Vec<f64>) -> Self {
+        let (p, n) = (self.degree, knots.len() - self.degree - 1);
+        let points = (0..n)
+            .map(|i| {
+                let middle = 0.5 * (knots[i] + knots[i + p + 1]);
+                self.blossom(find_span(&self.knots, p, middle), &knots[i + 1..=i + p])
+            })
+            .collect();
+        Self { degree: p, knots, points }
+    }
+
+    /// The part over `[a, b]`, which must lie in the domain with `a < b`; its domain is `[a, b]`.
+    pub fn restricted(&self, a: f64, b: f64) -> Self {
+        if [a, b] == self.domain() && self.is_clamped() {
+            return self.clone();
+        }
+        let inner = self.knots.iter().copied().filter(|&k| k > a && k < b);
+        let p1 = self.degree + 1;
+        let knots = std::iter::repeat_n(a, p1).chain(inner).chain(std::iter::repeat_n(b, p1)).collect();
+        self.refined(knots)
+    }
+
+    /// Control points of [`Spline::restricted`], which hull the curve over `[a, b]`; within one knot span, without the rest of it.
+    pub fn restricted_points(&self, a: f64, b: f64) -> SmallVec<[P; 8]> {
+        let p = self.degree;
+        let span = find_span(&self.knots, p, a);
+        if !(self.knots[span] <= a && a < b && b <= self.knots[span + 1]) {
+            return self.restricted_across(span, a, b);
+        }
+        let mut arguments = [a; MAX_DEGREE];
+        let mut out = SmallVec::new();
+        out.push(self.blossom(span, &arguments[..p]));
+        for i in 1..=p {
+            arguments[p - i] = b;
+            out.push(self.blossom(span, &arguments[..p]));
+        }
+        out
+    }
+
+    /// [`Spline::restricted_points`] over several spans, of which `span` is the first: points whose knots all lie inside are the curve's own.
+    fn restricted_across(&self, span: usize, a: f64, b: f64) -> SmallVec<[P; 8]> {
+        let (p, end) = (self.degree, self.knots.partition_point(|&k| k < b));
+        if end <= span || self.knots[span] > a || a >= b || b > self.domain()[1] {
+            return self.restricted(a, b).points.into();
+        }
+        let inner = &self.knots[span + 1..end];
+        // Knot i of the cut curve.
+        let knot = |i: usize| match i.checked_sub(p + 1) {
+            None => a,
+            Some(j) => inner.get(j).copied().unwrap_or(b),
+        };
+        let n = inner.len() + p + 1;
+        let mut arguments = [a; MAX_DEGREE];
+        (0..n)
+            .map(|i| {
+                if i >= p && i < inner.len() + 1 {
+                    return self.points[span + i - p];
+                }
+                let middle = 0.5 * (knot(i) + knot(i + p + 1));
+                (0..p).for_each(|k| arguments[k] = knot(i + 1 + k));
+                self.blossom(find_span(&self.knots, p, middle), &arguments[..p])
+            })
+            .collect()
+    }
+}
