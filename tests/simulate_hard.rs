@@ -183,3 +183,39 @@ fn blocks_that_overlap_and_share_planes_are_one_block() {
         }
     }
 }
+
+/// A box of absorbing glass without its lid: what goes out by the opening is lost, not absorbed on an endless way, and a receiver
+/// outside does not take it for light in the open; one inside the body counts as ever.
+#[test]
+fn light_that_leaves_by_an_opening_is_lost_and_not_absorbed_or_received() {
+    let mut world = World::default();
+    world.cuboid("cup", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 10.0));
+    world.model.parts[0].shells[0].faces.retain(|f| f.name != "z1");
+    world.model.parts[0].shells[0].closed = false;
+    world.shapes.remove(5);
+    let text = |receiver: &str| {
+        format!(
+            "[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\n[[medium]]\nname = 'glass'\nindex = 1.5\nabsorption_per_mm = 0.01
+            [[material]]\npart = 'cup'\nmedium = 'glass'
+            [[source]]\nkind = 'collimated'\nat = [0, 0, -10]\nradius = 5\n{receiver}"
+        )
+    };
+    let plane = |z: f64| format!("[[receiver]]\nname = 'r'\nat = [0, 0, {z:?}]\nsize = [90, 90]\n");
+    let bare = world.run(&text(""), |_| ());
+    assert!((bare.power.lost - 0.96).abs() < 1e-9 && bare.power.absorbed == 0.0, "{:?}", bare.power);
+    let outside = world.run(&text(&plane(30.0)), |_| ());
+    assert!(outside.receivers[0].power == 0.0 && outside.power.lost > 0.7, "{:?}", outside.power);
+    // Closed, the same plane in the glass receives what Beer leaves.
+    let mut whole = World::default();
+    whole.cuboid("cup", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 10.0));
+    let inside = whole.run(&text(&plane(5.0)), |_| ());
+    assert!((inside.receivers[0].power - 0.96 * (-0.05f64).exp()).abs() < 1e-9, "{:?}", inside.power);
+    // A body that is open elsewhere: in it, with a wall behind, the receiver counts.
+    let mut open = World::default();
+    open.cuboid("cup", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 10.0));
+    open.model.parts[0].shells[0].faces.retain(|f| f.name != "x1");
+    open.model.parts[0].shells[0].closed = false;
+    open.shapes.remove(1);
+    let inside = open.run(&text(&plane(5.0)), |_| ());
+    assert!((inside.receivers[0].power - 0.96 * (-0.05f64).exp()).abs() < 1e-9, "{:?}", inside.power);
+}

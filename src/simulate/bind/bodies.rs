@@ -26,6 +26,8 @@ pub(crate) struct Body {
     pub(crate) medium: String,
     /// Length that light goes by total reflection alone before it is taken to be caught, mm.
     pub(crate) patience: f64,
+    /// Whether it has faces in no closed shell.
+    pub(crate) open: bool,
 }
 
 impl Body {
@@ -39,6 +41,7 @@ impl Body {
             name,
             medium: m.name,
             patience: f64::INFINITY,
+            open: false,
         }
     }
 
@@ -109,6 +112,7 @@ pub(super) fn find(
                 bodies.len() - 1
             }
         };
+        bodies[body].open |= super::notes::is_open(&f, model);
         boxes[body] = boxes[body].union(bounds(&f));
         of_face[f.id.index()] = body as u16;
     }

@@ -104,13 +104,17 @@ fn of_surface(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
     [("coating", coating), ("reflectance", reflectance)].into_iter().filter_map(|(key, range)| Some((key, range?)))
 }
 
+/// Whether a face is one of no closed shell. Of ready meshes nothing is known.
+pub(super) fn is_open(f: &PlacedFace<'_>, model: &Model) -> bool {
+    f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
+}
+
 /// One sentence about the bodies that have faces in no closed shell.
 pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
     let open = |f: &PlacedFace<'_>| {
-        f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
-            && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
+        is_open(f, model) && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
     };
-    let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(|f| f.face.is_some()).filter(open).collect();
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(open).collect();
     let first = faces.first()?;
     let [instance, medium] = bound.body(bound.faces[first.id.index()].body)?;
     let bodies: BTreeSet<u16> = faces.iter().map(|f| bound.faces[f.id.index()].body).collect();

@@ -2,7 +2,7 @@
 
 use super::{Carry, Context, settle};
 use crate::intersect::Cost;
-use crate::math::{Departure, Ray, orthonormal_pair};
+use crate::math::{Departure, Point, Ray, orthonormal_pair};
 use crate::simulate::bind::{AMBIENT, FaceOptics};
 use crate::simulate::emitter::{Stream, Ticket};
 use smallvec::SmallVec;
@@ -126,6 +126,13 @@ pub(super) fn regained<C: Carry>(context: &Context<'_>, carry: &C, ray: &Ray, en
     let middle = 0.5 * (ray.t_min + end.min(ray.t_min + 1.0));
     let found = carry.instead(&bodies(context, &Ray::new(ray.at(middle), ray.direction)))?;
     (found.body() != carry.body()).then_some(found)
+}
+
+/// Whether light that a receiver would end has left its body by an opening: the body is open, and on the way on it is not left.
+#[inline]
+pub(super) fn is_out<C: Carry>(context: &Context<'_>, carry: &C, ray: &Ray, point: Point) -> bool {
+    let body = carry.body();
+    context.bound.bodies[body as usize].open && !bodies(context, &Ray::new(point, ray.direction)).contains(&body)
 }
 
 #[derive(Default)]

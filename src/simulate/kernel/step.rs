@@ -93,7 +93,7 @@ pub(super) fn step<C: Carry>(
     if !C::PLAIN && !context.passing.is_empty() {
         pass(context, path, ray, end, local);
     }
-    if C::MEDIA {
+    if C::MEDIA && (end.is_finite() || path.carry.body() == AMBIENT) {
         attenuate(context, path, end, local);
     }
     let Some(hit) = hit else {
@@ -171,7 +171,7 @@ pub(super) fn go<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut 
     if !C::PLAIN && !context.passing.is_empty() {
         pass(context, path, ray, ray.t_max, local);
     }
-    if C::MEDIA {
+    if C::MEDIA && (ray.t_max.is_finite() || path.carry.body() == AMBIENT) {
         attenuate(context, path, ray.t_max, local);
     }
     leave(context, path, ray, local);
@@ -351,6 +351,10 @@ fn deposit<C: Carry>(
 fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: &mut Local) {
     if path.receiver != NO_RECEIVER {
         let point = ray.at(ray.t_max);
+        if C::MEDIA && around::is_out(context, &path.carry, ray, point) {
+            record(context, path, point, Event::Lost, local);
+            return lose(path, ray, Cause::NoExit, None, local);
+        }
         record(context, path, point, Event::Received, local);
         local.ends.received += count(path.quanta);
         receive(context, path, path.receiver, point, local);
