@@ -182,7 +182,7 @@ impl Receiver {
     }
 
     /// Distances at which a ray crosses the receiver, in `(after, before)`; the nearest.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn crossing(&self, ray: &Ray, after: f64, before: f64) -> Option<f64> {
         match &self.shape {
             Shape::Plane { frame, half, one_sided } => {
@@ -214,7 +214,7 @@ impl Receiver {
     }
 
     /// The cell and coordinates of a point on a plane or sphere.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn spot(&self, p: Point) -> Option<Spot> {
         match &self.shape {
             Shape::Plane { frame, half, .. } => {

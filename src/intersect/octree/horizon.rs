@@ -26,7 +26,7 @@ const PATIENCE: u32 = 200;
 const IMPATIENCE: u32 = 32;
 /// A horizon is not found more closely than this share of the least slope of the rays so far, and only in the sectors where they
 /// ran: what stands lower or elsewhere is not looked at.
-const BELOW: f64 = 0.125;
+const BELOW: f64 = 0.2;
 /// Slope above which a horizon is of no use.
 const STEEP: f64 = 8.0;
 /// Sectors around a triangle: a ray is in one by the signs and the order of its two coordinates in the plane.

@@ -17,7 +17,7 @@ use super::Octree;
 use crate::intersect::facet::{FacetHit, FacetRay, Nearest};
 use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, Expected};
-use crate::math::{Ray, Vector, orthonormal_pair};
+use crate::math::{Point, Ray, Vector, orthonormal_pair};
 
 /// Rays for each facet from which on a map pays: a facet costs some 2 µs to draw, and a ray that need not walk saves 0.1 µs.
 const WORTH: u64 = 100;
@@ -67,6 +67,7 @@ pub(super) struct Map {
 }
 
 /// Where a ray looks.
+#[derive(Clone, Copy)]
 struct Look {
     index: u16,
     map: u16,
@@ -77,6 +78,13 @@ struct Look {
     scale: f64,
     shift: f64,
     ray: FacetRay,
+}
+
+impl Look {
+    fn idle() -> Self {
+        let ray = FacetRay::new(&Ray::new(Point::ZERO, Vector::Z));
+        Self { index: 0, map: 0, square: 0, rest: [0.0; 2], scale: 1.0, shift: 0.0, ray }
+    }
 }
 
 /// Rays that are looked up together.
@@ -145,10 +153,12 @@ pub(super) fn find(tree: &Octree, expected: &Expected<'_>, there: &[Map]) -> Vec
 }
 
 impl Map {
-    /// Where a ray looks first. Without closures, which would be compiled without the caller's instruction set.
+    /// Where a ray looks first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
+    /// instruction set.
     #[inline(always)]
-    fn look(&self, (index, map): (usize, usize), ray: &Ray) -> Option<Look> {
-        let prepared = FacetRay::new(ray);
+    fn look(&self, (index, map): (usize, usize), ray: &Ray, look: &mut Look) -> bool {
+        look.ray = FacetRay::new(ray);
+        let prepared = &look.ray;
         let (side, [x, y], scale, shift) = match &self.view {
             View::Point(_) => {
                 let axes = prepared.axes();
@@ -166,12 +176,14 @@ impl Map {
         let (x, y) = ((0.5 * x + 0.5) * n, (0.5 * y + 0.5) * n);
         // False for NaN too.
         if !(x >= 0.0 && x <= n && y >= 0.0 && y <= n) {
-            return None;
+            return false;
         }
         let (i, j) = ((x as usize).min(self.side - 1), (y as usize).min(self.side - 1));
-        let square = ((side * self.side + j) * self.side + i) as u32;
-        let rest = [x - i as f64, y - j as f64];
-        Some(Look { index: index as u16, map: map as u16, square, rest, scale, shift, ray: prepared })
+        look.square = ((side * self.side + j) * self.side + i) as u32;
+        look.rest = [x - i as f64, y - j as f64];
+        (look.scale, look.shift) = (scale, shift);
+        (look.index, look.map) = (index as u16, map as u16);
+        true
     }
 
     /// The facets that a ray may meet.
@@ -217,7 +229,8 @@ pub(super) fn answer(
 ) -> usize {
     let (mut others, mut next, mut last) = (0, 0, 0);
     let mesh = tree.around.mesh;
-    let mut looks: [Option<Look>; TOGETHER] = [const { None }; TOGETHER];
+    let idle = Look::idle();
+    let mut looks = [idle; TOGETHER];
     let mut found: [&[Entry]; TOGETHER] = [&[]; TOGETHER];
     while next < rays.len() {
         let mut n = 0;
@@ -225,10 +238,8 @@ pub(super) fn answer(
             let ray = &rays[next];
             if let Some(map) = map_of(maps, last, ray) {
                 last = map;
-                let look = maps[map].look((next, map), ray);
-                if let Some(at) = &look {
-                    prefetch(&maps[map].squares, at.square as usize);
-                    looks[n] = look;
+                if maps[map].look((next, map), ray, &mut looks[n]) {
+                    prefetch(&maps[map].squares, looks[n].square as usize);
                     n += 1;
                 }
             } else {
@@ -238,13 +249,14 @@ pub(super) fn answer(
             next += 1;
         }
         for k in 0..n {
-            if let Some(look) = &looks[k] {
-                found[k] = maps[usize::from(look.map)].entries(look);
-                prefetch(found[k], 0);
-            }
+            found[k] = maps[usize::from(looks[k].map)].entries(&looks[k]);
+            prefetch(found[k], 0);
         }
         for k in 0..n {
-            let Some(look) = &looks[k] else { continue };
+            if found[k].is_empty() {
+                continue;
+            }
+            let look = &looks[k];
             let index = usize::from(look.index);
             let mut best = Nearest::before(rays[index].t_max);
             for entry in found[k] {
