@@ -7,6 +7,9 @@
 //! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of the room. Thirty-two rays of
 //! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
 //!
+//! Where a run says beforehand which rays it will ask ([`Intersector::expect`]), those of point and collimated sources are answered
+//! from a map of what the source sees, and rays that leave facets for which many do are known to be gone by the facet's horizon.
+//!
 //! Sources: the octree after Revelles, Ureña, Lastra, *An Efficient Parametric Algorithm for Octree Traversal*, WSCG
 //! 2000 (cells), and Ylitie, Karras, Laine, HPG 2017 (compressed wide nodes).
 //!
