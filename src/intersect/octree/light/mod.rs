@@ -19,8 +19,10 @@ use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, Expected};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
 
-/// Rays for each facet from which on a map pays: a facet costs some 2 µs to draw, and a ray that need not walk saves 0.1 µs.
-const WORTH: u64 = 100;
+/// Rays for each facet from which on a map pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
+const WORTH: u64 = 200;
+/// Facets above which no map is drawn: drawing takes 300 bytes for each.
+const LARGEST: usize = 1 << 18;
 /// Most maps that are kept.
 const MOST: usize = 64;
 /// Squares along each side of a divided square.
@@ -141,7 +143,8 @@ impl View {
 /// The maps for these sources, as far as they pay; those that are there already are kept.
 pub(super) fn find(tree: &Octree, expected: &Expected<'_>, there: &[Map]) -> Vec<Map> {
     let mut maps: Vec<Map> = Vec::new();
-    let worth = |rays: u64| rays / WORTH >= tree.around.mesh.facets.len() as u64;
+    let facets = tree.around.mesh.facets.len();
+    let worth = |rays: u64| facets <= LARGEST && rays / WORTH >= facets as u64;
     let views = expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::of(beam, tree));
     for view in views {
         if maps.len() < MOST && maps.iter().all(|m| m.view != view) {
