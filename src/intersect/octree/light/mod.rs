@@ -24,7 +24,7 @@ const WORTH: u64 = 200;
 /// Facets above which no map is drawn: drawing takes 300 bytes for each.
 const LARGEST: usize = 1 << 18;
 /// Most maps that are kept.
-const MOST: usize = 64;
+const MOST: usize = 16;
 /// Squares along each side of a divided square.
 const FINE: usize = 4;
 /// Set in [`Square::count`] where the square is divided.
@@ -127,16 +127,15 @@ impl View {
         if matches!(self, Self::Point(_)) { 6 } else { 1 }
     }
 
-    /// Whether a ray is one of those that are seen.
+    /// Whether a ray that starts on no face is one of those that are seen.
     #[inline(always)]
     fn sees(&self, ray: &Ray) -> bool {
-        let own = match self {
+        match self {
             Self::Point(origin) => ray.origin.to_array() == *origin,
             Self::Along { direction, start, stray, .. } => {
                 ray.direction == *direction && (ray.origin.dot(*direction) - start).abs() <= *stray
             }
-        };
-        own && ray.from.is_none() && ray.t_min == 0.0
+        }
     }
 }
 
@@ -207,6 +206,9 @@ impl Map {
 /// The map that shows a ray; `last` is the first to be looked at.
 #[inline(always)]
 fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
+    if ray.from.is_some() || ray.t_min != 0.0 {
+        return None;
+    }
     if maps[last].view.sees(ray) {
         return Some(last);
     }
