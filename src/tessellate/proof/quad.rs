@@ -242,7 +242,7 @@ mod tests {
     fn off(p: Point, [a, b, c]: [Point; 3]) -> f64 {
         let at = |u: f64, v: f64| (a + (b - a) * u + (c - a) * v - p).length();
         let (mut best, mut step) = ((0.0, 0.0), 0.25);
-        for _ in 0..14 {
+        for _ in 0..26 {
             let (x, y) = best;
             for i in -4..=4 {
                 for j in -4..=4 {
