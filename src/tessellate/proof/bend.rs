@@ -9,6 +9,7 @@
 
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::{BezierPatch, Surface};
+use rayon::prelude::*;
 
 /// Most patches that are looked at for one triangle.
 const MOST: usize = 64;
@@ -28,7 +29,7 @@ impl Bends {
             let times = |k: &f64| surface.knots[d].iter().filter(|x| *x == k).count();
             breaks[d].iter().map(|k| times(k) < surface.degree[d]).collect()
         });
-        Self { of: patches.iter().map(second).collect(), smooth, columns: breaks[1].len() - 1 }
+        Self { of: patches.par_iter().with_min_len(64).map(second).collect(), smooth, columns: breaks[1].len() - 1 }
     }
 
     /// Whether the surface and its weight are C1 through these knot intervals (first and last).
