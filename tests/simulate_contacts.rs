@@ -228,3 +228,37 @@ fn light_that_slips_past_an_edge_goes_on_through_further_blocks() {
     let [a, b] = [whole, glued].map(|r| r.power.absorbed);
     assert!((a - b).abs() < 0.02 * a, "{a} {b}");
 }
+
+/// Solids of one part that touch or overlap are one block of glass, as are solids of several parts.
+#[test]
+fn solids_of_one_part_that_touch_or_overlap_are_one_block() {
+    let mut results = Vec::new();
+    for blocks in
+        [&[(0.0, 15.0)][..], &[(0.0, 6.0), (6.0, 15.0)], &[(6.1, 15.0), (0.0, 6.1)], &[(0.0, 9.0), (4.0, 15.0)]]
+    {
+        let mut world = World::default();
+        for (k, &(from, to)) in blocks.iter().enumerate() {
+            // The inner block is narrower, so that no sides share a plane.
+            let side = 10.0 - k as f64;
+            world.cuboid("glass", Point::new(-side, -side, from), Point::new(side, side, to));
+        }
+        // All in one part, shell by shell.
+        let shells: Vec<_> = world.model.parts.iter_mut().flat_map(|p| std::mem::take(&mut p.shells)).collect();
+        world.model.parts.truncate(1);
+        world.model.instances.truncate(1);
+        world.model.parts[0].shells = shells;
+        let text = format!(
+            "[run]\nrays = 20000\n{MEDIA}[[material]]\npart = 'glass'\nmedium = 'glass'
+            [[source]]\nkind = 'cone'\nhalf_angle_deg = 20\nat = [1, 2, -12]
+            [[source]]\nkind = 'cone'\nhalf_angle_deg = 20\nat = [1, 2, 30]\ndirection = [0, 0, -1]
+            [[source]]\nkind = 'cone'\nhalf_angle_deg = 20\nat = [0.5, 0.2, 5]\n{FAR}"
+        );
+        results.push(world.run(&text, |_| ()));
+    }
+    let [whole, others @ ..] = &results[..] else { panic!() };
+    for other in others {
+        assert_eq!(other.lost_rays, 0, "{:?}", other.ledger.first());
+        let [a, b] = [whole, other].map(|r| r.receivers[0].power);
+        assert!((a - b).abs() < 0.01, "{a} {b}");
+    }
+}

@@ -149,6 +149,29 @@ pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<boo
     touching
 }
 
+/// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.
+pub(super) fn twins(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
+    let mut twins = vec![false; of_face.len()];
+    let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
+        .filter(|f| of_face[f.id.index()] != AMBIENT && model.part(f.part).shells.len() > 1)
+        .map(|f| (f.id.index(), f.shell, f))
+        .collect();
+    faces.sort_by_key(|(id, ..)| of_face[*id]);
+    for body in faces.chunk_by(|a, b| of_face[a.0] == of_face[b.0]) {
+        let boxed = |f: &PlacedFace<'_>| bounds(f).grown(0.5 * scene.run.glue_mm);
+        let mut body: Vec<(usize, Option<usize>, Aabb)> = body.iter().map(|(i, s, f)| (*i, *s, boxed(f))).collect();
+        body.sort_by(|a, b| a.2.min.x.total_cmp(&b.2.min.x));
+        for (i, (a, shell, box_a)) in body.iter().enumerate() {
+            for (b, other, box_b) in body[i + 1..].iter().take_while(|(.., b)| b.min.x <= box_a.max.x) {
+                if shell != other && !box_a.intersection(*box_b).is_empty() {
+                    (twins[*a], twins[*b]) = (true, true);
+                }
+            }
+        }
+    }
+    twins
+}
+
 /// Questions of distance after which faces whose boxes meet are taken to touch: some seconds of work.
 const MOST_ASKED: usize = 50_000;
 /// Samples across a face in each parameter.

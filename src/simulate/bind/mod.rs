@@ -29,6 +29,8 @@ pub(crate) struct FaceOptics {
     pub(crate) sealed: bool,
     /// Whether it may lie on a face of another body.
     pub(crate) touching: bool,
+    /// Whether it may lie on a face of another solid of the same body.
+    pub(crate) twin: bool,
     /// Whether a medium and an opaque solid touch here, and this is a face of one of both.
     pub(crate) against: bool,
 }
@@ -108,6 +110,8 @@ impl Scene {
         check_indices(self, &loaded, &bodies)?;
         let touching =
             if nested { bodies::touching(self, model, &body_of_face) } else { vec![false; chosen.len()] };
+        let twins = bodies::twins(self, model, &body_of_face);
+        let nested = nested || twins.contains(&true);
         let (mut faces, mut opaques) = (Vec::with_capacity(chosen.len()), Vec::with_capacity(chosen.len()));
         for ((f, (rule, _)), &body) in model.placed_faces().zip(&chosen).zip(&body_of_face) {
             let surface = match rule.map(|r| &self.materials[r]) {
@@ -125,7 +129,8 @@ impl Scene {
             let touching = touching[f.id.index()];
             let surface = surface_index(&mut surfaces, surface);
             opaques.push(opaque && body == AMBIENT);
-            faces.push(FaceOptics { surface, body, sealed, touching, against: false });
+            let twin = twins[f.id.index()];
+            faces.push(FaceOptics { surface, body, sealed, touching, twin, against: false });
         }
         let against = bodies::against(self, model, &body_of_face, &opaques);
         faces.iter_mut().zip(against).for_each(|(f, against): (&mut FaceOptics, bool)| f.against = against);

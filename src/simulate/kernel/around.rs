@@ -94,7 +94,7 @@ fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         crossed.cross(face.body, along < 0.0);
-        if !(face.touching || face.against) {
+        if !(face.touching || face.against || face.twin) {
             continue;
         }
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
@@ -103,8 +103,10 @@ fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let entering = d.dot(second.geometric_normal) < 0.0;
         let other = context.bound.faces.get(second.face.index());
-        let meets =
-            |o: &&FaceOptics| o.body != face.body && (o.touching && face.touching || o.against && face.against);
+        let meets = |o: &&FaceOptics| match o.body == face.body {
+            true => o.twin && face.twin,
+            false => o.touching && face.touching || o.against && face.against,
+        };
         // Overlapping bodies that end at one plane look the same way there, touching ones against each other.
         let fits = entering == (along >= 0.0) || second.geometric_normal.dot(hit.geometric_normal) > 0.5;
         if let Some(other) = other.filter(meets).filter(|_| fits) {

@@ -14,6 +14,21 @@ pub(super) fn glued(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> Optio
     partner(context, ray, at.hit, at.face, at.point).map(|(_, other, _)| other.body)
 }
 
+/// Whether another solid of the same body lies against the face, looking the other way: between them there is no interface.
+#[inline(never)]
+pub(super) fn twin(context: &Context<'_>, ray: &Ray, at: &Meeting<'_>) -> bool {
+    let mut probe = beside(context, ray, at.hit, at.point);
+    for _ in 0..NEAR {
+        let Some(found) = context.intersector.intersect(&probe, &mut Cost::default()) else { return false };
+        let Some(other) = context.bound.faces.get(found.face.index()) else { return false };
+        if other.twin && other.body == at.face.body && found.geometric_normal.dot(at.hit.geometric_normal) < -0.5 {
+            return true;
+        }
+        probe.t_min = found.t.next_up();
+    }
+    false
+}
+
 /// Another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
 /// entered or left at once, wherever rounding puts the second face.
 #[inline(never)]

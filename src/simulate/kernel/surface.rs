@@ -1,7 +1,7 @@
 //! What happens to a path at a face.
 
 use super::around::regained;
-use super::contact::{alike, glued};
+use super::contact::{alike, glued, twin};
 use super::step::{Meeting, caught, key, lose, onward, record, stray};
 use super::{Carry, Cause, Context, Event, Local, Path};
 use crate::math::{Ray, Vector};
@@ -192,6 +192,11 @@ fn cross<C: Carry>(
     at: &Meeting<'_>,
     local: &mut Local,
 ) -> Option<C> {
+    if at.face.twin && path.carry.across(at.face.body, false).is_some() && twin(context, ray, at) {
+        // From one solid of a part into the next.
+        at.skip.set(context.bound.scene.run.glue_mm);
+        return Some(path.carry);
+    }
     let mut across = path.carry.across(at.face.body, at.entering);
     if across.is_none()
         && let Some(found) = regained(context, &path.carry, ray, at.hit.t, at.face.touching)
