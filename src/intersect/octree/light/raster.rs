@@ -169,29 +169,34 @@ pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> Map {
     let facets = mesh.facets.len();
     let squares = (SQUARES * facets) as f64 / view.sides() as f64;
     let side = (squares.sqrt() as usize).next_power_of_two().clamp(8, 1024);
-    let shadows: Vec<Vec<Shadow>> = (0..view.sides()).map(|face| shadows(mesh, &view, face)).collect();
-    let sheets: Vec<OnceLock<Sheet>> = (0..view.sides() * SHEETS * SHEETS).map(|_| OnceLock::new()).collect();
-    let next = AtomicUsize::new(0);
+    let shadows = in_parallel(view.sides(), threads, |face| shadows(mesh, &view, face));
     let room = ROOMY * facets.max(64) / 8;
+    let sheets = in_parallel(view.sides() * SHEETS * SHEETS, threads, |k| {
+        let window = Window::WHOLE.part(SHEETS, [k % SHEETS, k / SHEETS % SHEETS]);
+        Sheet::draw(mesh, &shadows[k / (SHEETS * SHEETS)], &window, side / SHEETS, room)
+    });
+    let mut map =
+        Map { view, side, squares: vec![Square::default(); view.sides() * side * side], entries: Vec::new() };
+    for (k, sheet) in sheets.into_iter().enumerate() {
+        sheet.paste(&mut map, k);
+    }
+    map
+}
+
+/// The values of a function at 0 to `n`, worked out on so many threads.
+fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let values: Vec<OnceLock<T>> = (0..n).map(|_| OnceLock::new()).collect();
+    let next = AtomicUsize::new(0);
     let work = || {
-        while let Some((k, sheet)) = sheets.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) {
-            let shadows = &shadows[k / (SHEETS * SHEETS)];
-            let window = Window::WHOLE.part(SHEETS, [k % SHEETS, k / SHEETS % SHEETS]);
-            let _ = sheet.set(Sheet::draw(mesh, shadows, &window, side / SHEETS, room));
+        while let Some((k, place)) = values.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) {
+            place.get_or_init(|| value(k));
         }
     };
     std::thread::scope(|scope| {
         (1..threads).for_each(|_| drop(scope.spawn(work)));
         work();
     });
-    let mut map =
-        Map { view, side, squares: vec![Square::default(); view.sides() * side * side], entries: Vec::new() };
-    for (k, sheet) in sheets.into_iter().enumerate() {
-        if let Some(sheet) = sheet.into_inner() {
-            sheet.paste(&mut map, k);
-        }
-    }
-    map
+    values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 /// All facets that a map shows, the nearest first.
