@@ -84,6 +84,7 @@ fn the_angle_holds_along_trims_too() {
     let turned = |angle_deg: Option<f64>| {
         let made = tessellate(&model, &Settings { angle_deg, ..measured(2.0) });
         assert_eq!((made.report.faces.failed, made.report.over_tolerance), (0, Some(0)));
+        assert_eq!(made.report.over_angle, angle_deg.map(|_| Vec::new()));
         let angles = (0..made.mesh.facets.len()).flat_map(|f| {
             let (p, v) = (made.mesh.corners(f), made.mesh.facets[f].vertices);
             let cuts = if made.mesh.facets[f].is_triangle() { vec![[0, 1, 2]] } else { vec![[0, 1, 2], [0, 2, 3]] };
@@ -98,6 +99,37 @@ fn the_angle_holds_along_trims_too() {
     };
     assert!(turned(None) > 2.0 * most);
     assert!(turned(Some(most)) <= most, "{}", turned(Some(most)));
+}
+
+/// The same wall with an acute corner, whose facet cannot follow both trims: where the angle is broken the report says so, to the
+/// number found from the mesh.
+#[test]
+fn facets_beyond_the_angle_are_named() {
+    let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, [0.0, 2.0], [0.0, 200.0]);
+    let c = [Uv::new(0.1, 20.0), Uv::new(1.9, 20.0), Uv::new(1.9, 21.0)];
+    let sides = (0..3).map(|k| chain(256, |f| c[k].lerp(c[(k + 1) % 3], f))).collect();
+    let model = face(wall, &[sides]);
+    for angle in [0.5, 1.0, 4.0] {
+        let made = tessellate(&model, &Settings { angle_deg: Some(angle), ..measured(2.0) });
+        let mut found = (0, 0f64);
+        for (f, facet) in made.mesh.facets.iter().enumerate() {
+            let p = made.mesh.corners(f);
+            let cuts = if facet.is_triangle() { vec![[0, 1, 2]] } else { vec![[0, 1, 2], [0, 2, 3]] };
+            let of = |t: [usize; 3]| {
+                let n = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+                // The wall's own normals are radial.
+                let radial = |q: Point| Point::new(q.x, q.y, 0.0);
+                t.into_iter().map(|k| n.angle_between(radial(p[k])).to_degrees()).fold(0.0, f64::max)
+            };
+            let worst = cuts.into_iter().map(of).fold(0.0, f64::max);
+            if worst > angle * (1.0 + 1e-6) {
+                found = (found.0 + 1, found.1.max(worst));
+            }
+        }
+        let said = made.report.over_angle.unwrap();
+        let sum = said.iter().fold((0, 0f64), |s, x| (s.0 + x.facets, s.1.max(x.largest_deg)));
+        assert!(sum.0 == found.0 && (sum.1 - found.1).abs() < 1e-6, "{angle}: {sum:?} {found:?}");
+    }
 }
 
 /// Over a chord the distance to the arc is a parabola, whose mean is two thirds of its top.

@@ -17,8 +17,10 @@ use tessellate_support::{cases, knots, seeded, seeds};
 fn fans() -> impl Strategy<Value = Surface> {
     let side = || (1usize..=5, proptest::collection::vec((any::<u8>(), any::<u8>()), 0..3));
     let noise = proptest::collection::vec((-1f64..1.0, -1f64..1.0, -1f64..1.0, -2f64..2.0), 400);
-    (side(), side(), noise, 0usize..2, any::<bool>(), 0.3f64..6.0).prop_map(
-        |((p, inner_u), (q, inner_v), noise, across, last, turn)| {
+    // With the opposite side drawn together too in one of four.
+    let flags = (any::<bool>(), 0..4).prop_map(|(last, both)| (last, both == 0));
+    (side(), side(), noise, 0usize..2, flags, 0.3f64..6.0).prop_map(
+        |((p, inner_u), (q, inner_v), noise, across, (last, both), turn)| {
             let degree = [p, q];
             let knots = [knots(p, &inner_u), knots(q, &inner_v)];
             let counts = [0, 1].map(|d| knots[d].len() - degree[d] - 1);
@@ -28,10 +30,12 @@ fn fans() -> impl Strategy<Value = Surface> {
                     let [x, y] = [0, 1].map(|d| at[d] as f64 / (counts[d] - 1) as f64);
                     let (out, round) = if across == 0 { (x, y) } else { (y, x) };
                     let out = if last { 1.0 - out } else { out };
+                    let tip = both && out == 1.0 && counts[across] > 2;
+                    let round = if tip { 0.5 } else { round };
                     let (a, b, c, e) = noise[k % noise.len()];
                     let r = 40.0 * out;
                     let (sin, cos) = (turn * round).sin_cos();
-                    let wild = if out == 0.0 { 0.0 } else { 2.0 };
+                    let wild = if out == 0.0 || tip { 0.0 } else { 2.0 };
                     let at = Point::new(r * cos + wild * a, r * sin + wild * b, wild * 2.0 * c);
                     let w = 10f64.powf(e);
                     (at * w).extend(w)

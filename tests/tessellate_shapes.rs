@@ -55,6 +55,38 @@ fn a_whole_sphere_is_closed_and_certified() {
     }
 }
 
+/// With the rim of its parameters as it is, and with a seam that is an edge of the file used twice, from pole to pole.
+#[test]
+fn a_sphere_smaller_than_the_tolerance_still_is_one() {
+    for r in [0.04, 1e-4] {
+        let surface = sweep::sphere(&Frame::IDENTITY, r, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        let made = tessellate(&whole(surface.clone()), &measured(0.1));
+        assert_sound(&made, "whole");
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        let corner = [[u0, v0], [u1, v0], [u1, v1], [u0, v1]].map(Uv::from);
+        let side = |edge: Option<EdgeId>, reversed: bool, [a, b]: [usize; 2], t: [f64; 2]| EdgeUse {
+            edge,
+            reversed,
+            uv: UvCurve::line(corner[a], corner[b], t),
+        };
+        let seam = Some(EdgeId(0));
+        let uses = vec![
+            side(None, false, [0, 1], [u0, u1]),
+            side(seam, false, [1, 2], [v0, v1]),
+            side(None, false, [2, 3], [u0, u1]),
+            side(seam, true, [0, 3], [v0, v1]),
+        ];
+        let ball = face(surface.clone(), false, vec![TrimLoop { uses }]);
+        let part = Part {
+            vertices: vec![surface.evaluate(corner[0]), surface.evaluate(corner[3])],
+            edges: vec![Edge { curve: surface.isoline(0, u0), vertices: [VertexId(0), VertexId(1)], entity: None }],
+            shells: vec![Shell { faces: vec![ball], closed: true, ..Shell::default() }],
+            ..Part::default()
+        };
+        assert_sound(&tessellate(&Model::from_part(part), &measured(0.1)), "seam");
+    }
+}
+
 /// A sector of angle 2α strays r·(1 − cos α) from its triangle, so acos(1 − ξ/r) says how many there must be.
 #[test]
 fn the_tip_of_a_cone_has_as_many_facets_as_its_rim() {

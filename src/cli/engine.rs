@@ -74,6 +74,22 @@ pub(super) fn mesh_settings(
         let place = Place::Part(name.clone());
         settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
     }
+    for (name, tolerance) in &meshing.face {
+        let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
+        let known = || model.placed_faces().filter_map(|f| f.face);
+        if !known().any(|f| f.name == *name || entity.is_some() && f.entity == entity) {
+            let names: Vec<&str> = known().map(|f| f.name.as_str()).filter(|n| !n.is_empty()).collect();
+            let failure =
+                Failure::arguments(format!("--face {name}: the model has no face of this name or number"));
+            return Err(failure.help(match names.as_slice() {
+                [] => "its faces have no names; write the number of the entity in the file, as in #17=0.01".into(),
+                names => super::suggest::names("its faces are", name, names),
+            }));
+        }
+        let named = known().any(|f| f.name == *name);
+        let place = entity.filter(|_| !named).map_or_else(|| Place::Face(name.clone()), Place::Entity);
+        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
+    }
     Ok(settings)
 }
 

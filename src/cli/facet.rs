@@ -183,6 +183,22 @@ fn described(r: &Report) -> String {
             ),
         );
     }
+    if let Some(steep) = &r.over_angle {
+        let count: usize = steep.iter().map(|s| s.facets).sum();
+        let largest = steep.iter().map(|s| s.largest_deg).fold(0.0, f64::max);
+        line(
+            "angle",
+            match count {
+                0 => "kept by all facets".to_owned(),
+                _ => format!(
+                    "{} facets of {} faces turn farther, at most {}°",
+                    n(count),
+                    steep.len(),
+                    figures(largest, 3)
+                ),
+            },
+        );
+    }
     let volume = r.volume_mm3.map_or("open".to_owned(), |v| format!("{} mm³", figures(v, 6)));
     line("size", format!("area {} mm², volume {volume}", figures(r.area_mm2, 6)));
     line(

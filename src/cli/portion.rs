@@ -27,6 +27,8 @@ struct Header {
     tolerance: Option<[u64; 2]>,
     angle: Option<u64>,
     part: Vec<(String, [u64; 2])>,
+    #[serde(default)]
+    face: Vec<(String, [u64; 2])>,
     rays: Option<u64>,
     seed: Option<u64>,
     intersector: Option<String>,
@@ -45,6 +47,7 @@ impl Header {
             tolerance: m.tolerance.map(bits),
             angle: m.angle.map(f64::to_bits),
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             rays: t.rays,
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
@@ -60,6 +63,7 @@ impl Header {
             tolerance: self.tolerance.map(back),
             angle: self.angle.map(f64::from_bits),
             part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            face: self.face.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             // Parts are not traced with an accuracy asked for.
             plan: None,
         }

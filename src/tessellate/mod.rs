@@ -10,9 +10,11 @@
 //! measured both ways; the argument stands in `bound.rs`. Facets that cannot be proved are counted, never hidden. The
 //! result is the same bits for any number of threads.
 //!
-//! Known weakness: the angle condition ([`Settings::angle_deg`]) is checked at corners, not proved; a face whose edges lie farther from
+//! Known weakness: the angle condition ([`Settings::angle_deg`]) is checked at corners, not proved, and broken in acute corners between
+//! trims (counted and named in [`Report::over_angle`]); a face whose edges lie farther from
 //! its surface than the tolerance keeps that gap.
 
+mod angles;
 mod assemble;
 mod border;
 mod cells;
@@ -28,6 +30,7 @@ mod strip;
 
 use crate::mesh::FacetMesh;
 use crate::model::Model;
+pub use angles::SteepFace;
 pub use repairs::{Repair, RepairedFace};
 pub use report::{FaceCounts, Percentiles, Report, Sag, ShellCounts, ToleranceRange, sampled_sag};
 pub use settings::{Judge, Law, Override, Place, Settings};

@@ -1,5 +1,6 @@
 //! What came out, in the words of `facet --json`.
 
+use super::angles::{self, SteepFace};
 use super::repairs::{self, Repair, RepairedFace};
 use super::{Settings, Tessellation, sample};
 use crate::math::FaceId;
@@ -35,6 +36,9 @@ pub struct Report {
     pub not_certified: Vec<NotCertified>,
     /// Faces of which something was given up, and what was reached there.
     pub repaired: Vec<RepairedFace>,
+    /// Faces with facets that turn farther from the surface normals than was asked; `None` when no angle was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub over_angle: Option<Vec<SteepFace>>,
     /// Share of the area that is in facets with four corners.
     pub quad_area_share: f64,
     /// Area of the facets as traced.
@@ -151,6 +155,7 @@ pub(super) fn fill(
     let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
     report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
     report.faces.failed = failed.len();
+    report.over_angle = angles::broken(mesh, model, settings);
     report.faces.repaired = repairs.len();
     report.repaired = repairs::named(made, model, repairs);
     report.faces.meshed = model.placed_face_count() - failed.len();

@@ -135,6 +135,11 @@ impl Field {
         }
     }
 
+    /// The same with no tolerance above this.
+    pub(super) fn at_most(self, most: f64) -> Self {
+        Self { range: self.range.map(|x| x.min(most)), ..self }
+    }
+
     /// The same with the angle condition of [`Settings::angle_deg`].
     pub(super) fn with_angle(self, degrees: Option<f64>) -> Self {
         Self { angle: degrees.map(f64::to_radians), ..self }

@@ -13,6 +13,9 @@ const SHARP: f64 = 0.05;
 /// Share of the domain within which a place is on a crease.
 pub(super) const CREASE: f64 = 1e-7;
 
+/// Largest tolerance of a surface that closes on itself, in shares of its size; a ball is a third as large in radius as its box is across.
+const SMALLEST: f64 = 0.05;
+
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct Sheet<'a> {
     pub(super) surface: &'a Surface,
@@ -56,6 +59,11 @@ impl<'a> Sheet<'a> {
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
         let affine = is_affine(surface, size);
+        // A ball or ring within its tolerance would be a point: all its triangles had two corners in one place.
+        let most = SMALLEST * size;
+        let closed = |d: usize| poles[d] == [true; 2] || is_closed(surface, d, least);
+        let small = field.loosest() > most && (poles.contains(&[true; 2]) || closed(0) && closed(1));
+        let field = if small { field.at_most(most) } else { field };
         Self {
             surface,
             field,
@@ -168,6 +176,12 @@ impl<'a> Sheet<'a> {
         });
         let patch = self.patch(a, b);
         let d = patch.second_derivatives(local(patch, uv).clamp(Uv::ZERO, Uv::ONE));
+        let (lu, lv) = (d.du.length(), d.dv.length());
+        if lu.min(lv) <= 1e-10 * lu.max(lv) {
+            // At a pole rounding is all that is left of one derivative: the limit there, a little beside the crease.
+            let beside = |d: usize| on[d].map_or(uv[d], |c| c + (1e-9 * self.extent()[d]).copysign(inside[d] - c));
+            return self.normal(Uv::new(beside(0), beside(1)));
+        }
         let n = d.du.cross(d.dv).try_normalize();
         n.map(|n| if self.flip { -n } else { n }).or_else(|| self.normal(uv))
     }
@@ -201,6 +215,15 @@ fn side_size(s: &Surface, d: usize, end: usize) -> f64 {
         s.points[i * counts[1] + j].project()
     };
     (1..counts[1 - d]).map(|k| (at(k) - at(0)).length()).fold(0.0, f64::max)
+}
+
+/// Whether both ends of a direction are one curve.
+fn is_closed(s: &Surface, d: usize, least: f64) -> bool {
+    let counts = s.counts();
+    let at = |i: usize, j: usize| s.points[i * counts[1] + j].project();
+    let last = counts[d] - 1;
+    let pair = |k: usize| if d == 0 { [at(0, k), at(last, k)] } else { [at(k, 0), at(k, last)] };
+    (0..counts[1 - d]).map(pair).all(|[a, b]| (a - b).length() <= least)
 }
 
 /// Local parameters of `uv` on a patch.

@@ -295,28 +295,32 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
                 let [a, b] = poles.domain[d];
                 let mut beside = v.uv;
                 beside[d] += 1e-6 * (0.5 * (a + b) - beside[d]);
-                let (_, [du, dv]) = look(s, beside, [false; 2]);
-                let n = du.cross(dv) * if face.reversed { -1.0 } else { 1.0 };
-                if n.length() > 1e-3 * du.length() * dv.length() && n.angle_between(v.normal) > 0.03 {
-                    return Err(format!("normal at the pole {:?}: {} for {}", v.uv, v.normal, n.normalize()));
+                let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
+                    let (_, [du, dv]) = look(s, beside, left);
+                    let n = du.cross(dv) * if face.reversed { -1.0 } else { 1.0 };
+                    (n.length() > 1e-3 * du.length() * dv.length()).then_some(n)
+                });
+                if seen.iter().all(|n| n.is_some_and(|n| n.angle_between(v.normal) > 0.03)) {
+                    return Err(format!("normal at the pole {:?}: {} for {seen:?}", v.uv, v.normal));
                 }
                 continue;
             }
-            // On a crease the normal of any side will do; where there is none, or one that rounding decides, any at all.
-            let domain = s.domain().map(|[a, b]| b - a);
-            let snapped = Uv::from_array([0, 1].map(|d| {
-                let near = s.knots[d].iter().copied().find(|k| (k - v.uv[d]).abs() <= 1e-7 * domain[d]);
-                near.unwrap_or(v.uv[d])
+            // On a crease, or so near to it that a facet beyond may end here, the normal of any side will do; where there is none, or one that
+            // rounding decides, any at all.
+            let at = Uv::from_array([0, 1].map(|d| {
+                let near = 1e-6 * (poles.domain[d][1] - poles.domain[d][0]);
+                s.knots[d].iter().copied().find(|k| (k - v.uv[d]).abs() <= near).unwrap_or(v.uv[d])
             }));
+            let most = if at == v.uv { 1e-6 } else { 1e-3 };
             let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
-                let (_, [du, dv]) = look(s, snapped, left);
+                let (_, [du, dv]) = look(s, at, left);
                 let n = du.cross(dv);
                 (n.length() > 1e-6 * du.length() * dv.length())
                     .then(|| if face.reversed { -n } else { n }.normalize())
             });
             let known = seen.iter().all(|n| n.is_some());
             let near = seen.iter().flatten().map(|n| n.angle_between(v.normal)).fold(f64::INFINITY, f64::min);
-            if known && near > 1e-6 {
+            if known && near > most {
                 return Err(format!("normal of facet {f} at {:?} is {near} off", v.uv));
             }
         }
@@ -369,6 +373,17 @@ fn pieces(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>) -> R
                 let inside = [i.min(j), i.max(j)] == [0, 2] && cuts.len() == 2 || sides.contains_key(&[v[j], v[i]]);
                 let along = if inside { &[][..] } else { &outlines[..] };
                 piece.extend(sector(along, [x[k], uv[i], uv[j]], at[k].unwrap_or(0), extent));
+            }
+            // From pole to pole: between its own line and the parameter line of the third corner.
+            if let Some(k) =
+                (0..3).find(|&k| at[k].is_none() && at[(k + 1) % 3].is_some() && at[(k + 2) % 3].is_some())
+            {
+                let (d, [y, a, b]) = (at[(k + 1) % 3].unwrap_or(0), [x[k], x[(k + 1) % 3], x[(k + 2) % 3]]);
+                if (a[d] - b[d]).abs() > 0.5 * extent[d] {
+                    let mut feet = [y; 2];
+                    (feet[0][d], feet[1][d]) = (a[d], b[d]);
+                    piece.extend([[a, b, feet[1]], [a, feet[1], feet[0]]]);
+                }
             }
             if x.iter().any(|&x| poles.of(x).is_some()) {
                 continue;

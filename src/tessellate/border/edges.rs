@@ -7,6 +7,7 @@ use crate::math::{Point, Uv, Vector};
 use crate::model::{Edge, EdgeUse, Face, Part};
 use crate::nurbs::Curve;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 /// Share of the tolerance that chords of edges may take; the rest is left to rounding and to the proof's slack.
 const SHARE: f64 = 0.96;
@@ -60,21 +61,28 @@ pub(in crate::tessellate) fn divide(
     (divisions, positions)
 }
 
-/// Two edges around a face that both are one chord leave nothing of it: the one that bends more gets a corner.
+/// Edges around a face that all are one chord between the same two places leave nothing of it, be they two or the seam of a sphere that runs
+/// from pole to pole: the one that bends most gets a corner.
 fn open_lenses(part: &Part, faces: &[(&Face, &Sheet<'_>)], times: &mut [Vec<f64>]) {
-    for trim in faces.iter().flat_map(|(face, _)| &face.loops) {
-        let [a, b] = trim.uses.as_slice() else { continue };
-        let (Some(a), Some(b)) = (a.edge.map(|e| e.0 as usize), b.edge.map(|e| e.0 as usize)) else { continue };
-        if a == b || [a, b].iter().any(|&e| times.get(e).is_none_or(|t| t.len() != 2)) {
+    for trim in faces.iter().flat_map(|(face, _)| &face.loops).filter(|l| l.uses.len() <= 4) {
+        let edges: SmallVec<[usize; 4]> = trim.uses.iter().filter_map(|u| Some(u.edge?.0 as usize)).collect();
+        if edges.len() < 2 || edges.iter().any(|&e| times.get(e).is_none_or(|t| t.len() != 2)) {
+            continue;
+        }
+        let chord = |e: usize| {
+            let [a, b] = part.edges[e].vertices;
+            [a.0.min(b.0), a.0.max(b.0)]
+        };
+        if edges.iter().any(|&e| chord(e) != chord(edges[0])) {
             continue;
         }
         let off = |e: usize| {
             let (curve, t) = (&part.edges[e].curve, &times[e]);
             from_chord(curve.evaluate(0.5 * (t[0] + t[1])), &[curve.evaluate(t[0]), curve.evaluate(t[1])])
         };
-        let (x, y) = (off(a), off(b));
-        if x.max(y) > 0.0 {
-            bisect_all(&mut times[if y > x { b } else { a }]);
+        let most = edges.iter().rev().map(|&e| (off(e), e)).max_by(|x, y| x.0.total_cmp(&y.0));
+        if let Some((_, e)) = most.filter(|x| x.0 > 0.0) {
+            bisect_all(&mut times[e]);
         }
     }
 }

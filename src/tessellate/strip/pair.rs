@@ -73,7 +73,7 @@ pub(in crate::tessellate) fn join(
             let (full, empty) = if collapsed[i] { (j, i) } else { (i, j) };
             // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
             let (uv, xyz) = (t[empty].map(|n| node(n).uv), t[full].map(|n| node(n).place));
-            let whole = sector::applies(prover.sheet, t[full].map(|n| node(n).uv));
+            let whole = sector::covers(prover.sheet, t[full].map(|n| node(n).uv));
             let covered = if whole { bound } else { bound.max(prover.piece(uv, xyz, tolerance)) };
             facets.push(with_pole(strip, prover, t[full], q, [covered, tolerance]));
         } else {

@@ -3,8 +3,19 @@
 //! A triangle between a pole and two corners `a` and `b` stands for the piece between the parameter lines from `a` and from `b`
 //! into the pole, not for its own triangle of parameters: the straight line of parameters from `b` to another place on the pole
 //! bows sideways by a quarter of the facet's width, the parameter line does not. Neighbours around a pole share such lines, so
-//! their pieces meet; a triangle with two corners on the pole has no piece. On the tip of a cone of 10 m that is 320 facets in place
-//! of 160 000.
+//! their pieces meet; a triangle with two corners on one pole has no piece. On the tip of a cone of 10 m that is 320 facets in place
+//! of 160 000. A triangle from pole to pole and to a corner `x` stands for what lies between its own line from pole to pole and the parameter
+//! line through `x`.
+//!
+//! Why the bound of `bound.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into curves
+//! between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole (or the
+//! poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P each
+//! boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its place onto
+//! its chord, and the side along the pole onto the one point that it is, which it leaves by no more than the size of the pole. A border that
+//! runs aslant into the pole ends the piece in place of the parameter line: its chord's deviation and the hull around what lies between chord and
+//! curve are in its own bound, and its foot is the pole's corner itself. Corners stay where they are while curves shrink, the file's gap between
+//! corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners lie in one direction from
+//! the pole the piece has no width and the sides decide alone.
 
 use super::super::border::trim::Trim;
 use super::super::proof::bound::Prover;
@@ -33,6 +44,20 @@ fn corner(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
     found
 }
 
+/// Whether two corners at poles, at which this parameter is constant, are not at the same one.
+fn apart(sheet: &Sheet<'_>, a: Uv, b: Uv, across: usize) -> bool {
+    (a[across] - b[across]).abs() > 0.5 * sheet.extent()[across]
+}
+
+/// The corner off the poles of a triangle from pole to pole, and the parameter that is constant along these.
+fn between(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
+    let at = uv.map(|x| sheet.pole(x));
+    let k = (0..3).find(|&k| at[k].is_none())?;
+    let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+    let across = at[a]?;
+    (at[b] == Some(across) && apart(sheet, uv[a], uv[b], across)).then_some((k, across))
+}
+
 /// Middles of the sides of a triangle, those into a pole along parameter lines.
 pub(in crate::tessellate) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] {
     let mut at = [0, 1, 2].map(|i| 0.5 * (uv[i] + uv[(i + 1) % 3]));
@@ -40,6 +65,11 @@ pub(in crate::tessellate) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] 
         let (a, b) = (uv[(k + 1) % 3], uv[(k + 2) % 3]);
         at[k] = 0.5 * (a + foot(a, uv[k], across));
         at[(k + 2) % 3] = 0.5 * (b + foot(b, uv[k], across));
+    }
+    if let Some((k, across)) = between(sheet, &uv) {
+        let x = uv[k];
+        at[k] = 0.5 * (x + foot(x, uv[(k + 1) % 3], across));
+        at[(k + 2) % 3] = 0.5 * (x + foot(x, uv[(k + 2) % 3], across));
     }
     at
 }
@@ -51,6 +81,11 @@ pub(in crate::tessellate) fn seen(sheet: &Sheet<'_>, uv: &[Uv]) -> Option<(usize
     let (k, across) = uv.iter().enumerate().find_map(|(k, &x)| Some((k, sheet.pole(x)?)))?;
     let from = if n == 4 && k % 2 == 0 { uv[(k + 2) % 4] } else { 0.5 * (uv[(k + 1) % n] + uv[(k + n - 1) % n]) };
     Some((k, foot(from, uv[k], across)))
+}
+
+/// Whether a triangle is proved with all that lies beside it up to parameter lines into a pole.
+pub(in crate::tessellate) fn covers(sheet: &Sheet<'_>, uv: [Uv; 3]) -> bool {
+    applies(sheet, uv) || between(sheet, &uv).is_some()
 }
 
 /// Whether a triangle is proved by its sector.
@@ -66,6 +101,9 @@ pub(in crate::tessellate) fn bound(
     sides: [Option<&Trim>; 3],
     limit: f64,
 ) -> Option<f64> {
+    if let Some((k, across)) = between(prover.sheet, &uv) {
+        return Some(spindle(prover, uv, xyz, sides, limit, (k, across)));
+    }
     let (k, across) = corner(prover.sheet, &uv)?;
     let [p, a, b] = [0, 1, 2].map(|i| uv[(k + i) % 3]);
     let [xp, xa, xb] = [0, 1, 2].map(|i| xyz[(k + i) % 3]);
@@ -73,29 +111,65 @@ pub(in crate::tessellate) fn bound(
     // A border that runs into the pole aslant ends the piece itself.
     let foot_a = if of_a.is_some() { p } else { foot(a, p, across) };
     let foot_b = if of_b.is_some() { p } else { foot(b, p, across) };
-    let mut worst = 0f64;
     let lines = [
         (of_a, [a, foot_a], [xa, xp]),
         (of_base, [a, b], [xa, xb]),
         (of_b, [b, foot_b], [xb, xp]),
         (None, [foot_a, foot_b], [xp, xp]),
     ];
+    // Where the corners run back around the pole the piece is folded; the argument of `bound.rs` does not ask for more.
+    Some(quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit))
+}
+
+/// Bound for a triangle from pole to pole whose corner `k` is off them.
+fn spindle(
+    prover: &mut Prover<'_, '_>,
+    uv: [Uv; 3],
+    xyz: [Point; 3],
+    sides: [Option<&Trim>; 3],
+    limit: f64,
+    (k, across): (usize, usize),
+) -> f64 {
+    let [x, a, b] = [0, 1, 2].map(|i| uv[(k + i) % 3]);
+    let [at, xa, xb] = [0, 1, 2].map(|i| xyz[(k + i) % 3]);
+    let [of_a, of_base, of_b] = [0, 1, 2].map(|i| sides[(k + i) % 3]);
+    let foot_a = if of_a.is_some() { a } else { foot(x, a, across) };
+    let foot_b = if of_b.is_some() { b } else { foot(x, b, across) };
+    let lines = [
+        (of_a, [x, foot_a], [at, xa]),
+        (of_base, [a, b], [xa, xb]),
+        (of_b, [x, foot_b], [at, xb]),
+        (None, [foot_a, a], [xa, xa]),
+        (None, [foot_b, b], [xb, xb]),
+    ];
+    let aslant = of_a.or(of_b).map(|_| prover.piece([x, foot_a, foot_b], xyz, limit));
+    quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit).max(aslant.unwrap_or(0.0))
+}
+
+/// Bound for a triangle whose piece is a quadrilateral of parameters, each boundary curve measured from its own edge or trim.
+fn quadrilateral<const N: usize>(
+    prover: &mut Prover<'_, '_>,
+    lines: [(Option<&Trim>, [Uv; 2], [Point; 2]); N],
+    [a, b, c, d]: [Uv; 4],
+    xyz: [Point; 3],
+    limit: f64,
+) -> f64 {
+    let mut worst = 0f64;
     for (trim, uv, ends) in lines {
         worst = worst.max(match trim {
             Some(trim) => trim.bound(prover, xyz, limit),
             None => prover.side(uv, ends, limit),
         });
         if worst > limit {
-            return Some(worst);
+            return worst;
         }
     }
-    // Where the corners run back around the pole the piece is folded; the argument of `bound.rs` does not ask for more.
-    for piece in [[a, b, foot_b], [a, foot_b, foot_a]] {
+    for piece in [[a, b, c], [a, c, d]] {
         if worst <= limit {
             worst = worst.max(prover.piece(piece, xyz, limit));
         }
     }
-    Some(worst)
+    worst
 }
 
 /// Bound for a triangle with two corners on one pole: nothing, but where a border runs aslant into it.
@@ -107,7 +181,7 @@ pub(in crate::tessellate) fn line(
 ) -> Option<f64> {
     let k = (0..3).find(|&k| sheet.pole(uv[k]).is_none())?;
     let across = sheet.pole(uv[(k + 1) % 3])?;
-    if sheet.pole(uv[(k + 2) % 3]) != Some(across) {
+    if sheet.pole(uv[(k + 2) % 3]) != Some(across) || apart(sheet, uv[(k + 1) % 3], uv[(k + 2) % 3], across) {
         return None;
     }
     let extent = sheet.extent()[1 - across];

@@ -19,10 +19,12 @@ use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, Expected};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
 
-/// Rays for each facet from which on a map pays: a facet costs some 2 µs to draw, and a ray that need not walk saves 0.1 µs.
-const WORTH: u64 = 100;
+/// Rays for each facet from which on a map pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
+const WORTH: u64 = 200;
+/// Facets above which no map is drawn: drawing takes 300 bytes for each.
+const LARGEST: usize = 1 << 18;
 /// Most maps that are kept.
-const MOST: usize = 64;
+const MOST: usize = 16;
 /// Squares along each side of a divided square.
 const FINE: usize = 4;
 /// Set in [`Square::count`] where the square is divided.
@@ -125,23 +127,23 @@ impl View {
         if matches!(self, Self::Point(_)) { 6 } else { 1 }
     }
 
-    /// Whether a ray is one of those that are seen.
+    /// Whether a ray that starts on no face is one of those that are seen.
     #[inline(always)]
     fn sees(&self, ray: &Ray) -> bool {
-        let own = match self {
+        match self {
             Self::Point(origin) => ray.origin.to_array() == *origin,
             Self::Along { direction, start, stray, .. } => {
                 ray.direction == *direction && (ray.origin.dot(*direction) - start).abs() <= *stray
             }
-        };
-        own && ray.from.is_none() && ray.t_min == 0.0
+        }
     }
 }
 
 /// The maps for these sources, as far as they pay; those that are there already are kept.
 pub(super) fn find(tree: &Octree, expected: &Expected<'_>, there: &[Map]) -> Vec<Map> {
     let mut maps: Vec<Map> = Vec::new();
-    let worth = |rays: u64| rays / WORTH >= tree.around.mesh.facets.len() as u64;
+    let facets = tree.around.mesh.facets.len();
+    let worth = |rays: u64| facets <= LARGEST && rays / WORTH >= facets as u64;
     let views = expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::of(beam, tree));
     for view in views {
         if maps.len() < MOST && maps.iter().all(|m| m.view != view) {
@@ -204,6 +206,9 @@ impl Map {
 /// The map that shows a ray; `last` is the first to be looked at.
 #[inline(always)]
 fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
+    if ray.from.is_some() || ray.t_min != 0.0 {
+        return None;
+    }
     if maps[last].view.sees(ray) {
         return Some(last);
     }
