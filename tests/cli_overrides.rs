@@ -39,3 +39,26 @@ fn a_face_that_is_not_there_is_refused_with_what_to_write() {
         assert!(code == 2 && err.contains(&format!("--face {name}")), "{err}");
     }
 }
+
+/// The mirrors of a scene are finer, whatever parts they belong to; a file alone has no roles.
+#[test]
+fn an_optical_role_has_its_own_tolerance() {
+    let scene = fixture("scenes/s3_reflector.toml").display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let facets = |options: &[&str]| {
+        let all = [&["check", &scene, "--rays", "1000", "--tolerance", "0.2", "--json"], options].concat();
+        let (code, out, err) = lampyris_in(folder.path(), &all);
+        assert_eq!(code, 0, "{err}");
+        serde_json::from_str::<Value>(&out).unwrap()["scene"]["facets"].as_u64().unwrap()
+    };
+    let (plain, absorber, mirror) =
+        (facets(&[]), facets(&["--role", "coated=0.001"]), facets(&["--role", "mirror=0.01"]));
+    assert!(mirror > 3 * plain && absorber == plain, "{plain} {absorber} {mirror}");
+    let lens = fixture("step/lens_planoconvex_analytic.stp").display().to_string();
+    for (options, says) in
+        [(["facet", &lens, "--role", "mirror=0.1"], "--part"), (["check", &scene, "--role", "miror=0.1"], "mirror")]
+    {
+        let (code, _, err) = lampyris_in(folder.path(), &options);
+        assert!(code == 2 && err.contains("--role") && err.contains(says), "{err}");
+    }
+}

@@ -10,7 +10,7 @@ use crate::intersect::polish::Polished;
 use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
-use crate::simulate::Scene;
+use crate::simulate::{BoundScene, Scene};
 use crate::tessellate::{self, Override, Place, Tessellation, tessellate};
 use std::time::Instant;
 
@@ -64,6 +64,18 @@ pub(super) fn mesh_settings(
     settings.angle_deg = meshing.angle.or(accuracy.and_then(|a| a.angle_deg));
     if let Some(plan) = &meshing.plan {
         plan.apply(&mut settings);
+    }
+    for (role, tolerance) in &meshing.role {
+        if !BoundScene::ROLES.contains(&role.as_str()) {
+            let failure = Failure::arguments(format!("--role {role}: there is no such optical role"));
+            return Err(failure.help(format!("use one of {}", BoundScene::ROLES.join(", "))));
+        }
+        let Some(scene) = scene else {
+            let failure = Failure::arguments(format!("--role {role}: only a scene says what faces are for light"));
+            return Err(failure.help("name the faces or the part: --face NAME=0.01 or --part NAME=0.01"));
+        };
+        let place = Place::Placed(scene.bind(model)?.faces_in_role(role));
+        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
     }
     for (name, tolerance) in &meshing.part {
         if !model.parts.iter().any(|p| p.name == *name) {

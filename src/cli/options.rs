@@ -34,6 +34,9 @@ pub(crate) struct Meshing {
     /// Tolerance of one face, by its name or as #ID of its entity in the file; may be given several times, and wins over that of its part
     #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = part)]
     pub(crate) face: Vec<(String, [f64; 2])>,
+    /// Tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given several times
+    #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = part)]
+    pub(crate) role: Vec<(String, [f64; 2])>,
     /// Local tolerances that an accuracy came to.
     #[arg(skip)]
     pub(crate) plan: Option<crate::study::aim::Plan>,

@@ -29,6 +29,8 @@ struct Header {
     part: Vec<(String, [u64; 2])>,
     #[serde(default)]
     face: Vec<(String, [u64; 2])>,
+    #[serde(default)]
+    role: Vec<(String, [u64; 2])>,
     rays: Option<u64>,
     seed: Option<u64>,
     intersector: Option<String>,
@@ -48,6 +50,7 @@ impl Header {
             angle: m.angle.map(f64::to_bits),
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             rays: t.rays,
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
@@ -64,6 +67,7 @@ impl Header {
             angle: self.angle.map(f64::from_bits),
             part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             face: self.face.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            role: self.role.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             // Parts are not traced with an accuracy asked for.
             plan: None,
         }

@@ -3,6 +3,7 @@
 mod bodies;
 mod nearest;
 mod notes;
+mod role;
 mod select;
 
 use super::emitter::{self, Area, Emitter, Loaded};

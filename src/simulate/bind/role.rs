@@ -1,0 +1,21 @@
+//! Faces by what light meets on them.
+
+use super::{BoundScene, Surface};
+use crate::math::FaceId;
+
+impl BoundScene {
+    /// What a face can be for light, as [`BoundScene::faces_in_role`] takes it.
+    pub const ROLES: [&'static str; 4] = ["mirror", "interface", "coated", "absorber"];
+
+    /// The placed faces with a role: plain mirrors, bare interfaces of a medium, faces with a coating or scatter, absorbers.
+    pub fn faces_in_role(&self, role: &str) -> Vec<FaceId> {
+        let is = |surface: &Surface| match surface {
+            Surface::Mirror(_) => role == "mirror",
+            Surface::Interface => role == "interface",
+            Surface::Coated(_) => role == "coated",
+            Surface::Absorber => role == "absorber",
+        };
+        let ids = (0u32..).zip(&self.faces);
+        ids.filter(|(_, f)| is(&self.surfaces[f.surface as usize])).map(|(k, _)| FaceId(k)).collect()
+    }
+}
