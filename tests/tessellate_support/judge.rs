@@ -294,7 +294,7 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
             if let Some(d) = poles.of(v.uv) {
                 let [a, b] = poles.domain[d];
                 let mut beside = v.uv;
-                beside[d] += 1e-6 * (0.5 * (a + b) - beside[d]);
+                beside[d] += 1e-8 * (0.5 * (a + b) - beside[d]);
                 let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
                     let (_, [du, dv]) = look(s, beside, left);
                     let n = du.cross(dv) * if face.reversed { -1.0 } else { 1.0 };
@@ -308,8 +308,11 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
             // On a crease, or so near to it that a facet beyond may end here, the normal of any side will do; where there is none, or one that
             // rounding decides, any at all.
             let at = Uv::from_array([0, 1].map(|d| {
-                let near = 1e-6 * (poles.domain[d][1] - poles.domain[d][0]);
-                s.knots[d].iter().copied().find(|k| (k - v.uv[d]).abs() <= near).unwrap_or(v.uv[d])
+                let [a, b] = poles.domain[d];
+                let times = |k: &f64| s.knots[d].iter().filter(|x| *x == k).count();
+                let crease = |k: &f64| *k > a && *k < b && times(k) >= s.degree[d];
+                let near = |k: &f64| (k - v.uv[d]).abs() <= 2e-7 * (b - a);
+                s.knots[d].iter().copied().find(|k| near(k) && crease(k)).unwrap_or(v.uv[d])
             }));
             let most = if at == v.uv { 1e-6 } else { 1e-3 };
             let seen = [[false, false], [true, false], [false, true], [true, true]].map(|left| {
