@@ -105,8 +105,12 @@ impl Light<'_> {
         text += ". ";
         for grid in r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(receiver_grid) {
             if let Some(([h, v], peak)) = grid.peak() {
+                // Small cells at a pole are the brightest by chance: their error says so.
+                let at = grid.values.iter().position(|x| *x == peak);
+                let error = at.and_then(|k| grid.error.as_ref()?.get(k).copied());
+                let error = error.map(|e| format!(" ± {}", figures(e, 2))).unwrap_or_default();
                 text += &format!(
-                    "The brightest direction is {} {}°, {} {}° with **{} {}**. ",
+                    "The brightest direction is {} {}°, {} {}° with **{}{error} {}**. ",
                     grid.axes[0].label,
                     figures(h, 2),
                     grid.axes[1].label,
