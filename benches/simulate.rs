@@ -4,6 +4,9 @@
 //! so that a machine that slows down slows down all of them. Keys: `scenes=s1,s2,s3`, `rays=1000000`, `threads=1,4`, `tolerance=0.1`
 //! (mm; `exact` for the spline), `repeats=3`, `batch=1024`.
 //!
+//! Rates are those of a run on an octree just built, with all that it works out about sources and facets on the way. The kernels are
+//! compared on one octree that has done so before: `full_over_pruned`.
+//!
 //! `share` is the part of the pruned kernel's time that is spent in the intersector; `of_raw` compares its segments per second with
 //! those of the bare octree on the scene's own rays, asked in shuffled order without normals. `walk_share` is the time that the bare
 //! octree takes for the same rays in the order of the run, against the whole: no kernel can be faster than that.
@@ -197,9 +200,16 @@ fn report(
     let all: Vec<RunSettings> =
         asked.threads.iter().map(|&threads| RunSettings { threads, ..one.clone() }).collect();
     let mut rows: Vec<Row> = all.iter().map(|_| Row::default()).collect();
+    let fresh = |settings: &RunSettings| match octree {
+        Some(octree) => simulate(bound, &octree.anew(), settings, &|_| true),
+        None => simulate(bound, engine, settings, &|_| true),
+    };
     let (mut scaling, most) = (Vec::new(), asked.threads.iter().copied().max().unwrap_or(1));
     for _ in 0..asked.repeats {
-        all.iter().zip(&mut rows).for_each(|(settings, row)| row.measure(bound, engine, settings));
+        for (settings, row) in all.iter().zip(&mut rows) {
+            row.cold.push(fresh(settings).seconds.trace);
+            row.measure(bound, engine, settings);
+        }
         if let Some(octree) = octree {
             for (settings, row) in all.iter().zip(&mut rows) {
                 row.raw.push(raw(octree, &mixed, settings.threads));
@@ -207,8 +217,7 @@ fn report(
             }
         }
         if most > 1 {
-            let ours =
-                |threads| simulate(bound, engine, &RunSettings { threads, ..one.clone() }, &|_| true).seconds.trace;
+            let ours = |threads| fresh(&RunSettings { threads, ..one.clone() }).seconds.trace;
             let [alone, together] = [1, most].map(ours);
             let [single, many] = [1, most].map(|n| processes(n, name, &asked.args));
             let [lone, full] = [1, most].map(|n| n as f64 / arithmetic(n));
@@ -235,6 +244,7 @@ fn report(
 /// What is measured with one number of threads.
 #[derive(Default)]
 struct Row {
+    cold: Vec<f64>,
     pruned: Vec<f64>,
     full: Vec<f64>,
     inside: Vec<f64>,
@@ -264,7 +274,7 @@ impl Row {
         let least = |x: &[f64]| x.iter().copied().fold(f64::INFINITY, f64::min);
         let most = |x: &[f64]| x.iter().copied().fold(0.0, f64::max);
         let Some(r) = &self.last else { return };
-        let (w, seconds) = (&r.receivers[0], least(&self.pruned));
+        let (w, seconds, warm) = (&r.receivers[0], least(&self.cold), least(&self.pruned));
         let per_second = |n: u64| n as f64 / seconds / 1e6;
         let (raw, in_order) = (most(&self.raw), most(&self.in_order));
         println!(
@@ -276,9 +286,9 @@ impl Row {
             r.rays,
             per_second(r.rays),
             per_second(r.segments),
-            least(&self.full) / seconds,
+            least(&self.full) / warm,
             least(&self.inside),
-            r.cost.rays as f64 / in_order / 1e6 / seconds,
+            r.cost.rays as f64 / in_order / 1e6 / warm,
             per_second(r.segments) / raw,
             r.segments as f64 / r.rays as f64,
             w.power,

@@ -257,15 +257,9 @@ pub fn trace(
     let (first, last) = (mine(shard), mine(shard.saturating_add(1)).min(replicates));
     let before = from.unwrap_or_else(|| Portion::none(bound, replicates));
     let todo: Vec<u32> = (first..last).filter(|r| before.done.binary_search(r).is_err()).collect();
-    let threads = match settings.threads {
-        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-        n => n,
-    };
+    let threads = threads_of(settings);
     let kind = kernel_of(bound, settings);
-    let own = |rays: u64| rays / u64::from(shards.max(1));
-    let beam = |(e, s): (&Emitter, &SourceShare)| Some((e.beam()?, own(s.rays)));
-    let beams: Vec<_> = bound.emitters.iter().zip(&context.plan.shares).filter_map(beam).collect();
-    intersector.expect(&Expected { rays: own(context.plan.rays), threads, beams: &beams });
+    announce(&context, threads);
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let share = context.plan.rays * u64::from(last.saturating_sub(first)) / u64::from(replicates);
@@ -293,6 +287,26 @@ pub fn trace(
     });
     let (portion, cost) = all.into_whole();
     Traced { portion, cost, threads }
+}
+
+/// Tells the intersector which rays a run is going to ask.
+fn announce(context: &Context<'_>, threads: usize) {
+    let own = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
+    let beam = |(e, s): (&Emitter, &SourceShare)| Some((e.beam()?, own(s.rays)));
+    let beams: Vec<_> = context.bound.emitters.iter().zip(&context.plan.shares).filter_map(beam).collect();
+    context.intersector.expect(&Expected { rays: own(context.plan.rays), threads, beams: &beams });
+}
+
+/// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.
+pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) {
+    announce(&Context::new(bound, intersector, settings), threads_of(settings));
+}
+
+fn threads_of(settings: &RunSettings) -> usize {
+    match settings.threads {
+        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+        n => n,
+    }
 }
 
 /// Traces some rays of a run once more, by their number, and records their whole paths; `paths` and `ledger` of the results

@@ -2,7 +2,7 @@
 
 use super::bind::BoundScene;
 use super::results::Results;
-use super::run::{KernelChoice, Progress, RunSettings, simulate};
+use super::run::{KernelChoice, Progress, RunSettings, prepare, simulate};
 use crate::intersect::Intersector;
 use serde::Serialize;
 
@@ -30,6 +30,7 @@ pub fn verify_pruning(
     settings: &RunSettings,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> (Results, Verification) {
+    prepare(bound, intersector, settings);
     let with = |kernel| simulate(bound, intersector, &RunSettings { kernel, ..settings.clone() }, progress);
     let (pruned, full) = (with(KernelChoice::Pruned), with(KernelChoice::Full));
     let differing = compare(bound, &pruned, &full);

@@ -162,6 +162,23 @@ impl<'m> Octree<'m> {
         }
     }
 
+    /// The same tree without what it has worked out about expected rays.
+    pub fn anew(&self) -> Self {
+        Self {
+            around: self.around,
+            settings: self.settings,
+            center: self.center,
+            frame: self.frame,
+            nodes: self.nodes.clone(),
+            blocks: self.blocks.clone(),
+            root: self.root,
+            horizons: OnceLock::new(),
+            maps: RwLock::default(),
+            statistics: self.statistics.clone(),
+            build_seconds: self.build_seconds,
+        }
+    }
+
     /// Distance and facet of the nearest hit of each ray, without normals: what other ray tracers' kernels report.
     pub fn closest(&self, rays: &[Ray], found: &mut [Option<(f64, u32)>], cost: &mut Cost) {
         let mut hits = [None; BATCH];
@@ -258,7 +275,8 @@ impl Intersector for Octree<'_> {
             let _ = self.horizons.set(horizons);
         }
         let mut maps = self.maps.write().unwrap_or_else(PoisonError::into_inner);
-        *maps = light::find(self, expected, &maps);
+        let there = std::mem::take(&mut *maps);
+        *maps = light::find(self, expected, there);
     }
 
     #[inline]

@@ -140,14 +140,14 @@ impl View {
 }
 
 /// The maps for these sources, as far as they pay; those that are there already are kept.
-pub(super) fn find(tree: &Octree, expected: &Expected<'_>, there: &[Map]) -> Vec<Map> {
+pub(super) fn find(tree: &Octree, expected: &Expected<'_>, mut there: Vec<Map>) -> Vec<Map> {
     let mut maps: Vec<Map> = Vec::new();
     let facets = tree.around.mesh.facets.len();
     let worth = |rays: u64| facets <= LARGEST && rays / WORTH >= facets as u64;
     let views = expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::of(beam, tree));
     for view in views {
         if maps.len() < MOST && maps.iter().all(|m| m.view != view) {
-            let own = there.iter().find(|m| m.view == view).cloned();
+            let own = there.iter().position(|m| m.view == view).map(|k| there.swap_remove(k));
             maps.push(own.unwrap_or_else(|| raster::draw(tree.around.mesh, view, expected.threads)));
         }
     }
