@@ -8,7 +8,7 @@ use lampyris::nurbs::{Surface, UvCurve};
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
 use std::collections::HashMap;
-use tessellate_support::cases;
+use tessellate_support::config;
 
 /// A knot vector from 0 to 1 whose inner knots have any multiplicity up to the degree.
 fn knots(degree: usize, inner: &[u8]) -> Vec<f64> {
@@ -106,7 +106,7 @@ fn volume_below(surface: &Surface) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(32), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(32))]
 
     #[test]
     fn two_sheets_over_one_rim_close(sheets in sheets()) {

@@ -11,7 +11,7 @@ use lampyris::nurbs::Surface;
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
 use tessellate_support::judge::{Found, judge};
-use tessellate_support::{cases, knots, seeded, seeds};
+use tessellate_support::{config, knots, seeded, seeds};
 
 /// A fan of rational surface with the side at the first (or last) parameter of one direction in one point; weights run over four decades.
 fn fans() -> impl Strategy<Value = Surface> {
@@ -55,7 +55,7 @@ fn fan(surface: &Surface, tolerance: f64) -> Result<Found, String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(12), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { max_shrink_iters: 0, ..config(12) })]
 
     #[test]
     fn certified_facets_at_a_pole_are_never_over(seed in seeds()) {

@@ -8,7 +8,7 @@ mod tessellate_support;
 use lampyris::model::Model;
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use proptest::prelude::*;
-use tessellate_support::{cases, judge, rounds, seeded, seeds, shells};
+use tessellate_support::{config, judge, rounds, seeded, seeds, shells};
 
 /// Whether one thread makes the same bits.
 fn same_alone(model: &Model, settings: &Settings, made: &Tessellation) -> bool {
@@ -18,7 +18,7 @@ fn same_alone(model: &Model, settings: &Settings, made: &Tessellation) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(12), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { max_shrink_iters: 0, ..config(12) })]
 
     #[test]
     fn trimmed_shells_keep_all_promises(seed in seeds()) {

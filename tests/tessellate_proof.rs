@@ -8,7 +8,7 @@ use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Judge, Settings, Tessellation, tessellate};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use tessellate_support::{cases, knots};
+use tessellate_support::{config, knots};
 
 fn model(surface: Surface, closed: bool) -> Model {
     let face = Face::whole(surface);
@@ -154,7 +154,7 @@ fn with_hole(surface: Surface) -> Model {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(24), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(24))]
 
     /// Whatever is certified stays within its tolerance under dense sampling, and every face gets facets.
     #[test]

@@ -5,6 +5,8 @@ pub(crate) mod judge;
 pub(crate) mod rounds;
 pub(crate) mod shells;
 
+use proptest::test_runner::{Config as ProptestConfig, RngSeed};
+
 /// A clamped knot vector with uneven spans, inner knots of any multiplicity up to the degree.
 pub(crate) fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
     let mut t = vec![0.0; degree + 1];
@@ -17,9 +19,11 @@ pub(crate) fn knots(degree: usize, inner: &[(u8, u8)]) -> Vec<f64> {
     t
 }
 
-/// How many random models a property is tried on: `few` by default, `PROPTEST_CASES` where that asks for more.
-pub(crate) fn cases(few: u32) -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(few)
+/// `few` random models, the same ones at each run; as many as `PROPTEST_CASES` asks for, others each time.
+pub(crate) fn config(few: u32) -> ProptestConfig {
+    let asked = std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok());
+    let rng_seed = if asked.is_some() { RngSeed::Random } else { RngSeed::Fixed(1) };
+    ProptestConfig { cases: asked.unwrap_or(few), rng_seed, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 /// The value that a strategy makes of a seed: a failure names a number instead of a thousand control points.
