@@ -76,13 +76,14 @@ fn the_error_falls_with_the_sag_at_the_order_of_theory() {
             let (found, sag) = case.facets(tolerance, normals);
             (sag, change(&found, &exact, receiver, normals))
         };
-        let all = |normals: NormalMode| [0.2, 0.1, 0.05, 0.03, 0.02].map(|tolerance| at(tolerance, normals));
+        // At 0.2 mm a lens has too few facets for its order.
+        let all = |normals: NormalMode| [0.1, 0.05, 0.03, 0.02, 0.01].map(|tolerance| at(tolerance, normals));
         let order = slope(&all(NormalMode::Flat));
         assert!((0.4..0.6).contains(&order), "{file}, flat normals: order {order}");
         let changes = all(NormalMode::Bilinear);
         if file.starts_with("s2") {
             // What is left is below the noise of the beam's far tails.
-            let (coarse, fine) = (changes[1].1, at(0.005, NormalMode::Bilinear).1);
+            let (coarse, fine) = (changes[0].1, at(0.005, NormalMode::Bilinear).1);
             assert!(fine < 0.2 * coarse && fine < 0.003 * 690.0, "{file}: {coarse} and {fine} mm");
             continue;
         }
