@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub(crate) mod judge;
+pub(crate) mod pieces;
 pub(crate) mod rounds;
 pub(crate) mod shells;
 
