@@ -18,7 +18,7 @@ fn every_effect_that_a_scene_does_not_call_for_is_priced_alone() {
     assert_eq!((rows.len(), &rows[0]["choice"], &rows[9]["choice"]), (10, &"pruned".into(), &"full".into()));
     assert_eq!(rows[0]["effects"], serde_json::json!(["reflection"]));
     assert_eq!(rows[9]["effects"].as_array().unwrap().len(), 9);
-    assert_eq!((&rows[0]["kernel"], &rows[9]["kernel"]), (&"opaque".into(), &"full".into()));
+    assert_eq!((&rows[0]["kernel"], &rows[9]["kernel"]), (&"mirror".into(), &"full".into()));
     let added: Vec<&str> = rows[1..9].iter().map(|r| r["added"].as_str().unwrap()).collect();
     assert!(added.contains(&"polarisation") && added.contains(&"bulk_scatter") && !added.contains(&"reflection"));
     for row in rows {
@@ -39,7 +39,7 @@ fn the_terminal_shows_the_table_and_the_folder_holds_it() {
             err.lines().find(|l| l.trim_start().starts_with(start)).unwrap_or_else(|| panic!("{start}: {err}"));
         line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
     };
-    assert!(words("as called for: reflection").contains(&"opaque".into()));
+    assert!(words("as called for: reflection").contains(&"mirror".into()));
     assert!(words("+ polarisation").ends_with(&["yes".into()]));
     let csv = std::fs::read_to_string(folder.path().join("tables/effects.csv")).unwrap();
     assert_eq!(csv.lines().count(), 11, "{csv}");

@@ -128,7 +128,7 @@ fn s3_reflector() {
     near("reflected power", reflected.power, 0.501825, 4.0 * reflected.power_error);
     near("RMS x", reflected.rms[0], 81.3350, 0.5);
     near("RMS y", reflected.rms[1], 37.0787, 0.3);
-    assert_eq!(r.effects.kernel, "opaque");
+    assert_eq!(r.effects.kernel, "mirror");
 }
 
 /// The share of the third LED's rays that meet a mirror first: 0.90170 ± 0.00018.

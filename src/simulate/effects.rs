@@ -28,7 +28,9 @@ pub struct Required {
 /// The kernels, by what a ray carries; each can do all that the ones before it can.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum KernelKind {
-    /// Power alone.
+    /// Power alone, of which faces take a constant share.
+    Mirror,
+    /// Power alone, at faces of any kind.
     Opaque,
     /// And the body it is in.
     Clear,
@@ -44,16 +46,19 @@ impl KernelKind {
     /// The smallest kernel that can do these effects where bodies stand apart.
     pub(crate) fn of(effects: Effects) -> Self {
         let media = [Effect::Refraction, Effect::Fresnel, Effect::BulkAbsorption, Effect::BulkScatter];
+        let faces = [Effect::SurfaceScatter, Effect::Coating];
         match () {
             () if effects.contains(Effect::Polarisation) => Self::Full,
             () if effects.contains(Effect::Dispersion) => Self::Coloured,
             () if media.iter().any(|e| effects.contains(*e)) => Self::Clear,
-            () => Self::Opaque,
+            () if faces.iter().any(|e| effects.contains(*e)) => Self::Opaque,
+            () => Self::Mirror,
         }
     }
 
     pub(crate) fn name(self) -> &'static str {
         match self {
+            Self::Mirror => "mirror",
             Self::Opaque => "opaque",
             Self::Clear => "clear",
             Self::Nested => "nested",
@@ -101,7 +106,7 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
         effects: Effects::NONE,
         simulated: Vec::new(),
         not_simulated: Vec::new(),
-        kernel: KernelKind::Opaque,
+        kernel: KernelKind::Mirror,
     };
     for effect in Effect::ALL {
         let (wanted, because) = match effect {
@@ -138,6 +143,7 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
     }
     let nested = bound.nested || bound.emitters.iter().any(|e| e.inside.len() > 1);
     let media = match (bound.has_media(), nested) {
+        (false, _) if coated(&|_| true) == 0 => KernelKind::Mirror,
         (false, _) => KernelKind::Opaque,
         (true, false) => KernelKind::Clear,
         (true, true) => KernelKind::Nested,

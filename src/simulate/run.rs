@@ -2,7 +2,9 @@ use super::bind::BoundScene;
 use super::effects::{self, KernelKind};
 use super::emitter::Emitter;
 use super::gather::{Gather, Own};
-use super::kernel::{self, Coloured, Context, Everything, Local, Nothing, OneBody, PathSink, Plain, Stack, Which};
+use super::kernel::{
+    self, Coloured, Context, Everything, Local, Mirrors, Nothing, OneBody, PathSink, Plain, Stack, Which,
+};
 use super::portion::Portion;
 use super::receiver::Shape;
 use super::results::Results;
@@ -349,6 +351,8 @@ pub(crate) fn kernel_of(bound: &BoundScene, settings: &RunSettings) -> KernelKin
 
 fn dispatch(kind: KernelKind, context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
     match kind {
+        KernelKind::Mirror if context.plain() => kernel::trace::<Plain<Mirrors>>(context, which, local),
+        KernelKind::Mirror => kernel::trace::<Mirrors>(context, which, local),
         KernelKind::Opaque if context.plain() => kernel::trace::<Plain<Nothing>>(context, which, local),
         KernelKind::Opaque => kernel::trace::<Nothing>(context, which, local),
         KernelKind::Clear if context.plain() => kernel::trace::<Plain<OneBody>>(context, which, local),

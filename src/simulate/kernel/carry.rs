@@ -6,6 +6,8 @@ use crate::simulate::bind::AMBIENT;
 pub(crate) trait Carry: Copy + Send {
     /// Whether there are media at all; without, a face is opaque and nothing is absorbed on the way.
     const MEDIA: bool;
+    /// Whether faces may do more than absorb or reflect a constant share.
+    const COATED: bool = true;
     /// Whether nothing is asked about a ray on its way but where it ends: no paths are recorded, and no receiver lets light pass,
     /// asks for colours or counts some bounces only.
     const PLAIN: bool = false;
@@ -41,12 +43,30 @@ pub(crate) trait Carry: Copy + Send {
     fn light(&mut self, _wavelength: Option<f64>, _stokes: impl FnOnce() -> Stokes) {}
 }
 
-/// No media: mirrors and absorbers in empty space.
+/// No media: faces of any kind in empty space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nothing;
 
 impl Carry for Nothing {
     const MEDIA: bool = false;
+    fn inside(_: &[u16]) -> Option<Self> {
+        Some(Self)
+    }
+    fn body(&self) -> u16 {
+        AMBIENT
+    }
+    fn across(&self, _: u16, _: bool) -> Option<Self> {
+        None
+    }
+}
+
+/// Faces that absorb or reflect a constant share, in empty space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mirrors;
+
+impl Carry for Mirrors {
+    const MEDIA: bool = false;
+    const COATED: bool = false;
     fn inside(_: &[u16]) -> Option<Self> {
         Some(Self)
     }
@@ -64,6 +84,7 @@ pub(crate) struct Plain<C>(C);
 
 impl<C: Carry> Carry for Plain<C> {
     const MEDIA: bool = C::MEDIA;
+    const COATED: bool = C::COATED;
     const PLAIN: bool = true;
     const COLOURED: bool = C::COLOURED;
     fn inside(bodies: &[u16]) -> Option<Self> {

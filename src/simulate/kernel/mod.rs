@@ -13,13 +13,14 @@ mod surface;
 mod wide;
 
 pub(crate) use around::{Around, sources as around_sources};
-pub(crate) use carry::{Carry, Coloured, Everything, Nothing, OneBody, Plain, Stack};
+pub(crate) use carry::{Carry, Coloured, Everything, Mirrors, Nothing, OneBody, Plain, Stack};
 pub(crate) use local::Local;
 pub use local::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
 use super::emitter::{Emission, Stream, Ticket};
+use super::random::Key;
 use super::receiver::Receiver;
 use super::run::{Plan, RunSettings};
 use super::tally::count;
@@ -75,6 +76,12 @@ pub(crate) struct Path<C> {
     /// Length up to the last hit that was no total reflection, mm.
     pub(crate) free: f32,
     pub(crate) carry: C,
+}
+
+/// The key of the random numbers of a path at its present vertex.
+#[inline(always)]
+fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
+    Key { seed: context.settings.seed, ray: path.ray, branch: path.branch, bounce: path.bounce }
 }
 
 /// No receiver ahead.

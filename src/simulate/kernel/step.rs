@@ -1,10 +1,10 @@
-use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex, SCATTERS};
+use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex, SCATTERS, key};
 use super::{around, contact, surface};
 use crate::intersect::Hit;
 use crate::math::{Departure, FaceId, Point, Ray, Vector};
 use crate::optics::polarised::Stokes;
 use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
-use crate::simulate::random::{Key, Purpose};
+use crate::simulate::random::Purpose;
 use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::tally::{QUANTA, count, whole};
 use std::cell::Cell;
@@ -152,10 +152,11 @@ pub(super) fn step<C: Carry>(
         }
         // A bare face without a medium behind it is not there for light.
         Surface::Interface => Some(ray.direction),
-        Surface::Coated(c) => {
+        Surface::Coated(c) if C::COATED => {
             stray(path);
             surface::coated(context, c, path, ray, &meeting, local, pending)
         }
+        Surface::Coated(_) => unreachable!("scenes with such faces have a kernel for them"),
     };
     going.is_some_and(|going| onward(context, path, ray, &meeting, going, local))
 }
@@ -202,7 +203,7 @@ pub(super) fn onward<C: Carry>(
     let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
     path.bounce += 1;
     let mut next = Ray::new(point, going).leaving(from);
-    if meeting.skip.get() > 0.0 {
+    if C::MEDIA && meeting.skip.get() > 0.0 {
         next.t_min = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
     }
     proceed(context, path, ray, next, local)
@@ -292,12 +293,6 @@ fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, l
         *stokes = Stokes::unpolarised(1.0, going);
     }
     proceed(context, path, ray, Ray::new(point, going), local)
-}
-
-/// The key of the random numbers of a path at its present vertex.
-#[inline(always)]
-pub(super) fn key<C>(context: &Context<'_>, path: &Path<C>) -> Key {
-    Key { seed: context.settings.seed, ray: path.ray, branch: path.branch, bounce: path.bounce }
 }
 
 /// Counts the light on receivers that let it pass.

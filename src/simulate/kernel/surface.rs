@@ -2,8 +2,8 @@
 
 use super::around::regained;
 use super::contact::{alike, glued, twin};
-use super::step::{Meeting, caught, key, lose, onward, record, stray};
-use super::{Carry, Cause, Context, Event, Local, Path};
+use super::step::{Meeting, caught, lose, onward, record, stray};
+use super::{Carry, Cause, Context, Event, Local, Path, key};
 use crate::math::{Ray, Vector};
 use crate::optics::polarised::{self, Mueller, Stokes};
 use crate::optics::{Coating, Split, fresnel, reflect, refract_with_cosine};
