@@ -265,15 +265,19 @@ impl Work<'_, '_> {
         (p.is_finite() && p.abs().max_element() < 1e30).then(|| Point2::new(clean(p.x), clean(p.y)))
     }
 
-    /// Whether a point can be added without splitting a constraint or meeting a vertex.
+    /// Whether a point can be added without splitting a constraint or meeting a vertex, be it but for rounding: between corners one
+    /// rounding apart on a crease stood facets without width.
     pub(super) fn is_free(&self, uv: Uv) -> bool {
         use spade::PositionInTriangulation as At;
+        let apart = |p: Point2<f64>, v: Point2<f64>| {
+            (p.x - v.x).abs() > 1e-14 * p.x.abs() || (p.y - v.y).abs() > 1e-14 * p.y.abs()
+        };
         self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
-            At::OnFace(_) => true,
+            At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),
             At::OnEdge(e) => {
                 let e = self.cdt.directed_edge(e);
                 let border = || self.odd.contains_key(&key(e.from().data().node, e.to().data().node));
-                !e.is_constraint_edge() || !border()
+                (!e.is_constraint_edge() || !border()) && e.vertices().iter().all(|v| apart(p, v.position()))
             }
             _ => false,
         })
