@@ -270,7 +270,9 @@ impl Intersector for Octree<'_> {
     }
 
     fn expect(&self, expected: &Expected<'_>) {
-        if let Some(horizons) = Horizons::expecting(expected.rays, self).filter(|_| self.horizons.get().is_none()) {
+        if self.horizons.get().is_none()
+            && let Some(horizons) = Horizons::expecting(expected.rays, self)
+        {
             // Whoever came first has as good ones.
             let _ = self.horizons.set(horizons);
         }

@@ -43,30 +43,18 @@ pub(crate) trait Carry: Copy + Send {
     fn light(&mut self, _wavelength: Option<f64>, _stokes: impl FnOnce() -> Stokes) {}
 }
 
-/// No media: faces of any kind in empty space.
+/// No media: faces in empty space, of any kind where `COATED`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Nothing;
+pub(crate) struct Empty<const COATED: bool>;
 
-impl Carry for Nothing {
-    const MEDIA: bool = false;
-    fn inside(_: &[u16]) -> Option<Self> {
-        Some(Self)
-    }
-    fn body(&self) -> u16 {
-        AMBIENT
-    }
-    fn across(&self, _: u16, _: bool) -> Option<Self> {
-        None
-    }
-}
-
+/// Faces of any kind in empty space.
+pub(crate) type Nothing = Empty<true>;
 /// Faces that absorb or reflect a constant share, in empty space.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Mirrors;
+pub(crate) type Mirrors = Empty<false>;
 
-impl Carry for Mirrors {
+impl<const COATED: bool> Carry for Empty<COATED> {
     const MEDIA: bool = false;
-    const COATED: bool = false;
+    const COATED: bool = COATED;
     fn inside(_: &[u16]) -> Option<Self> {
         Some(Self)
     }
