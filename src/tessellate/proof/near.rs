@@ -9,6 +9,7 @@
 
 use super::super::sheet::{Sheet, local};
 use super::linear::Linear;
+use super::refine::split;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
 use smallvec::{SmallVec, smallvec};
@@ -160,16 +161,7 @@ impl Near {
             let d = if along_u >= along_v { 0 } else { 1 };
             self.stack.extend_from_within(start..);
             let (low, high) = self.stack[start..].split_at_mut(size);
-            let (lines, n, step, across) = if d == 0 { (q + 1, p, q + 1, 1) } else { (p + 1, q, 1, q + 1) };
-            for line in 0..lines {
-                let at = |k: usize| line * across + k * step;
-                for r in 0..=n {
-                    low[at(r)] = high[at(0)];
-                    for k in 0..n - r {
-                        high[at(k)] = 0.5 * (high[at(k)] + high[at(k + 1)]);
-                    }
-                }
-            }
+            split(low, high, [p, q], d);
             let (mut half, mut second) = (share, from);
             half[d] *= 0.5;
             second[d] += half[d];

@@ -19,6 +19,7 @@ use super::super::settings::Judge;
 use super::super::sheet::local;
 use super::bound::Prover;
 use super::flat::from_chord;
+use super::refine::split;
 use crate::math::{Point, Uv, Vector};
 
 /// Knot rectangles up to which a cell is looked at as one quad.
@@ -114,19 +115,9 @@ impl Halving {
             let along_u = (0..size.saturating_sub(2 * (q + 1))).map(|i| bend(i, q + 1)).fold(0.0, f64::max);
             let rows = (0..=p).flat_map(|i| (0..q.saturating_sub(1)).map(move |j| i * (q + 1) + j));
             let along_v = rows.map(|i| bend(i, 1)).fold(0.0, f64::max);
-            let (lines, n, step, across) =
-                if along_u >= along_v { (q + 1, p, q + 1, 1) } else { (p + 1, q, 1, q + 1) };
             self.stack.extend_from_within(start..);
             let (low, high) = self.stack[start..].split_at_mut(size);
-            for line in 0..lines {
-                let at = |k: usize| line * across + k * step;
-                for r in 0..=n {
-                    low[at(r)] = high[at(0)];
-                    for k in 0..n - r {
-                        high[at(k)] = 0.5 * (high[at(k)] + high[at(k + 1)]);
-                    }
-                }
-            }
+            split(low, high, [p, q], if along_u >= along_v { 0 } else { 1 });
         }
         Some(limit + most / heaviest)
     }

@@ -8,6 +8,26 @@ use crate::nurbs::BezierPatch;
 /// How often a piece is cut into four before the bound is taken as it is.
 pub(super) const LEVELS: u32 = 3;
 
+/// Halves a net of degrees `[p, q]` along one direction by de Casteljau's steps: `high` holds it and keeps its upper half, `low` takes
+/// the lower one.
+#[inline]
+pub(super) fn split<T>(low: &mut [T], high: &mut [T], [p, q]: [usize; 2], along: usize)
+where
+    T: Copy + std::ops::Add<Output = T>,
+    f64: std::ops::Mul<T, Output = T>,
+{
+    let (lines, n, step, across) = if along == 0 { (q + 1, p, q + 1, 1) } else { (p + 1, q, 1, q + 1) };
+    for line in 0..lines {
+        let at = |k: usize| line * across + k * step;
+        for r in 0..=n {
+            low[at(r)] = high[at(0)];
+            for k in 0..n - r {
+                high[at(k)] = 0.5 * (high[at(k)] + high[at(k + 1)]);
+            }
+        }
+    }
+}
+
 /// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
 pub(super) fn refine<const N: usize>(
     (nets, scalar): (&mut Nets, &mut Scalar),
