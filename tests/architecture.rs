@@ -22,6 +22,9 @@ const FLOORS: &[(&str, u32)] = &[
     ("cli", 7),
 ];
 
+/// Large rooms have rooms of their own, each of which sees only those before it.
+const INNER: &[(&str, &[&str])] = &[("step", &["part21", "chart", "geometry", "trim", "product"])];
+
 /// Crates that only one room may name.
 const DOORS: &[(&str, &[&str])] = &[
     ("truck_modeling", &["kernel"]),
@@ -131,6 +134,26 @@ fn rooms_import_only_lower_floors() {
         }
     }
     assert!(broken.is_empty(), "walls broken:\n{}", broken.join("\n"));
+}
+
+#[test]
+fn inner_rooms_import_only_those_before_them() {
+    let mut broken = Vec::new();
+    for (room, inner) in INNER {
+        let inside = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(room);
+        for (floor, own) in inner.iter().enumerate() {
+            let files = sources().into_iter().filter(|p| p.starts_with(inside.join(own)));
+            for path in files {
+                let code = code(&path);
+                for later in &inner[floor + 1..] {
+                    if code.contains(&format!("crate::{room}::{later}")) {
+                        broken.push(format!("{}: '{own}' imports '{later}'", path.display()));
+                    }
+                }
+            }
+        }
+    }
+    assert!(broken.is_empty(), "inner walls broken:\n{}", broken.join("\n"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
-//! Parts of curves by blossoms: knot insertion, clamping and cutting in one.
+//! Parts of curves by blossoms: knot insertion, clamping and cutting in one; and parts put together.
 
 use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, find_span};
-use super::spline::{ControlPoint, Spline};
+use super::spline::{ControlPoint, Curve, Spline};
 use smallvec::SmallVec;
 
 impl<P: ControlPoint> Spline<P> {
@@ -97,5 +97,39 @@ impl<P: ControlPoint> Spline<P> {
                 self.blossom(find_span(&self.knots, p, middle), &arguments[..p])
             })
             .collect()
+    }
+}
+
+impl Curve {
+    /// This curve and behind it another of its degree that starts where it ends; the parameter follows on at the joint.
+    pub fn followed_by(&self, tail: &Self) -> Self {
+        let p = self.degree;
+        let (end, start) = (self.domain()[1], tail.domain()[0]);
+        // One control point at the joint: weights are scaled to agree there.
+        let scale = self.points[self.points.len() - 1].w / tail.points[0].w;
+        let mut points = self.points.clone();
+        points.extend(tail.points[1..].iter().map(|&q| q * scale));
+        let mut knots = self.knots[..self.knots.len() - 1].to_vec();
+        knots.extend(tail.knots[p + 1..].iter().map(|k| end + (k - start)));
+        Self { degree: p, knots, points }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::math::Frame;
+    use crate::nurbs::conic;
+
+    #[test]
+    fn two_arcs_put_together_are_one_circle() {
+        let arc = |a: f64, b: f64| conic::arc(&Frame::IDENTITY, 2.0, [a, b]);
+        let whole = arc(0.0, 2.0).followed_by(&arc(2.0, 5.0).reparametrised([7.0, 8.0]));
+        assert_eq!(whole.domain(), [0.0, 3.0]);
+        for k in 0..=30 {
+            let t = 0.1 * f64::from(k);
+            let p = whole.evaluate(t);
+            assert!((p.length() - 2.0).abs() < 1e-14, "{t} {p}");
+        }
+        assert!((whole.evaluate(2.0).y.atan2(whole.evaluate(2.0).x) - 2.0).abs() < 1e-14);
     }
 }

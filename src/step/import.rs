@@ -1,10 +1,10 @@
-use super::assembly::{Assembly, Placed};
-use super::part::{Converted, convert};
+use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
+use super::product::assembly::{Assembly, Placed};
+use super::product::part::{Converted, convert};
+use super::product::styles::Styles;
+use super::product::topology::Items;
 use super::report::{ImportReport, Note, SurfaceCounts};
-use super::styles::Styles;
-use super::topology::Items;
-use super::units::{Units, contexts};
 use super::{Error, ErrorKind, Settings, bounds};
 use crate::math::Frame;
 use crate::model::{Analytic, Instance, Model, PartId};

@@ -1,10 +1,10 @@
 //! STEP files to [`Model`](crate::model::Model)s: Part 21 text, units, assemblies, trimmed surfaces, and an account of every face.
 //!
 //! Sources: ISO 10303-21:2016 (text), ISO 10303-42 (geometry and topology), ISO 10303-43/44 (representations and
-//! assemblies). The way of a face: its surface becomes a chart with the parameters of ISO 10303-42 (`chart`); every edge
-//! is located in it (`fit`), by closed forms or by Newton steps with a search behind them; the loops are chained,
-//! unwrapped and closed over seams and poles (`loops`, `arrange`); then the rectangle they cover becomes one rational
-//! B-spline.
+//! assemblies). The way of a file: text becomes records (`part21`); records become curves and surfaces (`geometry`), a surface with the
+//! parameters of ISO 10303-42 (`chart`); loops are located in these, by closed forms or by Newton steps with a search behind them,
+//! and the rectangle that they bound becomes one rational B-spline (`trim`); faces make parts, and parts stand in an assembly
+//! (`product`). Of `part21`, `chart`, `geometry`, `trim` and `product` each sees only those before it.
 //!
 //! Guarantee: what [`crate::model`] promises, with uv curves within [`Settings::uv_tolerance`] of the foot points of
 //! their edges wherever they were checked; each face is converted, repaired (said how) or refused (said why). Known
@@ -21,35 +21,16 @@
 // Negated comparisons refuse NaN together with what is out of range.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
-mod arrange;
-mod assembly;
 mod bounds;
 mod chart;
-mod composite;
-mod curves;
-mod edges;
 mod error;
-mod face;
-mod fit;
 mod geometry;
 mod import;
-mod loops;
-mod loose;
-mod meridian;
-mod offset;
-mod order;
-mod outward;
-mod part;
 mod part21;
-mod pcurves;
+mod product;
 mod report;
-mod seams;
 mod settings;
-mod styles;
-mod surfaces;
-mod tessellated;
-mod topology;
-mod units;
+mod trim;
 
 pub use error::{Error, ErrorKind};
 pub use import::{Import, read, read_bytes};

@@ -6,6 +6,7 @@
 //! them only in angular directions ([`Chart::to_surface`]).
 
 mod analytic;
+pub(super) mod offset;
 mod spline;
 mod swept;
 

@@ -239,7 +239,7 @@ pub(super) fn covering(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> 
     let copy = curve.reparametrised([start, start + period]);
     let mut whole = copy.clone();
     for _ in first..last {
-        whole = crate::step::curves::joined(&whole, curve);
+        whole = whole.followed_by(curve);
     }
     let [w0, w1] = whole.domain();
     whole.restricted(a.clamp(w0, w1), b.clamp(w0, w1))

@@ -1,23 +1,23 @@
 //! Seams that were added to a face: curves in space for straight lines in its parameter plane.
 
-use super::chart::Chart;
 use super::face::{Task, refit};
 use super::fit::{Budget, Overrun};
 use super::loops::{Piece, Source};
-use super::pcurves::cubic;
 use crate::math::{Point, Uv};
 use crate::nurbs::{Curve, Surface, UvCurve};
+use crate::step::chart::Chart;
+use crate::step::geometry::pcurves::cubic;
 
 /// A seam in space.
 #[derive(Clone, Debug)]
-pub(super) struct Seam {
-    pub(super) curve: Curve,
+pub(crate) struct Seam {
+    pub(crate) curve: Curve,
     /// Where it starts and ends, mm.
-    pub(super) ends: [Point; 2],
+    pub(crate) ends: [Point; 2],
 }
 
 /// The seams of a face under construction.
-pub(super) struct Seams<'s> {
+pub(crate) struct Seams<'s> {
     surface: &'s Surface,
     chart: &'s Chart,
     domain: [[f64; 2]; 2],
@@ -33,18 +33,18 @@ struct Made {
 }
 
 impl<'s> Seams<'s> {
-    pub(super) fn new(surface: &'s Surface, chart: &'s Chart, domain: [[f64; 2]; 2], lines: Vec<[Uv; 2]>) -> Self {
+    pub(crate) fn new(surface: &'s Surface, chart: &'s Chart, domain: [[f64; 2]; 2], lines: Vec<[Uv; 2]>) -> Self {
         let made = lines.into_iter().map(|line| make(surface, chart, domain, line)).collect();
         Self { surface, chart, domain, made }
     }
 
     /// Whether the curve of a source runs against the line it was made of.
-    pub(super) fn is_turned(&self, source: Source) -> bool {
+    pub(crate) fn is_turned(&self, source: Source) -> bool {
         matches!(source, Source::Seam(k) if self.made[k].turned)
     }
 
     /// The uv curve of a use of a seam, over the seam's own parameter.
-    pub(super) fn uv(
+    pub(crate) fn uv(
         &mut self,
         k: usize,
         piece: &Piece,
@@ -66,7 +66,7 @@ impl<'s> Seams<'s> {
         }
     }
 
-    pub(super) fn finish(self) -> Vec<Seam> {
+    pub(crate) fn finish(self) -> Vec<Seam> {
         self.made
             .into_iter()
             .map(|m| {

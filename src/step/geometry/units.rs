@@ -1,37 +1,37 @@
 //! Units of a representation context: one file may mix several.
 
-use super::part21::{Args, Entity, File};
 use crate::math::units::{DEGREE, INCH, METRE, si_prefix};
+use crate::step::part21::{Args, Entity, File};
 
 /// Deepest chain of conversion-based units.
 const MAX_DEPTH: usize = 8;
 
 /// Factors from a context's units to mm and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Units {
+pub(crate) struct Units {
     /// Millimetres per unit of length.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// Radians per unit of plane angle.
-    pub(super) angle: f64,
+    pub(crate) angle: f64,
     /// The file's own distance accuracy in mm, when it states one.
-    pub(super) accuracy: Option<f64>,
+    pub(crate) accuracy: Option<f64>,
 }
 
 impl Units {
     /// Millimetres and radians.
-    pub(super) const DEFAULT: Self = Self { length: 1.0, angle: 1.0, accuracy: None };
+    pub(crate) const DEFAULT: Self = Self { length: 1.0, angle: 1.0, accuracy: None };
 }
 
 /// Units that a context assigns, with their names for the report.
 #[derive(Clone, Debug)]
-pub(super) struct Assigned {
-    pub(super) units: Units,
-    pub(super) length_name: Option<String>,
-    pub(super) angle_name: Option<String>,
+pub(crate) struct Assigned {
+    pub(crate) units: Units,
+    pub(crate) length_name: Option<String>,
+    pub(crate) angle_name: Option<String>,
 }
 
 /// Reads the units of a representation context; what it does not assign is mm and radians.
-pub(super) fn of_context(context: Entity<'_, '_>) -> Assigned {
+pub(crate) fn of_context(context: Entity<'_, '_>) -> Assigned {
     let mut assigned = Assigned { units: Units::DEFAULT, length_name: None, angle_name: None };
     if let Some(args) = context.own("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
         let units = args.list(0);
@@ -124,6 +124,6 @@ fn known(name: &str) -> Option<(Kind, f64)> {
 }
 
 /// All contexts of a file that assign units.
-pub(super) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
+pub(crate) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
     file.entities().filter(|e| e.is("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, of_context(e)))
 }

@@ -1,7 +1,7 @@
 //! Colours: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB.
 
-use super::part21::{Entity, File};
 use crate::model::Colour;
+use crate::step::part21::{Entity, File};
 use rustc_hash::FxHashMap;
 
 /// Most entities looked at for one style.
@@ -9,11 +9,11 @@ const MAX_STEPS: usize = 64;
 
 /// Colours by the item that is styled.
 #[derive(Debug, Default)]
-pub(super) struct Styles(FxHashMap<u64, Colour>);
+pub(crate) struct Styles(FxHashMap<u64, Colour>);
 
 impl Styles {
     /// Collects all styles of a file.
-    pub(super) fn read(file: &File<'_>) -> Self {
+    pub(crate) fn read(file: &File<'_>) -> Self {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();
         for e in file.entities() {
@@ -34,7 +34,7 @@ impl Styles {
     }
 
     /// The colour given to an item itself.
-    pub(super) fn colour(&self, item: u64) -> Option<Colour> {
+    pub(crate) fn colour(&self, item: u64) -> Option<Colour> {
         self.0.get(&item).copied()
     }
 }

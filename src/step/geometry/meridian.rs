@@ -1,16 +1,15 @@
 //! Profiles of surfaces of revolution that cross their axis: the part that the face lies on.
 
-use super::chart::profile_distance;
-use super::curves::joined;
 use super::surfaces::Reach;
 use crate::math::{Frame, Point, Vector};
 use crate::nurbs::Curve;
+use crate::step::chart::profile_distance;
 
 /// Samples that look for crossings of the axis.
 const SAMPLES: i32 = 256;
 
 /// A meridian that crosses the axis is cut there: the part on which the points of the face lie stays.
-pub(super) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curve {
+pub(crate) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curve {
     let mut parts = parts(frame, &curve);
     // A tube bent more tightly than its own radius passes through the axis.
     parts.push(curve.clone());
@@ -66,7 +65,7 @@ fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
         let tail = curve.restricted(last, b);
         let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
         match parts.pop() {
-            Some(head) if closed => parts.push(joined(&tail, &head)),
+            Some(head) if closed => parts.push(tail.followed_by(&head)),
             Some(head) => parts.extend([head, tail]),
             None => parts.push(tail),
         }

@@ -4,18 +4,18 @@
 //! basis' own domain that is refined until the middles of all cells agree. Known weakness: an offset beyond a radius of
 //! curvature folds; it is fitted as it is.
 
-use super::chart::{Chart, Kind, SplineChart};
+use super::{Chart, Kind, SplineChart};
 use crate::math::{Homogeneous, Point, Uv, Vector};
 use crate::model::Analytic;
 use crate::nurbs::Surface;
 
 /// Stated error of fitted offsets, mm.
-pub(super) const TOLERANCE: f64 = 1e-6;
+pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Most cells in one direction.
 const MAX_CELLS: usize = 256;
 
 /// The chart of the surface at `distance` along the normals of `basis`; `None` where nothing is left.
-pub(super) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
+pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     let mut chart = match &basis.kind {
         Kind::Plane { frame } => {
             let mut frame = *frame;

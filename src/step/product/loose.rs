@@ -1,18 +1,18 @@
 //! Surfaces without a face (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
 
-use super::chart::{Chart, Kind};
-use super::face::{Built, EdgeShape, Task, build};
-use super::geometry::{Geometry, Outcome, Refusal};
 use super::part::{Converted, place};
-use super::part21::Entity;
-use super::settings::Settings;
 use super::styles::Styles;
-use super::surfaces::Reach;
 use super::tessellated::Leaves;
 use super::topology::Items;
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
+use crate::step::chart::{Chart, Kind};
+use crate::step::geometry::surfaces::Reach;
+use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::part21::Entity;
+use crate::step::settings::Settings;
+use crate::step::trim::face::{Built, EdgeShape, Task, build};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -20,7 +20,7 @@ use rustc_hash::FxHashMap;
 type Bounded = (Built, Vec<Vec<Curve>>);
 
 /// Converts what is not a face of a shell: each surface becomes a shell of one face.
-pub(super) fn convert(
+pub(crate) fn convert(
     geometry: &Geometry<'_, '_>,
     items: &Items,
     styles: &Styles,

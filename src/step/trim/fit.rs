@@ -4,9 +4,9 @@
 //! `curve(t)`. Known weakness: what happens between those points is not bounded, only unlikely: the error of a cubic
 //! piece is symmetric, and pieces are halved until it is met.
 
-use super::chart::Pole;
 use crate::math::{Point, Uv};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, UvCurve};
+use crate::step::chart::Pole;
 use std::cell::Cell;
 
 /// Deepest halving of a Bézier span of the edge.
@@ -17,10 +17,10 @@ const BEYOND: f64 = 1e-7;
 
 /// Counts work, so that no face takes for ever.
 #[derive(Debug)]
-pub(super) struct Budget(Cell<u64>);
+pub(crate) struct Budget(Cell<u64>);
 
 impl Budget {
-    pub(super) fn new(steps: u64) -> Self {
+    pub(crate) fn new(steps: u64) -> Self {
         Self(Cell::new(steps))
     }
 
@@ -33,30 +33,30 @@ impl Budget {
 
 /// The work budget of the face is used up.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Overrun;
+pub(crate) struct Overrun;
 
 /// The surface as the fit sees it.
-pub(super) struct Target<'t> {
+pub(crate) struct Target<'t> {
     /// Parameters of a point, given the edge's parameter and what is expected.
-    pub(super) locate: &'t dyn Fn(f64, Point, Option<Uv>) -> Uv,
+    pub(crate) locate: &'t dyn Fn(f64, Point, Option<Uv>) -> Uv,
     /// Position and first derivatives.
-    pub(super) derivatives: &'t dyn Fn(Uv) -> Derivatives,
-    pub(super) poles: &'t [Pole],
+    pub(crate) derivatives: &'t dyn Fn(Uv) -> Derivatives,
+    pub(crate) poles: &'t [Pole],
     /// What the curve must not leave; infinite where the surface has no border.
-    pub(super) range: [[f64; 2]; 2],
+    pub(crate) range: [[f64; 2]; 2],
     /// Nearer than this is at the pole, mm.
-    pub(super) pole_tolerance: f64,
+    pub(crate) pole_tolerance: f64,
     /// Allowed error in space, mm.
-    pub(super) tolerance: f64,
-    pub(super) budget: &'t Budget,
+    pub(crate) tolerance: f64,
+    pub(crate) budget: &'t Budget,
 }
 
 /// An edge in the parameter plane.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
-    pub(super) curve: UvCurve,
+pub(crate) struct Fit {
+    pub(crate) curve: UvCurve,
     /// Largest distance between the edge and the surface at the fitted parameters, mm.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
 }
 
 #[derive(Clone, Copy)]
@@ -177,7 +177,7 @@ impl Target<'_> {
     }
 
     /// Fits an edge.
-    pub(super) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
+    pub(crate) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
         let breaks = curve.breakpoints();
         let spans = breaks.len() - 1;
         // One Bézier span of high degree may hold a whole turn of a thread.
@@ -273,7 +273,7 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
 }
 
 /// An edge on a plane, exactly: its control points in the plane's coordinates.
-pub(super) fn project(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
+pub(crate) fn project(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
     let mut gap = 0f64;
     let points = curve
         .points

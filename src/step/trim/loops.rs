@@ -1,12 +1,12 @@
 //! Loops in the unwrapped parameter plane: edge uses chained end to end, poles closed by their sides.
 
-use super::chart::{Chart, Pole};
 use crate::math::Uv;
 use crate::nurbs::{ControlPoint, UvCurve};
+use crate::step::chart::{Chart, Pole};
 
 /// Where a piece of a loop comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
+pub(crate) enum Source {
     /// An edge of the part.
     Edge(usize),
     /// A seam that was added to this face.
@@ -17,11 +17,11 @@ pub(super) enum Source {
 
 /// A part of a loop.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
-    pub(super) source: Source,
-    pub(super) reversed: bool,
+pub(crate) struct Piece {
+    pub(crate) source: Source,
+    pub(crate) reversed: bool,
     /// Over the parameter of its edge.
-    pub(super) curve: UvCurve,
+    pub(crate) curve: UvCurve,
 }
 
 impl Piece {
@@ -30,11 +30,11 @@ impl Piece {
         self.curve.points[if end { n } else { 0 }].position()
     }
 
-    pub(super) fn start(&self) -> Uv {
+    pub(crate) fn start(&self) -> Uv {
         self.at(self.reversed)
     }
 
-    pub(super) fn end(&self) -> Uv {
+    pub(crate) fn end(&self) -> Uv {
         self.at(!self.reversed)
     }
 
@@ -43,7 +43,7 @@ impl Piece {
         self.curve.evaluate(0.5 * (a + b))
     }
 
-    pub(super) fn shifted(mut self, by: Uv) -> Self {
+    pub(crate) fn shifted(mut self, by: Uv) -> Self {
         if by != Uv::ZERO {
             for p in &mut self.curve.points {
                 let w = p.z;
@@ -54,12 +54,12 @@ impl Piece {
     }
 
     /// A straight step.
-    pub(super) fn step(from: Uv, to: Uv) -> Self {
+    pub(crate) fn step(from: Uv, to: Uv) -> Self {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
     /// Points along the piece in the direction of the loop, without the last.
-    pub(super) fn sample(&self, into: &mut Vec<Uv>) {
+    pub(crate) fn sample(&self, into: &mut Vec<Uv>) {
         let start = into.len();
         let breaks = self.curve.breakpoints();
         let per_span = if self.curve.degree == 1 { 1 } else { 16usize.div_ceil(breaks.len() - 1).max(3) };
@@ -78,20 +78,20 @@ impl Piece {
 
 /// A chain of pieces that closes up to whole periods.
 #[derive(Clone, Debug)]
-pub(super) struct Chain {
-    pub(super) pieces: Vec<Piece>,
+pub(crate) struct Chain {
+    pub(crate) pieces: Vec<Piece>,
     /// Periods from the start of the first piece to the end of the last.
-    pub(super) winding: [i32; 2],
+    pub(crate) winding: [i32; 2],
     /// Largest step that had to be bridged, mm.
-    pub(super) bridged: f64,
+    pub(crate) bridged: f64,
 }
 
 impl Chain {
-    pub(super) fn closed(pieces: Vec<Piece>) -> Self {
+    pub(crate) fn closed(pieces: Vec<Piece>) -> Self {
         Self { pieces, winding: [0, 0], bridged: 0.0 }
     }
 
-    pub(super) fn polygon(&self) -> Vec<Uv> {
+    pub(crate) fn polygon(&self) -> Vec<Uv> {
         let mut points = Vec::new();
         for piece in &self.pieces {
             piece.sample(&mut points);
@@ -99,24 +99,24 @@ impl Chain {
         points
     }
 
-    pub(super) fn is_winding(&self) -> bool {
+    pub(crate) fn is_winding(&self) -> bool {
         self.winding != [0, 0]
     }
 
     /// Whether the chain runs along an edge twice, as along a seam.
-    pub(super) fn is_cut_open(&self) -> bool {
+    pub(crate) fn is_cut_open(&self) -> bool {
         let twice = |i: usize, p: &Piece| {
             matches!(p.source, Source::Edge(_)) && self.pieces[..i].iter().any(|q| q.source == p.source)
         };
         self.pieces.iter().enumerate().any(|(i, p)| twice(i, p))
     }
 
-    pub(super) fn shift(&mut self, by: Uv) {
+    pub(crate) fn shift(&mut self, by: Uv) {
         self.pieces = std::mem::take(&mut self.pieces).into_iter().map(|p| p.shifted(by)).collect();
     }
 
     /// The same loop run the other way.
-    pub(super) fn reverse(&mut self) {
+    pub(crate) fn reverse(&mut self) {
         self.pieces.reverse();
         for piece in &mut self.pieces {
             piece.reversed = !piece.reversed;
@@ -125,21 +125,21 @@ impl Chain {
     }
 
     /// The displacement that the winding stands for.
-    pub(super) fn displacement(&self, chart: &Chart) -> Uv {
+    pub(crate) fn displacement(&self, chart: &Chart) -> Uv {
         let one = |d: usize| chart.period[d].unwrap_or(0.0) * f64::from(self.winding[d]);
         Uv::new(one(0), one(1))
     }
 }
 
 /// Twice the signed area of a polygon, halved: positive counter-clockwise.
-pub(super) fn signed_area(polygon: &[Uv]) -> f64 {
+pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
     let n = polygon.len();
     let Some(&o) = polygon.first() else { return 0.0 };
     0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
 }
 
 /// Whether a point is inside a polygon, by crossings.
-pub(super) fn contains(polygon: &[Uv], p: Uv) -> bool {
+pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
     let n = polygon.len();
     let mut inside = false;
     for i in 0..n {
@@ -155,7 +155,7 @@ pub(super) fn contains(polygon: &[Uv], p: Uv) -> bool {
 ///
 /// Loops whose sides at a pole do not fit the sense in which they wind are tried with the sides run the other way: such
 /// loops run against their face's orientation.
-pub(super) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
+pub(crate) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
     let first = chained(uses.clone(), chart, tolerance, false);
     // On a surface with one pole nothing could close a loop that touches it and winds around it all the same.
     let lone = chart.poles.len() == 1 && first.pieces.iter().any(|p| p.source == Source::Nothing);

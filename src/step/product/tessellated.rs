@@ -1,19 +1,19 @@
 //! AP242 tessellated shapes: ready meshes, taken as they are.
 
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::{Args, Entity};
 use crate::math::{FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::TessellatedFace;
+use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::part21::{Args, Entity};
 
 /// Deepest nesting of tessellated items.
 const MAX_DEPTH: usize = 8;
 
 /// What the leaves of a tessellated item gave.
 #[derive(Default)]
-pub(super) struct Leaves {
-    pub(super) faces: Vec<TessellatedFace>,
-    pub(super) refused: Vec<Refusal>,
+pub(crate) struct Leaves {
+    pub(crate) faces: Vec<TessellatedFace>,
+    pub(crate) refused: Vec<Refusal>,
 }
 
 /// Where a kind of leaf keeps its indices, and how triangles are listed.
@@ -35,7 +35,7 @@ fn layout(keyword: &str) -> Option<Layout> {
 impl<'f, 'a> Geometry<'f, 'a> {
     /// Collects the triangulated faces of a tessellated item. A solid or shell that is linked to an exact shape is only
     /// its picture and gives nothing.
-    pub(super) fn tessellated(&self, id: u64, depth: usize, into: &mut Leaves) {
+    pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut Leaves) {
         let Ok(e) = self.entity(id) else { return };
         if let Some(layout) = layout(e.keyword()) {
             match self.triangles(e, &layout) {

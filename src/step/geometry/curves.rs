@@ -1,18 +1,18 @@
 //! Curves of the file: closed forms where there is one, rational splines for the rest.
 
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::Entity;
 use super::pcurves::associated;
+use super::{Geometry, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
+use crate::step::part21::Entity;
 use std::f64::consts::PI;
 
 /// Deepest chain of curves that refer to curves.
-pub(super) const MAX_DEPTH: usize = 16;
+pub(crate) const MAX_DEPTH: usize = 16;
 
 /// A curve, not yet cut.
 #[derive(Clone, Debug)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     /// `origin + t·direction`.
     Line { origin: Point, direction: Vector },
     /// `(a cos t, b sin t)`; a circle when equal.
@@ -27,14 +27,14 @@ pub(super) enum Shape {
 
 /// A curve with the direction in which it is run.
 #[derive(Clone, Debug)]
-pub(super) struct Directed {
-    pub(super) shape: Shape,
+pub(crate) struct Directed {
+    pub(crate) shape: Shape,
     /// Against its parameter.
-    pub(super) reversed: bool,
+    pub(crate) reversed: bool,
 }
 
 impl Shape {
-    pub(super) fn spline(curve: Curve) -> Self {
+    pub(crate) fn spline(curve: Curve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();
         let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= 1e-6 * size + 1e-9;
@@ -42,7 +42,7 @@ impl Shape {
     }
 
     /// Parameter difference after which the curve repeats.
-    pub(super) fn period(&self) -> Option<f64> {
+    pub(crate) fn period(&self) -> Option<f64> {
         match self {
             Self::Ellipse { .. } => Some(2.0 * PI),
             Self::Spline { curve, closed: true } => {
@@ -54,7 +54,7 @@ impl Shape {
     }
 
     /// Parameter of the nearest point.
-    pub(super) fn parameter(&self, p: Point) -> f64 {
+    pub(crate) fn parameter(&self, p: Point) -> f64 {
         match self {
             Self::Line { origin, direction } => (p - *origin).dot(*direction) / direction.length_squared(),
             Self::Ellipse { frame, a, b } => {
@@ -68,7 +68,7 @@ impl Shape {
     }
 
     /// The piece over `[t0, t1]`, `t0 < t1`, as a spline; over a period at most, and inside the domain of an open spline.
-    pub(super) fn segment(&self, t0: f64, t1: f64) -> Curve {
+    pub(crate) fn segment(&self, t0: f64, t1: f64) -> Curve {
         match self {
             Self::Line { origin, direction } => {
                 Curve::line(*origin + t0 * *direction, *origin + t1 * *direction, [t0, t1])
@@ -122,24 +122,11 @@ fn wrapped(curve: &Curve, s0: f64, s1: f64) -> Curve {
     }
     let head = curve.restricted(s0, b);
     let tail = curve.restricted(a, (s1 - period).clamp(a + 1e-9 * period, b));
-    joined(&head, &tail)
-}
-
-/// Two curves of one degree, the second behind the first; its parameter follows on.
-pub(super) fn joined(head: &Curve, tail: &Curve) -> Curve {
-    let p = head.degree;
-    let (end, start) = (head.domain()[1], tail.domain()[0]);
-    // One control point at the joint: weights are scaled to agree there.
-    let scale = head.points[head.points.len() - 1].w / tail.points[0].w;
-    let mut points = head.points.clone();
-    points.extend(tail.points[1..].iter().map(|&q| q * scale));
-    let mut knots = head.knots[..head.knots.len() - 1].to_vec();
-    knots.extend(tail.knots[p + 1..].iter().map(|k| end + (k - start)));
-    Curve { degree: p, knots, points }
+    head.followed_by(&tail)
 }
 
 /// A spline with its control points moved by an affine map.
-pub(super) fn mapped(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
+pub(crate) fn mapped(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(map(p.position()), p.w)).collect();
     Curve { points, ..curve }
 }
@@ -165,7 +152,7 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// A curve in space with its direction; trimming is left to the caller's vertices.
-    pub(super) fn curve(&self, id: u64, depth: usize) -> Outcome<Directed> {
+    pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<Directed> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::of(e, "curves refer to each other too deeply"));
@@ -275,7 +262,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
 }
 
 /// A polyline by arc length; repeated points are dropped. `None` when nothing is left.
-pub(super) fn polyline(points: &[Point]) -> Option<Curve> {
+pub(crate) fn polyline(points: &[Point]) -> Option<Curve> {
     let mut kept: Vec<Point> = Vec::with_capacity(points.len());
     let mut lengths = Vec::with_capacity(points.len());
     for &p in points {
@@ -298,14 +285,14 @@ pub(super) fn polyline(points: &[Point]) -> Option<Curve> {
 
 /// How knots follow from the subtype when they are not given.
 #[derive(Clone, Copy)]
-pub(super) enum KnotForm {
+pub(crate) enum KnotForm {
     Uniform,
     QuasiUniform,
     Bezier,
 }
 
 /// The form of a spline without knots.
-pub(super) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
+pub(crate) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
     let is = |prefix: &str| e.keywords().any(|k| k.strip_prefix(prefix).is_some_and(|rest| rest == kind));
     if is("UNIFORM_") {
         KnotForm::Uniform
@@ -318,7 +305,7 @@ pub(super) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
 
 impl KnotForm {
     /// The knot vector for a degree and a number of control points.
-    pub(super) fn knots(self, degree: usize, points: usize) -> Option<Vec<f64>> {
+    pub(crate) fn knots(self, degree: usize, points: usize) -> Option<Vec<f64>> {
         if degree == 0 || degree > crate::nurbs::MAX_DEGREE || points <= degree {
             return None;
         }
@@ -344,9 +331,9 @@ impl KnotForm {
 }
 
 /// Multiplicities and distinct knots as a knot vector.
-pub(super) fn explicit_knots(
-    multiplicities: super::part21::Args<'_, '_>,
-    knots: super::part21::Args<'_, '_>,
+pub(crate) fn explicit_knots(
+    multiplicities: crate::step::part21::Args<'_, '_>,
+    knots: crate::step::part21::Args<'_, '_>,
 ) -> Option<Vec<f64>> {
     let m: Vec<usize> = (0..multiplicities.len()).map(|i| multiplicities.count(i)).collect::<Option<_>>()?;
     sanitise::expand_knots(&knots.reals()?, &m)

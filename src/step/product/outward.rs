@@ -14,7 +14,7 @@ const GRIDS: [usize; 3] = [4, 16, 23];
 const EDGE: usize = 6;
 
 /// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
-pub(super) fn is_inside_out(faces: &[Face]) -> bool {
+pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
     let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(polygons).collect();
     let around = Aabb::around(faces.iter().map(|f| f.surface.evaluate(middle(f))));
     if around.is_empty() {

@@ -1,7 +1,7 @@
 //! Shells, faces and loops of a representation as lists of ids, before any geometry is computed.
 
-use super::geometry::{Outcome, Refusal};
-use super::part21::{Entity, File};
+use crate::step::geometry::{Outcome, Refusal};
+use crate::step::part21::{Entity, File};
 use rustc_hash::FxHashMap;
 
 /// Names of solids that hold no faces but a recipe.
@@ -26,20 +26,20 @@ const RECIPES: [&str; 16] = [
 
 /// A shell to be converted.
 #[derive(Clone, Debug)]
-pub(super) struct ShellPlan {
-    pub(super) name: String,
-    pub(super) closed: bool,
+pub(crate) struct ShellPlan {
+    pub(crate) name: String,
+    pub(crate) closed: bool,
     /// Whether a solid lies inside of it, and no void.
-    pub(super) outer: bool,
+    pub(crate) outer: bool,
     /// Faces, and whether the shell turns them around.
-    pub(super) faces: Vec<(u64, bool)>,
+    pub(crate) faces: Vec<(u64, bool)>,
     /// Entities whose style the shell inherits, the nearest first.
-    pub(super) owners: Vec<u64>,
+    pub(crate) owners: Vec<u64>,
 }
 
 /// An edge as loops name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) enum EdgeKey {
+pub(crate) enum EdgeKey {
     /// An EDGE_CURVE.
     Entity(u64),
     /// The straight line between two points of POLY_LOOPs, the smaller id first.
@@ -48,32 +48,32 @@ pub(super) enum EdgeKey {
 
 /// A face's topology.
 #[derive(Clone, Debug)]
-pub(super) struct FacePlan {
-    pub(super) name: String,
-    pub(super) surface: u64,
-    pub(super) same_sense: bool,
-    pub(super) loops: Vec<Vec<(EdgeKey, bool)>>,
+pub(crate) struct FacePlan {
+    pub(crate) name: String,
+    pub(crate) surface: u64,
+    pub(crate) same_sense: bool,
+    pub(crate) loops: Vec<Vec<(EdgeKey, bool)>>,
 }
 
 /// What the items of a representation amount to.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Items {
-    pub(super) shells: Vec<ShellPlan>,
+pub(crate) struct Items {
+    pub(crate) shells: Vec<ShellPlan>,
     /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
-    pub(super) surfaces: Vec<u64>,
+    pub(crate) surfaces: Vec<u64>,
     /// Tessellated solids, shells and faces.
-    pub(super) tessellated: Vec<u64>,
-    pub(super) refused: Vec<Refusal>,
+    pub(crate) tessellated: Vec<u64>,
+    pub(crate) refused: Vec<Refusal>,
 }
 
 impl Items {
     /// Whether there is nothing to convert or to refuse.
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.shells.is_empty() && self.surfaces.is_empty() && self.tessellated.is_empty() && self.refused.is_empty()
     }
 
     /// Sorts one item in; what is no shape is left out.
-    pub(super) fn add(&mut self, file: &File<'_>, id: u64) {
+    pub(crate) fn add(&mut self, file: &File<'_>, id: u64) {
         let Some(e) = file.entity(id) else { return };
         let name = e.own("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).text(0).unwrap_or_default();
         if let Some(a) = e.own("MANIFOLD_SOLID_BREP", 1).or_else(|| e.own("FACETED_BREP", 1)) {
@@ -193,7 +193,7 @@ fn is_tessellated(keyword: &str) -> bool {
 }
 
 /// Whether an entity is a surface.
-pub(super) fn is_surface(e: Entity<'_, '_>) -> bool {
+pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     e.keywords().any(|k| {
         k.ends_with("_SURFACE")
             || k.starts_with("SURFACE_OF_")
@@ -203,7 +203,7 @@ pub(super) fn is_surface(e: Entity<'_, '_>) -> bool {
 }
 
 /// Reads the bounds of a face.
-pub(super) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
+pub(crate) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     let Some(e) = file.entity(id) else {
         return Err(Refusal {
             id,
@@ -274,7 +274,7 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
 }
 
 /// Edges in the order of first use.
-pub(super) fn number_edges<'p>(
+pub(crate) fn number_edges<'p>(
     faces: impl Iterator<Item = &'p FacePlan>,
 ) -> (Vec<EdgeKey>, FxHashMap<EdgeKey, usize>) {
     let (mut keys, mut index) = (Vec::new(), FxHashMap::default());

@@ -4,11 +4,11 @@ use crate::math::Point;
 
 /// An edge use with the points between which it runs.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Ends<T> {
-    pub(super) edge: T,
-    pub(super) reversed: bool,
-    pub(super) from: Point,
-    pub(super) to: Point,
+pub(crate) struct Ends<T> {
+    pub(crate) edge: T,
+    pub(crate) reversed: bool,
+    pub(crate) from: Point,
+    pub(crate) to: Point,
 }
 
 impl<T> Ends<T> {
@@ -26,7 +26,7 @@ fn open<T>(uses: &[Ends<T>]) -> f64 {
 
 /// Makes each use begin where the one before ends, within `tolerance` mm; says what was changed. A loop that cannot be
 /// closed this way stays as it was.
-pub(super) fn follow<T: Copy>(uses: &mut Vec<Ends<T>>, tolerance: f64) -> Option<&'static str> {
+pub(crate) fn follow<T: Copy>(uses: &mut Vec<Ends<T>>, tolerance: f64) -> Option<&'static str> {
     if open(uses) <= tolerance {
         return None;
     }

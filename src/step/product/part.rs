@@ -1,36 +1,36 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::edges::CutEdge;
-use super::face::{Built, EdgeShape, Task, build, trim_loops};
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::loops::Source;
 use super::order::{Ends, follow};
 use super::outward::is_inside_out;
-use super::part21::File;
-use super::settings::Settings;
 use super::styles::Styles;
-use super::surfaces::Reach;
 use super::topology::{EdgeKey, FacePlan, Items, face, number_edges};
-use super::units::Units;
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
+use crate::step::geometry::edges::CutEdge;
+use crate::step::geometry::surfaces::Reach;
+use crate::step::geometry::units::Units;
+use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::part21::File;
+use crate::step::settings::Settings;
+use crate::step::trim::face::{Built, EdgeShape, Task, build, trim_loops};
+use crate::step::trim::loops::Source;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A part with the account of its conversion.
 #[derive(Debug, Default)]
-pub(super) struct Converted {
-    pub(super) part: Part,
+pub(crate) struct Converted {
+    pub(crate) part: Part,
     /// Faces the file has, distinct.
-    pub(super) found: usize,
-    pub(super) refused: Vec<Refusal>,
+    pub(crate) found: usize,
+    pub(crate) refused: Vec<Refusal>,
     /// Faces that were repaired, and how.
-    pub(super) repaired: Vec<Refusal>,
+    pub(crate) repaired: Vec<Refusal>,
 }
 
 /// Converts the items of a representation.
-pub(super) fn convert(
+pub(crate) fn convert(
     file: &File<'_>,
     units: Units,
     items: &Items,
@@ -222,7 +222,7 @@ fn build_face(
 }
 
 /// Numbers a built face's seams and vertices into the part.
-pub(super) fn place(
+pub(crate) fn place(
     built: Built,
     id: u64,
     name: String,

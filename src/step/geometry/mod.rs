@@ -1,38 +1,50 @@
-//! Points, directions and placements of one unit system.
+//! Curves and surfaces of the file, in mm and radians.
+//!
+//! Source: ISO 10303-42. A curve becomes a closed form where there is one and a rational spline else (`curves`, `composite`,
+//! `pcurves`), an edge the part of its curve between its vertices (`edges`), a surface a chart (`surfaces`). What cannot be had is a
+//! [`Refusal`] that names the entity and the reason.
 
-use super::part21::{Entity, File};
-use super::units::Units;
+pub(super) mod composite;
+pub(super) mod curves;
+pub(super) mod edges;
+mod meridian;
+pub(super) mod pcurves;
+pub(super) mod surfaces;
+pub(super) mod units;
+
+use self::units::Units;
 use crate::math::{Frame, Point, Vector};
+use crate::step::part21::{Entity, File};
 
 /// Why a piece of geometry cannot be had: the entity and the reason.
 #[derive(Clone, Debug)]
-pub(super) struct Refusal {
+pub(crate) struct Refusal {
     /// The `#id` that is to blame.
-    pub(super) id: u64,
+    pub(crate) id: u64,
     /// Its name in the file.
-    pub(super) entity: String,
+    pub(crate) entity: String,
     /// What is wrong with it.
-    pub(super) reason: String,
+    pub(crate) reason: String,
 }
 
-pub(super) type Outcome<T> = Result<T, Refusal>;
+pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {
-    pub(super) fn of(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
+    pub(crate) fn of(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
 }
 
 /// Reads geometry in mm and radians.
 #[derive(Clone, Copy)]
-pub(super) struct Geometry<'f, 'a> {
-    pub(super) file: &'f File<'a>,
-    pub(super) units: Units,
+pub(crate) struct Geometry<'f, 'a> {
+    pub(crate) file: &'f File<'a>,
+    pub(crate) units: Units,
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// The instance with an id, or a refusal that says that it is missing.
-    pub(super) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
+    pub(crate) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
         self.file.entity(id).ok_or_else(|| Refusal {
             id,
             entity: String::new(),
@@ -41,7 +53,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// The instance that a parameter refers to.
-    pub(super) fn follow(
+    pub(crate) fn follow(
         &self,
         from: Entity<'f, 'a>,
         position: Option<u64>,
@@ -54,7 +66,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A CARTESIAN_POINT, mm.
-    pub(super) fn point(&self, id: u64) -> Outcome<Point> {
+    pub(crate) fn point(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
         let xs = e.own("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
         match xs.as_deref() {
@@ -65,7 +77,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A VERTEX_POINT, mm.
-    pub(super) fn vertex(&self, id: u64) -> Outcome<Point> {
+    pub(crate) fn vertex(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
         match e.own("VERTEX_POINT", 1).and_then(|a| a.id(0)) {
             Some(point) => self.point(point),
@@ -75,7 +87,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A DIRECTION, not normalised; `None` when absent or zero.
-    pub(super) fn direction(&self, id: Option<u64>) -> Option<Vector> {
+    pub(crate) fn direction(&self, id: Option<u64>) -> Option<Vector> {
         let e = self.file.entity(id?)?;
         let xs = e.own("DIRECTION", 1)?.list(0).reals()?;
         let d = match xs.as_slice() {
@@ -87,7 +99,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A VECTOR with its magnitude, mm.
-    pub(super) fn vector(&self, id: u64) -> Outcome<Vector> {
+    pub(crate) fn vector(&self, id: u64) -> Outcome<Vector> {
         let e = self.entity(id)?;
         let args = e.own("VECTOR", 1);
         let direction = args.and_then(|a| self.direction(a.id(0))).and_then(|d| d.try_normalize());
@@ -99,7 +111,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// An AXIS1_PLACEMENT, AXIS2_PLACEMENT_2D or AXIS2_PLACEMENT_3D as a right-handed frame, mm.
-    pub(super) fn placement(&self, id: u64) -> Outcome<Frame> {
+    pub(crate) fn placement(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let args = ["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT", "AXIS2_PLACEMENT_2D"];
         let Some((name, args)) = args.into_iter().find_map(|n| {
@@ -126,7 +138,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A placement or CARTESIAN_TRANSFORMATION_OPERATOR_3D: the target of a mapped item.
-    pub(super) fn transformation(&self, id: u64) -> Outcome<Frame> {
+    pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let Some(args) = e.own("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
             // The simple form has all attributes behind the name of the representation item (and its own).

@@ -1,20 +1,20 @@
 //! Curves given only in the parameter plane of a surface, offset curves, and cubic curves through what can be evaluated.
 
-use super::chart::Chart;
 use super::curves::{Directed, Shape};
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::{Args, Entity};
 use super::surfaces::Reach;
 use super::units::Units;
+use super::{Geometry, Outcome, Refusal};
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::Curve;
+use crate::step::chart::Chart;
+use crate::step::part21::{Args, Entity};
 
 /// Most pieces of a fitted curve.
 const MAX_PIECES: u32 = 4096;
 
 /// The C¹ cubic through a curve given by position and derivative, its pieces doubled until the middles agree to
 /// `tolerance` mm; the error left.
-pub(super) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
+pub(crate) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
     let mut n = 8u32;
     loop {
         let t = |i: f64| a + (b - a) * i / f64::from(n);
@@ -31,7 +31,7 @@ pub(super) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), toler
 }
 
 /// The first curve in a parameter plane of a surface curve that has none in space.
-pub(super) fn associated(e: Entity<'_, '_>) -> Option<u64> {
+pub(crate) fn associated(e: Entity<'_, '_>) -> Option<u64> {
     let list = e.own("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
     let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
     curves.find(|c| c.is_any(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
@@ -39,7 +39,7 @@ pub(super) fn associated(e: Entity<'_, '_>) -> Option<u64> {
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// An OFFSET_CURVE_3D: the basis moved along the reference direction × its tangent.
-    pub(super) fn offset_curve(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>, depth: usize) -> Outcome<Directed> {
+    pub(crate) fn offset_curve(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>, depth: usize) -> Outcome<Directed> {
         let basis = self.follow(e, own.id(0), "basis curve")?;
         let distance = own.real(1).map(|d| d * self.units.length).filter(|d| d.is_finite());
         let distance = distance.ok_or_else(|| Refusal::of(e, "its distance is missing"))?;
@@ -86,7 +86,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A PCURVE as a curve in space.
-    pub(super) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    pub(crate) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let own = e.own("PCURVE", 1).unwrap_or_else(|| e.args());
         let basis = self.follow(e, own.id(0), "basis surface")?;
         let definition = self.follow(e, own.id(1), "curve in the parameter plane")?;
@@ -126,5 +126,5 @@ fn lifted(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
         };
         cubic([w[0], w[1]], line, 1e-6).0
     });
-    parts.reduce(|a, b| super::curves::joined(&a, &b)).unwrap_or_else(|| curve.clone())
+    parts.reduce(|a, b| a.followed_by(&b)).unwrap_or_else(|| curve.clone())
 }

@@ -4,10 +4,10 @@
 //! CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs, and inside representations along relationships and MAPPED_ITEMs.
 //! What holds shapes and is reached by no product is placed where it is.
 
-use super::geometry::Geometry;
-use super::part21::{Entity, File};
-use super::units::Units;
 use crate::math::Frame;
+use crate::step::geometry::Geometry;
+use crate::step::geometry::units::Units;
+use crate::step::part21::{Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Deepest nesting of assemblies.
@@ -17,17 +17,17 @@ const MAX_PLACED: usize = 1 << 20;
 
 /// A representation where it stands.
 #[derive(Clone, Debug)]
-pub(super) struct Placed {
-    pub(super) representation: u64,
-    pub(super) placement: Frame,
+pub(crate) struct Placed {
+    pub(crate) representation: u64,
+    pub(crate) placement: Frame,
     /// Name of the occurrence, empty when it had none.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Name of the product, empty when it had none.
-    pub(super) product: String,
+    pub(crate) product: String,
     /// Entities that may carry a style for this occurrence.
-    pub(super) owners: Vec<u64>,
+    pub(crate) owners: Vec<u64>,
     /// Whether no product leads here: shapes that stand elsewhere already are not meant again.
-    pub(super) orphan: bool,
+    pub(crate) orphan: bool,
 }
 
 /// A directed relationship: what it leads to, and how that is placed.
@@ -44,7 +44,7 @@ struct Usage {
 }
 
 /// Structure of the file.
-pub(super) struct Assembly<'f, 'a> {
+pub(crate) struct Assembly<'f, 'a> {
     file: &'f File<'a>,
     /// Units by context.
     units: FxHashMap<u64, Units>,
@@ -58,7 +58,7 @@ pub(super) struct Assembly<'f, 'a> {
     placements: FxHashMap<u64, Frame>,
     links: FxHashMap<u64, Vec<Link>>,
     /// Things that could not be placed.
-    pub(super) problems: Vec<String>,
+    pub(crate) problems: Vec<String>,
     placed: Vec<Placed>,
     reached: FxHashSet<u64>,
     in_orphans: bool,
@@ -68,7 +68,7 @@ pub(super) struct Assembly<'f, 'a> {
 
 impl<'f, 'a> Assembly<'f, 'a> {
     /// Reads the structure.
-    pub(super) fn read(file: &'f File<'a>, units: FxHashMap<u64, Units>, fallback: Units) -> Self {
+    pub(crate) fn read(file: &'f File<'a>, units: FxHashMap<u64, Units>, fallback: Units) -> Self {
         let mut a = Self {
             file,
             units,
@@ -113,7 +113,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Units of a representation.
-    pub(super) fn units_of(&self, representation: u64) -> Units {
+    pub(crate) fn units_of(&self, representation: u64) -> Units {
         let context = self
             .file
             .entity(representation)
@@ -126,7 +126,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Items of a representation.
-    pub(super) fn items(&self, representation: u64) -> Vec<u64> {
+    pub(crate) fn items(&self, representation: u64) -> Vec<u64> {
         let Some(e) = self.file.entity(representation) else { return Vec::new() };
         let args = e.own("REPRESENTATION", 0).unwrap_or_else(|| e.args());
         args.list(1).ids()
@@ -205,7 +205,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Every placed representation, in the order of the file.
-    pub(super) fn walk(mut self) -> (Vec<Placed>, Self) {
+    pub(crate) fn walk(mut self) -> (Vec<Placed>, Self) {
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
         let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
         products.sort_unstable();

@@ -2,22 +2,22 @@
 
 use super::composite::same;
 use super::curves::{Directed, Shape};
-use super::geometry::{Geometry, Outcome, Refusal};
+use super::{Geometry, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
 /// An edge before it is numbered.
 #[derive(Clone, Debug)]
-pub(super) struct CutEdge {
+pub(crate) struct CutEdge {
     /// `None` for an edge without length.
-    pub(super) curve: Option<Curve>,
+    pub(crate) curve: Option<Curve>,
     /// Distance between the curve's ends and the vertices, mm.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// An EDGE_CURVE's curve, cut.
-    pub(super) fn edge(&self, id: u64) -> Outcome<CutEdge> {
+    pub(crate) fn edge(&self, id: u64) -> Outcome<CutEdge> {
         let e = self.entity(id)?;
         let Some(edge) = e.own("EDGE", 1) else {
             // Simple form: name, start, end, geometry, sense.
@@ -48,7 +48,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
 }
 
 /// The part of a curve between two points.
-pub(super) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool, sense: bool) -> Option<CutEdge> {
+pub(crate) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool, sense: bool) -> Option<CutEdge> {
     let shape = &directed.shape;
     let forward = sense != directed.reversed;
     let (a, b) = if forward { (p, q) } else { (q, p) };

@@ -1,31 +1,31 @@
 //! Surfaces of the file as charts.
 
-use super::chart::{Chart, Kind, SplineChart};
 use super::curves::{Directed, Shape, explicit_knots, knot_form};
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::{Args, Entity};
+use super::{Geometry, Outcome, Refusal};
 use crate::math::{Aabb, Frame, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::{Curve, conic, sanitise};
+use crate::step::chart::{Chart, Kind, SplineChart};
+use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 /// Where a face is, for surfaces whose curves have no ends or cross their axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach<'r> {
+pub(crate) struct Reach<'r> {
     /// Middle of its edges.
-    pub(super) center: Point,
+    pub(crate) center: Point,
     /// Distance from there that holds them all, mm.
-    pub(super) radius: f64,
+    pub(crate) radius: f64,
     /// Some points of its edges.
-    pub(super) points: &'r [Point],
+    pub(crate) points: &'r [Point],
 }
 
 impl<'r> Reach<'r> {
     /// Nothing is known of the face.
-    pub(super) const UNKNOWN: Self = Self { center: Point::ZERO, radius: 0.0, points: &[] };
+    pub(crate) const UNKNOWN: Self = Self { center: Point::ZERO, radius: 0.0, points: &[] };
 
     /// Around edges in a box.
-    pub(super) fn around(bounds: Aabb, points: &'r [Point]) -> Self {
+    pub(crate) fn around(bounds: Aabb, points: &'r [Point]) -> Self {
         if bounds.is_empty() {
             return Self::UNKNOWN;
         }
@@ -38,11 +38,11 @@ impl<'r> Reach<'r> {
 }
 
 /// Deepest chain of surfaces that refer to surfaces.
-pub(super) const MAX_DEPTH: usize = 8;
+pub(crate) const MAX_DEPTH: usize = 8;
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// A surface.
-    pub(super) fn chart(&self, id: u64, reach: Reach<'_>, depth: usize) -> Outcome<Chart> {
+    pub(crate) fn chart(&self, id: u64, reach: Reach<'_>, depth: usize) -> Outcome<Chart> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::of(e, "surfaces refer to each other too deeply"));
@@ -143,7 +143,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let basis = self.chart(basis.id, reach.grown(distance.abs()), depth + 1)?;
             // Along the normal of the file's surface, which the chart's may oppose.
             let signed = if basis.flipped { -distance } else { distance };
-            return super::offset::offset(&basis, signed)
+            return crate::step::chart::offset::offset(&basis, signed)
                 .ok_or_else(|| Refusal::of(e, "the offset leaves nothing of its basis"));
         }
         const SPLINES: [&str; 5] = [

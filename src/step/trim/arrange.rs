@@ -1,23 +1,23 @@
 //! From chains to the boundary of a region without periods: chains that wind around the surface are joined by seams,
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
-use super::chart::Chart;
 use super::loops::{Chain, Piece, Source, contains, signed_area};
 use crate::math::Uv;
 use crate::nurbs::UvCurve;
+use crate::step::chart::Chart;
 
 /// What the arrangement gives.
-pub(super) struct Arranged {
+pub(crate) struct Arranged {
     /// Closed loops, material on the left.
-    pub(super) loops: Vec<Chain>,
+    pub(crate) loops: Vec<Chain>,
     /// Straight seams in the parameter plane, by their number in [`Source::Seam`].
-    pub(super) seams: Vec<[Uv; 2]>,
+    pub(crate) seams: Vec<[Uv; 2]>,
     /// What had to be put right.
-    pub(super) repairs: Vec<&'static str>,
+    pub(crate) repairs: Vec<&'static str>,
 }
 
 /// Arranges the chains of a face, given with the material on their left.
-pub(super) fn arrange(
+pub(crate) fn arrange(
     mut chains: Vec<Chain>,
     chart: &Chart,
     implicit_outer: bool,

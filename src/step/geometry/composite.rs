@@ -1,11 +1,11 @@
 //! Bounded curves as splines: trimmed, composite, and whole curves.
 
-use super::curves::{Directed, MAX_DEPTH, Shape, joined};
-use super::geometry::{Geometry, Outcome, Refusal};
-use super::part21::{Args, Entity};
+use super::curves::{Directed, MAX_DEPTH, Shape};
 use super::pcurves::associated;
+use super::{Geometry, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
+use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 /// Most segments of one composite curve.
@@ -13,7 +13,7 @@ const MAX_SEGMENTS: usize = 100_000;
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// A curve with two ends (or closed), in its own direction.
-    pub(super) fn bounded(&self, id: u64, depth: usize) -> Outcome<Curve> {
+    pub(crate) fn bounded(&self, id: u64, depth: usize) -> Outcome<Curve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::of(e, "curves refer to each other too deeply"));
@@ -70,7 +70,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// The segments of a composite curve, in its direction.
-    pub(super) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
+    pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
         let own = ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]
             .into_iter()
             .find_map(|n| e.own(n, 1).filter(|a| a.list(0).len() > 0));
@@ -115,7 +115,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A composite curve as one spline.
-    pub(super) fn composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    pub(crate) fn composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         if depth > MAX_DEPTH {
             return Err(Refusal::of(e, "curves refer to each other too deeply"));
         }
@@ -123,7 +123,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
         let mut parts = segments.iter().map(|c| elevated(c, degree));
         let first = parts.next().ok_or_else(|| Refusal::of(e, "composite curve without segments"))?;
-        Ok(parts.fold(first, |whole, part| joined(&whole, &part)))
+        Ok(parts.fold(first, |whole, part| whole.followed_by(&part)))
     }
 }
 
@@ -153,7 +153,7 @@ fn elevated(curve: &Curve, degree: usize) -> Curve {
 }
 
 /// Whether two points are the same within the accuracy of files.
-pub(super) fn same(a: Point, b: Point, tolerance: f64) -> bool {
+pub(crate) fn same(a: Point, b: Point, tolerance: f64) -> bool {
     (a - b).length() <= tolerance
 }
 

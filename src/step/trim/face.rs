@@ -1,63 +1,63 @@
 //! One face: chart, loops in its plane, spline, and edges' uv curves.
 
 use super::arrange::{Arranged, arrange};
-use super::chart::{Chart, Kind, Pole};
 use super::fit::{Budget, Fit, Overrun, Target, project};
 use super::loops::{Chain, Piece, Source, chain};
-use super::offset;
 use super::seams::{Seam, Seams};
 use crate::math::{Uv, Vector};
 use crate::model::{Analytic, EdgeUse, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve, Surface};
+use crate::step::chart::offset;
+use crate::step::chart::{Chart, Kind, Pole};
 use rustc_hash::FxHashMap;
 
 /// Most periods that a face may span.
 const MAX_TURNS: f64 = 4.0;
 
 /// What a face needs to know of an edge.
-pub(super) struct EdgeShape<'e> {
-    pub(super) curve: &'e Curve,
+pub(crate) struct EdgeShape<'e> {
+    pub(crate) curve: &'e Curve,
 }
 
 /// A face to be built.
-pub(super) struct Task<'e> {
-    pub(super) chart: Chart,
+pub(crate) struct Task<'e> {
+    pub(crate) chart: Chart,
     /// Whether the face's normal is `Su × Sv`.
-    pub(super) same_sense: bool,
+    pub(crate) same_sense: bool,
     /// Loops as the file runs them: edge and whether it is run against its parameter.
-    pub(super) loops: Vec<Vec<(usize, bool)>>,
-    pub(super) edges: FxHashMap<usize, EdgeShape<'e>>,
+    pub(crate) loops: Vec<Vec<(usize, bool)>>,
+    pub(crate) edges: FxHashMap<usize, EdgeShape<'e>>,
     /// Allowed error of uv curves, mm.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
     /// Distance below which points of the file are the same, mm.
-    pub(super) accuracy: f64,
+    pub(crate) accuracy: f64,
     /// Evaluations that the face may take.
-    pub(super) budget: u64,
+    pub(crate) budget: u64,
     /// Whether the natural border of the surface is the outer loop.
-    pub(super) implicit_outer: bool,
+    pub(crate) implicit_outer: bool,
 }
 
 /// A built face; seams are numbered from 0, edges as in the task.
-pub(super) struct Built {
-    pub(super) surface: Surface,
-    pub(super) analytic: Analytic,
-    pub(super) reversed: bool,
-    pub(super) loops: Vec<Vec<BuiltUse>>,
-    pub(super) seams: Vec<Seam>,
-    pub(super) gap: f64,
-    pub(super) repairs: Vec<String>,
+pub(crate) struct Built {
+    pub(crate) surface: Surface,
+    pub(crate) analytic: Analytic,
+    pub(crate) reversed: bool,
+    pub(crate) loops: Vec<Vec<BuiltUse>>,
+    pub(crate) seams: Vec<Seam>,
+    pub(crate) gap: f64,
+    pub(crate) repairs: Vec<String>,
 }
 
 /// An edge use whose edge is not numbered yet.
-pub(super) struct BuiltUse {
-    pub(super) source: Source,
-    pub(super) reversed: bool,
-    pub(super) uv: crate::nurbs::UvCurve,
+pub(crate) struct BuiltUse {
+    pub(crate) source: Source,
+    pub(crate) reversed: bool,
+    pub(crate) uv: crate::nurbs::UvCurve,
 }
 
 impl BuiltUse {
     /// The use with its edge's number.
-    pub(super) fn numbered(self, id: impl Fn(Source) -> Option<crate::model::EdgeId>) -> EdgeUse {
+    pub(crate) fn numbered(self, id: impl Fn(Source) -> Option<crate::model::EdgeId>) -> EdgeUse {
         EdgeUse { edge: id(self.source), reversed: self.reversed, uv: self.uv }
     }
 }
@@ -69,7 +69,7 @@ impl From<Overrun> for &'static str {
 }
 
 /// Builds a face, or says why not.
-pub(super) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
+pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
     let budget = Budget::new(task.budget);
     turn_sphere(&mut task);
     let chart = &task.chart;
@@ -240,7 +240,7 @@ fn fit_edge(chart: &Chart, curve: &Curve, task: &Task<'_>, budget: &Budget) -> R
 }
 
 /// The edge in the spline's parameters, following the piece in the chart's.
-pub(super) fn refit(
+pub(crate) fn refit(
     chart: &Chart,
     surface: &Surface,
     domain: [[f64; 2]; 2],
@@ -350,7 +350,7 @@ fn snap(uses: &mut [BuiltUse], surface: &Surface) -> f64 {
 }
 
 /// Loops of numbered uses.
-pub(super) fn trim_loops(
+pub(crate) fn trim_loops(
     loops: Vec<Vec<BuiltUse>>,
     id: impl Fn(Source) -> Option<crate::model::EdgeId>,
 ) -> Vec<TrimLoop> {
