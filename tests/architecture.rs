@@ -23,7 +23,10 @@ const FLOORS: &[(&str, u32)] = &[
 ];
 
 /// Large rooms have rooms of their own, each of which sees only those before it.
-const INNER: &[(&str, &[&str])] = &[("step", &["part21", "chart", "geometry", "trim", "product"])];
+const INNER: &[(&str, &[&str])] = &[
+    ("step", &["part21", "chart", "geometry", "trim", "product"]),
+    ("tessellate", &["proof", "border", "strip", "cells"]),
+];
 
 /// Crates that only one room may name.
 const DOORS: &[(&str, &[&str])] = &[

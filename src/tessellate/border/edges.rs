@@ -1,11 +1,11 @@
 //! Each edge is sampled once, in space, for the tighter of its faces; both faces use those very points.
 
-use super::super::proof::flat::from_chord;
-use super::super::sheet::{CREASE, Sheet};
 use super::opposite;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Edge, EdgeUse, Face, Part};
 use crate::nurbs::Curve;
+use crate::tessellate::proof::flat::from_chord;
+use crate::tessellate::sheet::{CREASE, Sheet};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 

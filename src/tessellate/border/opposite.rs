@@ -4,9 +4,9 @@
 //! parameter. The one with more samples hands its own on, from face to face, as long as the next has at least half
 //! as many: a strip between unequal sides has as many facets as the longer one anyway.
 
-use super::super::sheet::Sheet;
 use super::edges::{Side, breaks, hold};
 use crate::model::{EdgeUse, Face, Part};
+use crate::tessellate::sheet::Sheet;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 

@@ -1,10 +1,10 @@
 //! The border of a face as polygons in its parameter plane, on the shared samples of its edges.
 
-use super::super::sheet::Sheet;
 use super::edges::{self, Division};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeUse, Face, Part, TrimLoop};
 use crate::nurbs::UvCurve;
+use crate::tessellate::sheet::Sheet;
 
 /// A vertex of a border polygon, and what the polygon's edge that starts there follows.
 #[derive(Clone, Copy, Debug)]

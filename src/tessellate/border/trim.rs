@@ -1,12 +1,12 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
-use super::super::proof::bound::Prover;
-use super::super::proof::flat::from_chord;
-use super::super::proof::near::Near;
-use super::super::sheet::Sheet;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::proof::flat::from_chord;
+use crate::tessellate::proof::near::Near;
+use crate::tessellate::sheet::Sheet;
 use smallvec::{SmallVec, smallvec};
 
 /// Share of the tolerance below which the file's own gap is taken as it is known for the whole face.

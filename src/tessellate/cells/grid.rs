@@ -1,13 +1,13 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
-use super::super::border::trim::Trim;
-use super::super::proof::bound::Prover;
-use super::super::proof::flat::from_chord;
-use super::super::sheet::Sheet;
-use super::super::strip::delaunay::{Node, key, prove};
 use super::lines::Lines;
 use super::tree::{Cell, Leaf, Leaves};
 use crate::math::Uv;
+use crate::tessellate::border::trim::Trim;
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::proof::flat::from_chord;
+use crate::tessellate::sheet::Sheet;
+use crate::tessellate::strip::delaunay::{Node, key, prove};
 use rustc_hash::FxHashMap;
 
 /// The cells of a face that became facets.

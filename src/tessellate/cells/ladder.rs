@@ -1,10 +1,10 @@
 //! Preferred parameters for the cuts of the tree: samples of border edges that run along parameter lines, or lines spread evenly in
 //! curvature.
 
-use super::super::border::rings::{Follows, Rings};
-use super::super::sheet::Sheet;
 use super::tree::Cell;
 use crate::math::Uv;
+use crate::tessellate::border::rings::{Follows, Rings};
+use crate::tessellate::sheet::Sheet;
 
 /// Preferred cuts in direction `d`.
 pub(in crate::tessellate) fn ladder(sheet: &Sheet<'_>, rings: &Rings, root: Cell, d: usize) -> Vec<f64> {

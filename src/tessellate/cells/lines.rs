@@ -1,8 +1,8 @@
 //! The parameter lines on which sides of cells lie, and the nodes on them.
 
-use super::super::strip::delaunay::{Node, key};
 use super::tree::{Cell, Leaves};
 use crate::math::Uv;
+use crate::tessellate::strip::delaunay::{Node, key};
 use rustc_hash::FxHashMap;
 
 /// Most cells that are cut to lead one hanging vertex to another.

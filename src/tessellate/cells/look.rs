@@ -1,10 +1,10 @@
 //! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
 
-use super::super::proof::bound::Prover;
-use super::super::proof::flat::from_chord;
-use super::super::sheet::Sheet;
 use super::tree::Cell;
 use crate::math::{Point, Uv};
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::proof::flat::from_chord;
+use crate::tessellate::sheet::Sheet;
 use smallvec::SmallVec;
 
 /// Shares of the tolerance that the curve over the diagonal may stray from it in a cell that is proved as one quad. With hanging vertices

@@ -3,14 +3,14 @@
 //! Cuts fall on a ladder of preferred parameters, so that neighbouring cells and the border line up; below the ladder they
 //! halve. A cell is kept whole when it is clear of the border, or when the border runs along its sides, corner on sample.
 
-use super::super::border::rings::{Follows, Rings};
-use super::super::proof::bound::Prover;
-use super::super::settings::Judge;
-use super::super::sheet::Sheet;
-use super::super::strip::sector;
 use super::ladder::ladder;
 use super::look::Look;
 use crate::math::{Point, Uv};
+use crate::tessellate::border::rings::{Follows, Rings};
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::settings::Judge;
+use crate::tessellate::sheet::Sheet;
+use crate::tessellate::strip::sector;
 
 /// A rectangle `[lo, hi]` of the parameter plane.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,8 +17,6 @@
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
 
-use super::super::settings::Judge;
-use super::super::sheet::{Sheet, local};
 use super::flat::{Flat, clip, from_chord, whole};
 use super::near::Near;
 use super::net::{Corner, MOST_HALVED, Nets};
@@ -28,6 +26,8 @@ use super::scalar::Scalar;
 use super::slight::{self, Slight};
 use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
+use crate::tessellate::settings::Judge;
+use crate::tessellate::sheet::{Sheet, local};
 
 /// Knot rectangles that one triangle may span and still be tried.
 const MOST_PIECES: usize = 20_000;

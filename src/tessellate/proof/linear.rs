@@ -3,10 +3,10 @@
 //! Beside a chord, S = L + D with L in a plane through it and D = D⊥ + D∥: a point of the sliver is at most
 //! √(|D⊥|² + (reach + |D∥|)²) from the chord.
 
-use super::super::sheet::Sheet;
 use super::flat::from_chord;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::BezierPatch;
+use crate::tessellate::sheet::Sheet;
 use smallvec::SmallVec;
 
 /// Triangles with a smaller share of the rectangle around them are left to others: their L is steep.

@@ -7,11 +7,11 @@
 //! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
 //! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `net.rs` decides.
 
-use super::super::sheet::{Sheet, local};
 use super::linear::Linear;
 use super::refine::split;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
+use crate::tessellate::sheet::{Sheet, local};
 use smallvec::{SmallVec, smallvec};
 
 /// Triangles that reach into a patch by less than this share are left to others.

@@ -15,12 +15,12 @@
 //! The curve over the diagonal plays no part, where the proof of each triangle by itself must hold it to the traced diagonal: on a surface
 //! that is uneven or twisted in its own plane that alone cuts cells. And one net takes the place of the nets of two triangles.
 
-use super::super::settings::Judge;
-use super::super::sheet::local;
 use super::bound::Prover;
 use super::flat::from_chord;
 use super::refine::split;
 use crate::math::{Point, Uv, Vector};
+use crate::tessellate::settings::Judge;
+use crate::tessellate::sheet::local;
 
 /// Knot rectangles up to which a cell is looked at as one quad.
 const MOST_PATCHES: usize = 16;

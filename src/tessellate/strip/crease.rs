@@ -1,8 +1,8 @@
 //! Sharp creases of the surface through the strip: lines that no triangle and no quad crosses, so that each side keeps its own normals.
 
-use super::super::sheet::Sheet;
 use super::delaunay::{Node, key};
 use crate::math::Uv;
+use crate::tessellate::sheet::Sheet;
 use rustc_hash::FxHashMap;
 
 /// Lines between neighbouring nodes on each crease, where they run inside what `segments` bound.

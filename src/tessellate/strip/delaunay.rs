@@ -1,13 +1,13 @@
 //! Between the whole cells and the border: constrained Delaunay in parameters scaled by curvature, refined where a
 //! triangle cannot be proved.
 
-use super::super::border::trim::Trim;
-use super::super::proof::bound::Prover;
-use super::super::settings::Judge;
-use super::super::sheet::Sheet;
 use super::sector;
 use crate::math::{Point, Uv};
 use crate::model::EdgeId;
+use crate::tessellate::border::trim::Trim;
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::settings::Judge;
+use crate::tessellate::sheet::Sheet;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -17,7 +17,7 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation
 pub(in crate::tessellate) struct Node {
     pub(in crate::tessellate) uv: Uv,
     pub(in crate::tessellate) place: Point,
-    /// Shared or own position; see [`super::super::border::rings::RingVertex`].
+    /// Shared or own position; see [`crate::tessellate::border::rings::RingVertex`].
     pub(in crate::tessellate) position: u32,
 }
 

@@ -1,10 +1,10 @@
 //! Where the strip's triangles are divided further.
 
-use super::super::border::trim::Trim;
-use super::super::proof::flat::from_chord;
 use super::delaunay::{Node, Work, key};
 use super::sector;
 use crate::math::Uv;
+use crate::tessellate::border::trim::Trim;
+use crate::tessellate::proof::flat::from_chord;
 use rustc_hash::FxHashMap;
 
 /// Share of the tolerance within which places are one.

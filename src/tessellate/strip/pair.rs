@@ -1,11 +1,11 @@
 //! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
 
-use super::super::proof::bound::Prover;
-use super::super::sheet::Sheet;
 use super::delaunay::{Node, Strip, key};
 use super::sector;
 use super::{crease, matching};
 use crate::math::Uv;
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::sheet::Sheet;
 use rustc_hash::FxHashMap;
 
 /// A facet of the strip; a triangle repeats its third corner.

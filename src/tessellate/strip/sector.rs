@@ -17,11 +17,11 @@
 //! corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners lie in one direction from
 //! the pole the piece has no width and the sides decide alone.
 
-use super::super::border::trim::Trim;
-use super::super::proof::bound::Prover;
-use super::super::sheet::Sheet;
 use super::delaunay::key;
 use crate::math::{Point, Uv};
+use crate::tessellate::border::trim::Trim;
+use crate::tessellate::proof::bound::Prover;
+use crate::tessellate::sheet::Sheet;
 use rustc_hash::FxHashMap;
 
 /// Where the parameter line of `x` meets the pole at `pole`, whose parameter `across` it keeps.
