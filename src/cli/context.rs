@@ -1,4 +1,4 @@
-use super::args::Arguments;
+use super::arguments::args::Arguments;
 use crate::report::Provenance;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
@@ -143,6 +143,13 @@ fn command_line(line: &[OsString]) -> String {
         }
     };
     std::iter::once("lampyris".to_owned()).chain(line.iter().skip(1).map(quote)).collect::<Vec<_>>().join(" ")
+}
+
+/// The bar follows the study's own clock, remaining time included.
+pub(crate) fn show(bar: &ProgressBar, p: &crate::study::Progress) {
+    let left = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
+    bar.set_message(format!("{}{left}", p.stage));
+    bar.set_position((1000.0 * p.done.clamp(0.0, 1.0)) as u64);
 }
 
 #[cfg(test)]

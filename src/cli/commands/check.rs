@@ -1,12 +1,14 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
-use super::args::Refusals;
-use super::context::{Context, print};
-use super::engine::Choice;
-use super::load::Input;
-use super::options::{Meshing, Tracing};
-use super::witness::Witness;
-use super::{Failure, Outcome, aim, engine, load, look, pairs};
+use crate::cli::arguments::args::Refusals;
+use crate::cli::arguments::options::{Meshing, Tracing};
+use crate::cli::context::{Context, print};
+use crate::cli::output::look;
+use crate::cli::work::engine::Choice;
+use crate::cli::work::load::Input;
+use crate::cli::work::witness::Witness;
+use crate::cli::work::{aim, engine, load, pairs};
+use crate::cli::{Failure, Outcome};
 use crate::formats::write_atomic;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::Exact;
@@ -23,16 +25,16 @@ use crate::study::{Quantiles, Summary, records};
 use std::path::{Path, PathBuf};
 
 /// What `check` was asked for.
-pub(super) struct Asked<'a> {
-    pub(super) file: &'a Path,
-    pub(super) meshing: &'a Meshing,
-    pub(super) tracing: &'a Tracing,
-    pub(super) accuracy: Option<&'a str>,
-    pub(super) rays_out: Option<&'a PathBuf>,
-    pub(super) rays_in: Option<&'a PathBuf>,
-    pub(super) disagreements: Option<&'a PathBuf>,
-    pub(super) output: Option<&'a PathBuf>,
-    pub(super) limits: Refusals,
+pub(crate) struct Asked<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) meshing: &'a Meshing,
+    pub(crate) tracing: &'a Tracing,
+    pub(crate) accuracy: Option<&'a str>,
+    pub(crate) rays_out: Option<&'a PathBuf>,
+    pub(crate) rays_in: Option<&'a PathBuf>,
+    pub(crate) disagreements: Option<&'a PathBuf>,
+    pub(crate) output: Option<&'a PathBuf>,
+    pub(crate) limits: Refusals,
 }
 
 /// Rays when nothing else is asked: a second or two on a lamp.
@@ -40,7 +42,7 @@ const RAYS: u64 = 100_000;
 /// Rays of a timed round, and rounds.
 const TIMED: (usize, usize) = (20_000, 3);
 
-pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
     let threads = engine::threads(asked.tracing.threads)?;
     let given = asked.rays_in.map(|p| read_rays(p)).transpose()?;
     let input = load::either(asked.file, context)?;
@@ -292,7 +294,7 @@ fn described(c: &Check, normals: NormalMode) -> String {
             c.exact.uncertified
         ),
     );
-    let mut table = super::tables::blank(100);
+    let mut table = crate::cli::output::tables::blank(100);
     table.set_header(["", "Mrays/s, 1 thread", "build", "bytes per facet"]);
     let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);
     for (((name, rate), (_, build)), (_, size)) in m.named().into_iter().zip(b.named()).zip(s.named()) {

@@ -1,7 +1,7 @@
 //! STEP files and scenes from disk, with the exit codes that their errors deserve.
 
-use super::context::Context;
-use super::{Failure, Outcome};
+use crate::cli::context::Context;
+use crate::cli::{Failure, Outcome};
 use crate::model::Model;
 use crate::simulate::scene::ModelUse;
 use crate::simulate::{self, Scene};
@@ -10,14 +10,14 @@ use std::path::Path;
 use std::time::Instant;
 
 /// A model with the accounts of the files it was read from.
-pub(super) struct Loaded {
-    pub(super) model: Model,
-    pub(super) reports: Vec<ImportReport>,
-    pub(super) seconds: f64,
+pub(crate) struct Loaded {
+    pub(crate) model: Model,
+    pub(crate) reports: Vec<ImportReport>,
+    pub(crate) seconds: f64,
 }
 
 /// What a FILE argument turned out to be.
-pub(super) enum Input {
+pub(crate) enum Input {
     /// A CAD model.
     Step(Loaded),
     /// A scene with its models in one.
@@ -25,7 +25,7 @@ pub(super) enum Input {
 }
 
 /// Reads one STEP file, its lengths in the file's own unit or in one of so many mm.
-pub(super) fn step_file(path: &Path, unit_mm: Option<f64>, context: &Context) -> Result<Import, Failure> {
+pub(crate) fn step_file(path: &Path, unit_mm: Option<f64>, context: &Context) -> Result<Import, Failure> {
     let spinner = context.spinner(&format!("reading {}", path.display()));
     let import = step::read(path, &step::Settings { length_unit_mm: unit_mm, ..step::Settings::default() });
     spinner.finish_and_clear();
@@ -33,7 +33,7 @@ pub(super) fn step_file(path: &Path, unit_mm: Option<f64>, context: &Context) ->
 }
 
 /// A STEP file as a model.
-pub(super) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failure> {
+pub(crate) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failure> {
     let start = Instant::now();
     let Import { model, report } = step_file(path, None, context)?;
     if model.placed_face_count() == 0 {
@@ -44,7 +44,7 @@ pub(super) fn model_file(path: &Path, context: &Context) -> Result<Loaded, Failu
 }
 
 /// Reads the models of a scene with `read`, which gets each entry of the scene.
-pub(super) fn scene_models(
+pub(crate) fn scene_models(
     scene: &Scene,
     read: impl Fn(&ModelUse) -> Result<Import, Failure>,
 ) -> Result<Loaded, Failure> {
@@ -69,7 +69,7 @@ pub(super) fn scene_models(
 }
 
 /// Reads a scene file and the models it names.
-pub(super) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loaded), Failure> {
+pub(crate) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loaded), Failure> {
     let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
     if ["stp", "step", "p21"].into_iter().any(is) {
         let failure =
@@ -84,7 +84,7 @@ pub(super) fn scene_file(path: &Path, context: &Context) -> Result<(Scene, Loade
 }
 
 /// A scene when the name ends in `.toml`, a STEP file otherwise.
-pub(super) fn either(path: &Path, context: &Context) -> Result<Input, Failure> {
+pub(crate) fn either(path: &Path, context: &Context) -> Result<Input, Failure> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let (scene, loaded) = scene_file(path, context)?;
         return Ok(Input::Scene(Box::new(scene), loaded));
@@ -93,7 +93,7 @@ pub(super) fn either(path: &Path, context: &Context) -> Result<Input, Failure> {
 }
 
 /// Says what was refused and whether that is more than allowed.
-pub(super) fn account(reports: &[ImportReport], max_refused: f64, context: &Context) -> Outcome {
+pub(crate) fn account(reports: &[ImportReport], max_refused: f64, context: &Context) -> Outcome {
     let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
     if refused == 0 {
         return Outcome::Done;

@@ -1,10 +1,12 @@
 //! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, in alternating rounds, on one
 //! thread and on all; answers that differ are judged with twice the digits.
 
-use super::cells::Shape;
-use super::context::Context;
-use super::options::{Meshing, Tracing};
-use super::{Failure, demo, engine, load};
+use super::demo;
+use crate::cli::Failure;
+use crate::cli::arguments::options::{Meshing, Tracing};
+use crate::cli::context::Context;
+use crate::cli::output::cells::Shape;
+use crate::cli::work::{engine, load};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
@@ -27,13 +29,13 @@ const RAYS: u64 = 50_000;
 const ROUNDS: usize = 11;
 
 /// Rows, the sentence that answers, and what the octrees look like.
-pub(super) struct Race {
-    pub(super) rows: Vec<Value>,
-    pub(super) answer: String,
-    pub(super) shapes: Vec<Shape>,
+pub(crate) struct Race {
+    pub(crate) rows: Vec<Value>,
+    pub(crate) answer: String,
+    pub(crate) shapes: Vec<Shape>,
 }
 
-pub(super) fn run(
+pub(crate) fn run(
     file: Option<&Path>,
     meshing: &Meshing,
     tracing: &Tracing,

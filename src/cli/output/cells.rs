@@ -1,6 +1,6 @@
 //! What an octree looks like, for people: its statistics as text and in the report, its boxes as files to turn around.
 
-use super::Failure;
+use crate::cli::Failure;
 use crate::formats::{Facets, Group, Polylines, write_atomic, write_facets};
 use crate::intersect::octree::{Octree, Statistics};
 use crate::intersect::{Cost, Intersector};
@@ -16,17 +16,17 @@ const MOST_BOXES: usize = 50_000;
 const MOST_DRAWN: usize = 2_000;
 
 /// An octree after its race.
-pub(super) struct Shape {
+pub(crate) struct Shape {
     facets: usize,
     bytes: usize,
     statistics: Statistics,
     boxes: Vec<(usize, Aabb)>,
     /// Kind of rays, and what the octree did for them.
-    pub(super) costs: Vec<(String, Cost)>,
+    pub(crate) costs: Vec<(String, Cost)>,
 }
 
 impl Shape {
-    pub(super) fn of(octree: &Octree) -> Self {
+    pub(crate) fn of(octree: &Octree) -> Self {
         let footprint = octree.footprint();
         Self {
             facets: footprint.primitives,
@@ -60,7 +60,7 @@ impl Shape {
 }
 
 /// Writes `octree.txt` for all trees, `octree.vtu` and `octree.glb` for the first.
-pub(super) fn write(folder: &Path, shapes: &[Shape]) -> Result<(), Failure> {
+pub(crate) fn write(folder: &Path, shapes: &[Shape]) -> Result<(), Failure> {
     let text: Vec<String> = shapes.iter().map(Shape::described).collect();
     write_atomic(&folder.join("octree.txt"), |w| w.write_all(text.join("\n").as_bytes()))?;
     let Some(first) = shapes.first() else { return Ok(()) };
@@ -112,7 +112,7 @@ fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
 }
 
 /// Cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly.
-pub(super) fn drawn(shape: &Shape) -> View {
+pub(crate) fn drawn(shape: &Shape) -> View {
     let mut boxes = shape.boxes.clone();
     boxes.sort_by_key(|(depth, _)| *depth);
     let total = boxes.len();
@@ -153,7 +153,7 @@ fn frame(b: &Aabb) -> [Point; 16] {
 }
 
 /// The section of the report.
-pub(super) fn section(shapes: &[Shape]) -> Section {
+pub(crate) fn section(shapes: &[Shape]) -> Section {
     let deepest = shapes.iter().map(|s| s.statistics.depths.len()).max().unwrap_or(0);
     let layer = |s: &Shape| {
         let share = |depth: usize| {

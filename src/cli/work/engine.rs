@@ -1,8 +1,8 @@
 //! From options to facets and intersectors.
 
-use super::Failure;
-use super::context::Context;
-use super::options::{IntersectorKind, Meshing, Tracing};
+use crate::cli::Failure;
+use crate::cli::arguments::options::{IntersectorKind, Meshing, Tracing};
+use crate::cli::context::Context;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
@@ -16,14 +16,14 @@ use std::time::Instant;
 
 /// What finds the hits, and how the normal there is got.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Choice {
-    pub(super) intersector: IntersectorKind,
-    pub(super) normals: NormalMode,
+pub(crate) struct Choice {
+    pub(crate) intersector: IntersectorKind,
+    pub(crate) normals: NormalMode,
 }
 
 impl Choice {
     /// The options, else the scene, else octree and bilinear.
-    pub(super) fn new(tracing: &Tracing, scene: Option<&Scene>) -> Result<Self, Failure> {
+    pub(crate) fn new(tracing: &Tracing, scene: Option<&Scene>) -> Result<Self, Failure> {
         use clap::ValueEnum;
         fn named<T: ValueEnum + Default>(
             asked: Option<T>,
@@ -51,7 +51,7 @@ impl Choice {
 }
 
 /// The mesher's settings from options and scene.
-pub(super) fn mesh_settings(
+pub(crate) fn mesh_settings(
     meshing: &Meshing,
     scene: Option<&Scene>,
     model: &Model,
@@ -81,7 +81,7 @@ pub(super) fn mesh_settings(
         if !model.parts.iter().any(|p| p.name == *name) {
             let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
             return Err(Failure::arguments(format!("--part {name}: the model has no part of this name"))
-                .help(super::suggest::names("its parts are", name, &known)));
+                .help(crate::cli::arguments::suggest::names("its parts are", name, &known)));
         }
         let place = Place::Part(name.clone());
         settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
@@ -95,7 +95,7 @@ pub(super) fn mesh_settings(
                 Failure::arguments(format!("--face {name}: the model has no face of this name or number"));
             return Err(failure.help(match names.as_slice() {
                 [] => "its faces have no names; write the number of the entity in the file, as in #17=0.01".into(),
-                names => super::suggest::names("its faces are", name, names),
+                names => crate::cli::arguments::suggest::names("its faces are", name, names),
             }));
         }
         let named = known().any(|f| f.name == *name);
@@ -106,7 +106,7 @@ pub(super) fn mesh_settings(
 }
 
 /// Facets with the time they took.
-pub(super) fn facets(model: &Model, settings: &tessellate::Settings, context: &Context) -> (Tessellation, f64) {
+pub(crate) fn facets(model: &Model, settings: &tessellate::Settings, context: &Context) -> (Tessellation, f64) {
     let start = Instant::now();
     let spinner = context.spinner("making facets");
     let tessellation = tessellate(model, settings);
@@ -115,7 +115,7 @@ pub(super) fn facets(model: &Model, settings: &tessellate::Settings, context: &C
 }
 
 /// Builds the chosen intersector and hands it to `work`, with what it took to build.
-pub(super) fn with_intersector<T>(
+pub(crate) fn with_intersector<T>(
     choice: Choice,
     model: &Model,
     mesh: &FacetMesh,
@@ -149,7 +149,7 @@ pub(super) fn with_intersector<T>(
 }
 
 /// Sets the number of threads of everything that runs in parallel; all cores when nothing is asked. Gives the number.
-pub(super) fn threads(asked: Option<usize>) -> Result<usize, Failure> {
+pub(crate) fn threads(asked: Option<usize>) -> Result<usize, Failure> {
     let all = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = match asked {
         None => all,

@@ -1,25 +1,27 @@
 //! `lampyris demo`: the main job on the built-in three-cavity lamp, in any folder, with nothing else installed.
 
-use super::context::{Context, print};
-use super::job::{self, Job};
-use super::load::Loaded;
-use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, load, trace};
+use super::trace;
+use crate::cli::arguments::options::{Meshing, Tracing};
+use crate::cli::context::{Context, print};
+use crate::cli::work::job::{self, Job};
+use crate::cli::work::load;
+use crate::cli::work::load::Loaded;
+use crate::cli::{Failure, Outcome};
 use crate::report::{figures, grouped, seconds};
 use crate::simulate::Scene;
 use crate::step;
 use std::path::Path;
 
 /// The lamp: housing with three paraboloids, clear cover, three LED blocks.
-const LAMP: &[u8] = include_bytes!("../../fixtures/step/lamp_multicavity.stp");
+const LAMP: &[u8] = include_bytes!("../../../fixtures/step/lamp_multicavity.stp");
 /// LEDs, media, mirrors and receivers around it.
-const SCENE: &str = include_str!("../../fixtures/scenes/demo.toml");
+const SCENE: &str = include_str!("../../../fixtures/scenes/demo.toml");
 
 /// Share of the power that meets the wall at 25 m, and segments a ray, as other programs found them on facets of 0.001 mm
 /// (Mitsuba 3.9, 2e7 rays).
 const ELSEWHERE: [f64; 2] = [0.75595, 3.694];
 
-pub(super) fn run(
+pub(crate) fn run(
     folder: &Path,
     meshing: &Meshing,
     tracing: &Tracing,
@@ -62,7 +64,7 @@ pub(super) fn run(
 }
 
 /// The built-in lamp with its scene.
-pub(super) fn lamp() -> Result<(Scene, Loaded), Failure> {
+pub(crate) fn lamp() -> Result<(Scene, Loaded), Failure> {
     let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
     let loaded = load::scene_models(&scene, |_| {
         Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?)

@@ -1,25 +1,25 @@
 //! Commands about the command itself.
 
-use super::args::Arguments;
-use super::context::{Context, print};
-use super::{Failure, Outcome};
+use crate::cli::arguments::args::Arguments;
+use crate::cli::context::{Context, print};
+use crate::cli::{Failure, Outcome};
 use crate::formats::write_atomic;
 use clap::CommandFactory;
 use std::path::Path;
 
-pub(super) fn completions(shell: clap_complete::Shell) -> Result<Outcome, Failure> {
+pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Outcome, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "lampyris", &mut script);
     print(&String::from_utf8_lossy(&script))?;
     Ok(Outcome::Done)
 }
 
-pub(super) fn schema() -> Result<Outcome, Failure> {
+pub(crate) fn schema() -> Result<Outcome, Failure> {
     print(&format!("{:#}\n", crate::simulate::Scene::schema()))?;
     Ok(Outcome::Done)
 }
 
-pub(super) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, Failure> {
     let mut command = Arguments::command();
     command.build();
     let render = |command: clap::Command| -> std::io::Result<Vec<u8>> {

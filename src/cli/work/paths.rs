@@ -1,6 +1,6 @@
 //! `--paths FILE.npz`: every vertex of every path of a run.
 
-use super::Failure;
+use crate::cli::Failure;
 use crate::formats::{Column, Error, NpzStream};
 use crate::simulate::PathVertex;
 use std::path::Path;
@@ -16,12 +16,12 @@ const COLUMNS: [Column; 6] = [
 ];
 
 /// The file in the making, and what went wrong with it.
-pub(super) struct Paths {
+pub(crate) struct Paths {
     state: Mutex<(NpzStream, Option<Error>)>,
 }
 
 impl Paths {
-    pub(super) fn create(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
             return Err(Failure::arguments(message).help("write --paths paths.npz"));
@@ -30,7 +30,7 @@ impl Paths {
     }
 
     /// Takes some vertices; after a failure no more.
-    pub(super) fn take(&self, vertices: &[PathVertex]) {
+    pub(crate) fn take(&self, vertices: &[PathVertex]) {
         let mut columns: [Vec<u8>; 6] = Default::default();
         for v in vertices {
             columns[0].extend(v.ray.to_le_bytes());
@@ -48,12 +48,12 @@ impl Paths {
     }
 
     /// Whether writing has failed, so that tracing on is of no use.
-    pub(super) fn failed(&self) -> bool {
+    pub(crate) fn failed(&self) -> bool {
         self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
     }
 
     /// Completes the file and gives the number of vertices.
-    pub(super) fn finish(self) -> Result<u64, Failure> {
+    pub(crate) fn finish(self) -> Result<u64, Failure> {
         match self.state.into_inner().unwrap_or_else(|e| e.into_inner()) {
             (stream, None) => Ok(stream.finish()?),
             (_, Some(e)) => Err(e.into()),

@@ -3,11 +3,11 @@
 //! Runs of growing length are traced, each from its beginning, until one is good enough; so the result is the very one of
 //! `--rays N`, whatever number of threads found the N. The runs before the last cost about half of it at most.
 
-use super::Failure;
-use super::context::Context;
 use super::engine;
 use super::job::{Prepared, Ways};
-use super::suggest;
+use crate::cli::Failure;
+use crate::cli::arguments::suggest;
+use crate::cli::context::Context;
 use crate::report::{figures, grouped};
 use crate::simulate::{Portion, ReceiverResult, Results, Scene};
 use serde::Serialize;
@@ -19,7 +19,7 @@ const MOST: u64 = 10_000_000_000;
 
 /// What is asked for.
 #[derive(Debug, PartialEq)]
-pub(super) struct Until {
+pub(crate) struct Until {
     percent: f64,
     receiver: String,
     cells: bool,
@@ -27,17 +27,17 @@ pub(super) struct Until {
 
 /// What came of it.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Answer {
-    pub(super) receiver: String,
+pub(crate) struct Answer {
+    pub(crate) receiver: String,
     of: &'static str,
     asked_percent: f64,
     found_percent: Option<f64>,
     rays: u64,
-    pub(super) reached: bool,
+    pub(crate) reached: bool,
 }
 
 impl Until {
-    pub(super) fn new(text: &str, scene: &Scene) -> Result<Self, Failure> {
+    pub(crate) fn new(text: &str, scene: &Scene) -> Result<Self, Failure> {
         let form = || {
             Failure::arguments(format!("--until-error {text}: write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells"))
         };
@@ -68,7 +68,7 @@ impl Until {
     }
 
     /// Traces until the error is small enough.
-    pub(super) fn trace(&self, prepared: &mut Prepared, context: &Context) -> (Portion, Answer) {
+    pub(crate) fn trace(&self, prepared: &mut Prepared, context: &Context) -> (Portion, Answer) {
         let most = prepared.job.tracing.rays.unwrap_or(MOST);
         let mut rays = FIRST.min(most);
         loop {
@@ -102,7 +102,7 @@ impl Until {
     }
 
     /// What came of it, in words.
-    pub(super) fn sentence(&self, answer: &Answer) -> String {
+    pub(crate) fn sentence(&self, answer: &Answer) -> String {
         let found = answer.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
         let what = if self.cells { "the cells" } else { "the power" };
         let verdict = if answer.reached { "reached" } else { "**not reached**" };

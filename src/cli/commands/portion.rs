@@ -1,10 +1,10 @@
 //! Parts of a run on disk: shards, checkpoints, `--resume` and `merge`.
 
-use super::Failure;
-use super::context::{Context, print};
-use super::job::{self, Job, Prepared, Ways};
-use super::load;
-use super::options::{IntersectorKind, Meshing, Tracing};
+use crate::cli::Failure;
+use crate::cli::arguments::options::{IntersectorKind, Meshing, Tracing};
+use crate::cli::context::{Context, print};
+use crate::cli::work::job::{self, Job, Prepared, Ways};
+use crate::cli::work::load;
 use crate::formats::write_atomic;
 use crate::intersect::NormalMode;
 use crate::report::grouped;
@@ -17,7 +17,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Name of the file that an interrupted run leaves in its folder.
-pub(super) const CHECKPOINT: &str = "checkpoint.tally";
+pub(crate) const CHECKPOINT: &str = "checkpoint.tally";
 
 /// What stands at the head of a tally file: enough to write the results of the whole run. Lengths and angles as bits of `f64`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -115,7 +115,7 @@ fn fingerprint(prepared: &Prepared) -> Result<Fingerprint, Failure> {
 }
 
 /// `I/N` as it is typed, both counted from 1; from 0 inside.
-pub(super) fn shard(text: &str) -> Result<[u32; 2], Failure> {
+pub(crate) fn shard(text: &str) -> Result<[u32; 2], Failure> {
     let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
     match parts {
         Some((i, n)) if (1..=n).contains(&i) && n <= 1 << 16 => Ok([i - 1, n]),
@@ -124,7 +124,7 @@ pub(super) fn shard(text: &str) -> Result<[u32; 2], Failure> {
 }
 
 /// Where the tally of a shard goes: the file that was asked for, or one in the folder that was.
-pub(super) fn shard_file(output: &Path, [i, n]: [u32; 2]) -> PathBuf {
+pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2]) -> PathBuf {
     match output.extension().is_some_and(|e| e.eq_ignore_ascii_case("tally")) {
         true => output.to_path_buf(),
         false => output.join(format!("shard-{}-of-{n}.tally", i + 1)),
@@ -132,7 +132,7 @@ pub(super) fn shard_file(output: &Path, [i, n]: [u32; 2]) -> PathBuf {
 }
 
 /// A file that a run is saved to while it goes on.
-pub(super) struct Checkpoint<'a> {
+pub(crate) struct Checkpoint<'a> {
     prepared: &'a Prepared<'a>,
     header: Mutex<Option<Header>>,
     scene: &'a Path,
@@ -144,7 +144,7 @@ pub(super) struct Checkpoint<'a> {
 }
 
 impl<'a> Checkpoint<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         prepared: &'a Prepared<'a>,
         scene: &'a Path,
         file: PathBuf,
@@ -158,12 +158,12 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// How often to look whether it is time to save.
-    pub(super) fn often(&self) -> Duration {
+    pub(crate) fn often(&self) -> Duration {
         self.every.min(Duration::from_millis(250))
     }
 
     /// What an earlier run left behind; `None` when there is nothing.
-    pub(super) fn read(&self) -> Result<Option<Portion>, Failure> {
+    pub(crate) fn read(&self) -> Result<Option<Portion>, Failure> {
         let bytes = match std::fs::read(&self.file) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -181,7 +181,7 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Saves the run, when it is time to.
-    pub(super) fn finished(&self, portion: &Portion) {
+    pub(crate) fn finished(&self, portion: &Portion) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if last.elapsed() < self.every {
             return;
@@ -194,7 +194,7 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Saves the run now.
-    pub(super) fn write(&self, portion: &Portion) -> Result<(), Failure> {
+    pub(crate) fn write(&self, portion: &Portion) -> Result<(), Failure> {
         let mut header = self.header.lock().unwrap_or_else(|e| e.into_inner());
         let header = match &mut *header {
             Some(header) => header,
@@ -208,13 +208,13 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Removes the file of a run that is over.
-    pub(super) fn remove(&self) {
+    pub(crate) fn remove(&self) {
         let _ = std::fs::remove_file(&self.file);
     }
 }
 
 /// Says what a finished shard holds.
-pub(super) fn say_shard(
+pub(crate) fn say_shard(
     file: &Path,
     portion: &Portion,
     [i, n]: [u32; 2],
@@ -237,7 +237,7 @@ pub(super) fn say_shard(
 }
 
 /// `lampyris merge`: the results of all parts of a run.
-pub(super) fn merge(parts: &[PathBuf], folder: &Path, context: &Context) -> Result<super::Outcome, Failure> {
+pub(crate) fn merge(parts: &[PathBuf], folder: &Path, context: &Context) -> Result<crate::cli::Outcome, Failure> {
     let wrong = |path: &Path, m: String| Failure::input(format!("{}: {m}", path.display()));
     let read = |path: &PathBuf| std::fs::read(path).map_err(|e| wrong(path, e.to_string()));
     let [first, others @ ..] = parts else { return Err(Failure::arguments("merge: no parts given")) };
@@ -274,7 +274,7 @@ pub(super) fn merge(parts: &[PathBuf], folder: &Path, context: &Context) -> Resu
     let mut outcome = prepared.trace(Ways { from: Some(whole), ..Ways::default() }, context);
     let (document, report) = prepared.write(folder, &mut outcome, Vec::new(), context)?;
     super::trace::tell(&document, &report.answer, folder, &outcome.results, context)?;
-    Ok(super::Outcome::Done)
+    Ok(crate::cli::Outcome::Done)
 }
 
 /// Which shards are not there.
@@ -292,7 +292,7 @@ fn missing(whole: &Portion, shard: Option<[u32; 2]>) -> String {
 }
 
 /// Traces a shard, or goes on with it, into its file.
-pub(super) fn trace_shard(
+pub(crate) fn trace_shard(
     prepared: &Prepared,
     checkpoint: &Checkpoint,
     from: Option<Portion>,

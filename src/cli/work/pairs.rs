@@ -1,7 +1,7 @@
 //! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
 
-use super::context::Context;
-use super::options::Tracing;
+use crate::cli::arguments::options::Tracing;
+use crate::cli::context::Context;
 use crate::intersect::Intersector;
 use crate::report::{Cell, Table, figures};
 use crate::simulate::{BoundScene, RunSettings, Scene};
@@ -11,7 +11,7 @@ use crate::study::receivers::{Paired, paired};
 const MOST: u64 = 100_000;
 
 /// Traces the scene on both.
-pub(super) fn find(
+pub(crate) fn find(
     scene: &Scene,
     bound: &BoundScene,
     [facets, exact]: [&dyn Intersector; 2],
@@ -31,7 +31,7 @@ pub(super) fn find(
 }
 
 /// The same for the report.
-pub(super) fn table(pairs: &[Paired]) -> Table {
+pub(crate) fn table(pairs: &[Paired]) -> Table {
     let columns = [
         ("receiver", ""),
         ("power on the spline", "W or lm"),
@@ -56,7 +56,7 @@ pub(super) fn table(pairs: &[Paired]) -> Table {
 }
 
 /// One line a receiver.
-pub(super) fn described(pairs: &[Paired]) -> String {
+pub(crate) fn described(pairs: &[Paired]) -> String {
     let mut text = String::new();
     for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
         let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);

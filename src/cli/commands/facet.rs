@@ -1,9 +1,11 @@
 //! `lampyris facet`: quad facets within a proved tolerance, written in as many formats as asked for.
 
-use super::args::Refusals;
-use super::context::{Context, print};
-use super::options::Meshing;
-use super::{Failure, Outcome, aim, engine, load, look, machine};
+use crate::cli::arguments::args::Refusals;
+use crate::cli::arguments::options::Meshing;
+use crate::cli::context::{Context, print};
+use crate::cli::output::look;
+use crate::cli::work::{aim, engine, load};
+use crate::cli::{Failure, Outcome, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
 use crate::kernel::baseline;
 use crate::mesh::FacetMesh;
@@ -14,18 +16,18 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What `facet` was asked for.
-pub(super) struct Asked<'a> {
-    pub(super) file: &'a Path,
-    pub(super) output: &'a [PathBuf],
-    pub(super) meshing: &'a Meshing,
-    pub(super) accuracy: Option<&'a str>,
+pub(crate) struct Asked<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) output: &'a [PathBuf],
+    pub(crate) meshing: &'a Meshing,
+    pub(crate) accuracy: Option<&'a str>,
     /// Whether truck's mesher runs too.
-    pub(super) baseline: bool,
-    pub(super) threads: Option<usize>,
-    pub(super) limits: Refusals,
+    pub(crate) baseline: bool,
+    pub(crate) threads: Option<usize>,
+    pub(crate) limits: Refusals,
 }
 
-pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
     // A wrong extension is said before any work is done.
     if let Some(path) = asked.output.iter().find(|p| !is_facet_file(p)) {
         let given = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
@@ -221,7 +223,7 @@ fn described(r: &Report) -> String {
 
 /// For each facet the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
 /// the largest curvature there, 1/mm.
-pub(super) fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
     use rayon::prelude::*;
     let faces: Vec<PlacedFace> = model.placed_faces().collect();
     (0..mesh.facets.len())

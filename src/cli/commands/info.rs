@@ -1,13 +1,14 @@
 //! `lampyris info`: what a STEP file holds and what could not be read.
 
-use super::args::Refusals;
-use super::context::{Context, print};
-use super::{Failure, Outcome, load};
+use crate::cli::arguments::args::Refusals;
+use crate::cli::context::{Context, print};
+use crate::cli::work::load;
+use crate::cli::{Failure, Outcome};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::step::ImportReport;
 use std::path::Path;
 
-pub(super) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
     let report = load::step_file(path, None, context)?.report;
     if context.json {
         let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::running(e.to_string()))?;
@@ -55,7 +56,7 @@ fn described(r: &ImportReport, context: &Context) -> String {
     let notes: Vec<_> = notes.collect();
     let most = if context.verbose > 0 { usize::MAX } else { 20 };
     if !notes.is_empty() {
-        let mut table = super::tables::blank(context.width());
+        let mut table = crate::cli::output::tables::blank(context.width());
         table.set_header(["", "entity", "why"]);
         for (what, note) in notes.iter().take(most) {
             table.add_row([(*what).to_owned(), format!("#{} {}", note.id, note.entity), note.reason.clone()]);

@@ -1,13 +1,14 @@
 //! The main job: a scene that is read, bound, faceted, traced, checked and written down. `trace` and `demo` share it.
 
-use super::context::Context;
 use super::engine::{self, Choice};
 use super::ledger;
 use super::load::Loaded;
-use super::options::{IntersectorKind, Meshing, Tracing};
 use super::paths::Paths;
 use super::witness::Witness;
-use super::{Failure, cells, files, look};
+use crate::cli::Failure;
+use crate::cli::arguments::options::{IntersectorKind, Meshing, Tracing};
+use crate::cli::context::Context;
+use crate::cli::output::{cells, files, look};
 use crate::formats::{ColourMap, Facets, Polylines, write_facets, write_vtp};
 use crate::intersect::bvh::Bvh;
 use crate::intersect::exact::{self, Exact};
@@ -26,56 +27,56 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// What to do beside tracing.
-pub(super) struct Job<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) loaded: &'a Loaded,
-    pub(super) meshing: &'a Meshing,
-    pub(super) tracing: &'a Tracing,
+pub(crate) struct Job<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) loaded: &'a Loaded,
+    pub(crate) meshing: &'a Meshing,
+    pub(crate) tracing: &'a Tracing,
     /// Rays of the run to ask again of BVH and spline; 0 for none.
-    pub(super) recheck: usize,
+    pub(crate) recheck: usize,
     /// How an accuracy that was asked for was reached.
-    pub(super) aimed: Option<&'a Aim>,
+    pub(crate) aimed: Option<&'a Aim>,
 }
 
 /// A job whose scene fits its model and whose facets are made.
-pub(super) struct Prepared<'a> {
-    pub(super) job: Job<'a>,
-    pub(super) bound: BoundScene,
-    pub(super) tessellation: Tessellation,
-    pub(super) mesh_settings: tessellate::Settings,
-    pub(super) seconds: f64,
-    pub(super) choice: Choice,
-    pub(super) threads: usize,
+pub(crate) struct Prepared<'a> {
+    pub(crate) job: Job<'a>,
+    pub(crate) bound: BoundScene,
+    pub(crate) tessellation: Tessellation,
+    pub(crate) mesh_settings: tessellate::Settings,
+    pub(crate) seconds: f64,
+    pub(crate) choice: Choice,
+    pub(crate) threads: usize,
     /// Rays to trace in place of what the options and the scene say.
-    pub(super) rays: Option<u64>,
+    pub(crate) rays: Option<u64>,
 }
 
 /// How to trace beside the settings.
 #[derive(Clone, Default)]
-pub(super) struct Ways<'a> {
+pub(crate) struct Ways<'a> {
     /// With the full kernel too.
-    pub(super) verify: bool,
+    pub(crate) verify: bool,
     /// What is done already.
-    pub(super) from: Option<Portion>,
+    pub(crate) from: Option<Portion>,
     /// Which part of how many, from 0.
-    pub(super) shard: Option<[u32; 2]>,
+    pub(crate) shard: Option<[u32; 2]>,
     /// Told of all that is done, each thread after so long.
-    pub(super) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
-    pub(super) every: Duration,
+    pub(crate) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    pub(crate) every: Duration,
     /// Takes every path.
-    pub(super) paths: Option<&'a Paths>,
+    pub(crate) paths: Option<&'a Paths>,
 }
 
 /// What came of it.
-pub(super) struct Outcome {
-    pub(super) results: Results,
-    pub(super) check: Option<Check>,
+pub(crate) struct Outcome {
+    pub(crate) results: Results,
+    pub(crate) check: Option<Check>,
     /// The pruned kernel against the full one, when asked for.
-    pub(super) verification: Option<Verification>,
+    pub(crate) verification: Option<Verification>,
 }
 
 /// Binds the scene (so that its mistakes come before any work) and makes the facets.
-pub(super) fn prepare<'a>(job: Job<'a>, context: &Context) -> Result<Prepared<'a>, Failure> {
+pub(crate) fn prepare<'a>(job: Job<'a>, context: &Context) -> Result<Prepared<'a>, Failure> {
     let threads = engine::threads(job.tracing.threads)?;
     let choice = Choice::new(job.tracing, Some(job.scene))?;
     let bound = job.scene.bind(&job.loaded.model)?;
@@ -86,7 +87,7 @@ pub(super) fn prepare<'a>(job: Job<'a>, context: &Context) -> Result<Prepared<'a
 
 impl Prepared<'_> {
     /// The run's settings: the scene's, with the options over them.
-    pub(super) fn run_settings(&self) -> RunSettings {
+    pub(crate) fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);
         settings.rays = self.rays.or(self.job.tracing.rays).unwrap_or(settings.rays);
         settings.seed = self.job.tracing.seed.unwrap_or(settings.seed);
@@ -96,12 +97,12 @@ impl Prepared<'_> {
     }
 
     /// Number of independent parts that the run is divided into.
-    pub(super) fn replicates(&self) -> u32 {
+    pub(crate) fn replicates(&self) -> u32 {
         crate::simulate::replicates(&self.bound, &self.run_settings())
     }
 
     /// Traces the scene, and asks a sample of its rays again.
-    pub(super) fn trace(&self, ways: Ways, context: &Context) -> Outcome {
+    pub(crate) fn trace(&self, ways: Ways, context: &Context) -> Outcome {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let settings = self.run_settings();
         engine::with_intersector(self.choice, model, mesh, context, |intersector, footprint| {
@@ -129,7 +130,7 @@ impl Prepared<'_> {
     }
 
     /// Traces the replicates of a shard.
-    pub(super) fn portion(&self, ways: Ways, context: &Context) -> Portion {
+    pub(crate) fn portion(&self, ways: Ways, context: &Context) -> Portion {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let settings = RunSettings { shard: ways.shard.unwrap_or([0, 1]), ..self.run_settings() };
         engine::with_intersector(self.choice, model, mesh, context, |intersector, _| {
@@ -137,7 +138,7 @@ impl Prepared<'_> {
         })
     }
 
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         intersector: &dyn Intersector,
         settings: &RunSettings,
@@ -191,7 +192,7 @@ impl Prepared<'_> {
 
     /// Writes everything into a folder; the report comes last, so that a folder with a report is complete. Gives the document of
     /// `results.json`.
-    pub(super) fn write(
+    pub(crate) fn write(
         &self,
         folder: &Path,
         outcome: &mut Outcome,
@@ -307,7 +308,7 @@ impl Prepared<'_> {
 }
 
 /// The files of a result folder that a person wants to know of.
-pub(super) fn highlights(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
+pub(crate) fn highlights(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     let mut list = vec![
         (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),
         (folder.join("results.json"), "every number of the run".into()),

@@ -1,6 +1,6 @@
 //! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, Data_3 for planes, IES LM-63 for whole far fields in candela.
 
-use super::Failure;
+use crate::cli::Failure;
 use crate::formats::{
     Data3, Grid, LightRay, PhotometricType, Photometry, write_data3, write_grid_csv, write_grid_npz,
     write_grid_png, write_ies, write_vti,
@@ -11,7 +11,7 @@ use crate::simulate::{Event, ReceiverResult, Results};
 use std::path::Path;
 
 /// Writes all files of a receiver and gives their names.
-pub(super) fn write(folder: &Path, receiver: &ReceiverResult, rays: &[LightRay]) -> Result<Vec<String>, Failure> {
+pub(crate) fn write(folder: &Path, receiver: &ReceiverResult, rays: &[LightRay]) -> Result<Vec<String>, Failure> {
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
@@ -36,7 +36,7 @@ pub(super) fn write(folder: &Path, receiver: &ReceiverResult, rays: &[LightRay])
 }
 
 /// The last segments of the recorded paths that leave the scene or end on a receiver: the sampled ray list of Data_3.
-pub(super) fn arriving(results: &Results) -> Vec<LightRay> {
+pub(crate) fn arriving(results: &Results) -> Vec<LightRay> {
     let (lines, ends) = path_lines(&results.paths);
     let average = results.power.emitted / results.rays.max(1) as f64;
     let shares = lines.values.first().map(|(_, v)| v.clone()).unwrap_or_default();

@@ -7,7 +7,7 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// An empty table of the house's look that wraps its cells at the width.
-pub(super) fn blank(width: usize) -> comfy_table::Table {
+pub(crate) fn blank(width: usize) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     let width = u16::try_from(width).unwrap_or(u16::MAX);
     table.load_style(STYLE).set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
@@ -15,7 +15,7 @@ pub(super) fn blank(width: usize) -> comfy_table::Table {
 }
 
 /// A report's table for the terminal, its title above it.
-pub(super) fn shown(table: &Table, width: usize) -> String {
+pub(crate) fn shown(table: &Table, width: usize) -> String {
     let mut grid = blank(width);
     let heading = |c: &crate::report::Column| {
         if c.unit.is_empty() { c.title.clone() } else { format!("{} [{}]", c.title, c.unit) }
@@ -32,7 +32,7 @@ pub(super) fn shown(table: &Table, width: usize) -> String {
 }
 
 /// The tables of a study's page, its list of every measurement left to the page.
-pub(super) fn of_study(report: &Report, width: usize) -> String {
+pub(crate) fn of_study(report: &Report, width: usize) -> String {
     let blocks = report.sections.iter().flat_map(|s| &s.blocks);
     let tables = blocks.filter_map(|b| if let Block::Table(t) = b { Some(t) } else { None });
     let wanted = tables.filter(|t| !t.name.ends_with("-rows") && !t.rows.is_empty());

@@ -1,9 +1,9 @@
 //! `--accuracy 0.05deg`: a direction error asked for in place of a tolerance.
 
-use super::Failure;
-use super::context::Context;
-use super::options::{self, IntersectorKind, Meshing, Tracing};
 use super::witness::Witness;
+use crate::cli::Failure;
+use crate::cli::arguments::options::{self, IntersectorKind, Meshing, Tracing};
+use crate::cli::context::{Context, show};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::model::Model;
@@ -13,7 +13,7 @@ use crate::study::aim::{Aim, Ask, aim, aim_at};
 
 /// The options with tolerances and normals put in that reach what was asked, and how that went; unchanged when nothing was asked.
 /// With a scene, its own rays are what the accuracy is about.
-pub(super) fn meshing(
+pub(crate) fn meshing(
     asked: Option<&str>,
     (meshing, tracing): (&Meshing, &Tracing),
     scene: Option<&Scene>,
@@ -34,7 +34,7 @@ pub(super) fn meshing(
     }
     let product = Product::new(model);
     let bar = context.stages("aiming");
-    let progress = |p: crate::study::Progress| super::study::show(&bar, &p);
+    let progress = |p: crate::study::Progress| show(&bar, &p);
     let found = match scene {
         None => aim(model, &product, &ask, &progress),
         Some(scene) => {
@@ -54,7 +54,7 @@ pub(super) fn meshing(
 }
 
 /// The same for facets alone, whose readers interpolate the normals of their corners.
-pub(super) fn facets(
+pub(crate) fn facets(
     asked: Option<&str>,
     meshing: &Meshing,
     model: &Model,
@@ -63,7 +63,7 @@ pub(super) fn facets(
     let Some(ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), None)) };
     let ask = Ask { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
     let bar = context.stages("aiming");
-    let found = aim(model, &Product::new(model), &ask, &|p| super::study::show(&bar, &p));
+    let found = aim(model, &Product::new(model), &ask, &|p| show(&bar, &p));
     bar.finish_and_clear();
     context.say(&found.answer);
     Ok((Meshing { plan: Some(found.plan.clone()), ..meshing.clone() }, Some(found)))

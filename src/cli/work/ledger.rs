@@ -1,9 +1,9 @@
 //! The lost-ray ledger: one line a lost ray, with all that is needed to trace it again, and `trace --replay`.
 
-use super::Failure;
-use super::context::{Context, print};
 use super::engine;
 use super::job::Prepared;
+use crate::cli::Failure;
+use crate::cli::context::{Context, print};
 use crate::formats::{write_atomic, write_vtp};
 use crate::report::path_lines;
 use crate::simulate::{Cause, LostRay, PathVertex, Results, RunSettings, replay};
@@ -12,12 +12,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Name of the ledger in a folder of results.
-pub(super) const LEDGER: &str = "lost_rays.csv";
+pub(crate) const LEDGER: &str = "lost_rays.csv";
 const COLUMNS: &str =
     "ray,branch,bounce,cause,power,x_mm,y_mm,z_mm,dx,dy,dz,instance,medium,face,hit_instance,seed,rays";
 
 /// Writes the ledger, when a ray was lost. Text in quotes, as instance names may hold commas.
-pub(super) fn write(folder: &Path, results: &Results, prepared: &Prepared) -> Result<bool, Failure> {
+pub(crate) fn write(folder: &Path, results: &Results, prepared: &Prepared) -> Result<bool, Failure> {
     if results.ledger.is_empty() {
         return Ok(false);
     }
@@ -53,12 +53,12 @@ pub(super) fn write(folder: &Path, results: &Results, prepared: &Prepared) -> Re
 }
 
 /// Says what is open in the scene, or beyond its tables.
-pub(super) fn warn(prepared: &Prepared, context: &Context) {
+pub(crate) fn warn(prepared: &Prepared, context: &Context) {
     prepared.bound.notes().iter().for_each(|note| context.say(note));
 }
 
 /// Why rays were lost and where, the most frequent first.
-pub(super) fn reasons(results: &Results, prepared: &Prepared) -> String {
+pub(crate) fn reasons(results: &Results, prepared: &Prepared) -> String {
     let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for l in &results.ledger {
         let at = l.face.and_then(|f| prepared.bound.instance(f));
@@ -93,19 +93,19 @@ fn cause(l: &LostRay) -> String {
 
 /// What `--replay` asks for: rays by number, and the seed and number of rays of a ledger.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Asked {
-    pub(super) rays: Vec<u64>,
+pub(crate) struct Asked {
+    pub(crate) rays: Vec<u64>,
     run: Option<[u64; 2]>,
 }
 
 impl Asked {
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rays.is_empty()
     }
 }
 
 /// Rays given by number, or all those of a ledger.
-pub(super) fn asked(words: &[String]) -> Result<Asked, Failure> {
+pub(crate) fn asked(words: &[String]) -> Result<Asked, Failure> {
     let mut asked = Asked::default();
     for word in words {
         if let Ok(ray) = word.parse() {
@@ -143,7 +143,7 @@ fn read(text: &str, asked: &mut Asked) -> Result<(), String> {
 }
 
 /// Traces the rays again and shows every vertex of their paths; they are written as `replay.vtp` too.
-pub(super) fn run(prepared: &Prepared, asked: &Asked, folder: &Path, context: &Context) -> Result<(), Failure> {
+pub(crate) fn run(prepared: &Prepared, asked: &Asked, folder: &Path, context: &Context) -> Result<(), Failure> {
     let own = prepared.run_settings();
     let [seed, rays] = asked.run.unwrap_or([own.seed, own.rays]);
     let settings = RunSettings { seed, rays, ..own };

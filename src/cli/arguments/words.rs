@@ -11,10 +11,10 @@ Examples:
 }
 
 /// Examples under `facet -h`.
-pub(super) const FACET: &str = facet!();
+pub(crate) const FACET: &str = facet!();
 
 /// The same with the keys of the document.
-pub(super) const FACET_LONG: &str = concat!(
+pub(crate) const FACET_LONG: &str = concat!(
     facet!(),
     "
 
@@ -25,7 +25,7 @@ tolerance_mm, and every combination tried."
 );
 
 /// Examples under `trace --help`.
-pub(super) const TRACE: &str = "\
+pub(crate) const TRACE: &str = "\
 Examples:
   lampyris trace lamp.toml                               all as the scene says
   lampyris trace lamp.toml --until-error 0.1%@wall       until the power on 'wall' is known to 0.1 %
@@ -45,10 +45,10 @@ Examples:
 }
 
 /// Examples under `check -h`.
-pub(super) const CHECK: &str = check!();
+pub(crate) const CHECK: &str = check!();
 
 /// The same with the keys of the document.
-pub(super) const CHECK_LONG: &str = concat!(
+pub(crate) const CHECK_LONG: &str = concat!(
     check!(),
     "
 
@@ -62,7 +62,7 @@ the spline. With --accuracy also 'accuracy': asked_deg, reached_deg, kept, norma
 );
 
 /// Examples under `study --help`.
-pub(super) const STUDY: &str = "\
+pub(crate) const STUDY: &str = "\
 Examples:
   lampyris study accuracy                    which tolerance and normals are worth their time
   lampyris study accuracy lamp.toml -o acc   the same for a scene, its receivers included

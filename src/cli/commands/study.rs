@@ -1,11 +1,13 @@
 //! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
-use super::args::StudyKind;
-use super::context::{Context, print};
-use super::engine::{self, Choice};
-use super::load::{self, Input, Loaded};
-use super::options::{Meshing, Tracing};
-use super::{Failure, Outcome, cells, demo, tables};
+use super::demo;
+use crate::cli::arguments::args::StudyKind;
+use crate::cli::arguments::options::{Meshing, Tracing};
+use crate::cli::context::{Context, print, show};
+use crate::cli::output::{cells, tables};
+use crate::cli::work::engine::{self, Choice};
+use crate::cli::work::load::{self, Input, Loaded};
+use crate::cli::{Failure, Outcome};
 use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{
@@ -19,18 +21,17 @@ use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
 use crate::study::{self, Product, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
 use crate::tessellate::tessellate;
-use indicatif::ProgressBar;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What `study` was asked for.
-pub(super) struct Asked<'a> {
-    pub(super) kind: StudyKind,
-    pub(super) file: Option<&'a Path>,
-    pub(super) output: Option<&'a PathBuf>,
-    pub(super) meshing: &'a Meshing,
-    pub(super) tracing: &'a Tracing,
+pub(crate) struct Asked<'a> {
+    pub(crate) kind: StudyKind,
+    pub(crate) file: Option<&'a Path>,
+    pub(crate) output: Option<&'a PathBuf>,
+    pub(crate) meshing: &'a Meshing,
+    pub(crate) tracing: &'a Tracing,
 }
 
 /// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
@@ -77,7 +78,7 @@ fn refuse_idle(asked: &Asked) -> Result<(), Failure> {
     Err(failure.help("leave it out"))
 }
 
-pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
     refuse_idle(asked)?;
     let threads = engine::threads(asked.tracing.threads)?;
     let seed = asked.tracing.seed.unwrap_or(1);
@@ -136,13 +137,6 @@ pub(super) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
     Ok(Outcome::Done)
 }
 
-/// The bar follows the study's own clock, remaining time included.
-pub(super) fn show(bar: &ProgressBar, p: &Progress) {
-    let left = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
-    bar.set_message(format!("{}{left}", p.stage));
-    bar.set_position((1000.0 * p.done.clamp(0.0, 1.0)) as u64);
-}
-
 /// The model of the file, or the built-in lamp.
 fn model_of(file: Option<&Path>, context: &Context) -> Result<(Option<Scene>, Loaded, String), Failure> {
     let Some(path) = file else {
@@ -184,7 +178,7 @@ fn error_view(asked: &Asked, context: &Context) -> Result<Section, Failure> {
     let settings = engine::mesh_settings(asked.meshing, scene.as_ref(), &loaded.model)?;
     let (made, _) = engine::facets(&loaded.model, &settings, context);
     let (errors, _) = super::facet::per_facet(&loaded.model, &made.mesh);
-    let facets = super::look::facets(&loaded.model, &made.mesh, scene.as_ref());
+    let facets = crate::cli::output::look::facets(&loaded.model, &made.mesh, scene.as_ref());
     let [low, high] = settings.tolerance;
     let text = format!(
         "Largest angle between the bilinear normal and the spline's on each of {} facets within {low}..{high} mm.",

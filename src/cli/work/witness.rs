@@ -6,7 +6,7 @@ use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
 
 /// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
-pub(super) struct Witness<'a> {
+pub(crate) struct Witness<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
     noted: Mutex<Vec<(u64, Ray)>>,
@@ -14,7 +14,7 @@ pub(super) struct Witness<'a> {
 
 impl<'a> Witness<'a> {
     /// Notes about `wanted` and a fifth more of `expected` rays.
-    pub(super) fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
+    pub(crate) fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (1.2 * wanted as f64 / expected.max(1) as f64).min(1.0);
         Self { inner, threshold: (share * u64::MAX as f64) as u64, noted: Mutex::new(Vec::new()) }
     }
@@ -29,7 +29,7 @@ impl<'a> Witness<'a> {
     /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts `lift` mm
     /// above it, in free space, so that all intersectors are asked the same question whatever they take for the surface; one that
     /// left a ready mesh, which has no surface, is left out.
-    pub(super) fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
+    pub(crate) fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.noted.into_inner().unwrap_or_else(|e| e.into_inner());
         noted.sort_by_key(|(hash, _)| *hash);

@@ -18,7 +18,7 @@ const PALETTE: [[f64; 3]; 8] = [
 ];
 
 /// The mesh with a group for every instance.
-pub(super) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scene>) -> Facets<'a> {
+pub(crate) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scene>) -> Facets<'a> {
     let colours: Vec<_> = {
         let mut first = vec![None; model.instances.len()];
         for face in model.placed_faces() {

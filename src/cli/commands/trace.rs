@@ -1,21 +1,22 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::args::TraceOptions;
-use super::context::{Context, print};
-use super::job::{self, Job, Prepared, Ways};
-use super::options::{Meshing, Tracing};
-use super::paths::Paths;
 use super::portion::{self, Checkpoint};
-use super::{Failure, Outcome, aim, ledger, load, until};
+use crate::cli::arguments::args::TraceOptions;
+use crate::cli::arguments::options::{Meshing, Tracing};
+use crate::cli::context::{Context, print};
+use crate::cli::work::job::{self, Job, Prepared, Ways};
+use crate::cli::work::paths::Paths;
+use crate::cli::work::{aim, ledger, load, until};
+use crate::cli::{Failure, Outcome};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::simulate::Portion;
 use serde_json::json;
 use std::path::Path;
 
 /// Rays of a run that are asked again of BVH and spline.
-pub(super) const RECHECKED: usize = 10_000;
+pub(crate) const RECHECKED: usize = 10_000;
 
-pub(super) fn run(
+pub(crate) fn run(
     path: &Path,
     folder: &Path,
     meshing: &Meshing,
@@ -134,7 +135,7 @@ pub(super) fn run(
 }
 
 /// The results on stdout as JSON, or the closing lines.
-pub(super) fn tell(
+pub(crate) fn tell(
     document: &serde_json::Value,
     answer: &str,
     folder: &Path,
@@ -150,7 +151,7 @@ pub(super) fn tell(
 }
 
 /// The last lines of a traced scene: what was found, which file to open.
-pub(super) fn closing(answer: &str, folder: &Path, results: &crate::simulate::Results, context: &Context) {
+pub(crate) fn closing(answer: &str, folder: &Path, results: &crate::simulate::Results, context: &Context) {
     context.say("");
     for line in wrapped(&answer.replace("**", ""), context.width().min(96)) {
         context.say(format_args!("  {line}"));
