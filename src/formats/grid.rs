@@ -17,6 +17,33 @@ pub struct Grid {
     pub values: Vec<f64>,
     /// Standard error of each value, where it was estimated.
     pub error: Option<Vec<f64>>,
+    /// Further quantities over the same cells: colours, bands of wavelengths.
+    pub layers: Vec<Layer>,
+}
+
+/// A further quantity over the cells of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// What is measured, such as `X` or `380-480 nm`.
+    pub quantity: String,
+    /// Its unit.
+    pub unit: String,
+    /// One value for each cell, in the order of the grid's own.
+    pub values: Vec<f64>,
+    /// Standard error of each value.
+    pub error: Vec<f64>,
+}
+
+impl Layer {
+    /// What is measured with its unit, as the name of a column or array: `X_lx`.
+    pub fn column(&self) -> String {
+        column(&self.quantity, &self.unit)
+    }
+}
+
+/// A quantity with its unit as a name without blanks, commas and slashes.
+fn column(quantity: &str, unit: &str) -> String {
+    format!("{}_{}", quantity.replace([' ', ','], "_"), unit.replace('/', "_per_").replace('²', "2"))
 }
 
 /// One axis of a grid.
@@ -50,6 +77,11 @@ impl Axis {
 }
 
 impl Grid {
+    /// What is measured with its unit, as the name of a column or array: `luminous_intensity_cd`.
+    pub fn column(&self) -> String {
+        column(&self.quantity, &self.unit)
+    }
+
     /// Smallest and largest finite value; `None` without any.
     pub fn extremes(&self) -> Option<[f64; 2]> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
@@ -66,29 +98,36 @@ impl Grid {
     }
 }
 
-/// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error.
+/// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error, and the same of each layer.
 ///
 /// # Errors
 /// When the file cannot be written.
 pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
     let [a, b] = &grid.axes;
-    let unit = grid.unit.replace('/', "_per_").replace('²', "2");
     write_atomic(path, |w| {
-        write!(w, "{},{},{}_{unit}", a.column(), b.column(), grid.quantity.replace([' ', ','], "_"))?;
-        writeln!(w, "{}", if grid.error.is_some() { ",standard_error" } else { "" })?;
+        write!(w, "{},{},{}", a.column(), b.column(), grid.column())?;
+        write!(w, "{}", if grid.error.is_some() { ",standard_error" } else { "" })?;
+        for layer in &grid.layers {
+            write!(w, ",{0},{0}_standard_error", layer.column())?;
+        }
+        writeln!(w)?;
         for (k, value) in grid.values.iter().enumerate() {
             let (i, j) = (k % a.cells.max(1), k / a.cells.max(1));
             write!(w, "{},{},{value}", a.center(i), b.center(j))?;
-            match &grid.error {
-                Some(error) => writeln!(w, ",{}", error[k])?,
-                None => writeln!(w)?,
+            if let Some(error) = &grid.error {
+                write!(w, ",{}", error[k])?;
             }
+            for layer in &grid.layers {
+                write!(w, ",{},{}", layer.values[k], layer.error[k])?;
+            }
+            writeln!(w)?;
         }
         Ok(())
     })
 }
 
-/// Writes a grid as NPZ: `values[j, i]`, `error[j, i]` and the cell edges of both axes.
+/// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
+/// of its errors.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -105,6 +144,13 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
     ];
     if let Some(error) = &grid.error {
         arrays.push(NpyArray { name: "error", shape: vec![b.cells, a.cells], data: error });
+    }
+    let shape = || vec![b.cells, a.cells];
+    let names: Vec<[String; 2]> =
+        (grid.layers.iter()).map(|layer| [layer.column(), format!("{}_error", layer.column())]).collect();
+    for (layer, [name, error]) in grid.layers.iter().zip(&names) {
+        arrays.push(NpyArray { name, shape: shape(), data: &layer.values });
+        arrays.push(NpyArray { name: error, shape: shape(), data: &layer.error });
     }
     write_npz(path, &arrays)
 }

@@ -38,7 +38,7 @@ pub use data3::{Data3, read_data3, write_data3};
 pub use error::{Error, ErrorKind};
 pub use eulumdat::{parse_eulumdat, read_eulumdat, write_eulumdat};
 pub use facets::{FACET_EXTENSIONS, Facets, Group, is_facet_file, write_facets};
-pub use grid::{Axis, Grid, write_grid_csv, write_grid_npz};
+pub use grid::{Axis, Grid, Layer, write_grid_csv, write_grid_npz};
 pub use ies::{parse_ies, read_ies, write_ies};
 pub use npz::{NpyArray, write_npz};
 pub use photometry::{PhotometricType, Photometry};

@@ -133,11 +133,15 @@ pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
             a.step(),
             b.step()
         )?;
-        let name = format!("{}_{}", grid.quantity.replace(' ', "_"), grid.unit.replace('/', "_per_"));
+        let name = grid.column();
         writeln!(w, r#"<PointData></PointData><CellData Scalars="{}">"#, escape(&name))?;
         array(w, &name, 1, Array::F64(&grid.values))?;
         if let Some(error) = &grid.error {
             array(w, "standard_error", 1, Array::F64(error))?;
+        }
+        for layer in &grid.layers {
+            array(w, &layer.column(), 1, Array::F64(&layer.values))?;
+            array(w, &format!("{}_standard_error", layer.column()), 1, Array::F64(&layer.error))?;
         }
         writeln!(w, "</CellData></Piece></ImageData></VTKFile>")
     })

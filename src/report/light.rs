@@ -1,10 +1,11 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::court::{self, verdict};
-use super::{AxisStyle, Block, Cell, Chart, Provenance, Report, Section, Series, SeriesStyle, Table, View};
+use super::maps::{cuts, photometric_grid, reading, receiver_grid, spoken};
+use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View};
 use super::{figures, grouped, seconds};
 use crate::formats::file_stem;
-use crate::formats::{Axis, Facets, Grid, Polylines};
+use crate::formats::{Facets, Grid, Polylines};
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
 use crate::study::check::Check;
 
@@ -28,38 +29,6 @@ pub struct Light<'a> {
     pub comparison: Vec<String>,
     /// Where the numbers come from.
     pub provenance: Provenance,
-}
-
-/// The cells of a receiver with their axes; `None` for a receiver that has one number only.
-pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
-    if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
-        return None;
-    }
-    let (labels, unit) = match r.kind {
-        "plane" => (["x", "y"], "mm"),
-        _ if r.angles == Some(crate::simulate::scene::FarFieldType::C) => (["C", "gamma"], "deg"),
-        _ => (["H", "V"], "deg"),
-    };
-    let axis = |k: usize| Axis {
-        label: labels[k].into(),
-        unit: unit.into(),
-        range: [r.middle[k] - r.half[k], r.middle[k] + r.half[k]],
-        cells: r.grid[k],
-    };
-    let quantity = match r.unit {
-        "cd" => "luminous intensity",
-        "W/sr" => "radiant intensity",
-        "lx" => "illuminance",
-        _ => "irradiance",
-    };
-    Some(Grid {
-        name: r.name.clone(),
-        quantity: quantity.into(),
-        unit: r.unit.into(),
-        axes: [axis(0), axis(1)],
-        values: r.cells.clone(),
-        error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
-    })
 }
 
 /// Recorded paths as polylines with the power at their start and how they end; the ends are the second value.
@@ -182,8 +151,8 @@ impl Light<'_> {
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
         let mut section = notes.fold(Section::new("Light"), |s, note| s.with(note.as_str()));
-        let mut maps: Vec<(&ReceiverResult, Grid)> =
-            (self.results.receivers.iter()).filter_map(|r| Some((r, receiver_grid(r)?))).collect();
+        let grids = |r| [photometric_grid(r), receiver_grid(r)].into_iter().flatten().map(move |grid| (r, grid));
+        let mut maps: Vec<(&ReceiverResult, Grid)> = self.results.receivers.iter().flat_map(grids).collect();
         // Directions first: what a lamp is judged by.
         maps.sort_by_key(|(r, _)| r.kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
@@ -201,7 +170,12 @@ impl Light<'_> {
         for (r, grid) in maps {
             let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
             let cuts = cuts(r, &grid);
-            section = section.with(Chart::map(&file_stem(&r.name), &title, &reading(r, &grid), grid));
+            let name = if grid.unit == r.unit {
+                file_stem(&r.name)
+            } else {
+                format!("{}-{}", file_stem(&r.name), grid.unit)
+            };
+            section = section.with(Chart::map(&name, &title, &reading(r, &grid), grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
                 section = section.with(view).with(cuts);
@@ -260,7 +234,38 @@ impl Light<'_> {
                 r.rms[1].into(),
             ]);
         }
-        Section::new("Energy").with(table).with(receivers)
+        let section = Section::new("Energy").with(table).with(receivers);
+        if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
+            section.with(self.channels())
+        } else {
+            section
+        }
+    }
+
+    /// Colours and bands of wavelengths, receiver by receiver.
+    fn channels(&self) -> Table {
+        let columns = [("receiver", ""), ("channel", ""), ("total", ""), ("unit", ""), ("x", ""), ("y", "")];
+        let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
+            receiver's CSV, NPZ and VTI files.";
+        let mut table = Table::new("channels", "Channels", &columns).caption(caption);
+        for r in &self.results.receivers {
+            let sum: f64 = r.channels.iter().map(|c| c.total).sum();
+            for c in &r.channels {
+                let unit = if matches!(c.unit, "lx" | "cd") { "lm" } else { self.unit };
+                let shown = |name: &str| c.name == name && sum > 0.0;
+                let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
+                let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
+                table.row([
+                    r.name.as_str().into(),
+                    c.name.as_str().into(),
+                    Cell::Number(c.total, 6),
+                    unit.into(),
+                    x,
+                    y,
+                ]);
+            }
+        }
+        table
     }
 
     fn cross_check(&self, check: &Check) -> Section {
@@ -316,62 +321,4 @@ impl Light<'_> {
         let section = self.views.iter().cloned().fold(section, |s, v| s.with(v)).with(table);
         self.tables.iter().cloned().fold(section, |s, t| s.with(Block::Table(t)))
     }
-}
-
-/// The values along both axes through the peak, with their statistical errors.
-fn cuts(r: &ReceiverResult, grid: &Grid) -> Chart {
-    let [a, b] = &grid.axes;
-    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y])).unwrap_or(0);
-    let (column, row) = (peak % a.cells, peak / a.cells);
-    let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
-        name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
-        points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
-        errors: grid.error.as_ref().map(|e| (0..axis.cells).map(|k| e[cell(k)]).collect()).unwrap_or_default(),
-        style: SeriesStyle::Line,
-        ..Series::default()
-    };
-    let series = vec![along(a, b, row, &|k| row * a.cells + k), along(b, a, column, &|k| k * a.cells + column)];
-    let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
-    let axes =
-        [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
-    let name = format!("{}-cuts", file_stem(&r.name));
-    let caption = "One row and one column of cells; bars are one standard error.";
-    Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series)
-}
-
-fn reading(r: &ReceiverResult, grid: &Grid) -> String {
-    let peak = grid.peak().map(|([x, y], value)| {
-        format!(
-            "Peak {} {} at {} {} {}, {} {} {}. ",
-            figures(value, 3),
-            grid.unit,
-            grid.axes[0].label,
-            figures(x, 3),
-            grid.axes[0].unit,
-            grid.axes[1].label,
-            figures(y, 3),
-            grid.axes[1].unit
-        )
-    });
-    // The relative error where the light is: weighted by the light itself.
-    let error = grid.error.as_ref().map(|e| {
-        let sum: f64 = grid.values.iter().sum();
-        format!(
-            "Statistical error of a cell, weighted by its light: {} %. ",
-            figures(100.0 * e.iter().sum::<f64>() / sum.max(1e-300), 2)
-        )
-    });
-    let cells = format!(
-        "{} × {} cells of {} {}.",
-        r.grid[0],
-        r.grid[1],
-        figures(grid.axes[0].step(), 3),
-        grid.axes[0].unit
-    );
-    [peak, error, Some(cells)].into_iter().flatten().collect()
-}
-
-/// A name as words.
-fn spoken(name: &str) -> String {
-    name.replace('_', " ")
 }

@@ -11,6 +11,7 @@
 //! lost is kept with its cause.
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 
+mod arrivals;
 mod assemble;
 mod bind;
 mod digest;
@@ -28,6 +29,7 @@ pub mod scene;
 mod tally;
 mod verify;
 
+pub use arrivals::arrivals;
 pub use bind::BoundScene;
 pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};

@@ -175,6 +175,8 @@ pub struct ReceiverResult {
 pub struct ChannelResult {
     /// `lm`, `X`, `Y`, `Z`, or the wavelengths of a bin.
     pub name: String,
+    /// Unit of its cells: `lx` or `cd` of lumens and CIE values, the receiver's own of a bin.
+    pub unit: &'static str,
     /// Sum over the receiver: lumens, CIE values with Y in lumens, or watts of a bin.
     pub total: f64,
     /// Cells as those of the receiver, per m² or sr.
@@ -276,6 +278,13 @@ impl ReceiverResult {
             let total: u128 = sums.iter().map(|s| s.total).sum();
             ChannelResult {
                 name: r.channels.name(c),
+                unit: if r.channels.worth() == 1.0 {
+                    unit
+                } else if scale == 1.0 {
+                    "cd"
+                } else {
+                    "lx"
+                },
                 total: total as f64 * quantum * worth,
                 cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
                 errors: sums
@@ -311,6 +320,11 @@ impl ReceiverResult {
             cells,
             errors,
         }
+    }
+
+    /// The channel of lumens, of a receiver that counts them beside watts.
+    pub fn photometric(&self) -> Option<&ChannelResult> {
+        self.channels.iter().find(|c| matches!(c.name.as_str(), "lm" | "Y"))
     }
 
     /// Cell `(i, j)`: the `i`-th along the first side, the `j`-th along the second.

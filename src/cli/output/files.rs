@@ -5,13 +5,13 @@ use crate::formats::{
     Data3, Grid, LightRay, PhotometricType, Photometry, write_data3, write_grid_csv, write_grid_npz,
     write_grid_png, write_ies, write_vti,
 };
-use crate::report::{file_stem, path_lines, receiver_grid};
+use crate::report::{file_stem, photometric_grid, receiver_grid};
+use crate::simulate::ReceiverResult;
 use crate::simulate::scene::FarFieldType;
-use crate::simulate::{Event, ReceiverResult, Results};
 use std::path::Path;
 
-/// Writes all files of a receiver and gives their names.
-pub(crate) fn write(folder: &Path, receiver: &ReceiverResult, rays: &[LightRay]) -> Result<Vec<String>, Failure> {
+/// Writes all files of a receiver and gives their names; `rays` are those of the sample that it counted.
+pub(crate) fn write(folder: &Path, receiver: &ReceiverResult, rays: Vec<LightRay>) -> Result<Vec<String>, Failure> {
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
@@ -25,35 +25,27 @@ pub(crate) fn write(folder: &Path, receiver: &ReceiverResult, rays: &[LightRay])
     if receiver.kind == "plane" {
         names.push(format!("{stem}.data3"));
         let size = [receiver.grid[1], receiver.grid[0]];
-        let data = Data3 { size, results: receiver.cells.clone(), rays: rays.to_vec() };
+        let data = Data3 { size, results: receiver.cells.clone(), rays };
         write_data3(&folder.join(format!("{stem}.data3")), &data)?;
     }
-    if let Some(photometry) = photometry(receiver, &grid) {
+    let candela = match receiver.unit {
+        "cd" => Some((grid, receiver.power)),
+        _ => photometric_grid(receiver).zip(receiver.photometric().map(|c| c.total)),
+    };
+    if let Some(photometry) = candela.and_then(|(grid, lumens)| photometry(receiver, &grid, lumens)) {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;
     }
     Ok(names)
 }
 
-/// The last segments of the recorded paths that leave the scene or end on a receiver: the sampled ray list of Data_3.
-pub(crate) fn arriving(results: &Results) -> Vec<LightRay> {
-    let (lines, ends) = path_lines(&results.paths);
-    let average = results.power.emitted / results.rays.max(1) as f64;
-    let shares = lines.values.first().map(|(_, v)| v.clone()).unwrap_or_default();
-    (lines.lines().zip(&ends).zip(&shares))
-        .filter(|((_, end), _)| matches!(end, Event::Received | Event::Escaped))
-        .filter_map(|((line, _), share)| {
-            let [.., a, b] = line else { return None };
-            let direction = (*b - *a).try_normalize()?;
-            Some(LightRay { origin: *a, direction, power: share * average, wavelength_nm: None })
-        })
-        .collect()
-}
-
-/// A far field in candela over all its directions, with the ends of both ranges that LM-63 wants: values there are those
-/// of the nearest cells.
-fn photometry(receiver: &ReceiverResult, grid: &Grid) -> Option<Photometry> {
-    let (kind, whole) = match receiver.angles.filter(|_| receiver.unit == "cd")? {
+/// A far field in candela over all its directions, with the ends of both ranges that LM-63 wants: values there are those of the
+/// nearest cells, at a pole the mean of its ring.
+///
+/// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
+/// 1, so that their flux is the receiver's.
+fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
+    let (kind, whole) = match receiver.angles? {
         FarFieldType::A => (PhotometricType::A, [[-90.0, 90.0], [-90.0, 90.0]]),
         FarFieldType::B => (PhotometricType::B, [[-90.0, 90.0], [-90.0, 90.0]]),
         FarFieldType::C => (PhotometricType::C, [[0.0, 360.0], [0.0, 180.0]]),
@@ -69,14 +61,20 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid) -> Option<Photometry> {
     };
     // Index of the cell behind each angle: the ends repeat their neighbours.
     let cell = |i: usize, n: usize| i.saturating_sub(1).min(n - 1);
-    let value = |i: usize, j: usize| grid.values[cell(j, v.cells) * h.cells + cell(i, h.cells)];
-    // C 0 and C 360 are one plane, between the first and the last cell.
-    let wrapped = |i: usize, j: usize| match kind {
-        PhotometricType::C if i == 0 || i == h.cells + 1 => 0.5 * (value(1, j) + value(h.cells, j)),
-        _ => value(i, j),
+    let is_end = |i: usize, n: usize| i == 0 || i == n + 1;
+    let cells = |i: usize, j: usize| grid.values[cell(j, v.cells) * h.cells + cell(i, h.cells)];
+    let mean = |of: &mut dyn Iterator<Item = f64>, n: usize| of.sum::<f64>() / n as f64;
+    let value = |i: usize, j: usize| match kind {
+        PhotometricType::B if is_end(i, h.cells) => mean(&mut (1..=v.cells).map(|j| cells(i, j)), v.cells),
+        PhotometricType::A | PhotometricType::C if is_end(j, v.cells) => {
+            mean(&mut (1..=h.cells).map(|i| cells(i, j)), h.cells)
+        }
+        // C 0 and C 360 are one plane, between the first and the last cell.
+        PhotometricType::C if is_end(i, h.cells) => 0.5 * (cells(1, j) + cells(h.cells, j)),
+        _ => cells(i, j),
     };
-    let candela = (0..h.cells + 2).flat_map(|i| (0..v.cells + 2).map(move |j| (i, j))).map(|(i, j)| wrapped(i, j));
-    Some(Photometry {
+    let candela = (0..h.cells + 2).flat_map(|i| (0..v.cells + 2).map(move |j| (i, j))).map(|(i, j)| value(i, j));
+    let mut photometry = Photometry {
         kind,
         horizontal_deg: ends(0, h),
         vertical_deg: ends(1, v),
@@ -84,9 +82,20 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid) -> Option<Photometry> {
         lamp_lumens: None,
         watts: 0.0,
         opening_mm: [0.0; 3],
-        keywords: vec![
-            ("TEST".into(), format!("lampyris {}", env!("CARGO_PKG_VERSION"))),
-            ("LUMINAIRE".into(), receiver.name.clone()),
-        ],
-    })
+        // These four LM-63-2002 asks of every file.
+        keywords: [
+            ("TEST", receiver.name.as_str()),
+            ("TESTLAB", concat!("lampyris ", env!("CARGO_PKG_VERSION"), ", a simulation")),
+            ("ISSUEDATE", "see results.json"),
+            ("MANUFAC", "see results.json"),
+            ("LUMINAIRE", receiver.name.as_str()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .into(),
+    };
+    let factor = lumens / photometry.flux();
+    if factor.is_finite() {
+        photometry.candela.iter_mut().for_each(|c| *c *= factor);
+    }
+    Some(photometry)
 }

@@ -18,7 +18,7 @@ use crate::math::Ray;
 use crate::report::{Cell, Light, Report, Table, View, file_stem, path_lines};
 use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, Results, RunSettings, Scene, Traced, Verification,
-    replay, trace, verify_pruning,
+    arrivals, replay, trace, verify_pruning,
 };
 use crate::study::aim::Aim;
 use crate::study::check::{self, Check, Court, check};
@@ -202,9 +202,9 @@ impl Prepared<'_> {
         let spinner = context.spinner("writing");
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
-        let arriving = files::arriving(&outcome.results);
-        for receiver in &mut outcome.results.receivers {
-            receiver.files = files::write(folder, receiver, &arriving)?;
+        for k in 0..outcome.results.receivers.len() {
+            let rays = arrivals(&self.bound, k, &outcome.results);
+            outcome.results.receivers[k].files = files::write(folder, &outcome.results.receivers[k], rays)?;
         }
         let (paths, _) = path_lines(&outcome.results.paths);
         write_vtp(&folder.join("paths.vtp"), &paths)?;

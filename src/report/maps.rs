@@ -1,0 +1,119 @@
+//! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
+
+use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
+use crate::formats::file_stem;
+use crate::formats::{Axis, Grid, Layer};
+use crate::simulate::scene::FarFieldType;
+use crate::simulate::{ChannelResult, ReceiverResult};
+
+/// The cells of a receiver with their axes; `None` for a receiver that has one number only.
+pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
+    if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
+        return None;
+    }
+    let (labels, unit) = match r.kind {
+        "plane" => (["x", "y"], "mm"),
+        _ if r.angles == Some(FarFieldType::C) => (["C", "gamma"], "deg"),
+        _ => (["H", "V"], "deg"),
+    };
+    let axis = |k: usize| Axis {
+        label: labels[k].into(),
+        unit: unit.into(),
+        range: [r.middle[k] - r.half[k], r.middle[k] + r.half[k]],
+        cells: r.grid[k],
+    };
+    let quantity = match r.unit {
+        "cd" => "luminous intensity",
+        "W/sr" => "radiant intensity",
+        "lx" => "illuminance",
+        _ => "irradiance",
+    };
+    Some(Grid {
+        name: r.name.clone(),
+        quantity: quantity.into(),
+        unit: r.unit.into(),
+        axes: [axis(0), axis(1)],
+        values: r.cells.clone(),
+        error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
+        layers: r.channels.iter().map(layer).collect(),
+    })
+}
+
+/// A channel over the cells of its receiver.
+fn layer(channel: &ChannelResult) -> Layer {
+    Layer {
+        quantity: match (channel.name.as_str(), channel.unit) {
+            ("lm", "lx") => "illuminance".into(),
+            ("lm", _) => "luminous intensity".into(),
+            (name, _) => name.into(),
+        },
+        unit: channel.unit.into(),
+        values: channel.cells.clone(),
+        error: channel.errors.clone(),
+    }
+}
+
+/// What the eye sees of a receiver in watts that counts lumens or CIE values too: the grid of its candela or lux.
+pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
+    let (grid, Layer { unit, values, error, .. }) = (receiver_grid(r)?, layer(r.photometric()?));
+    let quantity = if unit == "lx" { "illuminance" } else { "luminous intensity" };
+    Some(Grid { quantity: quantity.into(), unit, values, error: Some(error), layers: Vec::new(), ..grid })
+}
+
+/// The values along both axes through the peak, with their statistical errors.
+pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Chart {
+    let [a, b] = &grid.axes;
+    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y])).unwrap_or(0);
+    let (column, row) = (peak % a.cells, peak / a.cells);
+    let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
+        name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
+        points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
+        errors: grid.error.as_ref().map(|e| (0..axis.cells).map(|k| e[cell(k)]).collect()).unwrap_or_default(),
+        style: SeriesStyle::Line,
+        ..Series::default()
+    };
+    let series = vec![along(a, b, row, &|k| row * a.cells + k), along(b, a, column, &|k| k * a.cells + column)];
+    let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
+    let axes =
+        [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
+    let name = format!("{}-cuts", file_stem(&r.name));
+    let caption = "One row and one column of cells; bars are one standard error.";
+    Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series)
+}
+
+pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
+    let peak = grid.peak().map(|([x, y], value)| {
+        format!(
+            "Peak {} {} at {} {} {}, {} {} {}. ",
+            figures(value, 3),
+            grid.unit,
+            grid.axes[0].label,
+            figures(x, 3),
+            grid.axes[0].unit,
+            grid.axes[1].label,
+            figures(y, 3),
+            grid.axes[1].unit
+        )
+    });
+    // The relative error where the light is: weighted by the light itself.
+    let error = grid.error.as_ref().map(|e| {
+        let sum: f64 = grid.values.iter().sum();
+        format!(
+            "Statistical error of a cell, weighted by its light: {} %. ",
+            figures(100.0 * e.iter().sum::<f64>() / sum.max(1e-300), 2)
+        )
+    });
+    let cells = format!(
+        "{} × {} cells of {} {}.",
+        r.grid[0],
+        r.grid[1],
+        figures(grid.axes[0].step(), 3),
+        grid.axes[0].unit
+    );
+    [peak, error, Some(cells)].into_iter().flatten().collect()
+}
+
+/// A name as words.
+pub(super) fn spoken(name: &str) -> String {
+    name.replace('_', " ")
+}

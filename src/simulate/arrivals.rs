@@ -1,0 +1,45 @@
+use super::bind::BoundScene;
+use super::kernel::{Event, PathVertex};
+use super::results::Results;
+use crate::formats::LightRay;
+use crate::math::Ray;
+
+/// The rays of the recorded paths that a plane or sphere counted: where they met it, where they go, and the power they stand for.
+///
+/// Recorded paths are a sample of all; each ray has the power of all rays that it stands for, so that the sum is an estimate of what
+/// the receiver counted.
+pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {
+    let Some(receiver) = bound.receivers.get(receiver) else { return Vec::new() };
+    let emitted: f64 = results.paths.iter().filter(|v| v.event == Event::Emitted).map(|v| v.power).sum();
+    let share = results.power.emitted / emitted.max(f64::MIN_POSITIVE);
+    let mut rays = Vec::new();
+    for path in results.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
+        for pair in path.windows(2) {
+            let [a, b] = [&pair[0], &pair[1]];
+            let Some(direction) = (b.point - a.point).try_normalize() else { continue };
+            if receiver.interactions.is_some_and(|n| n != b.bounce)
+                || receiver.absorbs && b.event != Event::Received
+            {
+                continue;
+            }
+            let (ray, end) = (Ray::new(a.point, direction), reach(a, b, receiver.absorbs));
+            let mut after = 0.0;
+            while let Some(t) = receiver.crossing(&ray, after, end) {
+                rays.push(LightRay { origin: ray.at(t), direction, power: b.power * share, wavelength_nm: None });
+                after = t;
+            }
+        }
+    }
+    rays
+}
+
+/// How far a segment may meet a receiver: to its end, one that leaves the scene for ever. One that ends on a receiver ends
+/// there but for rounding.
+fn reach(a: &PathVertex, b: &PathVertex, absorbs: bool) -> f64 {
+    let length = (b.point - a.point).length();
+    match b.event {
+        Event::Escaped => f64::INFINITY,
+        Event::Received if absorbs => length * (1.0 + 1e-9),
+        _ => length,
+    }
+}
