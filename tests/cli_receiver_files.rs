@@ -160,3 +160,31 @@ fn the_rays_of_data_3_are_those_that_arrived() {
         assert!((power / expected - 1.0).abs() < 0.05, "{name}: {power} lm of {expected}");
     }
 }
+
+/// What a far field wrote as LM-63 is the same light again as a source, the right way round.
+#[test]
+fn an_ies_file_read_as_a_source_is_the_light_it_was_written_from() {
+    let far = "[[receiver]]\nname = 'A'\nkind = 'far_field'\ncells = [18, 18]\n\
+        [[receiver]]\nname = 'B'\nkind = 'far_field'\nangles = 'B'\ncells = [18, 18]\n\
+        [[receiver]]\nname = 'C'\nkind = 'far_field'\nangles = 'C'\ncells = [24, 24]\n";
+    let (first, _) = trace("lm", far);
+    // Right of one who looks along +z with +y up is −x: there lies C 0.
+    for (name, x) in [("A", "[0, 1, 0]"), ("B", "[0, 1, 0]"), ("C", "[-1, 0, 0]")] {
+        let file = first.path().join(format!("out/{name}.ies"));
+        let scene = format!(
+            "[run]\nrays = 100_000\nunit = 'lm'\n[[source]]\nkind = 'ies'\nfile = '{}'\nx = {x}\n{far}",
+            file.display()
+        );
+        std::fs::write(first.path().join("again.toml"), scene).unwrap();
+        let (code, _, err) = lampyris_in(first.path(), &["trace", "again.toml", "-o", "again", "-q"]);
+        assert_eq!(code, 0, "{err}");
+        let [before, after] = ["out", "again"].map(|folder| {
+            let columns = columns(&first.path().join(format!("{folder}/{name}.csv")));
+            columns[2].1.clone()
+        });
+        let difference: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).abs()).sum();
+        // Cells of 10° and what lies between their middles; the mirror image differs by 0.4 and more.
+        let share = difference / before.iter().sum::<f64>();
+        assert!(share < 0.12, "{name}: {share}");
+    }
+}

@@ -37,7 +37,8 @@ impl PhotometricType {
     /// The direction of two angles in degrees.
     ///
     /// Components for type C: along the plane C 0, the plane C 90, and the main axis (γ = 0, down for a luminaire). For A and B:
-    /// to positive H, to positive V, and forward.
+    /// to positive H, to positive V, and forward. Seen along the main axis, C runs counterclockwise, as in the plan of a luminaire
+    /// that shines down, and positive H lies to the right of positive V.
     pub fn direction(self, horizontal_deg: f64, vertical_deg: f64) -> Vector {
         let (sh, ch) = horizontal_deg.to_radians().sin_cos();
         let (sv, cv) = vertical_deg.to_radians().sin_cos();

@@ -218,7 +218,9 @@ impl Light<'_> {
             ("mean position 1", "mm or °"),
             ("mean position 2", "mm or °"),
             ("rms 1", "mm or °"),
+            ("± (1σ)", "mm or °"),
             ("rms 2", "mm or °"),
+            ("± (1σ)", "mm or °"),
         ];
         let mut receivers = Table::new("receivers", "Receivers", &columns);
         for r in &self.results.receivers {
@@ -231,7 +233,9 @@ impl Light<'_> {
                 r.centroid[0].into(),
                 r.centroid[1].into(),
                 r.rms[0].into(),
+                Cell::Number(r.rms_error[0], 2),
                 r.rms[1].into(),
+                Cell::Number(r.rms_error[1], 2),
             ]);
         }
         let section = Section::new("Energy").with(table).with(receivers);
@@ -244,7 +248,8 @@ impl Light<'_> {
 
     /// Colours and bands of wavelengths, receiver by receiver.
     fn channels(&self) -> Table {
-        let columns = [("receiver", ""), ("channel", ""), ("total", ""), ("unit", ""), ("x", ""), ("y", "")];
+        let columns =
+            [("receiver", ""), ("channel", ""), ("total", ""), ("± (1σ)", ""), ("unit", ""), ("x", ""), ("y", "")];
         let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
             receiver's CSV, NPZ and VTI files.";
         let mut table = Table::new("channels", "Channels", &columns).caption(caption);
@@ -259,6 +264,7 @@ impl Light<'_> {
                     r.name.as_str().into(),
                     c.name.as_str().into(),
                     Cell::Number(c.total, 6),
+                    Cell::Number(c.error, 2),
                     unit.into(),
                     x,
                     y,

@@ -48,6 +48,8 @@ pub(crate) fn of(t: &Tallies) -> String {
         m.second.iter().for_each(|x| h.eat(&x.to_le_bytes()));
         h.eat(&m.farthest.to_le_bytes());
     }
+    t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| h.eat(&x.to_le_bytes()));
+    t.channels.iter().for_each(|c| h.sums(c));
     let c = &t.counts;
     [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off].iter().for_each(|x| h.eat(&x.to_le_bytes()));
     format!("{:032x}", h.0)

@@ -40,5 +40,5 @@ pub use run::{
     Hooks, KernelChoice, Progress, RunSettings, Traced, kernel_name, replay, replicates, simulate, trace,
 };
 pub use scene::Scene;
-pub use tally::{Moments, QUANTA, Sum};
+pub use tally::{Moments, QUANTA, Spread, Sum};
 pub use verify::{Verification, verify_pruning};

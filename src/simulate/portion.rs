@@ -25,7 +25,7 @@ pub struct Portion {
     pub seconds: f64,
 }
 
-const MAGIC: &[u8] = b"lampyris tally 2\n";
+const MAGIC: &[u8] = b"lampyris tally 3\n";
 
 impl Portion {
     pub(crate) fn none(bound: &BoundScene, replicates: u32) -> Self {
@@ -86,6 +86,8 @@ impl Portion {
             m.second.iter().for_each(|x| out.extend(x.to_le_bytes()));
             out.extend(m.farthest.to_le_bytes());
         }
+        t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| out.extend(x.to_le_bytes()));
+        t.channels.iter().for_each(|c| sums(&mut out, c));
         let c = &t.counts;
         [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught]
             .iter()
@@ -142,6 +144,12 @@ impl Portion {
                 second: [u128::from_le_bytes(r.array()?), u128::from_le_bytes(r.array()?)],
                 farthest: r.u64()?,
             };
+        }
+        for x in t.spreads.iter_mut().flat_map(|s| s.products.iter_mut().flatten()) {
+            *x = i128::from_le_bytes(r.array()?);
+        }
+        for channels in &mut t.channels {
+            r.sums(channels)?;
         }
         let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];

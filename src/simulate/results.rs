@@ -147,8 +147,12 @@ pub struct ReceiverResult {
     pub unit: &'static str,
     /// Mean position of the light: mm on a plane, degrees in angles.
     pub centroid: [f64; 2],
+    /// Its standard error.
+    pub centroid_error: [f64; 2],
     /// Root mean square about the receiver's centre, in the same units.
     pub rms: [f64; 2],
+    /// Its standard error.
+    pub rms_error: [f64; 2],
     /// Largest distance from the centre, in the same units.
     pub farthest: f64,
     /// Files written for it; whoever writes them fills this in.
@@ -179,6 +183,8 @@ pub struct ChannelResult {
     pub unit: &'static str,
     /// Sum over the receiver: lumens, CIE values with Y in lumens, or watts of a bin.
     pub total: f64,
+    /// Its standard error.
+    pub error: f64,
     /// Cells as those of the receiver, per m² or sr.
     #[serde(skip)]
     pub cells: Vec<f64>,
@@ -275,7 +281,7 @@ impl ReceiverResult {
         let channels = further.chunks(n).enumerate();
         let channels = channels.map(|(c, sums)| {
             let worth = r.channels.worth();
-            let total: u128 = sums.iter().map(|s| s.total).sum();
+            let total = &tallies.channels[i][c];
             ChannelResult {
                 name: r.channels.name(c),
                 unit: if r.channels.worth() == 1.0 {
@@ -285,7 +291,8 @@ impl ReceiverResult {
                 } else {
                     "lx"
                 },
-                total: total as f64 * quantum * worth,
+                total: total.total as f64 * quantum * worth,
+                error: total.error(tallies.replicates) * quantum * worth,
                 cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
                 errors: sums
                     .iter()
@@ -299,6 +306,7 @@ impl ReceiverResult {
         let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
         let total = &tallies.receivers[i];
         let means = tallies.moments[i].means(total.total);
+        let of_means = tallies.spreads[i].errors(total, &tallies.moments[i], tallies.replicates);
         let largest = half[0].max(half[1]);
         Self {
             name: r.name.clone(),
@@ -310,7 +318,10 @@ impl ReceiverResult {
             min: cells.iter().copied().fold(f64::INFINITY, f64::min),
             unit,
             centroid: [0, 1].map(|a| middle[a] + half[a] * means[a][0]),
+            centroid_error: [0, 1].map(|a| half[a] * of_means[a]),
             rms: [0, 1].map(|a| half[a] * means[a][1].sqrt()),
+            // Of a square root, to first order.
+            rms_error: [0, 1].map(|a| 0.5 * half[a] * of_means[2 + a] / means[a][1].sqrt().max(f64::MIN_POSITIVE)),
             farthest: largest * tallies.moments[i].farthest(),
             files: Vec::new(),
             half,

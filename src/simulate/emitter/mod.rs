@@ -96,7 +96,10 @@ impl Emitter {
         let mut coloured_list = false;
         match loaded {
             Some(Loaded::Intensity(sampler, kind, flux)) => {
-                if kind != PhotometricType::C {
+                if kind == PhotometricType::C {
+                    // C runs counterclockwise for one who looks along the light: the plan of a luminaire that shines down.
+                    frame.y = -frame.y;
+                } else {
                     // To positive H, to positive V, forward: as far fields have it.
                     frame = super::receiver::far_axes(at, direction, s.x.map_or(Vector::Y, Vector::from_array));
                 }

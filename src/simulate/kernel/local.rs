@@ -1,7 +1,7 @@
 use super::Context;
 use crate::math::{FaceId, Point, Vector};
 use crate::simulate::bind::BoundScene;
-use crate::simulate::tally::{Grid, Moments, Sum, count};
+use crate::simulate::tally::{Grid, Moments, Spread, Sum, count};
 use serde::{Deserialize, Serialize};
 
 /// Why a ray was lost.
@@ -206,6 +206,10 @@ pub struct Tallies {
     pub receivers: Vec<Sum>,
     /// Where light fell on each receiver.
     pub moments: Vec<Moments>,
+    /// How that differs between replicates.
+    pub spreads: Vec<Spread>,
+    /// All cells of each channel of each receiver together.
+    pub channels: Vec<Vec<Sum>>,
     /// Power absorbed on each placed face.
     pub faces: Vec<Sum>,
     /// Power absorbed on each instance: its faces share the replicates' ups and downs, so their errors do not simply add up.
@@ -228,6 +232,8 @@ impl Tallies {
             cells: bound.receivers.iter().map(|r| vec![Sum::default(); r.sum_count()]).collect(),
             receivers: vec![Sum::default(); bound.receivers.len()],
             moments: vec![Moments::default(); bound.receivers.len()],
+            spreads: vec![Spread::default(); bound.receivers.len()],
+            channels: bound.receivers.iter().map(|r| vec![Sum::default(); r.channels.count()]).collect(),
             faces: vec![Sum::default(); bound.faces.len()],
             instances: vec![Sum::default(); bound.instances.len()],
             bulk: vec![Sum::default(); bound.bodies.len()],
@@ -244,9 +250,18 @@ impl Tallies {
                 local.receivers[i].add(0, sum as f64);
                 local.receiver_totals[i] += sum;
             }
+            let mut channels = vec![0; self.channels[i].len()];
+            if !channels.is_empty() {
+                let further = local.receivers[i].touched().filter(|(cell, _)| *cell >= receiver.cell_count());
+                further.for_each(|(cell, quanta)| channels[cell / receiver.cell_count() - 1] += quanta);
+            }
+            self.channels[i].iter_mut().zip(channels).for_each(|(sum, quanta)| sum.add_replicate(quanta));
             local.receivers[i].flush(&mut self.cells[i]);
-            self.receivers[i].add_replicate(std::mem::take(&mut local.receiver_totals[i]));
-            self.moments[i].merge(&std::mem::take(&mut local.moments[i]));
+            let (power, moments) =
+                (std::mem::take(&mut local.receiver_totals[i]), std::mem::take(&mut local.moments[i]));
+            self.receivers[i].add_replicate(power);
+            self.spreads[i].add_replicate(power, &moments);
+            self.moments[i].merge(&moments);
         }
         let mut instances = vec![0; self.instances.len()];
         local.absorbed.touched().for_each(|(face, quanta)| {
@@ -274,6 +289,8 @@ impl Tallies {
         self.cells.iter_mut().zip(&o.cells).for_each(|(a, b)| pairs(a, b));
         pairs(&mut self.receivers, &o.receivers);
         self.moments.iter_mut().zip(&o.moments).for_each(|(a, b)| a.merge(b));
+        self.spreads.iter_mut().zip(&o.spreads).for_each(|(a, b)| a.merge(b));
+        self.channels.iter_mut().zip(&o.channels).for_each(|(a, b)| pairs(a, b));
         pairs(&mut self.faces, &o.faces);
         pairs(&mut self.instances, &o.instances);
         pairs(&mut self.bulk, &o.bulk);

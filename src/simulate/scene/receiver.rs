@@ -13,9 +13,9 @@ pub struct Receiver {
     pub kind: ReceiverKind,
     /// Centre of a plane or sphere, mm.
     pub at: [f64; 3],
-    /// Normal of a plane; the main direction (0, 0) of a far field.
+    /// Normal of a plane; the main direction of a far field or of a sphere's cells: H 0, V 0, or γ 0.
     pub normal: [f64; 3],
-    /// Direction of the first side of a plane, as far as `normal` lets it.
+    /// Direction of the first side of a plane, as far as `normal` lets it; the second is `normal` × `x`.
     pub x: Option<[f64; 3]>,
     /// Upward direction of a far field, as far as `normal` lets it.
     pub up: [f64; 3],
@@ -31,7 +31,8 @@ pub struct Receiver {
     pub one_sided: bool,
     /// Counts only light that was hit exactly so many times before.
     pub interactions: Option<u32>,
-    /// Angles of a far field.
+    /// Angles of a far field: for one who looks along `normal`, positive H lies to the right and positive V up; C 0 lies to the right
+    /// and C 90 up.
     pub angles: FarFieldType,
     /// First angle of a far field (H, or C), from and to, degrees.
     pub h_deg: [f64; 2],
@@ -82,7 +83,7 @@ pub enum ReceiverKind {
     Plane,
     /// All light that leaves the scene, by direction: power per solid angle.
     FarField,
-    /// A sphere in space, by direction from its centre: power per area.
+    /// A sphere in space, by direction from its centre as angles of type A: power per area.
     Sphere,
     /// What the faces of a part absorb.
     Absorbed,

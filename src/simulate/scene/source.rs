@@ -17,8 +17,9 @@ pub struct Source {
     pub power: Option<f64>,
     /// IES LM-63, EULUMDAT, ray list (CSV or NPZ) or Data_1, relative to the scene file.
     ///
-    /// Its main axis points along `direction`, for type C with the plane C 0 along `x`, for types A and B with upward along `x`
-    /// (+y unless said otherwise). Ray lists stand with their origin in `at`.
+    /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
+    /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
+    /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
     pub file: Option<String>,
     /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`.
     pub on: Option<FaceSelector>,
