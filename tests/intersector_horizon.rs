@@ -34,12 +34,24 @@ fn leaving(mesh: &FacetMesh, dice: &mut Random) -> Ray {
     Ray::new(origin, direction).leaving(from)
 }
 
+/// The same, but all rays of a facet run nearly the same way, which differs from facet to facet.
+fn in_a_bundle(mesh: &FacetMesh, dice: &mut Random) -> Ray {
+    let ray = leaving(mesh, dice);
+    let facet = ray.from.map_or(0, |from| from.primitive);
+    let bundle = Random(u64::from(facet)).direction();
+    Ray { direction: (bundle + dice.direction() * 0.2).normalize(), ..ray }
+}
+
 /// The share of rays to the outside that are called gone, of those that meet nothing.
 fn share_found(name: &str, mesh: &FacetMesh) -> f64 {
+    share_found_of(name, mesh, leaving)
+}
+
+fn share_found_of(name: &str, mesh: &FacetMesh, ray: fn(&FacetMesh, &mut Random) -> Ray) -> f64 {
     let tree = Octree::build(mesh, &octree::Settings::default());
     let judge = Bvh::build(mesh, &bvh::Settings::default());
     let mut dice = Random(7);
-    let rays: Vec<Ray> = (0..60_000).map(|_| leaving(mesh, &mut dice)).collect();
+    let rays: Vec<Ray> = (0..60_000).map(|_| ray(mesh, &mut dice)).collect();
     assert!(!rays.iter().any(|r| tree.is_gone(r)), "{name}: nothing is known before it was worth it");
     tree.expect(&many());
     let mut found = 0.0;
@@ -80,6 +92,19 @@ fn a_ray_above_the_horizon_meets_nothing() {
     // A convex body hides nothing: all but rays that graze a fold are found, though half of these do graze.
     assert!(found[0].1 > 0.85 && found[1].1 > 0.95, "{found:?}");
     assert!(found[2].1 > 0.7, "{found:?}");
+}
+
+#[test]
+fn a_ray_of_a_bundle_in_the_free_cone_meets_nothing() {
+    let bean = |d: Vector| Point::new(30.0 * d.x, 20.0 * d.y + 0.02 * (30.0 * d.x).powi(2), 9.0 * d.z);
+    let found = [
+        ("ball", share_found_of("ball", &ball(12, |d| Point::ZERO + d * 20.0), in_a_bundle)),
+        ("bean", share_found_of("bean", &ball(12, bean), in_a_bundle)),
+        ("heap", share_found_of("heap", &heap(2000, 50.0, 3.0, 5), in_a_bundle)),
+        ("lamp", share_found_of("lamp", &lamp(4000).0, in_a_bundle)),
+        ("stadium", share_found_of("stadium", &stadium(4000).0, in_a_bundle)),
+    ];
+    assert!(found[0].1 > 0.9 && found[1].1 > 0.8, "{found:?}");
 }
 
 #[test]

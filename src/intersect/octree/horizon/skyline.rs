@@ -1,40 +1,25 @@
-//! How high above each facet anything else stands: a ray that leaves a facet above its horizon meets nothing.
-//!
-//! Light leaves a lens, a cover or an open reflector by such rays, one in three to one in five of all, and to find out by walking
-//! that nothing is there costs as much as a hit.
+//! The horizon of a facet in sectors: how steeply anything rises over it, to all sides.
 //!
 //! The horizon of a triangle is bounded, in eight sectors around it, from lines in its plane that have the triangle on one side.
 //! A ray of slope `s` that runs at an angle `a` to the normal of such a line is at a height of at most `g·s/cos a` when it is
 //! `g` beyond the line; and of points of a convex set at heights `h` and distances `g`, `h/g` is greatest at a corner of the set.
 //! So is it bounded for boxes, and only boxes that may stand higher than what was found already are opened.
 //!
-//! Guarantee: conservative; heights up to the reach of a start, a picometre for a lamp, count as nothing.
 //! Weakness: eight sectors of one angle each, so that out of a narrow shaft no ray is seen to be free.
 
-use super::Octree;
-use super::node::{Link, Target};
+use crate::intersect::octree::Octree;
+use crate::intersect::octree::node::{Link, Target};
 use crate::math::{Aabb, Point, Vector, orthonormal_pair};
 use std::f64::consts::FRAC_PI_8;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Rays of a run for each facet below which no facet is watched.
-const WORTH: u64 = 64;
-/// Rays that leave a facet before its horizon is found: to find one takes some 20 µs, and it saves a ray that leaves 0.1 µs.
-const PATIENCE: u32 = 200;
-/// The same where the rays of the run suffice for all facets.
-const IMPATIENCE: u32 = 32;
-/// A horizon is not found more closely than this share of the least slope of the rays so far, and only in the sectors where they
-/// ran: what stands lower or elsewhere is not looked at.
-const BELOW: f64 = 0.2;
 /// Slope above which a horizon is of no use.
 const STEEP: f64 = 8.0;
 /// Sectors around a triangle: a ray is in one by the signs and the order of its two coordinates in the plane.
-const SECTORS: usize = 8;
+pub(super) const SECTORS: usize = 8;
 
 /// The sector of a ray with these coordinates in the plane.
 #[inline(always)]
-fn sector(x: f32, y: f32) -> usize {
+pub(super) fn sector(x: f32, y: f32) -> usize {
     usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(y.abs() > x.abs()) << 2
 }
 
@@ -80,80 +65,8 @@ impl Horizon {
     }
 }
 
-/// The horizons of the facets that many rays have left.
-pub(super) struct Horizons {
-    facets: Vec<Watched>,
-    patience: u32,
-}
-
-/// A facet, with the rays that left it while its horizon was not known.
-struct Watched {
-    left: AtomicU32,
-    /// The least slope of these rays, as bits of an f32, and the sectors that they lie in, one bit each.
-    least: AtomicU32,
-    sectors: AtomicU32,
-    horizon: OnceLock<Box<Horizon>>,
-}
-
-impl Watched {
-    fn new() -> Self {
-        Self {
-            left: AtomicU32::new(0),
-            least: AtomicU32::new(f32::INFINITY.to_bits()),
-            sectors: AtomicU32::new(0),
-            horizon: OnceLock::new(),
-        }
-    }
-
-    /// Watches a ray; after enough of them one thread finds the horizon, the others walk on.
-    #[cold]
-    fn watch(&self, tree: &Octree, facet: usize, direction: Vector, patience: u32) {
-        let [a, b, c, _] = tree.around.mesh.corners(facet);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        let up = normal.dot(direction);
-        let slope = up / (direction - normal * up).length();
-        // What goes into the body is not free; NaN neither.
-        if slope.is_nan() || slope <= 0.0 {
-            return;
-        }
-        let (x, y) = orthonormal_pair(normal);
-        // The bits of positive numbers are in their order.
-        self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
-        self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
-        if self.left.fetch_add(1, Ordering::Relaxed) == patience {
-            let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
-            let sectors = self.sectors.load(Ordering::Relaxed);
-            let floor = std::array::from_fn(|s| if sectors >> s & 1 == 1 { least * BELOW } else { f64::INFINITY });
-            let _ = self.horizon.set(Box::new(of_facet(tree, facet, &floor)));
-        }
-    }
-}
-
-impl Horizons {
-    /// None yet, for a run of so many rays; `None` when they are too few for the search.
-    pub(super) fn expecting(rays: u64, tree: &Octree) -> Option<Self> {
-        let facets = tree.around.mesh.facets.len();
-        let each = rays / facets.max(1) as u64;
-        let patience = if each >= 2 * u64::from(PATIENCE) { IMPATIENCE } else { PATIENCE };
-        (each >= WORTH).then(|| Self { facets: (0..facets).map(|_| Watched::new()).collect(), patience })
-    }
-
-    /// Whether a ray that leaves this facet is known to meet nothing.
-    #[inline]
-    pub(super) fn clear(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
-        let Some(watched) = self.facets.get(facet) else { return false };
-        match watched.horizon.get() {
-            Some(horizon) => horizon.is_below(direction),
-            None => {
-                watched.watch(tree, facet, direction, self.patience);
-                false
-            }
-        }
-    }
-}
-
 /// The horizon of a facet, in each sector no lower than the slope `floor`.
-fn of_facet(tree: &Octree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
+pub(super) fn of_facet(tree: &Octree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
     let mesh = tree.around.mesh;
     let [a, b, c, d] = mesh.corners(facet);
     let [first, second] = [[a, b, c], [a, c, d]];

@@ -1,0 +1,216 @@
+//! The free cone of a facet: how far from an axis the rays that leave it may run and meet nothing.
+//!
+//! Rays that start on a set T and meet a set Q run along differences `q − t`. A normal `N` with `N·(q − t) ≤ 0` for all of them, which
+//! is that of a plane between the two sets, keeps rays within the angle `asin N·a` of an axis `a` off Q. Such normals are looked
+//! for from the cheapest: that of T's plane, those of a ball around both sets, of six lines around T, and at last the very one that
+//! is nearest to the axis, which lies across one or two of the differences. Only boxes that may be nearer to the axis than what was
+//! found already are opened.
+
+use crate::intersect::octree::Octree;
+use crate::intersect::octree::node::{Link, Target};
+use crate::math::{Aabb, Point, Vector};
+
+/// Half an angle below which a cone is of no use.
+const NARROW: f64 = 0.02;
+/// Taken off the half angle for the rounding of starts and of what is asked in f32.
+const ROOM: f64 = 1e-3;
+
+/// The cosine of half the angle of a free cone of a facet, which is not made wider than half of `widest`; `None` where there is none.
+pub(super) fn cosine(tree: &Octree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
+    let mesh = tree.around.mesh;
+    let [a, b, c, d] = mesh.corners(facet);
+    let first = Base::new([a, b, c], tree.around.reach)?;
+    let bases = if mesh.facets[facet].is_triangle() {
+        [Some((first, [a, b, c, c])), None]
+    } else {
+        let second = Base::new([a, c, d], tree.around.reach)?;
+        [Some((first, [a, c, d, d])), Some((second, [a, b, c, c]))]
+    };
+    let mut limit = Limit::new(axis, widest);
+    // A plane of its own lies below the whole cone.
+    for (base, _) in bases.iter().flatten() {
+        limit.lower(axis.dot(base.normal));
+    }
+    for (base, other) in bases.iter().flatten() {
+        base.meet(other, &mut limit);
+        base.search(tree, facet, &mut limit);
+    }
+    let angle = limit.sine.clamp(0.0, 1.0).asin();
+    (angle > NARROW).then(|| (angle - ROOM).cos())
+}
+
+/// A cone that is made narrower.
+struct Limit {
+    axis: Vector,
+    /// Of half its angle.
+    sine: f64,
+    cosine: f64,
+}
+
+impl Limit {
+    fn new(axis: Vector, angle: f64) -> Self {
+        let (sine, cosine) = angle.sin_cos();
+        Self { axis, sine, cosine }
+    }
+
+    fn lower(&mut self, sine: f64) {
+        if sine < self.sine {
+            self.sine = sine.max(0.0);
+            self.cosine = (1.0 - self.sine * self.sine).sqrt();
+        }
+    }
+}
+
+/// A triangle that rays leave.
+struct Base {
+    corners: [Point; 3],
+    normal: Vector,
+    /// Directions in its plane away from it, across its sides and at its corners, and where the lines are.
+    lines: [(Vector, f64); 6],
+    middle: Point,
+    radius: f64,
+    reach: f64,
+}
+
+impl Base {
+    fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        let mut sides = [Vector::ZERO; 3];
+        for k in 0..3 {
+            sides[k] = (corners[(k + 1) % 3] - corners[k]).cross(normal).try_normalize()?;
+        }
+        let mut lines = [(Vector::ZERO, 0.0); 6];
+        for k in 0..3 {
+            lines[k] = (sides[k], sides[k].dot(corners[k] - a));
+            let across = (sides[k] + sides[(k + 2) % 3]).try_normalize()?;
+            lines[k + 3] = (across, across.dot(corners[k] - a));
+        }
+        let middle = (a + b + c) / 3.0;
+        let radius = corners.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
+        Some(Self { corners, normal, lines, middle, radius, reach })
+    }
+
+    /// Narrows the cone to what no facet of the tree but its own reaches.
+    fn search(&self, tree: &Octree, facet: usize, limit: &mut Limit) {
+        let mesh = tree.around.mesh;
+        let mut open: Vec<Link> = tree.root.into_iter().collect();
+        while let Some(link) = open.pop() {
+            if limit.sine < NARROW {
+                return;
+            }
+            match link.target() {
+                Target::Node(index) => {
+                    let node = &tree.nodes[index];
+                    for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
+                        let b = node.child(slot);
+                        if self.may_meet(&b, tree.center, limit) {
+                            open.push(Link(node.children[slot]));
+                        }
+                    }
+                }
+                Target::Block(index, count) => {
+                    let block = &tree.blocks[index];
+                    for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
+                        self.meet(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
+                    }
+                }
+                Target::End => {}
+            }
+        }
+    }
+
+    /// Whether a ray within the cone may meet a box about `center`.
+    fn may_meet(&self, b: &Aabb, center: Point, limit: &Limit) -> bool {
+        let (middle, half) = (b.center() + center, 0.5 * b.size());
+        let room = 1e-6 * half.max_element();
+        let height = (middle - self.corners[0]).dot(self.normal) + half.dot(self.normal.abs()) + room;
+        height > self.reach && self.may_meet_ball(middle, half.length() + room, limit)
+    }
+
+    /// Whether a ray within the cone may meet a ball.
+    fn may_meet_ball(&self, middle: Point, radius: f64, limit: &Limit) -> bool {
+        let (to, radius) = (middle - self.middle, (self.radius + radius) * (1.0 + 1e-9));
+        let (along, beside) = (to.dot(limit.axis), to.length_squared() - radius * radius);
+        // Of the angle to its middle and that which it fills.
+        beside <= 0.0 || along > limit.cosine * beside.sqrt() - limit.sine * radius
+    }
+
+    /// Narrows the cone to what does not reach a facet, the hull of which may be more than the facet.
+    fn meet(&self, corners: &[Point; 4], limit: &mut Limit) {
+        if !self.is_off(corners, limit) {
+            let [a, b, c, d] = *corners;
+            for triangle in [[a, b, c], [a, c, d]] {
+                if !self.is_off(&triangle, limit) {
+                    limit.lower(self.sine_to(&triangle, limit.axis));
+                }
+            }
+        }
+    }
+
+    /// Whether it is seen at once that no ray within the cone meets the hull of these points.
+    fn is_off(&self, points: &[Point], limit: &Limit) -> bool {
+        let heights = |p: &Point| (*p - self.corners[0]).dot(self.normal);
+        if points.iter().all(|p| heights(p) <= self.reach) {
+            return true;
+        }
+        let middle = points.iter().sum::<Point>() / points.len() as f64;
+        let radius = points.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
+        !self.may_meet_ball(middle, radius, limit) || self.is_beyond_a_line(points, limit)
+    }
+
+    /// Whether a plane through one of the lines keeps the points from the whole cone.
+    fn is_beyond_a_line(&self, points: &[Point], limit: &Limit) -> bool {
+        let upright = self.normal.dot(limit.axis);
+        self.lines.iter().any(|(across, at)| {
+            // The plane rises as steeply as this over the line.
+            let (mut least, mut most) = (0.0f64, f64::INFINITY);
+            for p in points {
+                let to = *p - self.corners[0];
+                let (height, beyond) = (to.dot(self.normal), to.dot(*across) - at);
+                if height > self.reach {
+                    least = least.max(height / beyond.max(0.0));
+                } else if beyond < -self.reach {
+                    most = most.min(height.min(0.0) / beyond);
+                }
+            }
+            least <= most
+                && least.is_finite()
+                && upright - least * across.dot(limit.axis) >= limit.sine * (1.0 + least * least).sqrt()
+        })
+    }
+
+    /// The sine of the angle between the axis and the nearest direction from one triangle to the other.
+    fn sine_to(&self, points: &[Point; 3], axis: Vector) -> f64 {
+        let mut ways = [Vector::ZERO; 9];
+        let mut count = 0;
+        for q in points {
+            for t in &self.corners {
+                let way = *q - *t;
+                if way.length_squared() > self.reach * self.reach && count < ways.len() {
+                    ways[count] = way;
+                    count += 1;
+                }
+            }
+        }
+        let ways = &ways[..count];
+        let mut best = 0.0;
+        let mut offer = |normal: Vector| {
+            let length = normal.length();
+            let sine = normal.dot(axis) / length;
+            // NaN is no better.
+            if sine > best && ways.iter().all(|w| normal.dot(*w) <= self.reach * length) {
+                best = sine;
+            }
+        };
+        offer(axis);
+        for (k, v) in ways.iter().enumerate() {
+            offer(axis * v.length_squared() - *v * v.dot(axis));
+            for w in &ways[..k] {
+                let across = v.cross(*w);
+                offer(if across.dot(axis) < 0.0 { -across } else { across });
+            }
+        }
+        best
+    }
+}

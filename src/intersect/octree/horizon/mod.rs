@@ -1,0 +1,192 @@
+//! Which rays that leave a facet meet nothing: those within its free cone, or above its horizon.
+//!
+//! Light leaves a lens, a cover or an open reflector by such rays, one in three to one in five of all, and to find out by walking
+//! that nothing is there costs as much as a hit. The rays of a facet mostly leave it within a narrow cone: from the first few of
+//! them an axis is taken and how wide the cone around it is that nothing stands in ([`cone`]), which one product of two directions
+//! then tells of a ray. Where many rays leave beside their cone, how high anything stands to all sides is found ([`skyline`]).
+//!
+//! Guarantee: conservative; heights up to the reach of a start, a picometre for a lamp, count as nothing.
+
+mod cone;
+mod skyline;
+
+use super::Octree;
+use crate::math::{Vector, orthonormal_pair};
+use skyline::{Horizon, sector};
+use std::f64::consts::FRAC_PI_2;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+
+/// Rays of a run for each facet below which no facet is watched.
+const WORTH: u64 = 64;
+/// Rays that leave a facet before its free cone is found: to find one takes some 3 µs, and it saves a ray that leaves 0.1 µs.
+const FIRST: u32 = 8;
+/// Rays that leave a facet beside its cone before its horizon is found: to find one takes some 20 µs.
+const PATIENCE: u32 = 200;
+/// The same where the rays of the run suffice for all facets.
+const IMPATIENCE: u32 = 32;
+/// A horizon is not found more closely than this share of the least slope of the rays so far, and only in the sectors where they
+/// ran: what stands lower or elsewhere is not looked at.
+const BELOW: f64 = 0.2;
+/// Half the angle of a free cone is not made wider than this share of that of the first rays and so much more.
+const WIDER: [f64; 2] = [2.0, 0.2];
+/// Directions are gathered in such steps.
+const STEP: f64 = 1.0 / (1 << 20) as f64;
+
+/// The free cones and horizons of the facets that many rays have left.
+pub(super) struct Horizons {
+    cones: Vec<Cone>,
+    facets: Vec<Watched>,
+    patience: u32,
+}
+
+/// Rays nearer to the axis than this cosine meet nothing.
+struct Cone {
+    /// At first the normal of the facet, and the cosine one that no ray has. Floats as their bits.
+    axis: [AtomicU32; 3],
+    cosine: AtomicU32,
+}
+
+impl Cone {
+    /// None yet.
+    fn around(axis: Vector) -> Self {
+        Self { axis: axis.to_array().map(|x| AtomicU32::new((x as f32).to_bits())), cosine: 2f32.to_bits().into() }
+    }
+
+    fn set(&self, axis: Vector, cosine: f64) {
+        for (own, x) in self.axis.iter().zip(axis.to_array()) {
+            own.store((x as f32).to_bits(), Ordering::Relaxed);
+        }
+        // Whoever sees it sees the axis.
+        self.cosine.store((cosine as f32 + 1e-6).to_bits(), Ordering::Release);
+    }
+
+    /// The cosine of the angle of a ray to the axis, and that of the cone.
+    #[inline(always)]
+    fn ask(&self, direction: Vector) -> (f32, f32) {
+        let cosine = f32::from_bits(self.cosine.load(Ordering::Acquire));
+        let [x, y, z] = [0, 1, 2].map(|k| f32::from_bits(self.axis[k].load(Ordering::Relaxed)));
+        let d = direction.as_vec3();
+        (x * d.x + y * d.y + z * d.z, cosine)
+    }
+}
+
+/// What is gathered of the rays that leave a facet.
+struct Watched {
+    /// How many did while it had no cone, and between which bounds their directions lie.
+    left: AtomicU32,
+    low: [AtomicI32; 3],
+    high: [AtomicI32; 3],
+    /// How many left beside the cone.
+    beside: AtomicU32,
+    /// The least slope of these rays, as bits of an f32, and the sectors that they lie in, one bit each.
+    least: AtomicU32,
+    sectors: AtomicU32,
+    horizon: OnceLock<Box<Horizon>>,
+}
+
+impl Watched {
+    fn new() -> Self {
+        Self {
+            left: AtomicU32::new(0),
+            low: [const { AtomicI32::new(i32::MAX) }; 3],
+            high: [const { AtomicI32::new(i32::MIN) }; 3],
+            beside: AtomicU32::new(0),
+            least: AtomicU32::new(f32::INFINITY.to_bits()),
+            sectors: AtomicU32::new(0),
+            horizon: OnceLock::new(),
+        }
+    }
+
+    /// Watches a ray; after enough of them one thread finds the cone or the horizon, the others walk on.
+    #[cold]
+    fn watch(&self, tree: &Octree, facet: usize, cone: &Cone, direction: Vector, patience: u32) {
+        let [a, b, c, _] = tree.around.mesh.corners(facet);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let up = normal.dot(direction);
+        let slope = up / (direction - normal * up).length();
+        // What goes into the body is not free; NaN neither.
+        if slope.is_nan() || slope <= 0.0 {
+            return;
+        }
+        if self.left.load(Ordering::Relaxed) <= FIRST {
+            return self.gather(tree, facet, cone, normal, direction);
+        }
+        let (x, y) = orthonormal_pair(normal);
+        // The bits of positive numbers are in their order.
+        self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
+        self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
+        if self.beside.fetch_add(1, Ordering::Relaxed) == patience {
+            let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
+            let sectors = self.sectors.load(Ordering::Relaxed);
+            let floor = std::array::from_fn(|s| if sectors >> s & 1 == 1 { least * BELOW } else { f64::INFINITY });
+            let _ = self.horizon.set(Box::new(skyline::of_facet(tree, facet, &floor)));
+        }
+    }
+
+    /// Takes the ray for one of those that the cone is laid around.
+    fn gather(&self, tree: &Octree, facet: usize, cone: &Cone, normal: Vector, direction: Vector) {
+        let direction = direction.to_array();
+        for axis in 0..3 {
+            let place = (direction[axis] / STEP) as i32;
+            self.low[axis].fetch_min(place, Ordering::Relaxed);
+            self.high[axis].fetch_max(place, Ordering::Relaxed);
+        }
+        if self.left.fetch_add(1, Ordering::Relaxed) != FIRST {
+            return;
+        }
+        let corner = |of: &[AtomicI32; 3]| {
+            Vector::from_array([0, 1, 2].map(|k| f64::from(of[k].load(Ordering::Relaxed)) * STEP))
+        };
+        let (low, high) = (corner(&self.low), corner(&self.high));
+        let widest = WIDER[0] * 0.5 * (high - low).length() + WIDER[1];
+        // Where rays leave to all sides none is farther than that from the normal.
+        let axis = if widest < FRAC_PI_2 { low + high } else { normal };
+        if let Some(axis) = axis.try_normalize() {
+            let widest = widest.min(FRAC_PI_2);
+            if let Some(cosine) = cone::cosine(tree, facet, axis, widest) {
+                cone.set(axis, cosine);
+            }
+        }
+    }
+}
+
+impl Horizons {
+    /// None yet, for a run of so many rays; `None` when they are too few for the search.
+    pub(super) fn expecting(rays: u64, tree: &Octree) -> Option<Self> {
+        let mesh = tree.around.mesh;
+        let each = rays / mesh.facets.len().max(1) as u64;
+        let patience = if each >= 2 * u64::from(PATIENCE) { IMPATIENCE } else { PATIENCE };
+        let cone = |f: usize| {
+            let [a, b, c, _] = mesh.corners(f);
+            Cone::around((b - a).cross(c - a).normalize_or_zero())
+        };
+        (each >= WORTH).then(|| Self {
+            cones: (0..mesh.facets.len()).map(cone).collect(),
+            facets: mesh.facets.iter().map(|_| Watched::new()).collect(),
+            patience,
+        })
+    }
+
+    /// Whether a ray that leaves this facet is known to meet nothing.
+    #[inline(always)]
+    pub(super) fn clear(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
+        let Some(cone) = self.cones.get(facet) else { return false };
+        let (along, cosine) = cone.ask(direction);
+        // Far from the axis it goes into the body.
+        along > cosine || (along > 0.0 && self.rises(tree, facet, direction))
+    }
+
+    /// The same of a ray beside the cone of the facet.
+    #[inline(never)]
+    fn rises(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
+        let watched = &self.facets[facet];
+        match watched.horizon.get() {
+            Some(horizon) => horizon.is_below(direction),
+            None => {
+                watched.watch(tree, facet, &self.cones[facet], direction, self.patience);
+                false
+            }
+        }
+    }
+}
