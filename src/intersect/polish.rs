@@ -9,9 +9,9 @@
 //! facets, so a silhouette that they miss stays missed: polishing is never a check. Hits that find no root fall back to the facet
 //! and are counted in [`Cost::fallbacks`].
 
-use super::exact::Exact;
+use super::exact::{Exact, SurfacePoint};
 use super::{Certainty, Cost, Footprint, Hit, Intersector};
-use crate::math::{Departure, Ray};
+use crate::math::{Departure, Ray, Vector};
 use crate::mesh::FacetMesh;
 
 /// Newton steps before the exact window is asked: residual p99 1e-11 after three on a sphere at 0.05 mm.
@@ -56,8 +56,7 @@ impl<'a> Polished<'a> {
     /// The distance up to which the ray's next root may hide between the surface it leaves and the facets there.
     ///
     /// On a surface of curvature κ a ray at angle θ stays within `sin²θ / 2κ` of it; a facet of length L has sag κL²/8.
-    fn hidden(&self, ray: &Ray, from: &Departure) -> Option<f64> {
-        let normal = self.exact.normal_at(from.face, from.uv)?;
+    fn hidden(&self, ray: &Ray, from: &Departure, normal: Vector) -> Option<f64> {
         let facet = from.primitive as usize;
         let known = self.mesh.facets.get(facet).is_some_and(|f| f.face == from.face);
         let (length, sag) = if known {
@@ -82,11 +81,14 @@ impl<'a> Polished<'a> {
         let sine = facet_hit.geometric_normal.dot(ray.direction).abs();
         let window = (16.0 * sag / sine.max(1e-3)).max(1e-6);
         let found = self.exact.converge(ray, facet_hit.face, facet_hit.uv, STEPS);
-        if let Some(point) = found.filter(|p| p.inside && (p.t - facet_hit.t).abs() <= window) {
-            if ray.from.is_some_and(|f| f.face == facet_hit.face && is_own(self.exact, &f, ray, &point)) {
-                return Outcome::Behind;
-            }
-            if point.t < ray.t_min || point.t > ray.t_max {
+        let near = found.filter(|p| (p.t - facet_hit.t).abs() <= window);
+        let own =
+            |p: &SurfacePoint| ray.from.is_some_and(|f| f.face == facet_hit.face && is_own(self.exact, &f, ray, p));
+        // Of two roots close by Newton's method may find the one that the ray crosses the other way.
+        let turned =
+            |p: &SurfacePoint| p.normal.dot(ray.direction) * facet_hit.geometric_normal.dot(ray.direction) <= 0.0;
+        if let Some(point) = near.filter(|p| p.inside && (own(p) || !turned(p))) {
+            if own(&point) || point.t < ray.t_min || point.t > ray.t_max {
                 return Outcome::Behind;
             }
             let (normal, certainty) = (point.normal, Certainty::Polished);
@@ -104,30 +106,42 @@ impl<'a> Polished<'a> {
         if around.t_min > around.t_max {
             return Outcome::Behind;
         }
-        match self.exact.first(&around, &mut Cost::default()).hit {
+        let answer = self.exact.first(&around, &mut Cost::default());
+        match answer.hit {
             Some(hit) => {
                 Outcome::Hit(Hit { primitive: facet_hit.primitive, certainty: Certainty::Polished, ..hit })
+            }
+            // A silhouette of the facets that the spline does not have. Where the surface goes on beyond its trims, faces gape.
+            None if answer.certainty == Certainty::Certified
+                && self.exact.traces(facet_hit.face)
+                && near.is_none_or(|p| p.t < ray.t_min || turned(&p)) =>
+            {
+                Outcome::Behind
             }
             None => Outcome::Lost,
         }
     }
-}
 
-/// Whether a root is the very point that the ray leaves: the same face, no distance along the ray, the same place.
-fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::SurfacePoint) -> bool {
-    if point.t.abs() > 1e-6 {
-        return false;
+    /// Whether an answer cannot be: a ray that goes into a closed solid comes out of it again, one that comes out goes into it.
+    fn is_odd(&self, ray: &Ray, (from, normal): (&Departure, Vector), answer: Option<&Hit>) -> bool {
+        let Some(solid) = self.exact.solid_of(from.face) else { return false };
+        let inward = normal.dot(ray.direction) < 0.0;
+        match answer {
+            None => inward && ray.t_max == f64::INFINITY,
+            Some(hit) if self.exact.solid_of(hit.face) == Some(solid) => {
+                inward != (hit.geometric_normal.dot(ray.direction) > 0.0)
+            }
+            Some(_) => false,
+        }
     }
-    let tolerance = 1e-7 + 64.0 * f64::EPSILON * ray.origin.abs().max_element();
-    // By parameters where they are regular, by place across a seam or at a pole.
-    exact.distance_at(from.face, from.uv, ray.at(point.t)).is_some_and(|d| d <= tolerance)
-}
 
-impl Intersector for Polished<'_> {
-    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+    /// The nearest root that the facets lead to.
+    fn search(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
         let mut ray = *ray;
-        if let Some(from) = &ray.from
-            && let Some(reach) = self.hidden(&ray, from)
+        // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden` may lead to a root behind it.
+        let mut start = ray.t_min - 2.0 * self.sag;
+        if let Some((from, normal)) = left
+            && let Some(reach) = self.hidden(&ray, from, normal)
         {
             let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
             if let Some(hit) = self.exact.first(&ray.within(ray.t_min, end), &mut Cost::default()).hit {
@@ -138,8 +152,6 @@ impl Intersector for Polished<'_> {
             ray.t_min = end;
         }
         let ray = &ray;
-        // The spline may lie ahead of an origin whose facet lies behind it.
-        let mut start = ray.t_min - 2.0 * self.sag;
         let mut rays = 0;
         let mut answer = None;
         for _ in 0..64 {
@@ -155,9 +167,7 @@ impl Intersector for Polished<'_> {
                     continue;
                 }
                 // A ready mesh has no spline to go to; that is no failure.
-                Outcome::Lost if self.exact.skipped().contains(&facet_hit.face) => {
-                    answer = in_range(ray, facet_hit)
-                }
+                Outcome::Lost if !self.exact.traces(facet_hit.face) => answer = in_range(ray, facet_hit),
                 // The exact model has no point there: a facet of the surface being left.
                 Outcome::Lost
                     if ray
@@ -175,6 +185,36 @@ impl Intersector for Polished<'_> {
         }
         cost.rays += rays.min(1);
         answer
+    }
+}
+
+/// Whether a root is the very point that the ray leaves: the same face, no distance along the ray, the same place.
+fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::SurfacePoint) -> bool {
+    if point.t.abs() > 1e-6 {
+        return false;
+    }
+    let tolerance = 1e-7 + 64.0 * f64::EPSILON * ray.origin.abs().max_element();
+    // By parameters where they are regular, by place across a seam or at a pole.
+    exact.distance_at(from.face, from.uv, ray.at(point.t)).is_some_and(|d| d <= tolerance)
+}
+
+impl Intersector for Polished<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        let normal = |f: &Departure| self.exact.normal_at(f.face, f.uv);
+        let Some(left) = ray.from.as_ref().and_then(|f| Some((f, normal(f)?))) else {
+            return self.search(ray, None, cost);
+        };
+        let answer = self.search(ray, Some(left), cost);
+        if !self.is_odd(ray, left, answer.as_ref()) {
+            return answer;
+        }
+        // Beside an edge a ray may start outside all facets and pass between them.
+        let exact = self.exact.first(ray, &mut Cost::default()).hit.map(|hit| Hit {
+            primitive: left.0.primitive,
+            certainty: Certainty::Polished,
+            ..hit
+        });
+        if self.is_odd(ray, left, exact.as_ref()) { answer } else { exact }
     }
 
     fn footprint(&self) -> Footprint {

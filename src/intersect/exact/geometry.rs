@@ -34,6 +34,8 @@ pub(super) struct FaceRecord {
     /// Largest distance from a trim within which a root is flagged, mm: as far as the faces of the file lie off their edges, and
     /// more for rays that graze them.
     pub(super) flagged: f64,
+    /// Instance and shell, of faces of closed shells.
+    pub(super) solid: Option<[u32; 2]>,
 }
 
 /// Break lines of a surface's patches.
@@ -102,7 +104,9 @@ impl Geometry {
                         geometry.grids.push(grid);
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
-                    geometry.place(&placed, face, trim, grid);
+                    let closed = |s: &usize| model.part(placed.part).shells[*s].closed;
+                    let solid = placed.shell.filter(closed).map(|s| [placed.instance as u32, s as u32]);
+                    geometry.place(&placed, face, (trim, grid), solid);
                 }
                 _ => geometry.skipped.push(placed.id),
             }
@@ -115,7 +119,7 @@ impl Geometry {
         self.band.max(8.0 * gap * placement.scale)
     }
 
-    fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, trim: u32, grid: u32) {
+    fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, (trim, grid): (u32, u32), solid: Option<[u32; 2]>) {
         let record = self.faces.len() as u32;
         let sign = if face.reversed != placed.placement.is_mirrored() { -1.0 } else { 1.0 };
         self.by_id.insert(placed.id, record);
@@ -135,6 +139,7 @@ impl Geometry {
             part,
             band,
             flagged,
+            solid,
         });
         self.patches.extend(face.surface.bezier_patches().iter().map(|p| Patch::new(p, record, placed)));
     }

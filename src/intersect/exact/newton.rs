@@ -107,6 +107,16 @@ impl Exact {
         Some((point - patch.center - project(&jet).0).length())
     }
 
+    /// Whether a face has a surface that is traced; ready meshes have none.
+    pub fn traces(&self, face: FaceId) -> bool {
+        self.geometry.by_id.contains_key(&face)
+    }
+
+    /// The closed shell that a face belongs to, by instance and shell; `None` for faces of open shells and ready meshes.
+    pub fn solid_of(&self, face: FaceId) -> Option<[u32; 2]> {
+        self.geometry.faces[*self.geometry.by_id.get(&face)? as usize].solid
+    }
+
     /// Outward unit normal of a face at surface parameters.
     pub fn normal_at(&self, face: FaceId, uv: Uv) -> Option<Vector> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
