@@ -1,0 +1,62 @@
+//! Light in closed bodies whose facet hits are moved to the spline: none is lost, however often it is reflected inside.
+
+mod simulate_support;
+
+use lampyris::intersect::exact::{self, Exact};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::math::Frame;
+use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
+use lampyris::nurbs::sweep;
+use lampyris::simulate::{Results, RunSettings, Scene, simulate};
+use lampyris::step;
+use lampyris::tessellate::{self, tessellate};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+fn run(model: &Model, text: &str) -> Results {
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(model).unwrap();
+    let settings = tessellate::Settings { measure: false, ..Default::default() };
+    let mesh = tessellate(model, &settings).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let exact = Exact::build(model, &exact::Settings::default());
+    let polished = Polished::new(&octree, &mesh, &exact);
+    let settings = RunSettings { threads: 2, ..RunSettings::from(&scene.run) };
+    let results = simulate(&bound, &polished, &settings, &|_| true);
+    assert!(results.power.imbalance() < 1e-9, "{:?}", results.power);
+    results
+}
+
+const GUIDE: &str = "[[medium]]\nname = 'core'\nindex = 1.6\n[[material]]\npart = '*'\nmedium = 'core'\n";
+
+/// Light that runs round in a ring by total reflection, a thousand times and flat along its wall: it never gets out.
+#[test]
+fn light_that_runs_round_in_a_ring_stays_in_it() {
+    let surface = sweep::torus(&Frame::IDENTITY, 20.0, 2.0, [0.0, TAU], [0.0, TAU]);
+    let (analytic, name) = (Analytic::Other, String::new());
+    let (entity, colour, loops, reversed) = (None, None, Vec::new(), false);
+    let face = Face { name, entity, colour, surface, analytic, reversed, loops, gap: 0.0 };
+    let shells = vec![Shell { faces: vec![face], closed: true, ..Shell::default() }];
+    let part = Part { name: "ring".into(), shells, ..Part::default() };
+    let placed = Instance { name: "ring".into(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
+    let model = Model { parts: vec![part], instances: vec![placed], ..Model::default() };
+    let text = format!(
+        "[run]\nrays = 500\nmax_bounces = 1000\ncaught_after = inf\n{GUIDE}
+        [[source]]\nkind = 'cone'\nhalf_angle_deg = 40\nat = [20.1, 0.05, 0.3]\ndirection = [0, 1, 0]"
+    );
+    let results = run(&model, &text);
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+    assert!(results.power.cut_off > 0.9, "{:?}", results.power);
+}
+
+/// Beside the edges of a lens the spline stands out over the facets on both sides: light that is reflected there goes on to the
+/// next face all the same.
+#[test]
+fn light_reflected_beside_the_edges_of_a_lens_is_not_lost() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_analytic.stp");
+    let model = step::read(&file, &step::Settings::default()).unwrap().model;
+    let text = format!("[run]\nrays = 20000\nmax_bounces = 300\n{GUIDE}[[source]]\nkind = 'point'\nat = [3, 2, 1]");
+    let results = run(&model, &text);
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+}
