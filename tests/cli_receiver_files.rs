@@ -1,9 +1,9 @@
-//! What stands in the files of a receiver: every channel cell by cell, the flux of IES files, the rays of Data_3. The readers here
-//! are the tests' own.
+//! What stands in the files of a receiver: every channel cell by cell, the flux of IES files, the rays of Data_3; and what a run says
+//! its facets did to the light. The readers here are the tests' own.
 
 mod cli_support;
 
-use cli_support::lampyris_in;
+use cli_support::{fixture, lampyris_in};
 use serde_json::Value;
 use std::path::Path;
 
@@ -187,4 +187,26 @@ fn an_ies_file_read_as_a_source_is_the_light_it_was_written_from() {
         let share = difference / before.iter().sum::<f64>();
         assert!(share < 0.12, "{name}: {share}");
     }
+}
+
+/// A spot that the facets widen is said to be so where people look; with exact normals there is nothing to say.
+#[test]
+fn a_trace_says_where_its_facets_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = fixture("scenes/s1_lens.toml").display().to_string();
+    let trace = |extra: &[&str]| {
+        let arguments: Vec<&str> = [&["trace", &scene, "-o", "out", "--rays", "20000"], extra].concat();
+        let (code, _, err) = lampyris_in(folder.path(), &arguments);
+        assert_eq!(code, 0, "{err}");
+        let text = std::fs::read_to_string(folder.path().join("out/results.json")).unwrap();
+        let said = err.split_whitespace().collect::<Vec<_>>().join(" ").contains("The facets show in the light");
+        (said, serde_json::from_str::<Value>(&text).unwrap())
+    };
+    let (said, flat) = trace(&["--normals", "flat"]);
+    let width = &flat["faceting"]["receivers"][0]["width"][1];
+    assert!(said && width[0].as_f64() > width[1].as_f64(), "{width}");
+    let (said, fine) = trace(&["--tolerance", "0.001"]);
+    assert!(!said && fine["faceting"]["rays"] == 16_384, "{}", fine["faceting"]);
+    let (said, exact) = trace(&["--normals", "exact"]);
+    assert!(!said && exact.get("faceting").is_none());
 }

@@ -1,6 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::court::{self, verdict};
+use super::faceting::{changes, limits};
 use super::maps::{cuts, photometric_grid, reading, receiver_grid, spoken};
 use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View};
 use super::{figures, grouped, seconds};
@@ -8,6 +9,7 @@ use crate::formats::file_stem;
 use crate::formats::{Facets, Grid, Polylines};
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
 use crate::study::check::Check;
+use crate::study::faceting::Faceting;
 
 /// Everything that the report of a traced scene speaks of.
 pub struct Light<'a> {
@@ -21,6 +23,8 @@ pub struct Light<'a> {
     pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
     pub check: Option<&'a Check>,
+    /// Some of the rays on facets and on the spline.
+    pub faceting: Option<&'a Faceting>,
     /// More 3-D views: of the facets, of the octree.
     pub views: Vec<View>,
     /// More tables: of the model, of the facets.
@@ -103,6 +107,7 @@ impl Light<'_> {
             }
         );
         text += &self.cut_off();
+        text += &self.faceting.map(limits).unwrap_or_default();
         if let Some(check) = self.check {
             text += &verdict(check);
         }
@@ -239,6 +244,7 @@ impl Light<'_> {
             ]);
         }
         let section = Section::new("Energy").with(table).with(receivers);
+        let section = self.faceting.map(changes).into_iter().fold(section, |s, table| s.with(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
             section.with(self.channels())
         } else {

@@ -10,6 +10,7 @@
 mod chart;
 mod court;
 mod document;
+mod faceting;
 mod html;
 mod light;
 mod maps;

@@ -117,9 +117,12 @@ pub struct Moments {
 }
 
 /// Fixed-point units of a coordinate.
-const GRAIN: f64 = (1u64 << 32) as f64;
+const GRAIN: f64 = Moments::GRAIN;
 
 impl Moments {
+    /// Units of a coordinate, and of its square, to a half side.
+    pub const GRAIN: f64 = (1u64 << 32) as f64;
+
     /// Adds `quanta` at `x`, `y` in units of the half sides, both within ±1; `radius2` as a share of the half side squared.
     #[inline]
     pub(crate) fn add(&mut self, quanta: f64, [x, y]: [f64; 2], radius2: f64) {

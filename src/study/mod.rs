@@ -15,6 +15,7 @@ pub mod check;
 pub mod complexity;
 pub mod effects;
 mod errors;
+pub mod faceting;
 pub mod interpolation;
 pub mod judge;
 pub mod lamp;

@@ -9,7 +9,7 @@ use super::timing::Countdown;
 use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{
-    BoundScene, Hooks, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
+    BoundScene, Hooks, Moments, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
 };
 use serde::Serialize;
 use std::sync::Mutex;
@@ -76,7 +76,7 @@ pub fn paired(
     let [(found, ours), (truth, theirs)] = [facets, exact].map(|i| by_replicate(bound, i, settings));
     (found.receivers.iter().zip(&truth.receivers).enumerate())
         .map(|(k, (f, e))| {
-            let differences = ours.iter().zip(&theirs).map(|(a, b)| a[k] as f64 - b[k] as f64);
+            let differences = ours.iter().zip(&theirs).map(|(a, b)| a[k].power as f64 - b[k].power as f64);
             let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
             let n = differences.len().max(2) as f64;
             let mean = differences.iter().sum::<f64>() / n;
@@ -93,21 +93,31 @@ pub fn paired(
         .collect()
 }
 
-/// Results of a run, and the quanta that each replicate brought to each receiver.
-fn by_replicate(
+/// What one replicate brought to one receiver: quanta, and their moments in half sides.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Part {
+    pub(super) power: u128,
+    pub(super) first: [f64; 2],
+    pub(super) second: [f64; 2],
+}
+
+/// Results of a run, and what each replicate brought to each receiver.
+pub(super) fn by_replicate(
     bound: &BoundScene,
     intersector: &dyn Intersector,
     settings: &RunSettings,
-) -> (Results, Vec<Vec<u128>>) {
+) -> (Results, Vec<Vec<Part>>) {
     let count = replicates(bound, settings) as usize;
-    let parts = Mutex::new((Vec::<u32>::new(), Vec::<u128>::new(), vec![Vec::new(); count]));
+    type Sums = Vec<(u128, Moments)>;
+    let parts = Mutex::new((Vec::<u32>::new(), Sums::new(), vec![Vec::new(); count]));
     let finished = |p: &Portion| {
         let mut parts = parts.lock().unwrap_or_else(|e| e.into_inner());
         let (done, sums, by) = &mut *parts;
-        let now: Vec<u128> = p.tallies.receivers.iter().map(|s| s.total).collect();
-        sums.resize(now.len(), 0);
+        let now: Sums =
+            p.tallies.receivers.iter().map(|s| s.total).zip(p.tallies.moments.iter().copied()).collect();
+        sums.resize(now.len(), Default::default());
         if let Some(&new) = p.done.iter().find(|r| done.binary_search(r).is_err()) {
-            by[new as usize] = now.iter().zip(sums.iter()).map(|(a, b)| a - b).collect();
+            by[new as usize] = now.iter().zip(sums.iter()).map(part).collect();
         }
         done.clone_from(&p.done);
         *sums = now;
@@ -116,6 +126,16 @@ fn by_replicate(
     let results = Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks));
     let (_, _, by) = parts.into_inner().unwrap_or_else(|e| e.into_inner());
     (results, by)
+}
+
+/// What came between two states of a receiver's sums; exact until the last step.
+fn part(((now, m), (before, o)): (&(u128, Moments), &(u128, Moments))) -> Part {
+    let unit = Moments::GRAIN;
+    Part {
+        power: now - before,
+        first: [0, 1].map(|a| (m.first[a] - o.first[a]) as f64 / unit),
+        second: [0, 1].map(|a| (m.second[a] - o.second[a]) as f64 / unit),
+    }
 }
 
 /// What to trace on, and the seconds that this will take.
