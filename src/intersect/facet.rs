@@ -146,6 +146,14 @@ impl FacetRay {
         self.axes.map(|a| (a % 3) as usize)
     }
 
+    /// The ray in the order of its axes.
+    #[inline(always)]
+    pub(crate) fn line(&self) -> Line {
+        let [kx, ky, kz] = self.axes();
+        let o = self.origin;
+        Line { origin: [o[kx], o[ky], o[kz]], shear: self.shear, t_min: self.t_min }
+    }
+
     /// Tests the triangles of a facet (bit 0: the first, bit 1: the second) and keeps the nearest hit.
     #[inline(always)]
     pub(crate) fn test(
@@ -175,62 +183,20 @@ impl FacetRay {
         }
     }
 
-    /// Both triangles from one origin: they share the shear of their corners and the edge function of the diagonal.
+    /// Both triangles from one origin.
     #[inline(always)]
     fn quad(&self, facet: u32, triangles: u32, corners: [&Point; 4], origin: [f64; 3], best: &mut Nearest) {
         let [kx, ky, kz] = self.axes();
-        let [sx, sy, _] = self.shear;
         // As arrays, since the index of a glam vector is a match.
         let corners: [&[f64; 3]; 4] = corners.map(|p| p.as_ref());
-        let z: [f64; 4] = std::array::from_fn(|k| corners[k][kz] - origin[kz]);
-        let x: [f64; 4] = std::array::from_fn(|k| (corners[k][kx] - origin[kx]) - sx * z[k]);
-        let y: [f64; 4] = std::array::from_fn(|k| (corners[k][ky] - origin[ky]) - sy * z[k]);
-        let edge = |p: usize, q: usize| x[p] * y[q] - y[p] * x[q];
-        let diagonal = edge(0, 2);
-        let first = [edge(2, 1), diagonal, edge(1, 0)];
-        let second = [edge(3, 2), edge(0, 3), -diagonal];
-        let zero = |e: [f64; 3]| (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
-        let at = |k: usize| [x[k], y[k], z[k]];
-        if zero(first) | zero(second) {
-            if triangles & 1 != 0 {
-                self.on_an_edge(facet, false, first, [at(0), at(1), at(2)], best);
-            }
-            if triangles & 2 != 0 {
-                self.on_an_edge(facet, true, second, [at(0), at(2), at(3)], best);
-            }
-            return;
+        let mut along = [[0.0; 4]; 3];
+        for k in 0..4 {
+            along[0][k] = corners[k][kx];
+            along[1][k] = corners[k][ky];
+            along[2][k] = corners[k][kz];
         }
-        let met = triangles & (u32::from(one_sided(first)) | u32::from(one_sided(second)) << 1);
-        if met == 3 {
-            self.keep(facet, false, first, [z[0], z[1], z[2]], best);
-        }
-        if met != 0 {
-            let other = met & 2 != 0;
-            let edges = std::array::from_fn(|k| select_unpredictable(other, second[k], first[k]));
-            let heights = [z[0], select_unpredictable(other, z[2], z[1]), select_unpredictable(other, z[3], z[2])];
-            self.keep(facet, other, edges, heights, best);
-        }
-    }
-
-    #[cold]
-    fn on_an_edge(&self, facet: u32, second: bool, edges: [f64; 3], corners: [[f64; 3]; 3], best: &mut Nearest) {
-        let [a, b, c] = corners;
-        let edges = if edges.contains(&0.0) { exact_edges(a, b, c) } else { edges };
-        if one_sided(edges) {
-            self.keep(facet, second, edges, [a[2], b[2], c[2]], best);
-        }
-    }
-
-    /// A hit with these edge functions, if it lies within the range of the ray.
-    #[inline(always)]
-    fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
-        let [u, v, w] = edges;
-        let det = u + v + w;
-        let t = (u * heights[0] + v * heights[1] + w * heights[2]) * self.shear[2] / det;
-        // A NaN (det = 0, or no direction) fails the comparisons.
-        if t >= self.t_min && t <= best.t {
-            best.offer(Reached { t, facet, second, edges });
-        }
+        let line = Line { origin: [origin[kx], origin[ky], origin[kz]], ..self.line() };
+        line.quad((facet, triangles), &along, best);
     }
 
     /// The facet that the ray leaves: only its other triangle may be met, and only where the fold between them closes
@@ -301,6 +267,83 @@ impl FacetRay {
         };
         let [a, b, c, d] = *corners;
         [way([a, b, c]), way([a, c, d])]
+    }
+}
+
+/// A ray in the order of its axes, the main one last.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) origin: [f64; 3],
+    /// As [`FacetRay::shear`].
+    pub(crate) shear: [f64; 3],
+    pub(crate) t_min: f64,
+}
+
+impl Line {
+    /// Both triangles of a facet, its corners axis by axis in the order of the ray's: they share the shear of their corners and the
+    /// edge function of the diagonal. The steps are loops over four, so that compilers make one instruction of each.
+    #[inline(always)]
+    pub(crate) fn quad(&self, (facet, triangles): (u32, u32), corners: &[[f64; 4]; 3], best: &mut Nearest) {
+        let ([ox, oy, oz], [sx, sy, _]) = (self.origin, self.shear);
+        let (mut x, mut y, mut z, mut outline) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
+        for k in 0..4 {
+            z[k] = corners[2][k] - oz;
+            x[k] = (corners[0][k] - ox) - sx * z[k];
+            y[k] = (corners[1][k] - oy) - sy * z[k];
+        }
+        for k in 0..4 {
+            let next = (k + 1) % 4;
+            outline[k] = x[next] * y[k] - y[next] * x[k];
+        }
+        let diagonal = x[0] * y[2] - y[0] * x[2];
+        let first = [outline[1], diagonal, outline[0]];
+        let second = [outline[2], outline[3], -diagonal];
+        let zero = |e: [f64; 3]| (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
+        if triangles & (u32::from(zero(first)) | u32::from(zero(second)) << 1) != 0 {
+            return self.on_an_edge((facet, triangles), [first, second], [x, y, z], best);
+        }
+        let met = triangles & (u32::from(one_sided(first)) | u32::from(one_sided(second)) << 1);
+        if met == 3 {
+            self.keep(facet, false, first, [z[0], z[1], z[2]], best);
+        }
+        if met != 0 {
+            let other = met & 2 != 0;
+            let edges = std::array::from_fn(|k| select_unpredictable(other, second[k], first[k]));
+            let heights = [z[0], select_unpredictable(other, z[2], z[1]), select_unpredictable(other, z[3], z[2])];
+            self.keep(facet, other, edges, heights, best);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn on_an_edge(
+        &self,
+        (facet, triangles): (u32, u32),
+        edges: [[f64; 3]; 2],
+        [x, y, z]: [[f64; 4]; 3],
+        best: &mut Nearest,
+    ) {
+        let at = |k: usize| [x[k], y[k], z[k]];
+        for (bit, edges, [a, b, c]) in [(1, edges[0], [0, 1, 2]), (2, edges[1], [0, 2, 3])] {
+            if triangles & bit != 0 {
+                let edges = if edges.contains(&0.0) { exact_edges(at(a), at(b), at(c)) } else { edges };
+                if one_sided(edges) {
+                    self.keep(facet, bit == 2, edges, [z[a], z[b], z[c]], best);
+                }
+            }
+        }
+    }
+
+    /// A hit with these edge functions, if it lies within the range of the ray.
+    #[inline(always)]
+    fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
+        let [u, v, w] = edges;
+        let det = u + v + w;
+        let t = (u * heights[0] + v * heights[1] + w * heights[2]) * self.shear[2] / det;
+        // A NaN (det = 0, or no direction) fails the comparisons.
+        if t >= self.t_min && t <= best.t {
+            best.offer(Reached { t, facet, second, edges });
+        }
     }
 }
 

@@ -95,7 +95,7 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
             let maps = tree.maps.read().unwrap_or_else(PoisonError::into_inner);
             let walkers = match maps.is_empty() {
                 true => rays.len(),
-                false => light::answer(tree, &maps, rays, hits, &mut order, cost),
+                false => light::answer(&maps, rays, hits, &mut order, cost),
             };
             together::<L>(tree, root, &mut states, (rays, &order[..walkers]), hits, cost);
         }
@@ -239,7 +239,9 @@ fn test(tree: &Octree, s: &mut State) {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask.wrapping_sub(1);
         let corners = block.positions[k].map(|p| &positions[p as usize]);
-        let triangles = waiting >> k & 1 | waiting >> (k + 3) & 2;
+        // The second triangle of a triangle is a line: it is never hit, but to see that takes exact arithmetic.
+        let is_quad = u32::from(block.positions[k][2] != block.positions[k][3]);
+        let triangles = waiting >> k & 1 | waiting >> (k + 3) & (is_quad << 1);
         s.facets.test(block.facets[k], triangles, corners, &tree.around, &mut s.best);
         if mask == 0 {
             break;

@@ -12,16 +12,19 @@
 //! decides. Weakness: a source with an extent has no such map.
 
 mod raster;
+mod slot;
 
 use super::Octree;
-use crate::intersect::facet::{FacetHit, FacetRay, Nearest};
+use crate::intersect::facet::{FacetHit, FacetRay, Line, Nearest};
 use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, Expected};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
+use slot::Slot;
+use std::hint::select_unpredictable;
 
 /// Rays for each facet from which on a map pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
 const WORTH: u64 = 200;
-/// Facets above which no map is drawn: drawing takes 300 bytes for each.
+/// Facets above which no map is drawn: drawing takes 500 bytes for each.
 const LARGEST: usize = 1 << 18;
 /// Most maps that are kept.
 const MOST: usize = 16;
@@ -42,9 +45,7 @@ struct Square {
 struct Entry {
     /// It lies nowhere nearer than this, in the depth of the map.
     near: f32,
-    facet: u32,
-    /// Positions of its corners.
-    corners: [u32; 4],
+    slot: u32,
 }
 
 /// How places are seen from a source.
@@ -54,7 +55,7 @@ enum View {
     Point([f64; 3]),
     /// Along a direction, in units of half the side of a square around all facets, from a plane at the depth `start`, which rays
     /// may miss by `stray`.
-    Along { direction: Vector, across: [Vector; 2], middle: [f64; 2], start: f64, stray: f64 },
+    Along { origin: Point, direction: Vector, across: [Vector; 2], middle: [f64; 2], start: f64, stray: f64 },
 }
 
 /// The maps of one source.
@@ -66,6 +67,7 @@ pub(super) struct Map {
     /// Those of the map, side after side of the cube, then those of divided squares.
     squares: Vec<Square>,
     entries: Vec<Entry>,
+    slots: Vec<Slot>,
 }
 
 /// Where a ray looks.
@@ -79,18 +81,23 @@ struct Look {
     /// From distances along the ray to depths of the map.
     scale: f64,
     shift: f64,
-    ray: FacetRay,
+    line: Line,
 }
 
 impl Look {
-    fn idle() -> Self {
-        let ray = FacetRay::new(&Ray::new(Point::ZERO, Vector::Z));
-        Self { index: 0, map: 0, square: 0, rest: [0.0; 2], scale: 1.0, shift: 0.0, ray }
-    }
+    const IDLE: Self = Self {
+        index: 0,
+        map: 0,
+        square: 0,
+        rest: [0.0; 2],
+        scale: 1.0,
+        shift: 0.0,
+        line: Line { origin: [0.0; 3], shear: [0.0; 3], t_min: 0.0 },
+    };
 }
 
 /// Rays that are looked up together.
-const TOGETHER: usize = 16;
+const TOGETHER: usize = 32;
 
 impl View {
     fn of(beam: &Beam, tree: &Octree) -> Option<Self> {
@@ -112,6 +119,7 @@ impl View {
                 let stray = 1e-9 * (start.abs() + half);
                 let (across, middle) = ([x / half, y / half], [a / half, b / half]);
                 (fits && origin.is_finite()).then_some(Self::Along {
+                    origin: *origin,
                     direction: *direction,
                     across,
                     middle,
@@ -159,15 +167,15 @@ impl Map {
     /// instruction set.
     #[inline(always)]
     fn look(&self, (index, map): (usize, usize), ray: &Ray, look: &mut Look) -> bool {
-        look.ray = FacetRay::new(ray);
-        let prepared = &look.ray;
+        let prepared = FacetRay::new(ray);
+        look.line = prepared.line();
         let (side, [x, y], scale, shift) = match &self.view {
             View::Point(_) => {
-                let axes = prepared.axes();
-                let [sx, sy, sz] = prepared.shear();
+                let [sx, sy, sz] = look.line.shear;
                 // Slopes are against the main axis as it points; the sides of the cube look outward.
                 let sign = 1f64.copysign(sz);
-                (2 * axes[2] + usize::from(sz < 0.0), [sx * sign, sy * sign], ray.direction[axes[2]].abs(), 0.0)
+                let main = prepared.axes()[2];
+                (2 * main + usize::from(sz < 0.0), [sx * sign, sy * sign], ray.direction[main].abs(), 0.0)
             }
             View::Along { direction, across: [x, y], middle, .. } => {
                 let place = [ray.origin.dot(*x) - middle[0], ray.origin.dot(*y) - middle[1]];
@@ -177,15 +185,13 @@ impl Map {
         let n = self.side as f64;
         let (x, y) = ((0.5 * x + 0.5) * n, (0.5 * y + 0.5) * n);
         // False for NaN too.
-        if !(x >= 0.0 && x <= n && y >= 0.0 && y <= n) {
-            return false;
-        }
+        let inside = (x >= 0.0) & (x <= n) & (y >= 0.0) & (y <= n);
         let (i, j) = ((x as usize).min(self.side - 1), (y as usize).min(self.side - 1));
-        look.square = ((side * self.side + j) * self.side + i) as u32;
+        look.square = select_unpredictable(inside, (side * self.side + j) * self.side + i, 0) as u32;
         look.rest = [x - i as f64, y - j as f64];
         (look.scale, look.shift) = (scale, shift);
         (look.index, look.map) = (index as u16, map as u16);
-        true
+        inside
     }
 
     /// The facets that a ray may meet.
@@ -206,7 +212,7 @@ impl Map {
 /// The map that shows a ray; `last` is the first to be looked at.
 #[inline(always)]
 fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
-    if ray.from.is_some() || ray.t_min != 0.0 {
+    if ray.from.is_some() | (ray.t_min != 0.0) {
         return None;
     }
     if maps[last].view.sees(ray) {
@@ -225,7 +231,6 @@ fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
 /// Answers the rays that are on a map; gives the number of the others, whose places come first in `rest`.
 #[inline(always)]
 pub(super) fn answer(
-    tree: &Octree,
     maps: &[Map],
     rays: &[Ray],
     hits: &mut [Option<FacetHit>],
@@ -233,47 +238,46 @@ pub(super) fn answer(
     cost: &mut Cost,
 ) -> usize {
     let (mut others, mut next, mut last) = (0, 0, 0);
-    let mesh = tree.around.mesh;
-    let idle = Look::idle();
-    let mut looks = [idle; TOGETHER];
-    let mut found: [&[Entry]; TOGETHER] = [&[]; TOGETHER];
+    let mut looks = [Look::IDLE; TOGETHER];
+    let mut found: [(&[Entry], u8); TOGETHER] = [(&[], 0); TOGETHER];
     while next < rays.len() {
         let mut n = 0;
         while n < TOGETHER && next < rays.len() {
             let ray = &rays[next];
             if let Some(map) = map_of(maps, last, ray) {
                 last = map;
-                if maps[map].look((next, map), ray, &mut looks[n]) {
-                    prefetch(&maps[map].squares, looks[n].square as usize);
-                    n += 1;
-                }
+                let inside = maps[map].look((next, map), ray, &mut looks[n]);
+                prefetch(&maps[map].squares, looks[n].square as usize);
+                n += usize::from(inside);
             } else {
                 rest[others] = next as u16;
                 others += 1;
             }
             next += 1;
         }
-        for k in 0..n {
-            found[k] = maps[usize::from(looks[k].map)].entries(&looks[k]);
-            prefetch(found[k], 0);
+        // Which rays find nothing is not to be guessed.
+        let mut full = 0;
+        for (k, look) in looks[..n].iter().enumerate() {
+            let entries = maps[usize::from(look.map)].entries(look);
+            prefetch(entries, 0);
+            found[full] = (entries, k as u8);
+            full += usize::from(!entries.is_empty());
         }
-        for k in 0..n {
-            if found[k].is_empty() {
-                continue;
-            }
-            let look = &looks[k];
+        for (entries, k) in &found[..full] {
+            let map = &maps[usize::from(looks[usize::from(*k) % TOGETHER].map)];
+            prefetch(&map.slots, entries[0].slot as usize);
+        }
+        for (entries, k) in &found[..full] {
+            let look = &looks[usize::from(*k) % TOGETHER];
+            let slots = &maps[usize::from(look.map)].slots;
             let index = usize::from(look.index);
             let mut best = Nearest::before(rays[index].t_max);
-            for entry in found[k] {
+            for entry in *entries {
                 if f64::from(entry.near) > best.t * look.scale + look.shift {
                     break;
                 }
                 cost.tests += 1;
-                let [a, b, c, d] = entry.corners;
-                let p = &mesh.positions;
-                let corners = [&p[a as usize], &p[b as usize], &p[c as usize], &p[d as usize]];
-                let triangles = if c == d { 1 } else { 3 };
-                look.ray.test(entry.facet, triangles, corners, &tree.around, &mut best);
+                slots[entry.slot as usize].test(&look.line, &mut best);
             }
             hits[index] = best.hit();
         }

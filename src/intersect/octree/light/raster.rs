@@ -4,7 +4,7 @@
 //! sides, or, where the facet is wholly in front, its two triangles as the map shows them pass the square by. Squares are wider than
 //! they are by far more than a ray's place can be wrong.
 
-use super::{DIVIDED, Entry, FINE, Map, Square, View};
+use super::{DIVIDED, Entry, FINE, Map, Slot, Square, View};
 use crate::intersect::facet::usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
@@ -173,12 +173,16 @@ pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> Map {
     let room = ROOMY * facets.max(64) / 8;
     let sheets = in_parallel(view.sides() * SHEETS * SHEETS, threads, |k| {
         let window = Window::WHOLE.part(SHEETS, [k % SHEETS, k / SHEETS % SHEETS]);
-        Sheet::draw(mesh, &shadows[k / (SHEETS * SHEETS)], &window, side / SHEETS, room)
+        Sheet::draw(&shadows[k / (SHEETS * SHEETS)], &window, side / SHEETS, room)
     });
-    let mut map =
-        Map { view, side, squares: vec![Square::default(); view.sides() * side * side], entries: Vec::new() };
+    let squares = vec![Square::default(); view.sides() * side * side];
+    let facets: Vec<Vec<u32>> = shadows.iter().map(|s| s.iter().map(|s| s.facet).collect()).collect();
+    let slots = Slot::all(mesh, &view, &facets);
+    let mut map = Map { view, side, squares, entries: Vec::new(), slots };
     for (k, sheet) in sheets.into_iter().enumerate() {
-        sheet.paste(&mut map, k);
+        // Slots stand side after side in the order of the shadows.
+        let first: usize = facets[..k / (SHEETS * SHEETS)].iter().map(Vec::len).sum();
+        sheet.paste(&mut map, k, first as u32);
     }
     map
 }
@@ -218,16 +222,16 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn draw(mesh: &FacetMesh, shadows: &[Shadow], window: &Window, side: usize, room: usize) -> Self {
+    fn draw(shadows: &[Shadow], window: &Window, side: usize, room: usize) -> Self {
         let sheet = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
-        let mut drawing = Drawing { mesh, sheet, written: FxHashMap::default(), shadows, room };
+        let mut drawing = Drawing { sheet, written: FxHashMap::default(), shadows, room };
         let all: Vec<u32> = (0..shadows.len() as u32).collect();
         drawing.quarter(drawing.seen(&all, window), window, [0, 0], side);
         drawing.sheet
     }
 
     /// Puts it into its place in the map.
-    fn paste(self, map: &mut Map, k: usize) {
+    fn paste(self, map: &mut Map, k: usize, first_slot: u32) {
         let (face, i, j) = (k / (SHEETS * SHEETS), k % SHEETS, k / SHEETS % SHEETS);
         let own = self.side * self.side;
         let (squares, entries) = (map.squares.len(), map.entries.len());
@@ -240,12 +244,11 @@ impl Sheet {
             map.squares[at..at + self.side].iter_mut().zip(own).for_each(|(to, from)| *to = moved(from));
         }
         map.squares.extend(self.squares[own..].iter().map(moved));
-        map.entries.extend(self.entries);
+        map.entries.extend(self.entries.into_iter().map(|e| Entry { slot: e.slot + first_slot, ..e }));
     }
 }
 
 struct Drawing<'a> {
-    mesh: &'a FacetMesh,
     /// The nearest first.
     shadows: &'a [Shadow],
     sheet: Sheet,
@@ -299,8 +302,7 @@ impl Drawing<'_> {
                 let first = sheet.entries.len() as u32;
                 sheet.entries.extend(list.iter().map(|&k| {
                     let shadow = &self.shadows[k as usize];
-                    let corners = self.mesh.corner_positions(shadow.facet as usize);
-                    Entry { near: (shadow.near as f32).next_down(), facet: shadow.facet, corners }
+                    Entry { near: (shadow.near as f32).next_down(), slot: k }
                 }));
                 first
             });

@@ -1,0 +1,54 @@
+//! Facets as the rays of a map ask them.
+
+use super::View;
+use crate::intersect::facet::{FacetRay, Line, Nearest};
+use crate::intersect::octree::huge;
+use crate::math::Ray;
+use crate::mesh::FacetMesh;
+
+/// A facet with its corners, axis by axis in the order of the rays' axes: two lines of the cache hold all that a test asks for, where
+/// its corners in the mesh are four places behind four indices.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Slot {
+    corners: [[f64; 4]; 3],
+    facet: u32,
+    /// One bit for each triangle.
+    triangles: u32,
+}
+
+impl Slot {
+    /// A facet as it is seen on one side of the map.
+    fn new(mesh: &FacetMesh, facet: u32, view: &View, side: usize) -> Self {
+        let axes = view.axes(side);
+        let positions = mesh.corner_positions(facet as usize);
+        let corners = mesh.corners(facet as usize).map(|p| p.to_array());
+        let triangles = if positions[2] == positions[3] { 1 } else { 3 };
+        Self { corners: axes.map(|a| corners.map(|p| p[a])), facet, triangles }
+    }
+
+    /// Those of some facets on each side, side after side.
+    pub(super) fn all(mesh: &FacetMesh, view: &View, facets: &[Vec<u32>]) -> Vec<Self> {
+        let mut slots = huge::with_capacity(facets.iter().map(Vec::len).sum());
+        for (side, facets) in facets.iter().enumerate() {
+            slots.extend(facets.iter().map(|f| Self::new(mesh, *f, view, side)));
+        }
+        slots
+    }
+
+    /// Tests the facet and keeps the nearest hit.
+    #[inline(always)]
+    pub(super) fn test(&self, line: &Line, best: &mut Nearest) {
+        line.quad((self.facet, self.triangles), &self.corners, best);
+    }
+}
+
+impl View {
+    /// The axes of the rays on a side of the map, the main one last.
+    pub(super) fn axes(&self, side: usize) -> [usize; 3] {
+        match self {
+            Self::Point(_) => [[1, 2, 0], [2, 0, 1], [0, 1, 2]][side / 2 % 3],
+            Self::Along { origin, direction, .. } => FacetRay::new(&Ray::new(*origin, *direction)).axes(),
+        }
+    }
+}
