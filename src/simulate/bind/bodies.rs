@@ -24,8 +24,10 @@ pub(crate) struct Body {
     pub(crate) name: String,
     /// Name of the medium.
     pub(crate) medium: String,
-    /// Length that light goes by total reflection alone before it is taken to be caught, mm.
+    /// Length that light goes by total reflection alone before it is taken to be caught, mm; without end where it is absorbed.
     pub(crate) patience: f64,
+    /// A box around it, mm.
+    pub(crate) bounds: Aabb,
     /// Whether it has faces in no closed shell.
     pub(crate) open: bool,
 }
@@ -41,6 +43,7 @@ impl Body {
             name,
             medium: m.name,
             patience: f64::INFINITY,
+            bounds: Aabb::EMPTY,
             open: false,
         }
     }
@@ -90,7 +93,6 @@ pub(super) fn find(
     };
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
     let mut places: HashMap<(usize, &str), usize> = HashMap::new();
-    let mut boxes = vec![Aabb::EMPTY];
     let mut of_face = vec![AMBIENT; chosen.len()];
     for (f, &(_, rule)) in model.placed_faces().zip(chosen) {
         let Some((rule, name)) = rule.and_then(|r| Some((r, scene.materials[r].medium.as_deref()?))) else {
@@ -107,23 +109,19 @@ pub(super) fn find(
                     return Err(scene.error(ErrorKind::Value, &at, message));
                 }
                 places.insert((f.instance, name), bodies.len());
-                boxes.push(Aabb::EMPTY);
                 bodies.push(body);
                 bodies.len() - 1
             }
         };
         bodies[body].open |= super::notes::is_open(&f, model);
-        boxes[body] = boxes[body].union(bounds(&f));
+        bodies[body].bounds = bodies[body].bounds.union(bounds(&f));
         of_face[f.id.index()] = body as u16;
     }
     if bodies.len() > usize::from(u16::MAX) {
         let message = format!("{} bodies with media; at most 65534 are possible", bodies.len());
         return Err(scene.error(ErrorKind::Model, &[Key::Name("material")], message));
     }
-    for (body, b) in bodies.iter_mut().zip(&boxes).skip(1).filter(|(_, b)| !b.is_empty()) {
-        body.patience = scene.run.caught_after * b.diagonal();
-    }
-    let mut order: Vec<Aabb> = boxes[1..].iter().map(|b| b.grown(scene.run.glue_mm)).collect();
+    let mut order: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
     order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
     let meets = |(i, a): (usize, &Aabb)| {
         order[i + 1..].iter().take_while(|b| b.min.x <= a.max.x).any(|b| !a.intersection(*b).is_empty())
@@ -132,21 +130,55 @@ pub(super) fn find(
     Ok((bodies, of_face, nested))
 }
 
-/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch.
-pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
+/// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
+/// body to light, and as long as the box around them all.
+pub(super) fn give_patience(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
+    let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
+    fn first(united: &mut [u16], mut body: u16) -> u16 {
+        while united[body as usize] != body {
+            united[body as usize] = united[united[body as usize] as usize];
+            body = united[body as usize];
+        }
+        body
+    }
+    for &[a, b] in pairs {
+        let [one, other] = [a, b].map(|k| &bodies[k as usize]);
+        if one.index == other.index && one.dispersive == other.dispersive {
+            let [a, b] = [a, b].map(|k| first(&mut united, k));
+            united[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut whole = vec![(Aabb::EMPTY, false); bodies.len()];
+    let of_body: Vec<usize> = (0..bodies.len() as u16).map(|k| first(&mut united, k) as usize).collect();
+    for (body, &k) in bodies.iter().zip(&of_body).skip(1) {
+        whole[k] = (whole[k].0.union(body.bounds), whole[k].1 | body.absorbs());
+    }
+    for (body, &k) in bodies.iter_mut().zip(&of_body).skip(1) {
+        let (bounds, absorbs) = whole[k];
+        // Where the body absorbs, a path ends by its power.
+        if !(absorbs || bounds.is_empty()) {
+            body.patience = scene.run.caught_after * bounds.diagonal();
+        }
+    }
+}
+
+/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
+pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> (Vec<bool>, Vec<[u16; 2]>) {
     let boxed = |f: crate::model::PlacedFace<'_>| (f.id.index(), bounds(&f).grown(0.5 * scene.run.glue_mm));
     let mut faces: Vec<(usize, Aabb)> =
         model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
     faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
-    let mut touching = vec![false; of_face.len()];
+    let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
     for (i, (a, box_a)) in faces.iter().enumerate() {
         for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
             if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
                 (touching[*a], touching[*b]) = (true, true);
+                pairs.push([of_face[*a], of_face[*b]]);
             }
         }
+        pairs.dedup();
     }
-    touching
+    (touching, pairs)
 }
 
 /// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.

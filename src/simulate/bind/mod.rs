@@ -106,11 +106,14 @@ impl Scene {
         let chosen = chosen_rules(self, model)?;
         let mut surfaces = vec![Surface::Absorber, Surface::Interface];
         let default = Material { surface: Some(self.default_surface), ..Material::default() };
-        let (bodies, body_of_face, nested) = bodies::find(self, model, &chosen, &light)?;
+        let (mut bodies, body_of_face, nested) = bodies::find(self, model, &chosen, &light)?;
         bare_interfaces(self, model, &chosen, &body_of_face)?;
         check_indices(self, &loaded, &bodies)?;
-        let touching =
-            if nested { bodies::touching(self, model, &body_of_face) } else { vec![false; chosen.len()] };
+        let (touching, pairs) = match nested {
+            true => bodies::touching(self, model, &body_of_face),
+            false => (vec![false; chosen.len()], Vec::new()),
+        };
+        bodies::give_patience(self, &mut bodies, &pairs);
         let twins = bodies::twins(self, model, &body_of_face);
         let nested = nested || twins.contains(&true);
         let (mut faces, mut opaques) = (Vec::with_capacity(chosen.len()), Vec::with_capacity(chosen.len()));

@@ -3,7 +3,7 @@
 use super::Context;
 use super::step::Meeting;
 use crate::intersect::{Cost, Hit};
-use crate::math::{Departure, Point, Ray};
+use crate::math::{Departure, Point, Ray, Vector};
 use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
 
 /// The body on the other side of a face that lies on a face of another body within the glue distance.
@@ -60,6 +60,22 @@ fn beside(context: &Context<'_>, ray: &Ray, hit: &Hit, point: Point) -> Ray {
 
 /// Faces within the glue distance among which the partner is looked for.
 const NEAR: usize = 6;
+
+/// Where the segment of light starts that has met both of two faces at one place, mm: behind all faces along them within `reach`,
+/// but not behind a face that stands across, as beside an edge. Without that, 4 % of what is caught in eight glued bricks got out
+/// between their faces in 200 times their length.
+#[inline(never)]
+pub(super) fn beyond(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
+    let mut probe = next.within(0.0, reach);
+    for _ in 0..NEAR {
+        match context.intersector.intersect(&probe, &mut Cost::default()) {
+            Some(found) if found.geometric_normal.dot(normal).abs() > 0.5 => probe.t_min = found.t.next_up(),
+            Some(_) => return probe.t_min,
+            None => return reach,
+        }
+    }
+    reach
+}
 
 /// That face, with its optics and the place.
 fn partner(

@@ -204,7 +204,8 @@ pub(super) fn onward<C: Carry>(
     path.bounce += 1;
     let mut next = Ray::new(point, going).leaving(from);
     if C::MEDIA && meeting.skip.get() > 0.0 {
-        next.t_min = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
+        let reach = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
+        next.t_min = contact::beyond(context, &next, hit.geometric_normal, reach);
     }
     proceed(context, path, ray, next, local)
 }
@@ -251,12 +252,10 @@ pub(super) fn stray<C: Carry>(path: &mut Path<C>) {
 }
 
 /// Whether a path that has just been reflected totally goes round in its body for ever; it ends here then.
-///
-/// Where the body absorbs, the path ends by its power.
 #[inline(always)]
 pub(super) fn caught<C: Carry>(context: &Context<'_>, path: &Path<C>, at: Point, local: &mut Local) -> bool {
     let body = &context.bound.bodies[path.carry.body() as usize];
-    let caught = path.length - f64::from(path.free) > body.patience && !body.absorbs();
+    let caught = path.length - f64::from(path.free) > body.patience;
     if caught {
         local.counts.caught += u64::from(path.quanta > 0.0);
         cut_off(context, path, at, local);

@@ -114,7 +114,10 @@ pub(super) fn interface<C: Carry>(
         }
         return Some(mirrored(d, normal, at, local));
     };
-    stray(path);
+    // Into a glued body of the same index light goes straight on: it is still on its way round.
+    if eta != 1.0 {
+        stray(path);
+    }
     let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
     let mut matrices = None;
     if path.carry.stokes().is_some() {
