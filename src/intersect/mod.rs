@@ -11,6 +11,7 @@ pub mod polish;
 mod prefetch;
 
 use crate::math::{FaceId, Point, Ray, Uv, Vector};
+pub(crate) use prefetch::prefetch;
 
 /// Finds the nearest hit of a ray.
 pub trait Intersector: Sync {

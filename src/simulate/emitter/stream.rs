@@ -1,4 +1,6 @@
-use super::Emitter;
+use super::sheaf::{Numbers, SHEAF, Sheaf};
+use super::{Emitter, wide};
+use crate::math::{Point, Vector};
 use crate::simulate::random::{self, Key, Purpose};
 use crate::simulate::scene::Sampling;
 
@@ -7,10 +9,17 @@ const CELL_BITS: u32 = 6;
 const CHUNK: usize = 1 << (2 * CELL_BITS);
 
 /// The lowest bits of a number with a gap after each.
+#[inline(always)]
 fn spread(x: u32) -> u32 {
     let x = (x | x << 4) & 0x0f0f;
     let x = (x | x << 2) & 0x3333;
     (x | x << 1) & 0x5555
+}
+
+/// The middle of a step of 2⁻³².
+#[inline(always)]
+fn unit(number: u32) -> f64 {
+    (f64::from(number) + 0.5) * (1.0 / 4_294_967_296.0)
 }
 
 /// Where the numbers of one source in one replicate come from.
@@ -29,6 +38,8 @@ pub(crate) struct Stream {
     order: Vec<u32>,
     pairs: [bool; 3],
     numbers: [Vec<u32>; random::DIMENSIONS],
+    /// The rays that start now, where the source can make many at a time.
+    pub(super) sheaf: Option<Box<Sheaf>>,
 }
 
 /// A ray of a source: its number in the run, and in its source and replicate.
@@ -51,12 +62,14 @@ impl Stream {
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
         let rays = rays.min(u64::from(u32::MAX)) as u32;
         let (order, pairs, numbers) = (Vec::new(), [true; 3], Default::default());
-        Self { seed, sampling, scrambles, replicate, replicates, rays, order, pairs, numbers }
+        Self { seed, sampling, scrambles, replicate, replicates, rays, order, pairs, numbers, sheaf: None }
     }
 
     /// The same stream with the numbers of a source alone.
     pub(crate) fn of(self, emitter: &Emitter) -> Self {
-        Self { pairs: emitter.pairs(), ..self }
+        let pairs = emitter.pairs();
+        let sheaves = self.sampling == Sampling::Sobol && pairs != [false; 3] && emitter.makes_sheaves();
+        Self { pairs, sheaf: sheaves.then(Sheaf::empty), ..self }
     }
 
     /// The ray to start after `started` others of this source and replicate, its numbers made ready.
@@ -64,15 +77,31 @@ impl Stream {
     /// Rays of a net start in chunks, each along a Z-curve through their directions, or places if all have one direction: rays that
     /// follow each other meet the same nodes and facets.
     #[inline(always)]
-    pub(crate) fn prepare(&mut self, started: u32) -> u32 {
+    pub(super) fn prepare(&mut self, emitter: &Emitter, started: u32) -> u32 {
         if self.sampling == Sampling::Random || self.pairs == [false; 3] {
             return started;
         }
         let k = started as usize % CHUNK;
-        if k == 0 {
-            self.chunk(started);
+        if k.is_multiple_of(SHEAF) {
+            wide::prepare(emitter, self, started);
         }
         started - k as u32 + self.order[k]
+    }
+
+    /// That ray, where it is made already.
+    #[inline(always)]
+    pub(super) fn ready(&self, started: u32) -> Option<(Point, Vector)> {
+        let sheaf = self.sheaf.as_ref()?;
+        Some(sheaf.ray(started as usize))
+    }
+
+    /// Makes ready what is needed from the `started`-th ray on.
+    #[inline(always)]
+    pub(super) fn refill(&mut self, emitter: &Emitter, started: u32) {
+        if (started as usize).is_multiple_of(CHUNK) {
+            self.chunk(started);
+        }
+        emitter.make(self, started);
     }
 
     /// Makes ready the numbers of one ray, which is the one to start.
@@ -86,9 +115,13 @@ impl Stream {
         index
     }
 
-    #[inline(never)]
+    /// Loops, not closures, which would be compiled without the caller's instruction set.
+    #[inline(always)]
     fn chunk(&mut self, first: u32) {
-        for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
+        for d in 0..random::DIMENSIONS {
+            if !self.pairs[d / 2] {
+                continue;
+            }
             self.numbers[d].resize(CHUNK, 0);
             for (block, numbers) in self.numbers[d].chunks_mut(random::BLOCK).enumerate() {
                 random::scrambled_block(first + (block * random::BLOCK) as u32, d, self.scrambles[d], numbers);
@@ -96,24 +129,46 @@ impl Stream {
         }
         let n = CHUNK.min((self.rays - first) as usize);
         let along = if self.pairs[1] { 2 } else { 0 };
-        let cell = |k: usize| {
-            let [x, y] = [along, along + 1].map(|d| self.numbers[d].get(k).map_or(0, |n| n >> (32 - CELL_BITS)));
-            (spread(x) | spread(y) << 1) as usize
-        };
+        let mut cells = [0u16; CHUNK];
+        for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
+            *cell = (spread(x >> (32 - CELL_BITS)) | spread(y >> (32 - CELL_BITS)) << 1) as u16;
+        }
         // Counting sort: most cells hold one ray of a chunk.
-        let mut ends = vec![0u32; CHUNK];
-        (0..n).for_each(|k| ends[cell(k)] += 1);
+        let mut ends = [0u16; CHUNK];
+        for cell in &cells[..n] {
+            ends[usize::from(*cell) % CHUNK] += 1;
+        }
         let mut sum = 0;
         for end in &mut ends {
             sum += *end;
             *end = sum;
         }
         self.order.resize(CHUNK, 0);
-        for k in (0..n).rev() {
-            let end = &mut ends[cell(k)];
+        for (k, cell) in cells[..n].iter().enumerate().rev() {
+            let end = &mut ends[usize::from(*cell) % CHUNK];
             *end -= 1;
-            self.order[*end as usize] = k as u32;
+            self.order[usize::from(*end)] = k as u32;
         }
+    }
+
+    /// The numbers of a pair for the rays that start from the `started`-th on; of no meaning beyond the last of them, and for a pair
+    /// that the source does not ask for.
+    #[inline(always)]
+    pub(super) fn pairs_from(&self, started: u32, pair: usize) -> [Numbers; 2] {
+        let mut pairs = [[0.0; SHEAF]; 2];
+        if self.pairs[pair] {
+            let order = &self.order[started as usize % CHUNK..];
+            for (numbers, from) in pairs.iter_mut().zip(&self.numbers[2 * pair..]) {
+                let mut raw = [0u32; SHEAF];
+                for (x, k) in raw.iter_mut().zip(order) {
+                    *x = from[*k as usize];
+                }
+                for (x, n) in numbers.iter_mut().zip(raw) {
+                    *x = unit(n);
+                }
+            }
+        }
+        pairs
     }
 
     /// Two numbers in `[0, 1)` of the prepared ticket: pair 0 for the place, 1 for the direction, 2 for the wavelength.
@@ -123,7 +178,7 @@ impl Stream {
             Sampling::Random => self.random(ticket, pair),
             Sampling::Sobol => {
                 let k = ticket.index as usize % CHUNK;
-                let number = |d: usize| (f64::from(self.numbers[d][k]) + 0.5) * (1.0 / 4_294_967_296.0);
+                let number = |d: usize| unit(self.numbers[d][k]);
                 [number(2 * pair as usize), number(2 * pair as usize + 1)]
             }
         }

@@ -2,9 +2,9 @@
 
 use super::{Carry, Context, settle};
 use crate::intersect::Cost;
-use crate::math::{Departure, Point, Ray, orthonormal_pair};
+use crate::math::{Departure, Point, Ray, Vector, orthonormal_pair};
 use crate::simulate::bind::{AMBIENT, FaceOptics};
-use crate::simulate::emitter::{Stream, Ticket};
+use crate::simulate::emitter::Stream;
 use smallvec::SmallVec;
 
 /// Bodies, outermost first.
@@ -44,11 +44,9 @@ pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
                 let which = [replicate, replicates];
                 let s = context.settings;
                 let mut stream = Stream::new(s.seed, s.sampling, which, source as u32, to - from).of(emitter);
-                let index = (to - from) * k / ASKED;
-                let ticket = Ticket { ray: from + index, index: stream.prepare_alone(index as u32) };
-                let emission = emitter.emit(&stream, ticket);
-                let mut ray = emission.ray;
-                if let Some((face, normal)) = emission.from {
+                let mut ray = Ray::new(Point::ZERO, Vector::Z);
+                let (_, leaving) = emitter.alone(&mut stream, from, ((to - from) * k / ASKED) as u32, &mut ray);
+                if let Some((face, normal)) = leaving.from {
                     settle(context, face, normal, &mut ray);
                 }
                 let found = bodies(context, &ray);

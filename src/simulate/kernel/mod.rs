@@ -5,6 +5,7 @@
 //! them. Everything else is arithmetic behind the `match`.
 
 mod around;
+mod arrive;
 mod carry;
 mod contact;
 mod local;
@@ -19,7 +20,7 @@ pub use local::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
 pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
-use super::emitter::{Emission, Stream, Ticket};
+use super::emitter::{Leaving, Stream, Ticket};
 use super::random::Key;
 use super::receiver::Receiver;
 use super::run::{Plan, RunSettings};
@@ -255,14 +256,15 @@ impl Sources {
                 self.enter(context, self.source + 1);
             }
             let Some(stream) = &mut self.stream else { return false };
-            let place = (self.next - self.range[0]) as u32;
-            let index = if self.alone { stream.prepare_alone(place) } else { stream.prepare(place) };
+            let (emitter, first) = (&context.bound.emitters[self.source], self.range[0]);
+            let started = (self.next - first) as u32;
             self.next += 1;
-            let ticket = Ticket { ray: self.range[0] + u64::from(index), index };
-            let emitter = &context.bound.emitters[self.source];
-            let emission = emitter.emit(stream, ticket);
+            let (ticket, leaving) = match self.alone {
+                true => emitter.alone(stream, first, started, ray),
+                false => emitter.next(stream, first, started, ray),
+            };
             let quanta = context.plan.shares[self.source].quanta;
-            if start(context, self.source, &emission, (ticket, quanta), path, ray, local) {
+            if start(context, self.source, &leaving, (ticket, quanta), path, ray, local) {
                 return true;
             }
         }
@@ -274,14 +276,13 @@ impl Sources {
 fn start<C: Carry>(
     context: &Context<'_>,
     source: usize,
-    emission: &Emission,
+    leaving: &Leaving,
     (ticket, quanta): (Ticket, f64),
     path: &mut Path<C>,
     ray: &mut Ray,
     local: &mut Local,
 ) -> bool {
-    *ray = emission.ray;
-    if let Some((face, normal)) = emission.from {
+    if let Some((face, normal)) = leaving.from {
         local.counts.corrected_normals += u64::from(settle(context, face, normal, ray));
     }
     local.counts.rays += 1;
@@ -306,7 +307,7 @@ fn start<C: Carry>(
         return false;
     };
     if C::COLOURED {
-        carry.light(emission.wavelength, || match context.bound.emitters[source].polarised {
+        carry.light(leaving.wavelength, || match context.bound.emitters[source].polarised {
             Some(field) => Stokes::linear(1.0, ray.direction, field),
             None => Stokes::unpolarised(1.0, ray.direction),
         });
@@ -315,7 +316,7 @@ fn start<C: Carry>(
     let (ray_number, first) = (ticket.ray, quanta);
     *path = Path { ray: ray_number, branch: 0, bounce: 0, quanta, first, length: 0.0, receiver, free: 0.0, carry };
     step::record(context, path, ray.origin, Event::Emitted, local);
-    step::aim(context, path, ray);
+    arrive::aim(context, path, ray);
     true
 }
 

@@ -68,7 +68,7 @@ pub const BLOCK: usize = 64;
 
 /// The same for the indices from `first`, a multiple of [`BLOCK`], on. At most [`BLOCK`] indices differ in their lowest byte alone,
 /// so the loop runs in vectors.
-#[inline]
+#[inline(always)]
 pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [u32]) {
     let t = &TABLES[dimension];
     let b = first.to_le_bytes();
