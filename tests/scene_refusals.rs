@@ -50,6 +50,34 @@ fn a_unit_given_by_the_user_replaces_that_of_the_file() {
 
 const PLANE: &str = "[[receiver]]\nname = 'r'\nsize = [1, 1]\n";
 
+/// A list with more entries than belong there is no list that means something else.
+#[test]
+fn lists_that_are_too_long_are_refused() {
+    for (head, line) in [
+        ("[[receiver]]\nname = 'r'\nsize = [1, 1]\ncells = [3, 4, 5]", 4),
+        ("[[receiver]]\nname = 'r'\nsize = [1, 1]\nat = [0, 0, 10, 5]", 4),
+        ("[[medium]]\nname = 'g'\nschott = [2.2, 0, 0, 0, 0, 0, 7]", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = [[400, 1.5], [500, 1.4, 1.3]]", 3),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { at = [0, 0, 0, 0] }", 3),
+    ] {
+        let said = refusal(head);
+        assert!(said.contains("values where") && said.contains(&format!("scene.toml:{line}:")), "{head}: {said}");
+    }
+}
+
+/// Lumens of lumens are nothing, and no lumens come from light that the eye does not see.
+#[test]
+fn lumens_are_not_weighed_twice() {
+    let lumens = "[run]\nunit = 'lm'\n";
+    assert!(refusal(&format!("{lumens}{PLANE}channels = 'xyz'")).contains("scene.toml:6:"));
+    let dark = "[[source]]\nspectrum = { kind = 'lines', values = [[900, 1], [950, 1]] }";
+    assert!(refusal(&format!("{lumens}{dark}")).contains("sees nothing"));
+    for key in ["graded_index", "index_extraordinary"] {
+        let said = refusal(&format!("[[medium]]\nname = 'g'\nindex = 1.5\n{key} = 1"));
+        assert!(said.contains("is not simulated"), "{said}");
+    }
+}
+
 /// Whatever is written must mean something, or be refused by its name and line.
 #[test]
 fn what_means_nothing_is_refused_by_name() {

@@ -222,3 +222,28 @@ fn errors_of_absorbed_flux_are_honest() {
         assert!((182..=200).contains(&two), "{sampling}: {two} of 200 within two standard errors");
     }
 }
+
+/// 1 W at 450 nm and 1 W at 555 nm are lumens in the ratio of V(λ), 0.038 to 1; what a red filter lets through of a black body's lumens
+/// is what the eye sees of that part.
+#[test]
+fn lumens_of_a_spectrum_are_those_that_the_eye_sees() {
+    let bins = |spectrum: &str, bins: &str| -> Vec<f64> {
+        let text = format!(
+            "[run]\nrays = 100_000\nunit = 'lm'\n[[source]]\nkind = 'collimated'\npower = 100\nspectrum = {spectrum}\n\
+             [[receiver]]\nname = 'r'\nat = [0, 0, 5]\nsize = [1, 1]\ncells = [1, 1]\nbins_nm = {bins}\n"
+        );
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let world = World::default();
+        let bound = scene.bind(&world.model).unwrap();
+        let r = simulate(&bound, &world, &RunSettings::from(&scene.run), &|_| true);
+        r.receivers[0].channels.iter().map(|c| c.total).collect()
+    };
+    let lines = bins("{ kind = 'lines', values = [[450, 1], [555, 1]] }", "[400, 500, 600]");
+    assert!(
+        (lines[0] - 100.0 * 0.038 / 1.038).abs() < 0.01 && (lines[1] - 100.0 / 1.038).abs() < 0.01,
+        "{lines:?}"
+    );
+    // 2856 K (illuminant A) from 620 nm on: 12.47 % of its lumens, by the CIE's table at 5 nm and Planck's law.
+    let warm = bins("{ kind = 'black_body', kelvin = 2856 }", "[360, 620, 830]");
+    assert!((warm[1] - 12.47).abs() < 0.05, "{warm:?}");
+}

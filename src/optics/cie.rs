@@ -46,6 +46,11 @@ pub(super) const DAYLIGHT: [f64; 95] = [
     63.3828, 63.8434, 64.304, 61.8779, 59.4519, 55.7054, 51.959, 54.6998, 57.4406, 58.8765, 60.3125,
 ];
 
+/// First and last wavelength that the observer sees, nm.
+pub(super) fn observer_range() -> [f64; 2] {
+    [OBSERVER_START, OBSERVER_START + STEP * (OBSERVER.len() - 1) as f64]
+}
+
 /// The colour-matching functions at a wavelength in nm, linear between the points, zero beyond them.
 pub(super) fn observer(wavelength_nm: f64) -> [f64; 3] {
     let x = (wavelength_nm - OBSERVER_START) / STEP;

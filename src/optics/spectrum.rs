@@ -235,6 +235,29 @@ impl Wavelengths {
         sum
     }
 
+    /// The same light by its lumens in place of its watts: what wavelengths are drawn from where power is counted in lumens. The product
+    /// with V(λ) is taken every nanometre and at every point of the spectrum.
+    pub fn seen(&self) -> Result<Self, Error> {
+        match &self.kind {
+            Kind::Lines(nm) => {
+                let before = std::iter::once(0.0).chain(self.sums.iter().copied());
+                let watts = self.sums.iter().zip(before).map(|(s, before)| s - before);
+                Self::lines(&nm.iter().zip(watts).map(|(&nm, w)| [nm, w * xyz_of_watt(nm)[1]]).collect::<Vec<_>>())
+            }
+            Kind::Continuous(points) => {
+                let [first, last] = cie::observer_range();
+                let [a, b] = self.range_nm().map(|nm| nm.clamp(first, last));
+                let steps = (0..=(b - a).ceil() as usize).map(|k| (a + k as f64).min(b));
+                let own = points.iter().map(|p| p[0]).filter(|nm| (a..=b).contains(nm));
+                let mut nm: Vec<f64> = steps.chain(own).collect();
+                nm.sort_by(f64::total_cmp);
+                nm.dedup();
+                let lumens = |nm: f64| (nm, self.density(nm) * xyz_of_watt(nm)[1]);
+                Self::continuous(Table::new("spectrum", nm.into_iter().map(lumens))?)
+            }
+        }
+    }
+
     /// Lumens per watt.
     pub fn efficacy(&self) -> f64 {
         self.xyz()[1]

@@ -256,7 +256,7 @@ fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[Body]) -> R
     for (i, (source, loaded)) in scene.sources.iter().zip(loaded).enumerate() {
         let mut wavelengths: Vec<f64> = match (&source.spectrum, loaded) {
             (Some(key), _) => {
-                let sampler = key.optics().ok().and_then(|s| s.sampler().ok());
+                let sampler = key.wavelengths(scene.run.unit).ok();
                 sampler.map(|s| (0..=64).map(|k| s.sample(f64::from(k) / 64.001)).collect()).unwrap_or_default()
             }
             (None, Some(Loaded::Rays(list))) => list.rays.iter().filter_map(|r| r.wavelength_nm).collect(),

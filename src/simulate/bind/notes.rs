@@ -13,9 +13,7 @@ pub(super) fn wavelengths(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64;
     let range = |i: &f64| [*i, *i];
     (scene.sources.iter().zip(loaded))
         .map(|(source, loaded)| match (&source.spectrum, loaded) {
-            (Some(key), _) => {
-                key.optics().and_then(|s| s.sampler().map_err(|e| e.to_string())).map_or(run, |s| s.range_nm())
-            }
+            (Some(key), _) => key.wavelengths(scene.run.unit).map_or(run, |s| s.range_nm()),
             (None, Some(Loaded::Rays(list))) => {
                 let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
                 all.fold(None, |r: Option<[f64; 2]>, nm| {

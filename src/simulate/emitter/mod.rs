@@ -131,7 +131,7 @@ impl Emitter {
             (_, false) => None,
             (None, true) if coloured_list => None,
             (None, true) => Spectrum::line(scene.run.wavelength_nm).sampler().ok(),
-            (Some(key), true) => key.optics().ok().and_then(|s| s.sampler().ok()),
+            (Some(key), true) => key.wavelengths(scene.run.unit).ok(),
         };
         let polarised = s.polarised.map(Vector::from_array);
         let power = s.power.unwrap_or(own_power);

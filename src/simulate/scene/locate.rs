@@ -2,10 +2,11 @@ use super::{Key, suggest};
 use crate::simulate::{Error, ErrorKind};
 use std::ops::Range;
 use std::sync::Arc;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Effects that a user may ask for by key or kind and that are not simulated: what such words start with.
-const REFUSED: [(&str, &str); 15] = [
+const REFUSED: [(&str, &str); 20] = [
     ("fluoresc", "fluorescence"),
     ("phosphor", "fluorescence"),
     ("luminesc", "fluorescence"),
@@ -15,7 +16,12 @@ const REFUSED: [(&str, &str); 15] = [
     ("uniaxial", "birefringence"),
     ("waveplate", "birefringence"),
     ("retarder", "birefringence"),
+    ("index_extraordinary", "birefringence"),
+    ("index_ordinary", "birefringence"),
+    ("ordinary", "birefringence"),
     ("gradient", "gradient index"),
+    ("graded", "gradient index"),
+    ("index_gradient", "gradient index"),
     ("grin", "gradient index"),
     ("diffract", "diffraction"),
     ("grating", "diffraction"),
@@ -114,6 +120,29 @@ fn key_of(text: &str, at: usize) -> &str {
     let line = before.rsplit('\n').next().unwrap_or("");
     let key = line.rsplit_once('=').map_or("", |(key, _)| key);
     key.rsplit(['{', ',', '.']).next().unwrap_or("").trim()
+}
+
+/// Every list of the file must be as long as what was understood of it, for the reader takes as many entries as it needs and passes
+/// over the rest.
+pub(super) fn lengths(text: &str, understood: &serde_json::Value) -> Option<(Range<usize>, String)> {
+    fn unread(value: &Spanned<DeValue<'_>>, known: &serde_json::Value) -> Option<(Range<usize>, String)> {
+        match (value.get_ref(), known) {
+            (DeValue::Table(table), serde_json::Value::Object(known)) => {
+                table.iter().find_map(|(key, v)| unread(v, known.get(&**key.get_ref())?))
+            }
+            (DeValue::Array(list), serde_json::Value::Array(known)) => {
+                if list.len() > known.len() {
+                    let message = format!("{} values where {} belong", list.len(), known.len());
+                    return Some((value.span(), message));
+                }
+                list.iter().zip(known).find_map(|(v, known)| unread(v, known))
+            }
+            _ => None,
+        }
+    }
+    let root = DeTable::parse(text).ok()?;
+    let serde_json::Value::Object(known) = understood else { return None };
+    root.get_ref().iter().find_map(|(key, v)| unread(v, known.get(&**key.get_ref())?))
 }
 
 /// An error of the TOML reader with its place, and the key that was probably meant.

@@ -115,7 +115,11 @@ impl Scene {
     pub fn parse(text: &str, file_name: &str, base_dir: &Path) -> Result<Self, Error> {
         let shared: Arc<str> = text.into();
         let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax(&e, file_name, &shared))?;
-        scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared) };
+        scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
+        let understood = serde_json::to_value(&scene).unwrap_or_default();
+        if let Some((span, message)) = locate::lengths(text, &understood) {
+            return Err(Error::new(ErrorKind::Syntax, message).at(file_name, &shared, Some(span)));
+        }
         scene.check()?;
         Ok(scene)
     }

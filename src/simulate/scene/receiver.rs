@@ -1,4 +1,4 @@
-use super::{Key, OneOrMany, Scene};
+use super::{Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -182,6 +182,9 @@ impl Receiver {
         }
         if self.channels.is_some() && self.bins_nm.is_some() {
             return fail("bins_nm", "a receiver has `channels` or `bins_nm`, not both");
+        }
+        if self.channels.is_some() && scene.run.unit == PowerUnit::Lumen {
+            return fail("channels", "this run counts lumens already: `channels` are for powers in watts");
         }
         if let Some(b) = &self.bins_nm
             && (b.len() < 2 || b.len() > 1000 || !b.windows(2).all(|w| w[0] < w[1]))

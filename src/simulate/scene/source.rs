@@ -39,7 +39,8 @@ pub struct Source {
     pub exponent: Option<f64>,
     /// Names of the instances that the source lies inside of, outermost first; without, geometry tells. `[]` for none.
     pub inside: Option<OneOrMany<String>>,
-    /// Spectrum; the line `wavelength_nm` of the run unless said otherwise.
+    /// Spectrum, in watts (in a run that counts lumens too: its light is then weighed by what the eye sees of it); the line
+    /// `wavelength_nm` of the run unless said otherwise.
     pub spectrum: Option<SpectrumKey>,
     /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
     pub polarised: Option<[f64; 3]>,
@@ -165,7 +166,7 @@ impl Source {
         if self.rays == Some(0) {
             return fail("rays", "`rays` must be positive".into());
         }
-        if let Some(Err(message)) = self.spectrum.as_ref().map(SpectrumKey::optics) {
+        if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(scene.run.unit)) {
             return fail("spectrum", message);
         }
         if self.polarised.is_some() && !scene.run.polarisation {

@@ -1,4 +1,5 @@
-use crate::optics::{Spectrum, Table, WhiteLed};
+use super::PowerUnit;
+use crate::optics::{Spectrum, Table, Wavelengths, WhiteLed};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,5 +82,16 @@ impl SpectrumKey {
         };
         spectrum.sampler().map_err(|e| e.to_string())?;
         Ok(spectrum)
+    }
+
+    /// What wavelengths are drawn from: the watts of the spectrum, or its lumens where the run counts these.
+    pub(crate) fn wavelengths(&self, unit: PowerUnit) -> Result<Wavelengths, String> {
+        let watts = self.optics()?.sampler().map_err(|e| e.to_string())?;
+        match unit {
+            PowerUnit::Watt => Ok(watts),
+            PowerUnit::Lumen => {
+                watts.seen().map_err(|_| "this run counts lumens, and the eye sees nothing of this spectrum".into())
+            }
+        }
     }
 }
