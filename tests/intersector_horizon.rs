@@ -7,7 +7,7 @@ use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Cost, Expected, Intersector};
 use lampyris::math::{Departure, FaceId, Point, Ray, Uv, Vector};
-use lampyris::mesh::FacetMesh;
+use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 
 /// A ray from a random place of a random facet, to all sides, half of them grazing; the place is often on a border.
 fn leaving(mesh: &FacetMesh, dice: &mut Random) -> Ray {
@@ -105,6 +105,49 @@ fn a_ray_of_a_bundle_in_the_free_cone_meets_nothing() {
         ("stadium", share_found_of("stadium", &stadium(4000).0, in_a_bundle)),
     ];
     assert!(found[0].1 > 0.9 && found[1].1 > 0.8, "{found:?}");
+}
+
+#[test]
+fn a_folded_facet_is_met_by_what_leaves_its_other_half() {
+    let mut dice = Random(3);
+    for k in 0..4000 {
+        // A kite with its fold along x, turned up by an angle on one side.
+        let fold = 2.5 * dice.unit().powi(1 + k % 6);
+        let mut side = |y: f64| Point::new(0.3 + 0.4 * dice.unit(), y * fold.cos().max(-0.5), y * fold.sin());
+        let d = side(0.7);
+        let corners = [Point::ZERO, Point::new(0.5, -0.7, 0.0), Point::X, d];
+        let at = |[a, b, c]: [Point; 3], r: &mut Random| {
+            let (u, v) = (0.1 + 0.35 * r.unit(), 0.1 + 0.35 * r.unit());
+            a + (b - a) * u + (c - a) * v
+        };
+        let first = at([corners[0], corners[1], corners[2]], &mut dice);
+        let second = at([corners[0], corners[2], corners[3]], &mut dice);
+        let mesh = FacetMesh {
+            positions: corners.to_vec(),
+            vertices: (0..4).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect(),
+            facets: vec![Facet { vertices: [0, 1, 2, 3], face: FaceId(0) }],
+            sag: vec![],
+        };
+        let (from, to) = if k % 2 == 0 { (first, second) } else { (second, first) };
+        let height = (to - from).z.abs();
+        if height < 1e-6 {
+            continue;
+        }
+        let departure = Departure { face: FaceId(0), primitive: 0, uv: Uv::ZERO };
+        let ray = Ray::new(from, (to - from).normalize()).leaving(departure);
+        let tree = Octree::build(&mesh, &octree::Settings::default());
+        let judge = Bvh::build(&mesh, &bvh::Settings::default());
+        let mut batch = [None; 2];
+        tree.intersect_batch(&[ray, ray], &mut batch, &mut Cost::default());
+        let alone = tree.intersect(&ray, &mut Cost::default());
+        let t = alone.map(|h| h.t);
+        assert!(
+            t.is_some_and(|t| (t - (to - from).length()).abs() < 1e-9 / height),
+            "fold {fold}: {ray:?} {alone:?}"
+        );
+        assert_eq!([alone, alone], batch);
+        assert_eq!(t, judge.intersect(&ray, &mut Cost::default()).map(|h| h.t));
+    }
 }
 
 #[test]

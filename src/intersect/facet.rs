@@ -11,6 +11,7 @@
 //! Weakness: two coincident sheets of different parts are two facets at the same place, and which of them a ray that
 //! leaves one meets at t = 0 is a matter of rounding.
 
+use super::slopes::OVER;
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
@@ -203,13 +204,11 @@ impl FacetRay {
     /// on the ray.
     #[cold]
     fn ways_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
-        // The fold is the same from both sides; where it opens to the ray whichever side that leaves, nothing is met.
         let [a, b, c, d] = *corners;
         let (first, second) = ((b - a).cross(c - a), (c - a).cross(d - a));
-        let fold = first.dot(d - a);
-        let sides = [first, second].map(|n| fold * n.dot(self.direction));
-        let certain = fold.abs() > 1e-9 * first.length_squared() || c == d;
-        if certain && sides[0] <= 0.0 && sides[1] <= 0.0 {
+        let over = |n: Vector, side: f64| side * n.dot(self.direction) > OVER * n.length();
+        let goes = |side: f64| over(first, side) && (c == d || over(second, side));
+        if goes(1.0) || goes(-1.0) {
             return [Way::Never; 2];
         }
         let start = Point::from_array(self.origin);

@@ -9,6 +9,7 @@ mod normals;
 pub mod octree;
 pub mod polish;
 mod prefetch;
+mod slopes;
 
 use crate::math::{FaceId, Point, Ray, Uv, Vector};
 pub(crate) use prefetch::prefetch;

@@ -18,6 +18,9 @@ use std::sync::PoisonError;
 /// Rays under way at a time.
 pub(super) const WIDTH: usize = 32;
 
+/// Rays before its start at which what a ray needs of the facet that it leaves is asked for.
+const AHEAD: usize = 8;
+
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
     /// Where the ray enters the children that it may meet before `t_max`, and their links, the farthest first; gives
@@ -117,7 +120,7 @@ fn alone<L: Lanes>(tree: &Octree, s: &mut State, cost: &mut Cost) {
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
-                s.waiting = L::sift(&tree.blocks[index], &s.sift, &s.boxes) & mask(count);
+                s.waiting = sift::<L>(&tree.blocks[index], s) & mask(count);
                 if s.waiting != 0 {
                     test(tree, s);
                 }
@@ -162,7 +165,7 @@ fn together<L: Lanes>(
             let (index, count) = s.at.as_block();
             cost.tests += count as u64;
             s.block = index as u32;
-            s.waiting = L::sift(&tree.blocks[index], &s.sift, &s.boxes) & mask(count);
+            s.waiting = sift::<L>(&tree.blocks[index], s) & mask(count);
             s.at = s.next::<L>(0);
             fetch(tree, s.at);
             agenda.put(select_unpredictable(s.waiting != 0, CORNERS, s.at.kind()), ray);
@@ -188,6 +191,9 @@ fn together<L: Lanes>(
             hits[s.index] = s.best.hit();
             if let Some(&place) = order.get(next) {
                 let place = usize::from(place);
+                if let Some(from) = order.get(next + AHEAD).and_then(|&place| rays[usize::from(place)].from) {
+                    prefetch(&tree.slopes, from.primitive as usize);
+                }
                 s.start(tree, root, &rays[place], place);
                 agenda.put(s.at.kind(), ray);
                 next += 1;
@@ -196,6 +202,16 @@ fn together<L: Lanes>(
             }
         }
     }
+}
+
+/// The triangles of a block that are left without those of the facet that the ray leaves.
+#[inline(always)]
+fn sift<L: Lanes>(block: &Block, s: &State) -> u32 {
+    let mut own = 0;
+    for k in 0..4 {
+        own |= u32::from(block.facets[k] == s.own) << k;
+    }
+    L::sift(block, &s.sift, &s.boxes) & !(own * 0x11)
 }
 
 /// The lanes of a block that hold facets.

@@ -35,12 +35,14 @@ mod state;
 mod statistics;
 
 use super::facet::{FacetHit, Surroundings};
+use super::slopes::Slopes;
 use super::{Cost, Expected, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::intersect::prefetch::prefetch;
 use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
 use horizon::Horizons;
 use node::{Block, Node};
+use rayon::prelude::*;
 pub use statistics::Statistics;
 use std::sync::{OnceLock, PoisonError, RwLock};
 use std::time::Instant;
@@ -121,6 +123,8 @@ pub struct Octree<'m> {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
     root: Option<node::Link>,
+    /// Of all facets.
+    slopes: Vec<Slopes>,
     /// Of the facets that many rays leave, once a run pays for it.
     horizons: OnceLock<Horizons>,
     /// Of the sources whose rays are expected.
@@ -145,6 +149,8 @@ impl<'m> Octree<'m> {
         };
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * 1e-6) };
         let frame = state::Frame::new(center, &bounds);
+        let mut slopes = huge::with_capacity(mesh.facets.len());
+        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::of(mesh.corners(f))).collect_into_vec(&mut slopes);
         let build_seconds = started.elapsed().as_secs_f64();
         let horizons = OnceLock::new();
         Self {
@@ -155,6 +161,7 @@ impl<'m> Octree<'m> {
             nodes,
             blocks,
             root,
+            slopes,
             horizons,
             maps: RwLock::default(),
             statistics,
@@ -172,6 +179,7 @@ impl<'m> Octree<'m> {
             nodes: self.nodes.clone(),
             blocks: self.blocks.clone(),
             root: self.root,
+            slopes: self.slopes.clone(),
             horizons: OnceLock::new(),
             maps: RwLock::default(),
             statistics: self.statistics.clone(),
@@ -232,6 +240,16 @@ impl<'m> Octree<'m> {
         }
     }
 
+    /// The facet that a ray leaves where it is known not to meet it.
+    #[inline(always)]
+    fn own_of(&self, ray: &Ray) -> u32 {
+        let Some(from) = ray.from else { return u32::MAX };
+        match self.slopes.get(from.primitive as usize) {
+            Some(slopes) if slopes.leaves(ray.direction) => from.primitive,
+            _ => u32::MAX,
+        }
+    }
+
     fn walk(&self, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
         #[cfg(target_arch = "x86_64")]
         {
@@ -289,7 +307,7 @@ impl Intersector for Octree<'_> {
 
     fn footprint(&self) -> Footprint {
         Footprint {
-            bytes: size_of_val(&*self.nodes) + size_of_val(&*self.blocks),
+            bytes: size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.slopes),
             primitives: self.around.mesh.facets.len(),
             build_seconds: self.build_seconds,
         }

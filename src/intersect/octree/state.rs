@@ -128,6 +128,8 @@ pub(super) struct State {
     pub(super) boxes: BoxRay,
     pub(super) sift: SiftRay,
     pub(super) at: Link,
+    /// The facet that the ray leaves where it is known not to meet it, else one that no block has.
+    pub(super) own: u32,
     /// Facets of `block` that wait for their corners.
     pub(super) waiting: u32,
     pub(super) block: u32,
@@ -152,6 +154,7 @@ impl State {
             best: Nearest::before(0.0),
             shift: 0.0,
             at: Link::END,
+            own: u32::MAX,
             waiting: 0,
             block: 0,
             top: GROUND,
@@ -200,6 +203,7 @@ impl State {
         self.best = Nearest::before(ray.t_max);
         self.cap();
         self.at = Link(select_unpredictable(meets, root.0, Link::END.0));
+        self.own = tree.own_of(ray);
         self.waiting = 0;
         self.top = GROUND;
         self.index = index;

@@ -1,0 +1,37 @@
+//! Which rays that leave a facet are known not to meet it again: all but those that graze one of its two triangles.
+//!
+//! One in three exact tests of a ray that refracts or reflects asked the facet that it had just left.
+
+use crate::math::{Point, Vector};
+
+/// The least sine of the angle between a ray and the planes of both triangles of its own facet over which nothing of the facet is
+/// ahead of it, whichever triangle it leaves and whether they fold to it or away.
+pub(crate) const OVER: f64 = 1e-3;
+
+/// Above which slope a ray that leaves a facet is known not to meet it again.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slopes {
+    axis: [f32; 3],
+    sine: f32,
+}
+
+impl Slopes {
+    pub(crate) fn of([a, b, c, d]: [Point; 4]) -> Self {
+        let first = (b - a).cross(c - a).normalize_or_zero();
+        let second = if c == d { first } else { (c - a).cross(d - a).normalize_or_zero() };
+        let axis = (first + second).normalize_or_zero();
+        // Half the fold and the angle over the plane, with room for f32.
+        let (cosine, sine) = (axis.dot(first).min(axis.dot(second)), axis.cross(first).length());
+        let sine = (sine + OVER + 1e-3) / cosine;
+        // Without area nothing is known.
+        let sine = if cosine > 0.5 { sine as f32 } else { f32::INFINITY };
+        Self { axis: axis.as_vec3().to_array(), sine }
+    }
+
+    /// Whether the ray is one that [`super::facet::FacetRay::test`] never finds to meet the facet it leaves.
+    #[inline(always)]
+    pub(crate) fn leaves(&self, direction: Vector) -> bool {
+        let ([x, y, z], d) = (self.axis, direction.as_vec3());
+        (x * d.x + y * d.y + z * d.z).abs() > self.sine
+    }
+}
