@@ -2,13 +2,14 @@
 
 mod tessellate_support;
 
-use lampyris::math::{Homogeneous, Point, Uv};
+use lampyris::math::Uv;
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Surface, UvCurve};
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
 use std::collections::HashMap;
 use tessellate_support::config;
+use tessellate_support::sheets::two_sheets;
 
 /// A knot vector from 0 to 1 whose inner knots have any multiplicity up to the degree.
 fn knots(degree: usize, inner: &[u8]) -> Vec<f64> {
@@ -26,26 +27,7 @@ fn sheets() -> impl Strategy<Value = [Surface; 2]> {
     let noise = proptest::collection::vec((-1f64..1.0, -1f64..1.0, -1f64..1.0, -1f64..1.0), 512);
     (side(), side(), noise).prop_map(|((p, inner_u), (q, inner_v), noise)| {
         let knots = [knots(p, &inner_u), knots(q, &inner_v)];
-        let [n, m] = [knots[0].len() - p - 1, knots[1].len() - q - 1];
-        let sheet = |lift: f64, from: usize| {
-            let point = |k: usize| {
-                let (i, j) = (k / m, k % m);
-                let border = i == 0 || j == 0 || i == n - 1 || j == m - 1;
-                let (a, b, c, e) = noise[if border { k } else { k + from } % noise.len()];
-                let step = [30.0 / (n - 1) as f64, 20.0 / (m - 1) as f64];
-                let z = if border { 0.5 * c } else { lift + 2.0 * c };
-                let at = Point::new(step[0] * (i as f64 + 0.2 * a), step[1] * (j as f64 + 0.2 * b), z);
-                // Weights from 1e-2 to 1e2 between a sheet's own points, gentler on the rim, where they set its shape alone.
-                let w = 10f64.powf(if border { 0.5 * e } else { 2.0 * e });
-                (at * w).extend(w)
-            };
-            Surface {
-                degree: [p, q],
-                knots: knots.clone(),
-                points: (0..n * m).map(point).collect::<Vec<Homogeneous>>(),
-            }
-        };
-        [sheet(5.0, 128), sheet(-5.0, 256)]
+        two_sheets([p, q], &knots, &noise, 0.5, |at| at)
     })
 }
 

@@ -61,7 +61,6 @@ proptest! {
     fn certified_facets_at_a_pole_are_never_over(seed in seeds()) {
         let (surface, fine) = seeded((fans(), any::<bool>()), seed);
         let found = fan(&surface, if fine { 0.3 } else { 1.0 });
-        if std::env::var("SHOW").is_ok() { println!("{seed} {surface:?} {found:?}"); }
         prop_assert!(found.is_ok(), "{}", found.unwrap_err());
     }
 }

@@ -4,6 +4,7 @@
 pub(crate) mod judge;
 pub(crate) mod pieces;
 pub(crate) mod rounds;
+pub(crate) mod sheets;
 pub(crate) mod shells;
 
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};

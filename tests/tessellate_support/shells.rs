@@ -1,7 +1,8 @@
 //! Random closed shells of trimmed rational faces: two sheets over one rim, the upper one cut into faces by random trims.
 
 use super::knots;
-use lampyris::math::{Homogeneous, Point, Uv, Vector};
+use super::sheets::two_sheets;
+use lampyris::math::{Point, Uv, Vector};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve};
 use proptest::prelude::*;
@@ -26,25 +27,10 @@ pub(crate) fn sheets() -> impl Strategy<Value = ([Surface; 2], Cuts)> {
     let place = (-4.5f64..3.3, prop_oneof![Just(0f64), 0f64..3.0], any::<bool>());
     (side(), side(), noise, place, cuts()).prop_map(|((p, inner_u), (q, inner_v), noise, place, cuts)| {
         let knots = [knots(p, &inner_u), knots(q, &inner_v)];
-        let [n, m] = [knots[0].len() - p - 1, knots[1].len() - q - 1];
         let (scale, off) = (10f64.powf(place.0), 10f64.powf(place.1) - 1.0);
         let wild_rim = if place.2 { 2.0 } else { 0.5 };
-        let sheet = |lift: f64, from: usize| {
-            let point = |k: usize| {
-                let (i, j) = (k / m, k % m);
-                let border = i == 0 || j == 0 || i == n - 1 || j == m - 1;
-                let (a, b, c, e) = noise[if border { k } else { k + from } % noise.len()];
-                let step = [30.0 / (n - 1) as f64, 20.0 / (m - 1) as f64];
-                let z = if border { 0.5 * c } else { lift + 2.0 * c };
-                let at = Point::new(step[0] * (i as f64 + 0.2 * a), step[1] * (j as f64 + 0.2 * b), z);
-                let at = (at + Vector::new(30.0, -20.0, 10.0) * off) * scale;
-                let w = 10f64.powf(if border { wild_rim * e } else { 2.0 * e });
-                (at * w).extend(w)
-            };
-            let points = (0..n * m).map(point).collect::<Vec<Homogeneous>>();
-            Surface { degree: [p, q], knots: knots.clone(), points }
-        };
-        ([sheet(5.0, 128), sheet(-5.0, 256)], cuts)
+        let placed = |at: Point| (at + Vector::new(30.0, -20.0, 10.0) * off) * scale;
+        (two_sheets([p, q], &knots, &noise, wild_rim, placed), cuts)
     })
 }
 

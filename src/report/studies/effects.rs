@@ -43,8 +43,8 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
         ("same bits", ""),
     ];
     let mut table = Table::new("effects", "Time by effect", &columns).caption(
-        "Every kernel can do what the ones before it can: opaque (power alone), clear (a body), nested (a stack of bodies), coloured (a \
-         wavelength), full (polarisation). Effects that ask for the same kernel cost the same: they are the same code.",
+        "Every kernel can do what the ones before it can: mirror (mirrors and absorbers), opaque (power alone), clear \
+         (a body), nested (a stack of bodies), coloured (a wavelength), full (polarisation). Effects that ask for the same kernel cost the same: they are the same code.",
     );
     let three = |x: f64| Cell::Number(x, 3);
     for (row, name) in rows.iter().zip(&categories) {
