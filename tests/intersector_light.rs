@@ -44,6 +44,11 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     let ((known, less), (walked, more)) = (ask(&knowing), ask(&plain));
     let (judged, _) = ask(&judge);
     assert!(known.iter().all(Option::is_none) || less.nodes < more.nodes / 4, "{name}: {less:?} against {more:?}");
+    for path in [octree::Path::Avx2, octree::Path::Portable] {
+        let other = Octree::build(mesh, &octree::Settings { path, ..octree::Settings::default() });
+        other.expect(&Expected { rays: u64::MAX, threads: 2, beams: &beams });
+        assert!(ask(&other).0 == walked, "{name}: {beam:?} {path:?}");
+    }
     for (k, ray) in rays.iter().enumerate() {
         assert_eq!(known[k], walked[k], "{name}: {beam:?} {ray:?}");
         assert_eq!(known[k].map(|h| h.t), judged[k].map(|h| h.t), "{name}: {beam:?} {ray:?}");

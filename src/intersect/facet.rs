@@ -335,7 +335,7 @@ impl Line {
 
     /// A hit with these edge functions, if it lies within the range of the ray.
     #[inline(always)]
-    fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
+    pub(crate) fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
         let [u, v, w] = edges;
         let det = u + v + w;
         let t = (u * heights[0] + v * heights[1] + w * heights[2]) * self.shear[2] / det;

@@ -8,10 +8,11 @@
 use super::Octree;
 use super::avx2::{self, Avx2};
 use super::engine::{self, Lanes};
+use super::light::pair::{Corners, Edges};
 use super::node::{Block, Node};
 use super::state::{BoxRay, SiftRay, corner_error, edge_error};
 use crate::intersect::Cost;
-use crate::intersect::facet::FacetHit;
+use crate::intersect::facet::{FacetHit, Line};
 use crate::math::Ray;
 use std::arch::x86_64::*;
 
@@ -88,6 +89,15 @@ unsafe fn coarse(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512
     }
 }
 
+/// The corners of two facets along an axis.
+#[inline(always)]
+unsafe fn both(corners: [&Corners; 2], axis: usize) -> __m512d {
+    unsafe {
+        let [a, b] = [_mm256_loadu_pd(corners[0][axis].as_ptr()), _mm256_loadu_pd(corners[1][axis].as_ptr())];
+        _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(a), b)
+    }
+}
+
 impl Lanes for Avx512 {
     #[inline(always)]
     fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
@@ -154,6 +164,33 @@ impl Lanes for Avx512 {
             let late = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
             let early = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
             u32::from(!(below & above | late | early))
+        }
+    }
+
+    #[inline(always)]
+    fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
+        // SAFETY: see the head of the file; eight numbers are stored to arrays of eight that start at multiples of 64 bytes.
+        unsafe {
+            let (x, y, z) = (both(corners, 0), both(corners, 1), both(corners, 2));
+            let [ox, oy, oz] = line.origin;
+            let [sx, sy, _] = line.shear;
+            // Not fused, to have the bits of plain Rust.
+            let z = _mm512_sub_pd(z, _mm512_set1_pd(oz));
+            let x = _mm512_sub_pd(_mm512_sub_pd(x, _mm512_set1_pd(ox)), _mm512_mul_pd(_mm512_set1_pd(sx), z));
+            let y = _mm512_sub_pd(_mm512_sub_pd(y, _mm512_set1_pd(oy)), _mm512_mul_pd(_mm512_set1_pd(sy), z));
+            let (next_x, next_y) = (_mm512_permutex_pd::<0x39>(x), _mm512_permutex_pd::<0x39>(y));
+            let outline = _mm512_sub_pd(_mm512_mul_pd(next_x, y), _mm512_mul_pd(next_y, x));
+            let (x0, x2) = (_mm512_permutex_pd::<0x00>(x), _mm512_permutex_pd::<0xAA>(x));
+            let (y0, y2) = (_mm512_permutex_pd::<0x00>(y), _mm512_permutex_pd::<0xAA>(y));
+            let diagonal = _mm512_sub_pd(_mm512_mul_pd(x0, y2), _mm512_mul_pd(y0, x2));
+            _mm512_store_pd(edges.outline.as_mut_ptr(), outline);
+            _mm512_store_pd(edges.diagonal.as_mut_ptr(), diagonal);
+            _mm512_store_pd(edges.heights.as_mut_ptr(), z);
+            let zero = _mm512_setzero_pd();
+            edges.below[0] = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(outline, zero);
+            edges.above[0] = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(outline, zero);
+            edges.below[1] = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(diagonal, zero);
+            edges.above[1] = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(diagonal, zero);
         }
     }
 

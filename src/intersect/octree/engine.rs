@@ -4,11 +4,12 @@
 //! [`WIDTH`] rays under way and does all steps of one kind in a row, without branches that depend on a ray: what the
 //! processor guesses wrong about a ray costs as much as a whole node. After a step the ray asks for the memory of its next one.
 
+use super::light::pair::{Corners, Edges};
 use super::node::{Block, Link, Node, Target};
 use super::state::{BoxRay, SiftRay, State};
 use super::{BATCH, Octree, light};
 use crate::intersect::Cost;
-use crate::intersect::facet::FacetHit;
+use crate::intersect::facet::{FacetHit, Line};
 use crate::intersect::prefetch::{prefetch, prefetch_either};
 use crate::math::Ray;
 use std::cell::RefCell;
@@ -29,6 +30,11 @@ pub(super) trait Lanes {
     fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
     /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
     fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32;
+    /// The edge functions of two facets, all with the same bits.
+    #[inline(always)]
+    fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
+        edges.set(corners, line);
+    }
     /// Which distances do not lie beyond `t_max`, one bit each.
     fn open(enters: &[f32; 16], t_max: f32) -> u32;
 }
@@ -98,7 +104,7 @@ pub(super) fn walk<L: Lanes>(tree: &Octree, rays: &[Ray], hits: &mut [Option<Fac
             let maps = tree.maps.read().unwrap_or_else(PoisonError::into_inner);
             let walkers = match maps.is_empty() {
                 true => rays.len(),
-                false => light::answer(&maps, rays, hits, &mut order, cost),
+                false => light::answer::<L>(&maps, rays, hits, &mut order, cost),
             };
             together::<L>(tree, root, &mut states, (rays, &order[..walkers]), hits, cost);
         }

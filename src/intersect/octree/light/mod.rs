@@ -11,14 +11,17 @@
 //! Guarantee: the hits of the walk, bit by bit; facets are put into squares with room for rounding, and the facet's own test
 //! decides. Weakness: a source with an extent has no such map.
 
+pub(super) mod pair;
 mod raster;
 mod slot;
 
 use super::Octree;
+use super::engine::Lanes;
 use crate::intersect::facet::{FacetHit, FacetRay, Line, Nearest};
 use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, Expected};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
+use pair::Edges;
 use slot::Slot;
 use std::hint::select_unpredictable;
 
@@ -230,7 +233,7 @@ fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
 
 /// Answers the rays that are on a map; gives the number of the others, whose places come first in `rest`.
 #[inline(always)]
-pub(super) fn answer(
+pub(super) fn answer<L: Lanes>(
     maps: &[Map],
     rays: &[Ray],
     hits: &mut [Option<FacetHit>],
@@ -239,6 +242,7 @@ pub(super) fn answer(
 ) -> usize {
     let (mut others, mut next, mut last) = (0, 0, 0);
     let mut looks = [Look::IDLE; TOGETHER];
+    let mut edges = Edges::default();
     let mut found: [(&[Entry], u8); TOGETHER] = [(&[], 0); TOGETHER];
     while next < rays.len() {
         let mut n = 0;
@@ -265,19 +269,26 @@ pub(super) fn answer(
         }
         for (entries, k) in &found[..full] {
             let map = &maps[usize::from(looks[usize::from(*k) % TOGETHER].map)];
-            prefetch(&map.slots, entries[0].slot as usize);
+            for entry in entries.iter().take(2) {
+                prefetch(&map.slots, entry.slot as usize);
+            }
         }
         for (entries, k) in &found[..full] {
             let look = &looks[usize::from(*k) % TOGETHER];
             let slots = &maps[usize::from(look.map)].slots;
             let index = usize::from(look.index);
             let mut best = Nearest::before(rays[index].t_max);
-            for entry in *entries {
-                if f64::from(entry.near) > best.t * look.scale + look.shift {
+            let mut first = 0;
+            while first < entries.len() {
+                if f64::from(entries[first].near) > best.t * look.scale + look.shift {
                     break;
                 }
-                cost.tests += 1;
-                slots[entry.slot as usize].test(&look.line, &mut best);
+                let other = entries.get(first + 1);
+                cost.tests += 1 + u64::from(other.is_some());
+                let one = &slots[entries[first].slot as usize];
+                let other = other.map(|e| &slots[e.slot as usize]);
+                pair::test::<L>(one, other, &look.line, &mut edges, &mut best);
+                first += 2;
             }
             hits[index] = best.hit();
         }

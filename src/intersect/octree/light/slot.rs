@@ -1,6 +1,7 @@
 //! Facets as the rays of a map ask them.
 
 use super::View;
+use super::pair::Corners;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
 use crate::intersect::octree::huge;
 use crate::math::Ray;
@@ -11,8 +12,8 @@ use crate::mesh::FacetMesh;
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Slot {
-    corners: [[f64; 4]; 3],
-    facet: u32,
+    pub(super) corners: Corners,
+    pub(super) facet: u32,
     /// One bit for each triangle.
     triangles: u32,
 }
@@ -34,6 +35,12 @@ impl Slot {
             slots.extend(facets.iter().map(|f| Self::new(mesh, *f, view, side)));
         }
         slots
+    }
+
+    /// One bit for each triangle, two apart.
+    #[inline(always)]
+    pub(super) fn sides(&self) -> u8 {
+        (self.triangles & 1 | (self.triangles & 2) << 1) as u8
     }
 
     /// Tests the facet and keeps the nearest hit.
