@@ -204,3 +204,35 @@ fn light_beyond_a_table_is_named() {
         assert!(says.iter().all(|word| notes.contains(word)), "{text}: {notes}");
     }
 }
+
+/// The schema's conditions speak of keys that there are, and ask for those without which the reader refuses an entry.
+#[test]
+fn the_schema_asks_for_what_the_reader_asks_for() {
+    fn required<'a>(value: &'a serde_json::Value, into: &mut Vec<&'a str>) {
+        match value {
+            serde_json::Value::Object(map) => map.iter().for_each(|(key, v)| match (key.as_str(), v) {
+                ("required", serde_json::Value::Array(keys)) => into.extend(keys.iter().filter_map(|k| k.as_str())),
+                _ => required(v, into),
+            }),
+            serde_json::Value::Array(list) => list.iter().for_each(|v| required(v, into)),
+            _ => {}
+        }
+    }
+    let schema = Scene::schema();
+    assert_eq!(schema["required"][0], "source");
+    for (name, wanted) in [
+        ("Medium", "name"),
+        ("Receiver", "name"),
+        ("Receiver", "size"),
+        ("Source", "half_angle_deg"),
+        ("SpectrumKey", "kelvin"),
+        ("Material", "surface"),
+    ] {
+        let definition = &schema["$defs"][name];
+        let mut keys = Vec::new();
+        required(definition, &mut keys);
+        assert!(keys.contains(&wanted), "{name}: {keys:?}");
+        assert!(keys.iter().all(|k| definition["properties"].get(k).is_some()), "{name}: {keys:?}");
+    }
+    assert!(schema["$defs"]["Accuracy"]["properties"]["normals"]["pattern"].as_str().unwrap().contains("[fF][lL]"));
+}

@@ -247,3 +247,15 @@ fn lumens_of_a_spectrum_are_those_that_the_eye_sees() {
     let warm = bins("{ kind = 'black_body', kelvin = 2856 }", "[360, 620, 830]");
     assert!((warm[1] - 12.47).abs() < 0.05, "{warm:?}");
 }
+
+/// With two replicates only three quarters of all runs lie within two errors, which a reader must know.
+#[test]
+fn few_replicates_are_named() {
+    let notes = |replicates: u32| {
+        let scene = Scene::parse("[[source]]\nkind = 'point'\n", "test.toml", std::path::Path::new(".")).unwrap();
+        let world = World::default();
+        let settings = RunSettings { rays: 1000, replicates, ..RunSettings::from(&scene.run) };
+        simulate(&scene.bind(&world.model).unwrap(), &world, &settings, &|_| true).notes
+    };
+    assert!(notes(2)[0].contains("12.71") && notes(8)[0].contains("2.36") && notes(32).is_empty());
+}

@@ -11,6 +11,7 @@ pub struct Medium {
     /// Name that materials use.
     pub name: String,
     /// Refractive index, the same for every wavelength.
+    #[schemars(range(min = 0.1, max = 10))]
     pub index: Option<f64>,
     /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`.
     pub catalogue: Option<String>,
@@ -25,8 +26,10 @@ pub struct Medium {
     /// Bulk absorption coefficient (natural logarithm), 1/mm: a number, or pairs `[nm, 1/mm]`.
     pub absorption_per_mm: Option<ByWavelength>,
     /// Scattering events per mm of way.
+    #[schemars(range(min = 0))]
     pub scatter_per_mm: Option<f64>,
     /// Mean cosine of the scattering angle (Henyey and Greenstein's g), in (−1, 1).
+    #[schemars(range(min = -1, max = 1))]
     pub anisotropy: Option<f64>,
 }
 

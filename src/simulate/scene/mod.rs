@@ -4,6 +4,7 @@
 //! [`Scene::bind`](crate::simulate::BoundScene) then finds the faces of a model that each rule means. Lengths are mm, angles degrees
 //! where the key says `_deg`, wavelengths nm, powers watts (or lumens: the receivers answer in the unit of the sources).
 
+mod conditions;
 mod lenient;
 mod locate;
 mod material;
@@ -126,7 +127,9 @@ impl Scene {
 
     /// The JSON Schema of a scene file.
     pub fn schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
+        let mut schema = schemars::schema_for!(Self).to_value();
+        conditions::add(&mut schema);
+        schema
     }
 
     /// A path named in the scene, seen from where the program runs.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct Receiver {
     /// Name, used in reports and file names.
+    #[schemars(length(min = 1))]
     pub name: String,
     /// What it is.
     pub kind: ReceiverKind,
@@ -22,8 +23,10 @@ pub struct Receiver {
     /// Sides of a plane, mm.
     pub size: Option<[f64; 2]>,
     /// Radius of a sphere, mm.
+    #[schemars(range(min = 0))]
     pub radius: Option<f64>,
     /// Number of cells along both sides.
+    #[schemars(inner(range(min = 1)))]
     pub cells: [u32; 2],
     /// Whether light ends at a plane or sphere; otherwise it is counted and goes on.
     pub absorbs: bool,

@@ -18,25 +18,32 @@ pub struct Run {
     /// What happens to a ray at a partly reflecting interface.
     pub interfaces: Interfaces,
     /// Below this share of a ray's first power an interface no longer splits the ray but chooses a side.
+    #[schemars(range(min = 0, max = 1))]
     pub split_floor: f64,
     /// Whether the polarisation of each ray is followed; otherwise light is unpolarised at every hit.
     pub polarisation: bool,
     /// Wavelength of sources without a spectrum, nm.
+    #[schemars(range(min = 1, max = 1e6))]
     pub wavelength_nm: f64,
     /// Unit of the sources' powers, and so of all results.
     pub unit: PowerUnit,
     /// Hits after which a path ends and counts as cut off: what is caught in a clear block goes round for ever.
+    #[schemars(range(min = 1))]
     pub max_bounces: u32,
     /// Diagonals of a body that light goes in it by total reflection alone before it counts as caught there and is cut off, where the
     /// body absorbs nothing; `inf` for a guide that is wound up on itself.
+    #[schemars(range(min = 1))]
     pub caught_after: f64,
     /// Length after which a path ends and counts as cut off, mm.
     pub max_length_mm: f64,
     /// Share of a ray's first power below which its path ends and counts as cut off.
+    #[schemars(range(min = 0))]
     pub power_floor: f64,
     /// Faces of two solids at most this far apart are one interface, mm.
+    #[schemars(range(min = 1e-9, max = 1))]
     pub glue_mm: f64,
-    /// Independent parts the run is divided into; errors are computed from how much they differ.
+    /// Independent parts the run is divided into; errors are computed from how much they differ. At least 16 rays go into each.
+    #[schemars(range(min = 2, max = 65536))]
     pub replicates: u32,
 }
 

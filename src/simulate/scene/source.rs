@@ -14,6 +14,7 @@ pub struct Source {
     /// How the light leaves.
     pub kind: SourceKind,
     /// Power, watts (or lumens, as the run says); 1 unless said otherwise, or what the source's file says.
+    #[schemars(range(min = 1e-30, max = 1e30))]
     pub power: Option<f64>,
     /// IES LM-63, EULUMDAT, ray list (CSV or NPZ) or Data_1, relative to the scene file.
     ///
@@ -30,12 +31,15 @@ pub struct Source {
     /// Direction of the first side of `size`, as far as `direction` lets it.
     pub x: Option<[f64; 3]>,
     /// Radius of a disc, mm.
+    #[schemars(range(min = 0))]
     pub radius: Option<f64>,
     /// Sides of a rectangle, mm.
     pub size: Option<[f64; 2]>,
     /// Half the opening angle of a cone, degrees.
+    #[schemars(range(min = 0, max = 180))]
     pub half_angle_deg: Option<f64>,
     /// Exponent n of a cosⁿ lobe.
+    #[schemars(range(min = 0, max = 1e6))]
     pub exponent: Option<f64>,
     /// Names of the instances that the source lies inside of, outermost first; without, geometry tells. `[]` for none.
     pub inside: Option<OneOrMany<String>>,

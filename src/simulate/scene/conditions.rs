@@ -1,0 +1,83 @@
+//! What the JSON Schema says of keys that go together, beside the types that it reads off the structs: what an editor can show before
+//! the command does. Whatever it refuses the reader of scenes refuses too; not the other way round.
+
+use serde_json::{Value, json};
+
+/// Adds the conditions to the schema of a scene.
+pub(super) fn add(schema: &mut Value) {
+    let needs = |keys: &[&str]| json!({"required": keys});
+    let of_kind = |kinds: &[&str], then: Value| json!({"if": {"properties": {"kind": {"enum": kinds}}, "required": ["kind"]}, "then": then});
+    let never = |keys: &[&str]| json!({"not": {"anyOf": keys.iter().map(|k| needs(&[k])).collect::<Vec<_>>()}});
+    let measured = ["ies", "eulumdat", "rays", "data_1"];
+    let lumens = json!({"required": ["run"],
+        "properties": {"run": {"required": ["unit"], "properties": {"unit": {"const": "lm"}}}}});
+    let root = json!({
+        "required": ["source"],
+        "allOf": [{"if": lumens, "then": {"properties": {"receiver": {"items": never(&["channels"])}}}}],
+    });
+    let indices = ["index", "catalogue", "sellmeier", "cauchy", "schott", "index_table"];
+    let receiver = json!({"required": ["name"], "allOf": [
+        {"not": needs(&["channels", "bins_nm"])},
+        {"if": never(&["kind"]), "then": needs(&["size"])},
+        of_kind(&["plane"], needs(&["size"])),
+        of_kind(&["sphere"], needs(&["radius"])),
+        of_kind(&["absorbed"], json!({"anyOf": [needs(&["part"]), needs(&["instance"])]})),
+        of_kind(&["plane", "far_field", "absorbed"], never(&["radius"])),
+        of_kind(&["sphere", "far_field", "absorbed"], never(&["size"])),
+    ]});
+    let source = json!({"allOf": [
+        of_kind(&["cone"], needs(&["half_angle_deg"])),
+        of_kind(&["cosine"], needs(&["exponent"])),
+        of_kind(&measured, needs(&["file"])),
+        {"not": needs(&["radius", "size"])},
+        {"if": never(&["kind"]), "then": never(&["half_angle_deg", "exponent", "file"])},
+    ]});
+    let spectrum = json!({"allOf": [
+        of_kind(&["lines", "table"], needs(&["values"])),
+        of_kind(&["black_body"], needs(&["kelvin"])),
+        of_kind(&["d65", "white_led"], never(&["values", "kelvin"])),
+    ]});
+    let said: Vec<Value> = ["medium", "surface", "scatter"].iter().map(|k| needs(&[k])).collect();
+    merge(schema, &root);
+    for (name, more) in [
+        ("Medium", json!({"required": ["name"], "oneOf": indices.map(|k| needs(&[k]))})),
+        ("Receiver", receiver),
+        ("Source", source),
+        ("SpectrumKey", spectrum),
+        ("Material", json!({"anyOf": said})),
+        (
+            "Accuracy",
+            json!({"properties": {
+                "intersector": {"pattern": either(&["octree", "bvh2", "cwbvh", "exact"])},
+                "normals": {"pattern": either(&["flat", "nearest", "bilinear", "cubic", "exact"])},
+                "angle_deg": {"exclusiveMinimum": 0, "exclusiveMaximum": 90},
+            }}),
+        ),
+    ] {
+        merge(&mut schema["$defs"][name], &more);
+    }
+    for direction in ["direction", "normal"] {
+        let owner = if direction == "normal" { "Receiver" } else { "Source" };
+        schema["$defs"][owner]["properties"][direction]["not"] = json!({"const": [0, 0, 0]});
+    }
+}
+
+/// A pattern for any of these words in any case.
+fn either(words: &[&str]) -> String {
+    let letter = |c: char| match c.is_ascii_alphabetic() {
+        true => format!("[{c}{}]", c.to_ascii_uppercase()),
+        false => c.to_string(),
+    };
+    let words: Vec<String> = words.iter().map(|w| w.chars().map(letter).collect()).collect();
+    format!("^({})$", words.join("|"))
+}
+
+/// Puts the keys of one object into another, table by table.
+fn merge(into: &mut Value, more: &Value) {
+    match (into, more) {
+        (Value::Object(into), Value::Object(more)) => {
+            more.iter().for_each(|(k, v)| merge(into.entry(k.clone()).or_insert(Value::Null), v));
+        }
+        (into, more) => *into = more.clone(),
+    }
+}
