@@ -142,7 +142,10 @@ impl<'a> Polished<'a> {
     fn search(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
         let mut ray = *ray;
         // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden` may lead to a root behind it.
-        let mut start = ray.t_min - 2.0 * self.sag;
+        // Seen flat, facets lie farther from it along the ray: of a short look for a face along the one left, all of them count.
+        let sine = left.map_or(1.0, |(_, normal)| normal.dot(ray.direction).abs().max(0.05));
+        let slack = 2.0 * self.sag / sine;
+        let mut start = ray.t_min - slack;
         if let Some((from, normal)) = left
             && let Some(reach) = self.hidden(&ray, from, normal)
         {
@@ -159,7 +162,7 @@ impl<'a> Polished<'a> {
         let mut answer = None;
         for _ in 0..64 {
             let mut own = Cost::default();
-            let facet_hit = self.facets.intersect(&ray.within(start, ray.t_max + 2.0 * self.sag), &mut own);
+            let facet_hit = self.facets.intersect(&ray.within(start, ray.t_max + slack), &mut own);
             rays += own.rays;
             *cost += Cost { rays: 0, ..own };
             let Some(facet_hit) = facet_hit else { break };

@@ -1,5 +1,6 @@
 //! The bodies around the start of a ray, from geometry, for sources that do not say what they lie in.
 
+use super::contact::lit_from;
 use super::{Carry, Context, settle};
 use crate::intersect::Cost;
 use crate::math::{Departure, Point, Ray, Vector, orthonormal_pair};
@@ -17,6 +18,8 @@ pub(crate) enum Around {
     Same(Bodies),
     /// Each must be asked: the source lies on a surface, or reaches into a body.
     Each,
+    /// The same, and the source may lie on a face of a solid: see [`laid`].
+    OnFace,
 }
 
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
@@ -24,14 +27,15 @@ const ASKED: u64 = 64;
 /// Faces on the way out after which it is given up.
 const DEEP: usize = 1000;
 
+/// Faces at one place that the start of a ray is asked about.
+const FACES: usize = 6;
+
 /// What the rays of each source start in.
 pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
     let emitters = context.bound.emitters.iter().zip(&context.plan.shares).enumerate();
     emitters
         .map(|(source, (emitter, share))| {
-            if emitter.stated || !context.bound.has_media() {
-                return Around::Same(emitter.inside.clone());
-            }
+            let known = emitter.stated || !context.bound.has_media();
             let replicates = context.plan.replicates;
             let mut first: Option<Bodies> = None;
             for k in 0..ASKED.min(u64::from(replicates)) {
@@ -46,15 +50,24 @@ pub(crate) fn sources(context: &Context<'_>) -> Vec<Around> {
                 let mut stream = Stream::new(s.seed, s.sampling, which, source as u32, to - from).of(emitter);
                 let mut ray = Ray::new(Point::ZERO, Vector::Z);
                 let (_, leaving) = emitter.alone(&mut stream, from, ((to - from) * k / ASKED) as u32, &mut ray);
+                if leaving.from.is_none() && laid(context, &ray).is_some() {
+                    return Around::OnFace;
+                }
+                if known {
+                    continue;
+                }
                 if let Some((face, normal)) = leaving.from {
                     settle(context, face, normal, &mut ray);
+                    if lit_from(context, face, normal, &mut ray).is_some() {
+                        return Around::Each;
+                    }
                 }
                 let found = bodies(context, &ray);
                 if first.get_or_insert_with(|| found.clone()) != &found {
                     return Around::Each;
                 }
             }
-            Around::Same(first.unwrap_or_default())
+            Around::Same(first.unwrap_or_else(|| emitter.inside.clone()))
         })
         .collect()
 }
@@ -126,6 +139,39 @@ pub(super) fn regained<C: Carry>(context: &Context<'_>, carry: &C, ray: &Ray, en
     let middle = 0.5 * (ray.t_min + end.min(ray.t_min + 1.0));
     let found = carry.instead(&bodies(context, &Ray::new(ray.at(middle), ray.direction)))?;
     (found.body() != carry.body()).then_some(found)
+}
+
+/// The same ray from one glue distance farther on.
+pub(super) fn behind(context: &Context<'_>, ray: &Ray) -> Ray {
+    Ray::new(ray.origin + ray.direction * context.bound.scene.run.glue_mm, ray.direction)
+}
+
+/// The ray of a source that is laid exactly on faces of solids: it starts behind all of them, by the glue distance along its way; one
+/// that goes into an opaque solid starts before it. `None` where there is no such face.
+///
+/// As it came, rounding put starts on either side: of a disc on a die 85 % were lost, on a clear cube 2 %.
+/// Known weakness: at a corner of an opaque solid the third face is not seen, and too much of a point's light is taken to go in.
+#[cold]
+pub(super) fn laid(context: &Context<'_>, ray: &Ray) -> Option<Ray> {
+    let (reach, d) = (context.bound.scene.run.glue_mm, ray.direction);
+    let before = Ray::new(ray.origin - d * reach, d);
+    let mut probe = before.within(0.0, 2.0 * reach);
+    let (mut found, mut goes_in, mut comes_out) = (false, false, false);
+    // Of two faces at one place the other comes next, and then the first once more.
+    for _ in 0..FACES {
+        let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { break };
+        let face = context.bound.faces.get(hit.face.index())?;
+        if face.sealed {
+            let entering = d.dot(hit.geometric_normal) < 0.0;
+            (goes_in, comes_out) = (goes_in || entering, comes_out || !entering);
+        }
+        found |= face.sealed || face.body != AMBIENT;
+        let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+        let rounding = 1e-9 + 1e-12 * ray.origin.abs().max_element();
+        probe = Ray::new(probe.at(hit.t), d).within(-rounding, probe.t_max - hit.t).leaving(from);
+    }
+    // Over an edge a ray goes in and out at once.
+    found.then(|| if goes_in && !comes_out { before } else { behind(context, ray) })
 }
 
 /// Whether light that a receiver would end has left its body by an opening: the body is open, and on the way on it is not left.

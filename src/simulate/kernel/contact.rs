@@ -3,7 +3,7 @@
 use super::Context;
 use super::step::Meeting;
 use crate::intersect::{Cost, Hit};
-use crate::math::{Departure, Point, Ray, Vector};
+use crate::math::{Departure, FaceId, Point, Ray, Vector};
 use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
 
 /// The body on the other side of a face that lies on a face of another body within the glue distance.
@@ -125,6 +125,26 @@ pub(super) fn dressed(
         [false, true] => Some(Err(())),
         [false, false] => Some(if entering { Ok((found, other, place)) } else { Err(()) }),
     }
+}
+
+/// The ray of a source on an opaque face that a body lies on, moved to behind the body's face: light shines into what is glued on a
+/// die, not against it. `None` where there is no such body.
+#[inline(never)]
+pub(super) fn lit_from(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> Option<Ray> {
+    let optics = context.bound.faces.get(face.index()).filter(|f| f.against && f.body == AMBIENT)?;
+    let reach = context.bound.scene.run.glue_mm / ray.direction.dot(normal).abs().max(1e-3);
+    let back = ray.origin - ray.direction * reach;
+    let mut probe = Ray { from: ray.from, ..Ray::new(back, ray.direction).within(0.0, 2.0 * reach) };
+    for _ in 0..NEAR {
+        let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+        let other = context.bound.faces.get(found.face.index())?;
+        if other.against && other.body != optics.body && found.geometric_normal.dot(normal) < -0.5 {
+            ray.t_min = beyond(context, ray, normal, reach);
+            return Some(Ray::new(ray.at(ray.t_min), ray.direction));
+        }
+        probe.t_min = found.t.next_up();
+    }
+    None
 }
 
 /// How far back the front of a solid is looked for, mm, that a ray has slipped into between the facets of two touching faces.

@@ -282,14 +282,26 @@ fn start<C: Carry>(
     ray: &mut Ray,
     local: &mut Local,
 ) -> bool {
+    let mut within = None;
     if let Some((face, normal)) = leaving.from {
         local.counts.corrected_normals += u64::from(settle(context, face, normal, ray));
+        within = if C::MEDIA { contact::lit_from(context, face, normal, ray) } else { None };
     }
     local.counts.rays += 1;
     local.ends.emitted += count(quanta);
     let inside = match context.around.get(source) {
         Some(Around::Same(bodies)) => C::inside(bodies),
-        _ if C::MEDIA => C::inside(&around::bodies(context, ray)),
+        Some(Around::OnFace) => {
+            // Through an edge or a corner a ray may pass without a hit.
+            *ray = around::laid(context, ray).unwrap_or_else(|| around::behind(context, ray));
+            let emitter = &context.bound.emitters[source];
+            if C::MEDIA && !emitter.stated {
+                C::inside(&around::bodies(context, ray))
+            } else {
+                C::inside(&emitter.inside)
+            }
+        }
+        _ if C::MEDIA => C::inside(&around::bodies(context, within.as_ref().unwrap_or(ray))),
         _ => C::inside(&[]),
     };
     let Some(mut carry) = inside else {
@@ -330,12 +342,20 @@ fn start<C: Carry>(
 fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in [1.0, 0.1, 0.01, 1e-3] {
         let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
-        let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        let mut point = probe.at(hit.t);
+        if hit.face != face {
+            // A face of a body that lies on it may come first.
+            let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+            let behind = Ray::new(point, -normal).within(0.0, context.bound.scene.run.glue_mm).leaving(from);
+            let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };
+            (point, hit) = (behind.at(next.t), next);
+        }
         if hit.face == face {
             let from = Departure { face, primitive: hit.primitive, uv: hit.uv };
             let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
             let going = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
-            *ray = Ray::new(probe.at(hit.t), going).leaving(from);
+            *ray = Ray::new(point, going).leaving(from);
             return below;
         }
     }
