@@ -9,6 +9,7 @@ mod arrive;
 mod carry;
 mod contact;
 mod local;
+mod rough;
 mod step;
 mod surface;
 mod wide;

@@ -2,6 +2,7 @@
 
 use super::around::regained;
 use super::contact::{alike, glued, twin};
+use super::rough::rough;
 use super::step::{Meeting, caught, lose, onward, record, stray};
 use super::{Carry, Cause, Context, Event, Local, Path, key};
 use crate::math::{Ray, Vector};
@@ -141,7 +142,7 @@ struct Both<'a, C> {
 }
 
 /// Chooses one of both ways, or splits the path.
-#[inline]
+#[inline(always)]
 fn divide<C: Carry>(
     context: &Context<'_>,
     path: &mut Path<C>,
@@ -152,31 +153,13 @@ fn divide<C: Carry>(
     pending: &mut Vec<(Path<C>, Ray)>,
 ) -> Option<Vector> {
     let (s, d) = (context.settings, ray.direction);
-    let reflected = |path: &mut Path<C>, local: &mut Local| {
-        if let Some([r, _]) = &both.matrices {
-            turn(context, path, r, d, both.normal);
-        }
-        let specular = mirrored(d, both.normal, at, local);
-        rough(context, both.scatter, path, specular, both.normal, at, local)
+    let reflects = match s.interfaces == Interfaces::Split && path.quanta > s.split_floor * path.first {
+        true => !split(context, path, ray, at, &both, local, pending),
+        false => key(context, path).unit(Purpose::Interface) < both.share,
     };
-    if s.interfaces == Interfaces::Split && path.quanta > s.split_floor * path.first {
-        let kept = whole(path.quanta * both.share);
-        if kept >= 1.0 && kept < path.quanta {
-            let mut child = Path { quanta: kept, branch: branch(path.branch, path.bounce), ..*path };
-            record(context, &child, at.point, Event::Split, local);
-            let going = reflected(&mut child, local);
-            let mut child_ray = *ray;
-            if onward(context, &mut child, &mut child_ray, at, going, local) {
-                pending.push((child, child_ray));
-            }
-            path.quanta -= kept;
-        } else if kept == path.quanta {
-            record(context, path, at.point, Event::Reflected, local);
-            return Some(reflected(path, local));
-        }
-    } else if key(context, path).unit(Purpose::Interface) < both.share {
+    if reflects {
         record(context, path, at.point, Event::Reflected, local);
-        return Some(reflected(path, local));
+        return Some(reflected(context, path, d, at, &both, local));
     }
     record(context, path, at.point, Event::Transmitted, local);
     if let Some([_, t]) = &both.matrices {
@@ -184,6 +167,49 @@ fn divide<C: Carry>(
     }
     path.carry = C::moved(&path.carry, both.across);
     Some(rough(context, both.scatter, path, both.transmitted, both.normal, at, local))
+}
+
+/// Splits off what is reflected, if it is anything; whether something is left to be transmitted.
+#[inline(never)]
+fn split<C: Carry>(
+    context: &Context<'_>,
+    path: &mut Path<C>,
+    ray: &Ray,
+    at: &Meeting<'_>,
+    both: &Both<'_, C>,
+    local: &mut Local,
+    pending: &mut Vec<(Path<C>, Ray)>,
+) -> bool {
+    let kept = whole(path.quanta * both.share);
+    if kept >= 1.0 && kept < path.quanta {
+        let mut child = Path { quanta: kept, branch: branch(path.branch, path.bounce), ..*path };
+        record(context, &child, at.point, Event::Split, local);
+        let going = reflected(context, &mut child, ray.direction, at, both, local);
+        let mut child_ray = *ray;
+        if onward(context, &mut child, &mut child_ray, at, going, local) {
+            pending.push((child, child_ray));
+        }
+        path.quanta -= kept;
+        return true;
+    }
+    kept != path.quanta
+}
+
+/// The direction to go on in of what a partly reflecting face reflects.
+#[inline(always)]
+fn reflected<C: Carry>(
+    context: &Context<'_>,
+    path: &mut Path<C>,
+    d: Vector,
+    at: &Meeting<'_>,
+    both: &Both<'_, C>,
+    local: &mut Local,
+) -> Vector {
+    if let Some([r, _]) = &both.matrices {
+        turn(context, path, r, d, both.normal);
+    }
+    let specular = mirrored(d, both.normal, at, local);
+    rough(context, both.scatter, path, specular, both.normal, at, local)
 }
 
 /// The path on the other side of the boundary; lost when it cannot be there.
@@ -322,37 +348,6 @@ fn mueller(coating: &Coating, split: &Split, cos_i: f64, n1: f64, n2: f64) -> [M
             [Mueller { c: -r.c, ..r }, Mueller::without_phase(split.transmitted)]
         }
     }
-}
-
-/// The direction after scatter at a rough surface; `specular` when it is smooth or this light stays specular.
-#[inline]
-fn rough<C: Carry>(
-    context: &Context<'_>,
-    coated: Option<&Coated>,
-    path: &mut Path<C>,
-    specular: Vector,
-    normal: Vector,
-    at: &Meeting<'_>,
-    local: &mut Local,
-) -> Vector {
-    let Some(scatter) = coated.and_then(|c| c.scatter.as_ref()) else { return specular };
-    let flat = at.hit.geometric_normal;
-    // Both normals on the side that the light leaves to.
-    let side = flat * specular.dot(flat).signum();
-    let normal = normal * normal.dot(side).signum();
-    let numbers = key(context, path);
-    let [u, v] = numbers.pair(Purpose::Scatter);
-    let Some(going) = scatter.sample(specular, normal, [numbers.unit(Purpose::Lobe), u, v]) else {
-        return specular;
-    };
-    if let Some(stokes) = path.carry.stokes() {
-        *stokes = Stokes::unpolarised(1.0, going);
-    }
-    if going.dot(side) > 0.0 {
-        return going;
-    }
-    local.counts.corrected_normals += 1;
-    reflect(going, side)
 }
 
 /// A number for the path that splits off at a hit; it depends on the splits before alone, not on the order of tracing.
