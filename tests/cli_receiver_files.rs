@@ -210,3 +210,14 @@ fn a_trace_says_where_its_facets_show() {
     let (said, exact) = trace(&["--normals", "exact"]);
     assert!(!said && exact.get("faceting").is_none());
 }
+
+/// Without a model there are ray paths to look at all the same, and no empty arrays, which glTF forbids.
+#[test]
+fn a_scene_without_a_model_is_drawn() {
+    let (folder, _) = trace("lm", "[[receiver]]\nname = 'near'\nat = [0, 0, 100]\nsize = [300, 200]\n");
+    let bytes = std::fs::read(folder.path().join("out/facets.glb")).unwrap();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let accessors = document["accessors"].as_array().unwrap();
+    assert!(accessors.len() == 2 && accessors.iter().all(|a| a["count"].as_u64() > Some(100)), "{accessors:?}");
+}

@@ -97,7 +97,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         meshes.push(group_mesh(&mut buffer, facets, &list, middle, materials.len() - 1));
         nodes.push(json!({"name": group.name, "mesh": meshes.len() - 1}));
     }
-    if let Some(paths) = facets.paths.filter(|p| !p.points.is_empty()) {
+    if let Some(paths) = facets.paths.filter(|p| p.lines().any(|line| line.len() > 1)) {
         let points: Vec<[f32; 3]> = paths.points.iter().map(|&p| single(p - middle)).collect();
         let mut segments = Vec::new();
         let mut start = 0;

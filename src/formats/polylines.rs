@@ -27,8 +27,11 @@ impl Polylines {
     }
 
     /// The lines cut off where they first leave a box, so that rays to infinity do not decide what a viewer shows; values stay with
-    /// their lines, lines that start outside become single points.
+    /// their lines, lines that start outside become single points. A box around nothing cuts nothing.
     pub fn inside(&self, bounds: &Aabb) -> Self {
+        if bounds.is_empty() {
+            return self.clone();
+        }
         let mut cut = Self { values: self.values.clone(), ..Self::default() };
         for line in self.lines() {
             let mut kept: Vec<Point> = line.iter().copied().take_while(|p| bounds.contains(*p)).collect();
@@ -61,5 +64,6 @@ mod tests {
         assert_eq!(points[0].len(), 3);
         assert!((points[0][2] - Point::new(0.5, 0.5, 1.0)).length() < 1e-14);
         assert_eq!(points[1], [Point::splat(3.0)]);
+        assert_eq!(lines.inside(&Aabb::EMPTY), lines);
     }
 }
