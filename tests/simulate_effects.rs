@@ -3,7 +3,7 @@
 mod simulate_support;
 
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::simulate::Results;
+use lampyris::simulate::{Required, Results, Scene};
 use simulate_support::{Shape, World};
 use std::f64::consts::PI;
 
@@ -271,5 +271,29 @@ fn touching_plates_are_one_interface() {
                 close(r.receivers[0].power, 1.0 - pair(pair(a, b), c), 1e-5);
             }
         }
+    }
+}
+
+/// What a scene calls for is what its light can meet: a scatter of no share is none, a rough mirror is no coating, and a mirror that
+/// reflects nothing is black.
+#[test]
+fn only_what_happens_is_said_to_be_simulated() {
+    let effects = |material: &str| -> Vec<String> {
+        let mut world = World::default();
+        world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
+        let text = format!("[[source]]\nat = [5, 4, 3]\n[[material]]\npart = 'box'\n{material}\n");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let required = Required::by(&scene.bind(&world.model).unwrap());
+        required.simulated.iter().map(|b| format!("{:?}", b.effect)).collect()
+    };
+    for (material, expected) in [
+        ("surface = 'mirror'\nscatter = { lobe = 'gaussian', sigma_deg = 1, share = 0 }", &["Reflection"][..]),
+        ("surface = 'mirror'\nscatter = { lobe = 'abg', abg = [0, 0.1, 2] }", &["Reflection"]),
+        ("surface = 'mirror'\nscatter = { lobe = 'gaussian', sigma_deg = 1 }", &["Reflection", "SurfaceScatter"]),
+        ("surface = 'diffuse'\nreflectance = 0.5", &["Reflection", "SurfaceScatter"]),
+        ("surface = 'mirror'\nreflectance = 0", &[]),
+        ("surface = 'coating'\nmedium = 'PMMA'\nreflectance = 1", &["Reflection", "Coating"]),
+    ] {
+        assert_eq!(effects(material), expected, "{material}");
     }
 }

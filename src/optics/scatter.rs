@@ -49,6 +49,11 @@ impl Scatter {
         Ok(Self { share, lobe })
     }
 
+    /// Whether any light leaves the specular direction.
+    pub fn scatters(&self) -> bool {
+        self.share > 0.0 && !matches!(&self.lobe, Lobe::Abg(abg) if abg.coefficients()[0] == 0.0)
+    }
+
     /// A direction to leave in, `None` when this light stays specular. `u` uniform in `[0, 1)³`.
     pub fn sample(&self, specular: Vector, n: Vector, u: [f64; 3]) -> Option<Vector> {
         if u[0] < self.share { self.lobe.sample(specular, n, [u[1], u[2]]) } else { None }

@@ -131,7 +131,12 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
                 (n > 0, plural(n, "rough or diffuse face", "no face scatters"))
             }
             Effect::Coating => {
-                let n = coated(&|c| c.coating != Coating::Bare && !matches!(c.coating, Coating::Metal { .. }));
+                let n = coated(&|c| match c.coating {
+                    Coating::Bare | Coating::Metal { .. } => false,
+                    // A rough mirror or a diffuse wall.
+                    Coating::Ideal { transmittance, .. } => transmittance > 0.0 || c.scatter.is_none(),
+                    Coating::Table(_) => true,
+                });
                 (n > 0, plural(n, "coated face", "no face is coated"))
             }
         };

@@ -313,8 +313,13 @@ fn light(scene: &Scene, loaded: &[Option<Loaded>]) -> Light {
 fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
     let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
     let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
+    // What scatters nothing and reflects nothing is named neither rough nor a mirror.
+    let scatter = scatter.filter(Scatter::scatters);
     Ok(match (kind, coating, scatter) {
         (SurfaceKind::Absorber, ..) => Surface::Absorber,
+        (SurfaceKind::Mirror | SurfaceKind::Diffuse, Coating::Ideal { reflectance: 0.0, .. }, _) => {
+            Surface::Absorber
+        }
         (_, Coating::Bare, None) => Surface::Interface,
         (SurfaceKind::Mirror, Coating::Ideal { reflectance, .. }, None) => Surface::Mirror(reflectance),
         (_, coating, scatter) => {
