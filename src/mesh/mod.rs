@@ -58,6 +58,7 @@ impl FacetMesh {
     }
 
     /// Indices of the four corner positions of a facet.
+    #[inline]
     pub fn corner_positions(&self, facet: usize) -> [u32; 4] {
         self.facets[facet].vertices.map(|v| self.vertices[v as usize].position)
     }

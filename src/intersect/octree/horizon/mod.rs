@@ -29,7 +29,7 @@ const IMPATIENCE: u32 = 32;
 /// ran: what stands lower or elsewhere is not looked at.
 const BELOW: f64 = 0.2;
 /// Half the angle of a free cone is not made wider than this share of that of the first rays and so much more.
-const WIDER: [f64; 2] = [2.0, 0.2];
+const WIDER: [f64; 2] = [2.0, 0.5];
 /// Directions are gathered in such steps.
 const STEP: f64 = 1.0 / (1 << 20) as f64;
 
@@ -144,8 +144,10 @@ impl Watched {
         let axis = if widest < FRAC_PI_2 { low + high } else { normal };
         if let Some(axis) = axis.try_normalize() {
             let widest = widest.min(FRAC_PI_2);
-            if let Some(cosine) = cone::cosine(tree, facet, axis, widest) {
-                cone.set(axis, cosine);
+            match cone::cosine(tree, facet, axis, widest) {
+                Some(cosine) => cone.set(axis, cosine),
+                // Something stands right ahead: what leaves is met, and the facet no longer watched.
+                None => cone.axis.iter().for_each(|x| x.store(0, Ordering::Relaxed)),
             }
         }
     }
