@@ -62,3 +62,27 @@ fn light_that_is_caught_beside_a_brick_that_absorbs_is_absorbed() {
     let caught = 3.0 * (1.0 - 1.0 / (N * N)).sqrt() - 2.0;
     assert!((r.power.absorbed - caught).abs() < 0.03 && r.power.cut_off < 1e-3, "{:?}", r.power);
 }
+
+/// Blocks of different media that overlap are named after the run; blocks that touch, lie in each other or are of one medium are not.
+#[test]
+fn blocks_of_different_media_that_overlap_are_named() {
+    for (second, index, named) in [
+        (([2.0, 2.0, 8.0], [6.0, 6.0, 14.0]), 1.6, true),
+        (([2.0, 2.0, 8.0], [6.0, 6.0, 14.0]), 1.5, false),
+        (([0.0, 0.0, 10.0], [10.0, 10.0, 14.0]), 1.6, false),
+        (([2.0, 2.0, 2.0], [6.0, 6.0, 8.0]), 1.6, false),
+    ] {
+        let mut world = World::default();
+        let (low, high) = (Point::from_array(second.0), Point::from_array(second.1));
+        world.cuboid("first", Point::ZERO, Point::splat(10.0)).cuboid("second", low, high);
+        let text = format!(
+            "[run]\nrays = 500\n[[medium]]\nname = 'm'\nindex = 1.5\n[[medium]]\nname = 'n'\nindex = {index}
+            [[material]]\npart = 'first'\nmedium = 'm'\n[[material]]\npart = 'second'\nmedium = 'n'
+            [[source]]\nkind = 'point'\nat = [4, 4, -3]"
+        );
+        let r = world.run(&text, |_| ());
+        let note = r.notes.iter().find(|n| n.contains("overlap"));
+        assert_eq!(note.is_some(), named, "{second:?} {index}: {:?}", r.notes);
+        assert!(note.is_none_or(|n| n.contains("'first' (m)") && n.contains("'second' (n)")), "{note:?}");
+    }
+}

@@ -25,7 +25,7 @@ pub struct Portion {
     pub seconds: f64,
 }
 
-const MAGIC: &[u8] = b"lampyris tally 3\n";
+const MAGIC: &[u8] = b"lampyris tally 4\n";
 
 impl Portion {
     pub(crate) fn none(bound: &BoundScene, replicates: u32) -> Self {
@@ -89,7 +89,8 @@ impl Portion {
         t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| out.extend(x.to_le_bytes()));
         t.channels.iter().for_each(|c| sums(&mut out, c));
         let c = &t.counts;
-        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught]
+        let [one, other] = c.overlapping.map(u64::from);
+        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught, c.overlaps, one, other]
             .iter()
             .for_each(|x| out.extend(x.to_le_bytes()));
         // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
@@ -153,7 +154,8 @@ impl Portion {
         }
         let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
-        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught };
+        let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u16, r.u64()? as u16]);
+        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
         let ledger: Vec<(LostRay, Vec<[u64; 3]>)> = r.json()?;
         let paths: Vec<(PathVertex, Vec<[u64; 3]>, u64)> = r.json()?;
         let place = |b: &[[u64; 3]], k: usize| b.get(k).map(|b| b.map(f64::from_bits).into()).unwrap_or_default();

@@ -207,7 +207,9 @@ impl Results {
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
-        let Counts { rays, segments, corrected_normals, lost, cut_off, caught } = tallies.counts;
+        let Counts { rays, segments, corrected_normals, lost, cut_off, caught, .. } = tallies.counts;
+        let found = bound.overlap_note(&tallies.counts).into_iter().chain(few_replicates(tallies.replicates));
+        let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
         let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;
         let digest = super::digest::of(&tallies);
@@ -223,7 +225,7 @@ impl Results {
                 not_simulated: required.not_simulated.clone(),
                 kernel: kernel.name(),
             },
-            notes: bound.notes.iter().cloned().chain(few_replicates(tallies.replicates)).collect(),
+            notes,
             power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },
             lost_rays: lost,
             cut_off_rays: cut_off,

@@ -4,6 +4,7 @@
 use super::{AMBIENT, BoundScene, Chosen, Loaded};
 use crate::model::{Model, PlacedFace};
 use crate::optics::catalogue;
+use crate::simulate::kernel::Counts;
 use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
 use std::collections::BTreeSet;
 
@@ -127,4 +128,18 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
          the model, or give it a surface instead of a medium"
     ))
+}
+
+impl BoundScene {
+    /// One sentence about bodies of different media that a run found to overlap.
+    pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
+        let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
+        let times = counts.overlaps;
+        (times > 0).then(|| {
+            format!(
+                "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {times} times by light; there it is \
+                 taken to be in the body that it came into last, so what is right depends on its way: cut one out of the other in the model"
+            )
+        })
+    }
 }

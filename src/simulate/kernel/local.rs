@@ -136,6 +136,10 @@ pub struct Counts {
     pub cut_off: u64,
     /// Those of them that went round by total reflection without end.
     pub caught: u64,
+    /// Times that light left a body below the one it had come into later, of another index: two bodies that overlap.
+    pub overlaps: u64,
+    /// The two bodies of one of them, those of the lowest numbers; zeros where there are none.
+    pub overlapping: [u16; 2],
 }
 
 impl Counts {
@@ -146,6 +150,15 @@ impl Counts {
         self.lost += o.lost;
         self.cut_off += o.cut_off;
         self.caught += o.caught;
+        self.overlap(o.overlapping, o.overlaps);
+    }
+
+    /// Notes that these bodies overlap, met so many times.
+    pub(crate) fn overlap(&mut self, pair: [u16; 2], times: u64) {
+        self.overlaps += times;
+        if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {
+            self.overlapping = pair;
+        }
     }
 }
 

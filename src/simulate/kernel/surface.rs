@@ -97,11 +97,16 @@ pub(super) fn interface<C: Carry>(
 ) -> Option<Vector> {
     let across = cross(context, path, ray, at, local)?;
     let (here, there) = (path.carry.body(), across.body());
+    let (bodies, nm) = (&context.bound.bodies, path.carry.wavelength());
     if here == there {
+        let left = at.face.body;
+        let other = || bodies[left as usize].index(nm) != bodies[here as usize].index(nm);
+        if !at.entering && left != here && at.skip.get() == 0.0 && other() {
+            local.counts.overlap([left.min(here), left.max(here)], 1);
+        }
         path.carry = across;
         return Some(ray.direction);
     }
-    let (bodies, nm) = (&context.bound.bodies, path.carry.wavelength());
     let eta = bodies[here as usize].index(nm) / bodies[there as usize].index(nm);
     let d = ray.direction;
     let (normal, cos_i, transmitted) = refracted(d, eta, at, local);
