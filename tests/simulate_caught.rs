@@ -86,3 +86,19 @@ fn blocks_of_different_media_that_overlap_are_named() {
         assert!(note.is_none_or(|n| n.contains("'first' (m)") && n.contains("'second' (n)")), "{note:?}");
     }
 }
+
+/// Of a solid that the file calls closed and that has a face too few it is said where its light was lost.
+#[test]
+fn where_light_was_lost_is_said() {
+    let mut world = World::default();
+    world.cuboid("whole", Point::splat(20.0), Point::splat(30.0)).cuboid("cup", Point::ZERO, Point::splat(10.0));
+    world.model.parts[1].shells[0].faces.retain(|f| f.name != "z1");
+    world.shapes.pop();
+    let text = "[run]\nrays = 500\n[[medium]]\nname = 'm'\nindex = 1.5\n[[material]]\npart = '*'\nmedium = 'm'
+        [[source]]\nkind = 'cone'\nhalf_angle_deg = 20\nat = [4, 4, -3]";
+    let r = world.run(text, |_| ());
+    let note = r.notes.iter().find(|n| n.contains("were lost")).expect("a note");
+    assert!(
+        r.lost_rays > 400 && note.starts_with(&format!("{} paths", r.lost_rays)) && note.contains("in 'cup' (m)")
+    );
+}

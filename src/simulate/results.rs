@@ -208,7 +208,8 @@ impl Results {
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
         let Counts { rays, segments, corrected_normals, lost, cut_off, caught, .. } = tallies.counts;
-        let found = bound.overlap_note(&tallies.counts).into_iter().chain(few_replicates(tallies.replicates));
+        let bodies = bound.overlap_note(&tallies.counts).into_iter();
+        let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
         let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;

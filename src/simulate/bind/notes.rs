@@ -4,9 +4,9 @@
 use super::{AMBIENT, BoundScene, Chosen, Loaded};
 use crate::model::{Model, PlacedFace};
 use crate::optics::catalogue;
-use crate::simulate::kernel::Counts;
+use crate::simulate::kernel::{Cause, Counts, LostRay};
 use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// First and last wavelength of each source, nm.
 pub(super) fn wavelengths(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
@@ -141,5 +141,35 @@ impl BoundScene {
                  taken to be in the body that it came into last, so what is right depends on its way: cut one out of the other in the model"
             )
         })
+    }
+
+    /// One sentence about lost light: where most of it was, and why.
+    pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
+        let mut places: BTreeMap<(u16, Option<&str>, Cause), usize> = BTreeMap::new();
+        for l in ledger {
+            let at = l.face.and_then(|f| self.instance(f));
+            *places.entry((l.body, at, l.cause)).or_default() += 1;
+        }
+        let ((body, at, cause), number) = places.into_iter().rev().max_by_key(|(_, number)| *number)?;
+        let why = match cause {
+            Cause::NoExit => {
+                "it left the scene inside a body, by a gap between faces, an open mesh or a missing face"
+            }
+            Cause::ImpossibleMedium => {
+                "it came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
+            }
+            Cause::InsideSolid => "it came to a closed opaque solid from inside, as from a source that lies in it",
+            Cause::TooDeep => "more bodies lie in each other than a ray can carry",
+            Cause::NotANumber => "its place or direction is no number",
+        };
+        let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
+            (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
+            (None, Some(name)) => format!("at '{name}'"),
+            (None, None) => "outside all bodies".into(),
+        };
+        Some(format!(
+            "{lost} paths were lost; {number} of the {} on record {place}: {why}; `trace --replay lost_rays.csv` shows their ways",
+            ledger.len()
+        ))
     }
 }
