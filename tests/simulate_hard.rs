@@ -30,8 +30,7 @@ fn layers(scale: f64, glue: f64) -> Results {
 }
 
 /// Light to and fro between layers adds up as power: `T = T₁T₂/(1 − R₁R₂)`, `R = R₁ + T₁²R₂/(1 − R₁R₂)`.
-fn of_stack() -> [f64; 2] {
-    let indices = [1.0, LAYERS[0], LAYERS[1], LAYERS[2], 1.0];
+fn of_stack(indices: &[f64]) -> [f64; 2] {
     let (mut t, mut r_front, mut r_back) = (1.0, 0.0, 0.0);
     for pair in indices.windows(2) {
         let r: f64 = ((pair[0] - pair[1]) / (pair[0] + pair[1])).powi(2);
@@ -44,7 +43,7 @@ fn of_stack() -> [f64; 2] {
 
 #[test]
 fn touching_layers_from_microns_to_kilometres() {
-    let [t, r] = of_stack();
+    let [t, r] = of_stack(&[1.0, LAYERS[0], LAYERS[1], LAYERS[2], 1.0]);
     assert!((t + r - 1.0).abs() < 1e-14);
     for (scale, glue) in [(1.0, 1e-3), (1e-3, 1e-6), (1e6, 1e-3), (1e6, 1.0)] {
         let results = layers(scale, glue);
@@ -101,6 +100,59 @@ fn grazing_light_on_a_thin_plate() {
     let through = (1.0 - r) / (1.0 + r);
     assert!((results.receivers[0].power - through).abs() < 1e-6, "{} {through}", results.receivers[0].power);
     assert_eq!(results.lost_rays, 0);
+}
+
+/// From inside, 10⁻⁹ degrees below the critical angle, `1 − (Rs + Rp)/2` gets out; as much above it nothing does.
+#[test]
+fn light_at_the_critical_angle() {
+    let (n, critical) = (1.5f64, (1.0f64 / 1.5).asin());
+    for side in [-1.0, 1.0] {
+        let less = side * 1e-9f64.to_radians();
+        // 1 − n² sin²(critical − less), without cancellation.
+        let below = 2.0 * (0.5 * less).sin().powi(2) + n * critical.cos() * less.sin();
+        let (cos_t, cos_i) = ((below * (2.0 - below)).max(0.0).sqrt(), (critical - less).cos());
+        let s = (n * cos_i - cos_t) / (n * cos_i + cos_t);
+        let p = (cos_i - n * cos_t) / (cos_i + n * cos_t);
+        let out = 1.0 - 0.5 * (s * s + p * p);
+        let mut world = World::default();
+        world.cuboid("glass", Point::new(-500.0, -500.0, 0.0), Point::new(500.0, 500.0, 10.0));
+        // Light that is reflected at the top is cut off at the bottom.
+        let text = format!(
+            "[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\npower_floor = 0\nmax_bounces = 2
+            [[medium]]\nname = 'glass'\nindex = {n}\n[[material]]\npart = 'glass'\nmedium = 'glass'
+            [[source]]\nkind = 'collimated'\nat = [0, 0, 5]\ndirection = [{:?}, 0, {cos_i:?}]\nradius = 0.1\ninside = 'glass'",
+            (critical - less).sin()
+        );
+        let results = world.run(&text, |_| ());
+        let power = &results.power;
+        assert!((power.escaped - out).abs() < 1e-9, "{side}: {} {out}", power.escaped);
+        assert!((power.escaped > 0.0) == (side > 0.0) && results.lost_rays == 0, "{side}: {power:?}");
+    }
+}
+
+/// A film that is not thicker than the glue is named; it loses nothing, and transmits what it must, where the glue is thinner.
+#[test]
+fn a_film_thinner_than_the_glue_is_named() {
+    for (glue, named) in [(1e-3, true), (1e-5, false)] {
+        let mut world = World::default();
+        world.cuboid("film", Point::new(-50.0, -50.0, -1e-3), Point::new(50.0, 50.0, 0.0));
+        world.cuboid("glass", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+        let text = format!(
+            "[run]\nrays = 2000\ninterfaces = 'split'\nsplit_floor = 0\nglue_mm = {glue:e}
+            [[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'
+            [[medium]]\nname = 'coat'\nindex = 1.7\n[[material]]\npart = 'film'\nmedium = 'coat'
+            [[source]]\nkind = 'collimated'\nat = [0, 0, -10]\nradius = 5
+            [[receiver]]\nname = 'behind'\nat = [0, 0, 20]\nsize = [20, 20]"
+        );
+        let results = world.run(&text, |_| ());
+        let said = results.notes.iter().any(|n| n.contains("'film'") && n.contains("glue_mm"));
+        assert_eq!(said, named, "{:?}", results.notes);
+        if !named {
+            let [t, _] = of_stack(&[1.0, 1.7, 1.5, 1.0]);
+            assert!((results.receivers[0].power - t).abs() < 1e-5, "{} {t}", results.receivers[0].power);
+            assert_eq!(results.lost_rays, 0);
+        }
+    }
 }
 
 /// Receivers in the faces of a tilted plate far from the origin: one that ends light is met before its face, one that lets it pass

@@ -172,6 +172,7 @@ impl Scene {
             notes,
         };
         bound.notes.extend(notes::openings(&bound, model));
+        bound.notes.extend(notes::films(&bound));
         Ok(bound)
     }
 }

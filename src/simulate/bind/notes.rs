@@ -1,4 +1,4 @@
-//! What someone who reads the results must know about the scene: bodies that are open, and light of wavelengths that a table or a
+//! What someone who reads the results must know about the scene: bodies that are open or too thin, and light of wavelengths that a table or a
 //! formula was not made for.
 
 use super::{AMBIENT, BoundScene, Chosen, Loaded};
@@ -127,6 +127,22 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
     Some(format!(
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
          the model, or give it a surface instead of a medium"
+    ))
+}
+
+/// One sentence about the thinnest body that touches others and is hardly thicker than the glue, along an axis.
+pub(super) fn films(bound: &BoundScene) -> Option<String> {
+    let glue = bound.scene.run.glue_mm;
+    let thickness = |k: u16| bound.bodies[usize::from(k)].bounds.size().min_element();
+    let touching: BTreeSet<u16> = bound.faces.iter().filter(|f| f.touching).map(|f| f.body).collect();
+    let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
+    let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
+    let [name, medium] = bound.body(film)?;
+    let thick = thickness(film);
+    Some(format!(
+        "'{name}' ({medium}) is {thick:.1e} mm thick, hardly more than [run] glue_mm = {glue:e}, within which faces of touching bodies \
+         are one: light may pass it by or be lost; set glue_mm to {:.0e}",
+        0.1 * thick
     ))
 }
 
