@@ -25,8 +25,9 @@ pub(super) fn limits(faceting: &Faceting) -> String {
 
 fn sentence(r: &OnBoth) -> Option<String> {
     let widths = |i: usize| format!("{} × {} {}", figures(r.width[0][i], 3), figures(r.width[1][i], 3), r.unit);
-    let wider =
-        r.widened(WIDER).map(|_| format!("the light is {} wide, {} on the true surfaces", widths(0), widths(1)));
+    let wider = r
+        .widened(WIDER)
+        .map(|_| format!("the light is {} wide (rms), {} on the true surfaces", widths(0), widths(1)));
     let stronger = r.changed(STRONGER).map(|share| format!("its power changes by {} %", figures(100.0 * share, 2)));
     let both: Vec<String> = wider.into_iter().chain(stronger).collect();
     (!both.is_empty()).then(|| format!("on {} {}", spoken(&r.name), both.join(" and ")))
@@ -37,14 +38,14 @@ pub(super) fn changes(faceting: &Faceting) -> Table {
     let columns = [
         ("receiver", ""),
         ("power, facets", ""),
-        ("spline", ""),
-        ("± of the difference", ""),
+        ("power, spline", ""),
+        ("power, ± of the difference", ""),
         ("width 1, facets", ""),
-        ("spline", ""),
-        ("± of the difference", ""),
+        ("width 1, spline", ""),
+        ("width 1, ± of the difference", ""),
         ("width 2, facets", ""),
-        ("spline", ""),
-        ("± of the difference", ""),
+        ("width 2, spline", ""),
+        ("width 2, ± of the difference", ""),
         ("unit of widths", ""),
     ];
     let caption = format!(
