@@ -6,6 +6,7 @@
 //! is nearest to the axis, which lies across one or two of the differences. Only boxes that may be nearer to the axis than what was
 //! found already are opened.
 
+use super::{Lines, lines_around};
 use crate::intersect::octree::Octree;
 use crate::intersect::octree::node::{Link, Target};
 use crate::math::{Aabb, Point, Vector};
@@ -66,7 +67,7 @@ struct Base {
     corners: [Point; 3],
     normal: Vector,
     /// Directions in its plane away from it, across its sides and at its corners, and where the lines are.
-    lines: [(Vector, f64); 6],
+    lines: Lines,
     middle: Point,
     radius: f64,
     reach: f64,
@@ -75,17 +76,7 @@ struct Base {
 impl Base {
     fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
         let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a).try_normalize()?;
-        let mut sides = [Vector::ZERO; 3];
-        for k in 0..3 {
-            sides[k] = (corners[(k + 1) % 3] - corners[k]).cross(normal).try_normalize()?;
-        }
-        let mut lines = [(Vector::ZERO, 0.0); 6];
-        for k in 0..3 {
-            lines[k] = (sides[k], sides[k].dot(corners[k] - a));
-            let across = (sides[k] + sides[(k + 2) % 3]).try_normalize()?;
-            lines[k + 3] = (across, across.dot(corners[k] - a));
-        }
+        let (normal, lines) = lines_around(corners)?;
         let middle = (a + b + c) / 3.0;
         let radius = corners.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
         Some(Self { corners, normal, lines, middle, radius, reach })

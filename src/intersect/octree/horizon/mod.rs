@@ -11,7 +11,7 @@ mod cone;
 mod skyline;
 
 use super::Octree;
-use crate::math::{Vector, orthonormal_pair};
+use crate::math::{Point, Vector, orthonormal_pair};
 use skyline::{Horizon, sector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
@@ -32,6 +32,29 @@ const BELOW: f64 = 0.2;
 const WIDER: [f64; 2] = [2.0, 0.5];
 /// Directions are gathered in such steps.
 const STEP: f64 = 1.0 / (1 << 20) as f64;
+
+/// Three sides and three corners.
+const LINES: usize = 6;
+/// Lines in the plane of a triangle: the direction across each, away from the triangle, and where the line is, from its first corner.
+type Lines = [(Vector, f64); LINES];
+
+/// The normal of a triangle, and the lines through its sides and corners, which have it on one side; `None` without area.
+fn lines_around(corners: [Point; 3]) -> Option<(Vector, Lines)> {
+    let [a, b, c] = corners;
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let mut sides = [Vector::ZERO; 3];
+    for k in 0..3 {
+        sides[k] = (corners[(k + 1) % 3] - corners[k]).cross(normal).try_normalize()?;
+    }
+    let mut lines = [(Vector::ZERO, 0.0); LINES];
+    for k in 0..3 {
+        lines[k] = (sides[k], sides[k].dot(corners[k] - a));
+        // At a corner between the sides that meet there.
+        let across = (sides[k] + sides[(k + 2) % 3]).try_normalize()?;
+        lines[k + 3] = (across, across.dot(corners[k] - a));
+    }
+    Some((normal, lines))
+}
 
 /// The free cones and horizons of the facets that many rays have left.
 pub(super) struct Horizons {

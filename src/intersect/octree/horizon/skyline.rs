@@ -7,6 +7,7 @@
 //!
 //! Weakness: eight sectors of one angle each, so that out of a narrow shaft no ray is seen to be free.
 
+use super::{LINES, Lines, lines_around};
 use crate::intersect::octree::Octree;
 use crate::intersect::octree::node::{Link, Target};
 use crate::math::{Aabb, Point, Vector, orthonormal_pair};
@@ -89,30 +90,15 @@ struct Base {
     y: Vector,
     origin: Point,
     /// Direction across each line, away from the triangle, and where the line is.
-    lines: [(Vector, f64); LINES],
+    lines: Lines,
     /// Greatest cosine between the direction across a line and that of a ray in a sector.
     toward: [[f64; SECTORS]; LINES],
     reach: f64,
 }
 
-/// Three sides and three corners.
-const LINES: usize = 6;
-
 impl Base {
     fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
-        let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a).try_normalize()?;
-        let mut sides = [Vector::ZERO; 3];
-        for k in 0..3 {
-            sides[k] = (corners[(k + 1) % 3] - corners[k]).cross(normal).try_normalize()?;
-        }
-        let mut lines = [(Vector::ZERO, 0.0); LINES];
-        for k in 0..3 {
-            lines[k] = (sides[k], sides[k].dot(corners[k] - a));
-            // At a corner between the sides that meet there.
-            let across = (sides[k] + sides[(k + 2) % 3]).try_normalize()?;
-            lines[k + 3] = (across, across.dot(corners[k] - a));
-        }
+        let (normal, lines) = lines_around(corners)?;
         let (x, y) = orthonormal_pair(normal);
         // Half a sector, and room for the rounding of where a ray belongs.
         let half = FRAC_PI_8 + 1e-3;
@@ -125,7 +111,7 @@ impl Base {
                 apart.cos().max(0.0)
             })
         });
-        Some(Self { normal, x, y, origin: a, lines, toward, reach })
+        Some(Self { normal, x, y, origin: corners[0], lines, toward, reach })
     }
 
     /// How steeply anything stands over the plane, seen from the triangle, at least `slopes`.
