@@ -265,3 +265,29 @@ fn recorded_paths_show_the_shift_of_a_plate() {
     assert!((shift - 3.291423).abs() < 1e-6, "{shift} {main:?}");
     assert_eq!(main.len(), 4);
 }
+
+/// Few paths are traced once more by themselves, many are noted on the way: they are the same paths, and no sum knows of either.
+#[test]
+fn few_recorded_paths_are_those_of_many() {
+    let mut world = World::default();
+    world.sphere("glass", Point::ZERO, 5.0).cuboid("plate", Point::new(-9.0, -9.0, 8.0), Point::new(9.0, 9.0, 9.0));
+    let text = [
+        "[run]\nrays = 20000\ninterfaces = 'split'\nsplit_floor = 0.01\n",
+        GLASS,
+        "[[material]]\npart = 'plate'\nsurface = 'mirror'\nreflectance = 0.9\n",
+        &collimated([0.0, 0.0, -20.0], [0.0, 0.0, 1.0], 6.0),
+        "[[source]]\nkind = 'point'\nat = [20, 0, 0]\npower = 0.5\n",
+        &plane("x", [0.0, 0.0, 30.0], 50.0),
+    ]
+    .concat();
+    let none = world.run(&text, |_| ());
+    let [few, many] = [100, 20_000].map(|samples| world.run(&text, |s| s.path_samples = samples));
+    assert_eq!([&few.digest, &many.digest], [&none.digest; 2]);
+    assert_eq!(few.lost_rays, none.lost_rays);
+    let rays: std::collections::BTreeSet<u64> = few.paths.iter().map(|v| v.ray).collect();
+    assert!(rays.len() > 70 && none.paths.is_empty(), "{}", rays.len());
+    let same: Vec<_> = many.paths.iter().filter(|v| rays.contains(&v.ray)).cloned().collect();
+    assert_eq!(few.paths, same);
+    // One thread and three record the same.
+    assert_eq!(few.paths, world.run(&text, |s| (s.path_samples, s.threads) = (100, 3)).paths);
+}

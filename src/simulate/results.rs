@@ -3,8 +3,9 @@
 use super::bind::BoundScene;
 use super::effects::Because;
 use super::kernel::{Counts, LostRay, PathVertex, Tallies};
+use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
-use super::run::{Plan, RunSettings, Traced};
+use super::run::{RunSettings, Traced};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tally::Sum;
 use crate::intersect::Cost;

@@ -5,11 +5,12 @@ use super::gather::{Gather, Own};
 use super::kernel::{
     self, Coloured, Context, Everything, Local, Mirrors, Nothing, OneBody, PathSink, Plain, Stack, Which,
 };
+use super::plan::{Plan, SourceShare};
 use super::portion::Portion;
 use super::receiver::Shape;
+use super::recorder::Recorder;
 use super::results::Results;
 use super::scene::{Interfaces, Run, Sampling};
-use super::tally::QUANTA;
 use crate::intersect::{Cost, Expected, Intersector};
 use crate::optics::Effects;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -98,109 +99,6 @@ pub struct Progress {
     pub seconds: f64,
 }
 
-/// The rays of one source.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SourceShare {
-    first: u64,
-    rays: u64,
-    pub(crate) quanta: f64,
-}
-
-impl SourceShare {
-    /// The rays of one of `n` replicates.
-    pub(crate) fn range(&self, replicate: u32, n: u32) -> [u64; 2] {
-        let at = |k: u32| self.first + (u128::from(self.rays) * u128::from(k) / u128::from(n)) as u64;
-        [at(replicate), at(replicate + 1)]
-    }
-}
-
-/// How the rays of a run are divided among sources and replicates.
-#[derive(Clone, Debug)]
-pub(crate) struct Plan {
-    pub(crate) shares: Vec<SourceShare>,
-    pub(crate) replicates: u32,
-    pub(crate) rays: u64,
-    /// Power of a quantum, in the unit of the sources.
-    pub(crate) quantum: f64,
-    pub(crate) emitted: f64,
-    /// Every 2ᵏ-th ray is recorded; none when absent.
-    record_mask: Option<u64>,
-    /// Every 2ᵏ-th ray is kept where all are recorded.
-    sample_mask: Option<u64>,
-    /// How far an escaping ray is drawn, mm.
-    pub(crate) reach: f64,
-}
-
-impl Plan {
-    pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
-        let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
-        // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
-        let (mut share, mut given) = (0.0, 0);
-        let counts: Vec<u64> = bound
-            .emitters
-            .iter()
-            .map(|e| {
-                share += e.power / emitted;
-                let upto = (settings.rays as f64 * share).round() as u64;
-                let own = upto.saturating_sub(given);
-                given = upto;
-                e.rays.unwrap_or(own).max(1)
-            })
-            .collect();
-        let rays: u64 = counts.iter().sum();
-        let mut first = 0;
-        let shares = bound
-            .emitters
-            .iter()
-            .zip(&counts)
-            .map(|(e, &n)| {
-                // Each source emits exactly its power: its rays weigh a little more or less than the average one.
-                let quanta = (QUANTA * (e.power / emitted) * (rays as f64 / n as f64)).round().max(1.0);
-                let share = SourceShare { first, rays: n, quanta };
-                first += n;
-                share
-            })
-            .collect();
-        // At least 16 rays of the run in each replicate, so that a small run still has an error to state, and at most some
-        // 2²², whose quanta a word of 64 bits can hold.
-        let replicates = settings.replicates.clamp(2, (rays / 16).clamp(2, 1 << 16) as u32);
-        let replicates = replicates.max((rays >> 21) as u32);
-        let record_mask =
-            (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
-        let quantum = emitted / (rays as f64 * QUANTA);
-        Self { shares, replicates, rays, quantum, emitted, record_mask, sample_mask: record_mask, reach: 100.0 }
-    }
-
-    #[inline]
-    pub(crate) fn records(&self, ray: u64) -> bool {
-        self.record_mask.is_some_and(|m| ray & m == 0)
-    }
-
-    /// Whether any ray is recorded.
-    pub(crate) fn records_any(&self) -> bool {
-        self.record_mask.is_some()
-    }
-
-    /// Whether the path of a ray belongs to the sample that is kept.
-    pub(crate) fn samples(&self, ray: u64) -> bool {
-        self.sample_mask.is_some_and(|m| ray & m == 0)
-    }
-
-    /// The source and the replicate of a ray; `None` when the run has no such ray.
-    pub(crate) fn place(&self, ray: u64) -> Option<(usize, u32)> {
-        let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
-        let share = &self.shares[source];
-        let guess = u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays);
-        let holds = |r: &u32| {
-            let [from, to] = share.range(*r, self.replicates);
-            (from..to).contains(&ray)
-        };
-        // Rounding puts the replicate next to the guess.
-        let near = (guess as u32).saturating_sub(1)..=(guess as u32).saturating_add(1).min(self.replicates - 1);
-        near.into_iter().find(holds).map(|r| (source, r))
-    }
-}
-
 /// What a run tells while it runs.
 #[derive(Clone, Copy)]
 pub struct Hooks<'a> {
@@ -248,11 +146,16 @@ pub fn trace(
     hooks: &Hooks<'_>,
 ) -> Traced {
     let start = Instant::now();
+    let alone = RunSettings { batch: 1, ..settings.clone() };
     let mut context = Context::new(bound, intersector, settings);
     context.paths = hooks.paths;
-    if hooks.paths.is_some() {
-        context.plan.record_mask = Some(0);
-    }
+    let recording = match hooks.paths {
+        Some(_) => {
+            context.plan.record_mask = Some(0);
+            None
+        }
+        None => context.plan.recording().map(|plan| Context { plan, settings: &alone, ..context.clone() }),
+    };
     let replicates = context.plan.replicates;
     let [shard, shards] = settings.shard;
     let mine = |k: u32| (u64::from(replicates) * u64::from(k) / u64::from(shards.max(1))) as u32;
@@ -270,9 +173,13 @@ pub fn trace(
     let work = || {
         let mut local = Local::new(bound);
         let mut own = Own::new(&all, bound, replicates);
+        let mut recorder = recording.as_ref().map(|context| Recorder::new(context, kind));
         while !stop.load(Ordering::Relaxed) {
             let Some(&replicate) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
             let cost = dispatch(kind, &context, Which::Replicate(replicate), &mut local);
+            if let Some(recorder) = &mut recorder {
+                recorder.record(replicate, &mut local);
+            }
             let rays = local.counts.rays + rays_done.fetch_add(local.counts.rays, Ordering::Relaxed);
             own.take(replicate, &mut local, &context, cost);
             let so_far = Progress { rays, total: share, seconds: start.elapsed().as_secs_f64() };
@@ -349,7 +256,7 @@ pub(crate) fn kernel_of(bound: &BoundScene, settings: &RunSettings) -> KernelKin
     }
 }
 
-fn dispatch(kind: KernelKind, context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
+pub(super) fn dispatch(kind: KernelKind, context: &Context<'_>, which: Which, local: &mut Local) -> Cost {
     match kind {
         KernelKind::Mirror if context.plain() => kernel::trace::<Plain<Mirrors>>(context, which, local),
         KernelKind::Mirror => kernel::trace::<Mirrors>(context, which, local),

@@ -114,6 +114,15 @@ impl Grid {
         self.cells[cell]
     }
 
+    /// Empties it.
+    pub(crate) fn forget(&mut self) {
+        self.waiting = (0, 0.0);
+        for &cell in &self.touched[..self.count] {
+            self.cells[cell as usize] = 0;
+        }
+        self.count = 0;
+    }
+
     /// Moves what the replicate gathered to the sums of the run.
     pub(crate) fn flush(&mut self, sums: &mut [Sum]) {
         if !self.cells.is_empty() {

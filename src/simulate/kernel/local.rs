@@ -178,6 +178,17 @@ impl Local {
         }
     }
 
+    /// Empties it, as [`Tallies::take`] does, of what nobody asks about.
+    pub(crate) fn forget(&mut self) {
+        self.receivers.iter_mut().chain([&mut self.absorbed, &mut self.bulk]).for_each(Grid::forget);
+        self.receiver_totals.fill(0);
+        self.moments.fill(Moments::default());
+        (self.ends, self.counts) = (Ends::default(), Counts::default());
+        self.ledger.clear();
+        self.paths.clear();
+        self.sample.clear();
+    }
+
     /// Hands the vertices gathered so far to whoever wants them all, and keeps the sample.
     pub(crate) fn stream(&mut self, context: &Context<'_>) {
         if let Some(sink) = context.paths {

@@ -22,9 +22,10 @@ pub(crate) use wide::trace;
 
 use super::bind::BoundScene;
 use super::emitter::{Leaving, Stream, Ticket};
+use super::plan::Plan;
 use super::random::Key;
 use super::receiver::Receiver;
-use super::run::{Plan, RunSettings};
+use super::run::RunSettings;
 use super::tally::count;
 use crate::intersect::{Cost, Hit, Intersector};
 use crate::math::{Aabb, Departure, FaceId, Point, Ray, Vector};
@@ -32,6 +33,7 @@ use crate::optics::polarised::Stokes;
 use crate::optics::reflect;
 
 /// What all replicates share.
+#[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub(crate) bound: &'a BoundScene,
     pub(crate) intersector: &'a dyn Intersector,

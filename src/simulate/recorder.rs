@@ -1,0 +1,32 @@
+//! The recorded paths of a run that records few: each ray is traced once more, by itself.
+//!
+//! Random numbers are keyed by ray, so it takes the same path again, bit by bit. The run itself then needs no kernel that can record:
+//! to record 2,000 paths of a reflector cost all its four million rays 5 % of their time.
+
+use super::effects::KernelKind;
+use super::kernel::{Context, Local, Which};
+use super::run::dispatch;
+
+/// Traces the rays that are recorded.
+pub(super) struct Recorder<'c, 'a> {
+    context: &'c Context<'a>,
+    kind: KernelKind,
+    /// Where their light ends, which was counted already.
+    local: Local,
+}
+
+impl<'c, 'a> Recorder<'c, 'a> {
+    /// For a run whose plan says which rays are recorded.
+    pub(super) fn new(context: &'c Context<'a>, kind: KernelKind) -> Self {
+        Self { context, kind, local: Local::new(context.bound) }
+    }
+
+    /// Gives `to` the recorded paths of a replicate.
+    pub(super) fn record(&mut self, replicate: u32, to: &mut Local) {
+        for ray in self.context.plan.recorded(replicate) {
+            dispatch(self.kind, self.context, Which::Ray(ray), &mut self.local);
+        }
+        to.paths.append(&mut self.local.paths);
+        self.local.forget();
+    }
+}
