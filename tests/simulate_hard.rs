@@ -2,8 +2,9 @@
 
 mod simulate_support;
 
+use lampyris::intersect::exact::{self, Exact};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::simulate::Results;
+use lampyris::simulate::{Results, RunSettings, Scene, simulate};
 use simulate_support::{Shape, World};
 
 const LAYERS: [f64; 3] = [1.5, 1.7, 1.33];
@@ -128,6 +129,30 @@ fn light_at_the_critical_angle() {
         assert!((power.escaped - out).abs() < 1e-9, "{side}: {} {out}", power.escaped);
         assert!((power.escaped > 0.0) == (side > 0.0) && results.lost_rays == 0, "{side}: {power:?}");
     }
+}
+
+/// On the spline light that is reflected less than the glue distance from the edge of two glued blocks goes on into the other block, and
+/// out of it at its far side.
+#[test]
+fn light_reflected_beside_a_glued_edge_is_not_lost() {
+    let mut world = World::default();
+    world.cuboid("left", Point::new(-10.0, -10.0, 0.0), Point::new(0.0, 10.0, 20.0));
+    world.cuboid("right", Point::new(0.0, -10.0, 0.0), Point::new(10.0, 10.0, 20.0));
+    let exact = Exact::build(&world.model, &exact::Settings::default());
+    let (d, far) = (Vector::new(0.49, 0.57, -0.66).normalize(), 3.0);
+    let at = Point::new(-5e-4, 0.0, 0.0) - d * far;
+    let text = format!(
+        "[run]\nrays = 4000\nmax_bounces = 200
+        [[medium]]\nname = 'a'\nindex = 1.5\n[[material]]\npart = 'left'\nmedium = 'a'
+        [[medium]]\nname = 'b'\nindex = 1.7\n[[material]]\npart = 'right'\nmedium = 'b'
+        [[source]]\nkind = 'collimated'\nat = [{:?}, {:?}, {:?}]\ndirection = [{:?}, {:?}, {:?}]\nradius = 4e-4\ninside = 'left'",
+        at.x, at.y, at.z, d.x, d.y, d.z
+    );
+    let scene = Scene::parse(&text, "edge.toml", std::path::Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let results = simulate(&bound, &exact, &RunSettings::from(&scene.run), &|_| true);
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+    assert!(results.power.imbalance() < 1e-12, "{:?}", results.power);
 }
 
 /// A film that is not thicker than the glue is named; it loses nothing, and transmits what it must, where the glue is thinner.
