@@ -5,7 +5,7 @@ use exact_common::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
-use lampyris::math::{Aabb, Departure, Point, Ray, Uv, Vector};
+use lampyris::math::{Aabb, Departure, FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::Model;
 use lampyris::tessellate::{self, tessellate};
@@ -153,5 +153,28 @@ fn a_departure_from_the_spline_is_never_lost() {
         println!("{name}: {asked} departures, {differ} differ, {own} found their own point");
         assert_eq!(own, 0, "{name}: its own point found");
         assert!(differ <= asked / 100, "{name}: {differ} of {asked} differ");
+    }
+}
+
+/// A ray shorter than the sag that grazes a sphere, as one that looks for a second face at the same place: the facet that belongs to
+/// its hit lies ten times the sag away, but the hit is found.
+#[test]
+fn short_flat_rays_meet_the_sphere() {
+    let plate = lampyris::nurbs::sweep::plane(&Frame::IDENTITY, [[40.0, 50.0], [-5.0, 5.0]]);
+    let model = model([sphere(20.0), plate]);
+    let mesh = mesh(&model, 0.1);
+    let exact = Exact::build(&model, &Settings::default());
+    let facets = EveryFacet(&mesh);
+    let polished = Polished::new(&facets, &mesh, &exact);
+    let other = mesh.facets.iter().position(|f| f.face == FaceId(1)).unwrap() as u32;
+    let from = Departure { face: FaceId(1), primitive: other, uv: Uv::new(45.0, 0.0) };
+    let mut random = Stream(11);
+    for _ in 0..300 {
+        let out = random.direction();
+        let along = out.cross(random.direction()).normalize();
+        let d = (along - 0.1 * out).normalize();
+        let ray = Ray::new(Point::ZERO + 20.0 * out - 1e-3 * d, d).within(0.0, 2e-3).leaving(from);
+        let hit = polished.intersect(&ray, &mut Cost::default());
+        assert!(hit.is_some_and(|h| (h.t - 1e-3).abs() < 1e-9 && h.face == FaceId(0)), "{ray:?} {hit:?}");
     }
 }
