@@ -5,12 +5,13 @@ mod simulate_support;
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
-use lampyris::math::Frame;
+use lampyris::math::{Frame, Point, Vector};
 use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
 use lampyris::simulate::{Results, RunSettings, Scene, simulate};
 use lampyris::step;
 use lampyris::tessellate::{self, tessellate};
+use simulate_support::{Shape, World};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -58,5 +59,22 @@ fn light_reflected_beside_the_edges_of_a_lens_is_not_lost() {
     let model = step::read(&file, &step::Settings::default()).unwrap().model;
     let text = format!("[run]\nrays = 20000\nmax_bounces = 300\n{GUIDE}[[source]]\nkind = 'point'\nat = [3, 2, 1]");
     let results = run(&model, &text);
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+}
+
+/// A ball in a shell with a gap of 5 µm between them, a twentieth of the sag, the facets of the one turned against those of the other and
+/// through them: light finds both faces.
+#[test]
+fn a_ball_in_a_shell_that_nearly_fits_loses_no_light() {
+    let mut world = World::default();
+    let sphere = |radius: f64, outward: bool| Shape::Sphere { centre: Point::ZERO, radius, outward };
+    world.part("shell", true, &[("out", sphere(10.0, true)), ("in", sphere(6.0, false))]);
+    world.sphere("ball", Point::ZERO, 5.995);
+    world.model.instances[1].placement = Frame::from_axis(Point::ZERO, Vector::new(1.0, 1.0, 1.0), None);
+    let text = "[run]\nrays = 5000\nmax_bounces = 300
+        [[medium]]\nname = 'a'\nindex = 1.5\n[[material]]\npart = 'shell'\nmedium = 'a'
+        [[medium]]\nname = 'b'\nindex = 1.7\n[[material]]\npart = 'ball'\nmedium = 'b'
+        [[source]]\nkind = 'point'\nat = [3, 2, 1]";
+    let results = run(&world.model, text);
     assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
 }

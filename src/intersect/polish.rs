@@ -22,6 +22,8 @@ const STEPS: u32 = 6;
 /// A ray of no more than so many sags is asked of the spline as well: where it meets a face flat, the facet there lies farther away than
 /// the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
 const SHORT: f64 = 4.0;
+/// The primitive of a hit that the spline alone knows.
+const NO_FACET: u32 = u32::MAX;
 /// Sag assumed where none was proved, mm.
 const UNPROVED_SAG: f64 = 0.2;
 
@@ -141,10 +143,21 @@ impl<'a> Polished<'a> {
         }
     }
 
-    /// What the exact model answers, as a hit of the facet that the ray leaves.
-    fn on_spline(&self, ray: &Ray, from: &Departure) -> Option<Hit> {
+    /// Whether the spline must be asked about an answer: it cannot be, or where two solids touch the facets of one may hide the other's, as
+    /// when a ray inside a solid comes to another first, or comes out of one that it has not been seen to enter.
+    fn is_doubtful(&self, ray: &Ray, left: (&Departure, Vector), answer: Option<&Hit>) -> bool {
+        let solid = |face| self.exact.solid_of(face);
+        let other = |hit: &Hit| {
+            let (inward, out) = (left.1.dot(ray.direction) < 0.0, hit.geometric_normal.dot(ray.direction) > 0.0);
+            (inward || out) && solid(hit.face).is_some() && solid(hit.face) != solid(left.0.face)
+        };
+        answer.is_some_and(other) || self.is_odd(ray, left, answer)
+    }
+
+    /// What the exact model answers, as a hit of no facet: of one that is not there a ray which leaves it could not meet it again.
+    fn on_spline(&self, ray: &Ray) -> Option<Hit> {
         let hit = self.exact.first(ray, &mut Cost::default()).hit?;
-        Some(Hit { primitive: from.primitive, certainty: Certainty::Polished, ..hit })
+        Some(Hit { primitive: NO_FACET, certainty: Certainty::Polished, ..hit })
     }
 
     /// The nearest root that the facets lead to.
@@ -159,7 +172,7 @@ impl<'a> Polished<'a> {
             && let Some(reach) = self.hidden(&ray, from, normal)
         {
             let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
-            if let Some(hit) = self.on_spline(&ray.within(ray.t_min, end), from) {
+            if let Some(hit) = self.on_spline(&ray.within(ray.t_min, end)) {
                 cost.rays += 1;
                 return Some(hit);
             }
@@ -221,14 +234,14 @@ impl Intersector for Polished<'_> {
         };
         let mut answer = self.search(ray, Some(left), cost);
         if ray.t_max - ray.t_min <= SHORT * self.sag {
-            let exact = self.on_spline(ray, left.0);
+            let exact = self.on_spline(ray);
             answer = answer.into_iter().chain(exact).min_by(|a, b| a.t.total_cmp(&b.t));
         }
-        if !self.is_odd(ray, left, answer.as_ref()) {
+        if !self.is_doubtful(ray, left, answer.as_ref()) {
             return answer;
         }
         // Beside an edge a ray may start outside all facets and pass between them.
-        let exact = self.on_spline(ray, left.0);
+        let exact = self.on_spline(ray);
         if self.is_odd(ray, left, exact.as_ref()) { answer } else { exact }
     }
 
