@@ -78,3 +78,15 @@ fn a_ball_in_a_shell_that_nearly_fits_loses_no_light() {
     let results = run(&world.model, text);
     assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
 }
+
+/// Light from outside is not found inside an opaque solid, whose facets it passes beside an edge.
+#[test]
+fn light_that_meets_an_opaque_solid_beside_its_edges_meets_it_from_outside() {
+    let (_, model, bound) = simulate_support::fixture_scene("s3_reflector.toml", "");
+    let mesh = tessellate(&model, &tessellate::Settings { measure: false, ..Default::default() }).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let exact = Exact::build(&model, &exact::Settings::default());
+    let settings = RunSettings { rays: 50_000, threads: 2, ..Default::default() };
+    let results = simulate(&bound, &Polished::new(&octree, &mesh, &exact), &settings, &|_| true);
+    assert_eq!(results.lost_rays, 0, "{:?}", results.ledger.first());
+}

@@ -154,6 +154,30 @@ impl<'a> Polished<'a> {
         answer.is_some_and(other) || self.is_odd(ray, left, answer)
     }
 
+    /// The nearest root of a ray that leaves no face, which the spline is asked for where it would come out of a closed solid first.
+    fn search_from_outside(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        let mut rest = *ray;
+        for _ in 0..8 {
+            let answer = self.search(&rest, None, cost);
+            if !self.comes_out(ray, answer.as_ref()) {
+                return answer;
+            }
+            if let Some(hit) = self.on_spline(ray) {
+                return Some(hit);
+            }
+            // A facet where the spline is not; ready meshes may stand behind it.
+            rest.t_min = answer?.t.next_up();
+        }
+        None
+    }
+
+    /// Whether a ray comes out of a closed solid by its answer: beside an edge it may have passed the facets of the side where it went in.
+    fn comes_out(&self, ray: &Ray, answer: Option<&Hit>) -> bool {
+        answer.is_some_and(|hit| {
+            hit.geometric_normal.dot(ray.direction) > 0.0 && self.exact.solid_of(hit.face).is_some()
+        })
+    }
+
     /// What the exact model answers, as a hit of no facet: of one that is not there a ray which leaves it could not meet it again.
     fn on_spline(&self, ray: &Ray) -> Option<Hit> {
         let hit = self.exact.first(ray, &mut Cost::default()).hit?;
@@ -230,7 +254,7 @@ impl Intersector for Polished<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let normal = |f: &Departure| self.exact.normal_at(f.face, f.uv);
         let Some(left) = ray.from.as_ref().and_then(|f| Some((f, normal(f)?))) else {
-            return self.search(ray, None, cost);
+            return self.search_from_outside(ray, cost);
         };
         let mut answer = self.search(ray, Some(left), cost);
         if ray.t_max - ray.t_min <= SHORT * self.sag {
