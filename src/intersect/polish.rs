@@ -156,17 +156,20 @@ impl<'a> Polished<'a> {
 
     /// The nearest root of a ray that leaves no face, which the spline is asked for where it would come out of a closed solid first.
     fn search_from_outside(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
-        let mut rest = *ray;
+        let mut answer = self.search(ray, None, cost);
+        if !self.comes_out(ray, answer.as_ref()) {
+            return answer;
+        }
+        if let Some(hit) = self.on_spline(ray) {
+            return Some(hit);
+        }
+        // A facet where the spline is not; ready meshes may stand behind it.
         for _ in 0..8 {
-            let answer = self.search(&rest, None, cost);
+            let behind = ray.within(answer?.t.next_up(), ray.t_max);
+            answer = self.search(&behind, None, cost);
             if !self.comes_out(ray, answer.as_ref()) {
                 return answer;
             }
-            if let Some(hit) = self.on_spline(ray) {
-                return Some(hit);
-            }
-            // A facet where the spline is not; ready meshes may stand behind it.
-            rest.t_min = answer?.t.next_up();
         }
         None
     }
@@ -257,15 +260,13 @@ impl Intersector for Polished<'_> {
             return self.search_from_outside(ray, cost);
         };
         let mut answer = self.search(ray, Some(left), cost);
-        if ray.t_max - ray.t_min <= SHORT * self.sag {
-            let exact = self.on_spline(ray);
-            answer = answer.into_iter().chain(exact).min_by(|a, b| a.t.total_cmp(&b.t));
-        }
+        let asked = (ray.t_max - ray.t_min <= SHORT * self.sag).then(|| self.on_spline(ray));
+        answer = answer.into_iter().chain(asked.flatten()).min_by(|a, b| a.t.total_cmp(&b.t));
         if !self.is_doubtful(ray, left, answer.as_ref()) {
             return answer;
         }
         // Beside an edge a ray may start outside all facets and pass between them.
-        let exact = self.on_spline(ray);
+        let exact = asked.unwrap_or_else(|| self.on_spline(ray));
         if self.is_odd(ray, left, exact.as_ref()) { answer } else { exact }
     }
 

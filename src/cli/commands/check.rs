@@ -234,6 +234,11 @@ fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ra
     [distance.summary(), angle.summary()]
 }
 
+fn spread(q: &Summary, unit: &str) -> String {
+    let [p50, p99, max] = [q.p50, q.p99, q.max].map(|x| figures(x, 2));
+    format!("off by {p50}{unit} (median), {p99}{unit} (99 %), {max}{unit} (largest)")
+}
+
 fn described(c: &Check, normals: NormalMode) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
@@ -267,24 +272,8 @@ fn described(c: &Check, normals: NormalMode) -> String {
         ),
     );
     let moved = if normals == NormalMode::Exact { "moved to the spline, " } else { "" };
-    line(
-        "distance",
-        format!(
-            "{moved}off by {} mm (median), {} mm (99 %), {} mm (largest)",
-            figures(f.t_error_mm.p50, 2),
-            figures(f.t_error_mm.p99, 2),
-            figures(f.t_error_mm.max, 2)
-        ),
-    );
-    line(
-        "normals",
-        format!(
-            "{normals}, off by {}° (median), {}° (99 %), {}° (largest)",
-            figures(f.normal_error_deg.p50, 2),
-            figures(f.normal_error_deg.p99, 2),
-            figures(f.normal_error_deg.max, 2)
-        ),
-    );
+    line("distance", format!("{moved}{}", spread(&f.t_error_mm, " mm")));
+    line("normals", format!("{normals}, {}", spread(&f.normal_error_deg, "°")));
     line(
         "spline",
         format!(
