@@ -16,7 +16,7 @@
 
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::intersect::{Cost, Expected, Footprint, Hit, Intersector};
+use lampyris::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use lampyris::math::Ray;
 use lampyris::mesh::FacetMesh;
 use lampyris::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};
@@ -57,12 +57,12 @@ impl Intersector for Probe<'_> {
         self.nanoseconds.fetch_add(start.elapsed().as_nanos() as u64, Ordering::Relaxed);
     }
 
-    fn expect(&self, expected: &Expected<'_>) {
-        self.inner.expect(expected);
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
+        self.inner.prepare_for(expected);
     }
 
-    fn is_gone(&self, ray: &Ray) -> bool {
-        self.inner.is_gone(ray)
+    fn escapes(&self, ray: &Ray) -> bool {
+        self.inner.escapes(ray)
     }
 
     fn footprint(&self) -> Footprint {

@@ -5,7 +5,7 @@ mod intersector_common;
 use intersector_common::*;
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::intersect::{Cost, Expected, Intersector};
+use lampyris::intersect::{Cost, ExpectedRays, Intersector};
 use lampyris::math::{Departure, FaceId, Point, Ray, Uv, Vector};
 use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 
@@ -52,8 +52,8 @@ fn share_found_of(name: &str, mesh: &FacetMesh, ray: fn(&FacetMesh, &mut Random)
     let judge = Bvh::build(mesh, &bvh::Settings::default());
     let mut dice = Random(7);
     let rays: Vec<Ray> = (0..60_000).map(|_| ray(mesh, &mut dice)).collect();
-    assert!(!rays.iter().any(|r| tree.is_gone(r)), "{name}: nothing is known before it was worth it");
-    tree.expect(&many());
+    assert!(!rays.iter().any(|r| tree.escapes(r)), "{name}: nothing is known before it was worth it");
+    tree.prepare_for(&many());
     let mut found = 0.0;
     // Horizons are found from the rays that left a facet before.
     for _ in 0..8 {
@@ -61,7 +61,7 @@ fn share_found_of(name: &str, mesh: &FacetMesh, ray: fn(&FacetMesh, &mut Random)
         for ray in &rays {
             let hit = judge.intersect(ray, &mut Cost::default());
             free += usize::from(hit.is_none());
-            if tree.is_gone(ray) {
+            if tree.escapes(ray) {
                 // Where parts touch without sharing corners a ray can start on both.
                 assert!(hit.is_none_or(|h| h.t <= 1e-9), "{name}: {ray:?} meets {hit:?}");
                 gone += 1;
@@ -72,8 +72,8 @@ fn share_found_of(name: &str, mesh: &FacetMesh, ray: fn(&FacetMesh, &mut Random)
     found
 }
 
-fn many() -> Expected<'static> {
-    Expected { rays: u64::MAX, threads: 2, beams: &[] }
+fn many() -> ExpectedRays<'static> {
+    ExpectedRays { rays: u64::MAX, threads: 2, beams: &[] }
 }
 
 #[test]
@@ -158,6 +158,6 @@ fn no_horizon_for_facets_without_area_or_corners_that_are_no_numbers() {
     share_found("broken ball", &mesh);
     let empty = FacetMesh::default();
     let tree = Octree::build(&empty, &octree::Settings::default());
-    tree.expect(&many());
-    assert!(!tree.is_gone(&Ray::new(Point::ZERO, Vector::Z)));
+    tree.prepare_for(&many());
+    assert!(!tree.escapes(&Ray::new(Point::ZERO, Vector::Z)));
 }

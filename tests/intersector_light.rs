@@ -5,7 +5,7 @@ mod intersector_common;
 use intersector_common::*;
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::intersect::{Beam, Cost, Expected, Intersector};
+use lampyris::intersect::{Beam, Cost, ExpectedRays, Intersector};
 use lampyris::math::{Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
 
@@ -35,7 +35,7 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     let plain = Octree::build(mesh, &octree::Settings::default());
     let judge = Bvh::build(mesh, &bvh::Settings::default());
     let beams = [(Beam::Point(Point::splat(0.5)), u64::MAX), (beam, u64::MAX)];
-    knowing.expect(&Expected { rays: u64::MAX, threads: 2, beams: &beams });
+    knowing.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams });
     let ask = |who: &dyn Intersector| {
         let (mut hits, mut cost) = (vec![None; rays.len()], Cost::default());
         who.intersect_batch(rays, &mut hits, &mut cost);
@@ -46,7 +46,7 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     assert!(known.iter().all(Option::is_none) || less.nodes < more.nodes / 4, "{name}: {less:?} against {more:?}");
     for path in [octree::Path::Avx2, octree::Path::Portable] {
         let other = Octree::build(mesh, &octree::Settings { path, ..octree::Settings::default() });
-        other.expect(&Expected { rays: u64::MAX, threads: 2, beams: &beams });
+        other.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams });
         assert!(ask(&other).0 == walked, "{name}: {beam:?} {path:?}");
     }
     for (k, ray) in rays.iter().enumerate() {
@@ -119,7 +119,7 @@ fn rays_along_a_direction() {
                 rays.push(Ray::new(start, direction));
             }
             rays.iter_mut().step_by(7).for_each(|r| r.t_max = size * dice.unit());
-            same(name, &mesh, Beam::Along { origin, direction }, &rays);
+            same(name, &mesh, Beam::Collimated { origin, direction }, &rays);
         }
     }
 }

@@ -27,11 +27,11 @@ pub trait Intersector: Sync {
     }
 
     /// Tells which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
-    fn expect(&self, _expected: &Expected<'_>) {}
+    fn prepare_for(&self, _expected: &ExpectedRays<'_>) {}
 
     /// Whether it is known, without looking for a hit, that a ray which leaves a surface meets nothing, however far it goes;
     /// `false` says nothing.
-    fn is_gone(&self, _ray: &Ray) -> bool {
+    fn escapes(&self, _ray: &Ray) -> bool {
         false
     }
 
@@ -41,7 +41,7 @@ pub trait Intersector: Sync {
 
 /// Rays that are going to be asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Expected<'a> {
+pub struct ExpectedRays<'a> {
     /// How many, without those that start on a face.
     pub rays: u64,
     /// On how many threads.
@@ -56,7 +56,7 @@ pub enum Beam {
     /// They start at one point.
     Point(Point),
     /// They start in one plane, in the direction across it.
-    Along {
+    Collimated {
         /// A point of the plane; starts may stray from it by rounding.
         origin: Point,
         /// Where the rays run, and the normal of the plane.

@@ -11,7 +11,7 @@ use super::receiver::Shape;
 use super::recorder::Recorder;
 use super::results::Results;
 use super::scene::{Interfaces, Run, Sampling};
-use crate::intersect::{Cost, Expected, Intersector};
+use crate::intersect::{Cost, ExpectedRays, Intersector};
 use crate::optics::Effects;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -203,7 +203,7 @@ fn announce(context: &Context<'_>, threads: usize) {
     let own = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
     let beam = |(e, s): (&Emitter, &SourceShare)| Some((e.beam()?, own(s.rays)));
     let beams: Vec<_> = context.bound.emitters.iter().zip(&context.plan.shares).filter_map(beam).collect();
-    context.intersector.expect(&Expected { rays: own(context.plan.rays), threads, beams: &beams });
+    context.intersector.prepare_for(&ExpectedRays { rays: own(context.plan.rays), threads, beams: &beams });
 }
 
 /// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.

@@ -1,6 +1,6 @@
 //! A fair sample of the very rays of a run, to be asked again of other intersectors.
 
-use crate::intersect::{Cost, Expected, Footprint, Hit, Intersector};
+use crate::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Point, Ray};
 use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
@@ -65,17 +65,17 @@ impl Intersector for Witness<'_> {
         self.inner.intersect_batch(rays, hits, cost);
     }
 
-    fn expect(&self, expected: &Expected<'_>) {
-        self.inner.expect(expected);
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
+        self.inner.prepare_for(expected);
     }
 
-    /// A ray that is gone is not asked about any more: it is noted here.
-    fn is_gone(&self, ray: &Ray) -> bool {
-        let gone = self.inner.is_gone(ray);
-        if gone {
+    /// A ray that escapes is not asked about any more: it is noted here.
+    fn escapes(&self, ray: &Ray) -> bool {
+        let escapes = self.inner.escapes(ray);
+        if escapes {
             self.note(ray);
         }
-        gone
+        escapes
     }
 
     fn footprint(&self) -> Footprint {

@@ -7,7 +7,7 @@
 //! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of the room. Thirty-two rays of
 //! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
 //!
-//! Where a run says beforehand which rays it will ask ([`Intersector::expect`]), those of point and collimated sources are answered
+//! Where a run says beforehand which rays it will ask ([`Intersector::prepare_for`]), those of point and collimated sources are answered
 //! from a map of what the source sees, and rays that leave facets for which many do are known to be gone by the facet's horizon.
 //!
 //! Sources: the octree after Revelles, Ureña, Lastra, *An Efficient Parametric Algorithm for Octree Traversal*, WSCG
@@ -36,7 +36,7 @@ mod statistics;
 
 use super::facet::{FacetHit, Surroundings};
 use super::slopes::Slopes;
-use super::{Cost, Expected, Footprint, Hit, Intersector, NormalMode, normals};
+use super::{Cost, ExpectedRays, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::intersect::prefetch::prefetch;
 use crate::math::{Aabb, Point, Ray};
 use crate::mesh::FacetMesh;
@@ -287,7 +287,7 @@ impl Intersector for Octree<'_> {
         }
     }
 
-    fn expect(&self, expected: &Expected<'_>) {
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
         if self.horizons.get().is_none()
             && let Some(horizons) = Horizons::expecting(expected.rays, self)
         {
@@ -300,7 +300,7 @@ impl Intersector for Octree<'_> {
     }
 
     #[inline]
-    fn is_gone(&self, ray: &Ray) -> bool {
+    fn escapes(&self, ray: &Ray) -> bool {
         let (Some(horizons), Some(from)) = (self.horizons.get(), ray.from) else { return false };
         horizons.clear(self, from.primitive as usize, ray.direction)
     }

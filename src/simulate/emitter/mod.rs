@@ -159,7 +159,9 @@ impl Emitter {
         let (origin, direction) = (self.frame.origin, self.frame.z);
         match (&self.shape, &self.lobe) {
             (Shape::Point, _) => Some(Beam::Point(origin)),
-            (Shape::Disc(_) | Shape::Rectangle(_), Lobe::Collimated) => Some(Beam::Along { origin, direction }),
+            (Shape::Disc(_) | Shape::Rectangle(_), Lobe::Collimated) => {
+                Some(Beam::Collimated { origin, direction })
+            }
             _ => None,
         }
     }

@@ -122,7 +122,7 @@ fn trace_rays<C: Carry>(context: &Context<'_>, which: Which, local: &mut Local) 
         local.counts.segments += wave.rays.len() as u64;
         for (i, (path, ray)) in wave.paths.iter_mut().zip(&mut wave.rays).enumerate() {
             let on = step::step(context, path, ray, wave.hits[i].as_ref(), local, &mut wave.pending)
-                && !(context.intersector.is_gone(ray) && step::go(context, path, ray, local));
+                && !(context.intersector.escapes(ray) && step::go(context, path, ray, local));
             if !on {
                 wave.ended.push(i as u32);
             }

@@ -19,7 +19,7 @@ use super::Octree;
 use super::engine::Lanes;
 use crate::intersect::facet::{FacetHit, FacetRay, Line, Nearest};
 use crate::intersect::prefetch::prefetch;
-use crate::intersect::{Beam, Cost, Expected};
+use crate::intersect::{Beam, Cost, ExpectedRays};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
 use pair::Edges;
 use slot::Slot;
@@ -106,7 +106,7 @@ impl View {
     fn of(beam: &Beam, tree: &Octree) -> Option<Self> {
         match beam {
             Beam::Point(origin) => origin.is_finite().then(|| Self::Point(origin.to_array())),
-            Beam::Along { origin, direction } => {
+            Beam::Collimated { origin, direction } => {
                 let (x, y) = orthonormal_pair(*direction);
                 let span = |axis: Vector| {
                     let along = tree.around.bounds.corners().map(|p| p.dot(axis));
@@ -151,7 +151,7 @@ impl View {
 }
 
 /// The maps for these sources, as far as they pay; those that are there already are kept.
-pub(super) fn find(tree: &Octree, expected: &Expected<'_>, mut there: Vec<Map>) -> Vec<Map> {
+pub(super) fn find(tree: &Octree, expected: &ExpectedRays<'_>, mut there: Vec<Map>) -> Vec<Map> {
     let mut maps: Vec<Map> = Vec::new();
     let facets = tree.around.mesh.facets.len();
     let worth = |rays: u64| facets <= LARGEST && rays / WORTH >= facets as u64;
