@@ -3,15 +3,17 @@
 //! `cargo bench --bench exact_rays [-- FILE.stp ...]`: closed forms and freeform surfaces, then the files. Rays come from a
 //! sphere of three radii towards the bounding box. Rounds alternate between the models; the minimum and the median count.
 
-#[path = "../tests/exact_common/mod.rs"]
-mod exact_common;
+// The bench uses a part of what the tests share.
+#[allow(dead_code)]
+#[path = "../tests/exact/support.rs"]
+mod support;
 
-use exact_common::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost, Hit, Intersector};
 use lampyris::math::{Aabb, Ray};
 use lampyris::model::Model;
 use std::time::Instant;
+use support::*;
 
 const RAYS: usize = 100_000;
 const ROUNDS: usize = 15;

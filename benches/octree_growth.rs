@@ -3,13 +3,15 @@
 //! One element is one ray of a path of three to eight bounces inside the lamp, answered in a batch. The largest size, 20 million
 //! facets, takes 7 GB: it is run when `LAMPYRIS_LARGE` is set.
 
-#[path = "../tests/intersector_common/mod.rs"]
-mod intersector_common;
+// The bench uses a part of what the tests share.
+#[allow(dead_code)]
+#[path = "../tests/intersect/support.rs"]
+mod support;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use intersector_common::{lamp, paths, refined};
 use lampyris::intersect::octree::{Octree, Settings};
 use lampyris::intersect::{Cost, Hit, Intersector};
+use support::{lamp, paths, refined};
 
 fn growth(c: &mut Criterion) {
     let (coarse, sources) = lamp(20_000);

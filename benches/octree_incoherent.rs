@@ -3,14 +3,16 @@
 //! One element is one ray of a path of three to eight bounces; all structures answer with normals. Larger lamps, Embree and all
 //! threads: `lampyris study bvh`.
 
-#[path = "../tests/intersector_common/mod.rs"]
-mod intersector_common;
+// The bench uses a part of what the tests share.
+#[allow(dead_code)]
+#[path = "../tests/intersect/support.rs"]
+mod support;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use intersector_common::{lamp, paths};
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{Octree, Settings};
 use lampyris::intersect::{Cost, Hit, Intersector};
+use support::{lamp, paths};
 
 fn incoherent(c: &mut Criterion) {
     for facets in [20_000, 200_000] {

@@ -4,10 +4,11 @@
 //! alternate between the octree alone and the octree polished, on the same rays that all hit; the difference of the medians is
 //! the surcharge a hit. The residual is the distance between the hit and the spline evaluated at the hit's parameters.
 
-#[path = "../tests/exact_common/mod.rs"]
-mod exact_common;
+// The bench uses a part of what the tests share.
+#[allow(dead_code)]
+#[path = "../tests/exact/support.rs"]
+mod support;
 
-use exact_common::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
@@ -16,6 +17,7 @@ use lampyris::math::Ray;
 use lampyris::model::Model;
 use lampyris::tessellate::{self, tessellate};
 use std::time::Instant;
+use support::*;
 
 const RAYS: usize = 100_000;
 const ROUNDS: usize = 11;

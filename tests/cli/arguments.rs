@@ -1,0 +1,52 @@
+//! Arguments, help and the commands about the command, with the real binary.
+
+use crate::support::lampyris;
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    let (code, out, err) = lampyris(&["--help"]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    for command in ["demo", "info", "facet", "trace", "check", "study", "merge", "schema", "completions", "man"] {
+        assert!(out.contains(command), "{command} is missing in {out}");
+    }
+    assert!(lampyris(&["--version"]).1.starts_with("lampyris 0."));
+}
+
+#[test]
+fn wrong_arguments_end_with_2_and_say_what_to_write() {
+    for (arguments, says) in [
+        (&["facet", "a.stp", "--tolerance", "-0.1"][..], "a tolerance is a positive length in mm, not -0.1"),
+        (&["facet", "a.stp", "--tolerance=0.2..0.05"], "0.05..0.2"),
+        (&["facet", "a.stp", "--part", "cover"], "cover=0.01..0.05"),
+        (&["facet", "a.stp", "--tolerance", "0.1", "--accuracy", "1deg"], "--accuracy"),
+        (&["trace", "a.toml", "--rays", "-5"], "at least 1"),
+        (&["trace", "a.toml", "--normals", "smooth"], "bilinear"),
+        (&["study", "everything"], "accuracy"),
+        (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
+        (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),
+        (&["study", "stability", "--rays", "5"], "its questions are fixed"),
+        (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
+        (&["tarce"], "trace"),
+        (&[], "Usage"),
+    ] {
+        let (code, out, err) = lampyris(arguments);
+        assert_eq!((code, out.as_str()), (2, ""), "{arguments:?}: {err}");
+        assert!(err.contains(says), "{arguments:?}: {err}");
+        assert!(!err.contains('\x1b'), "NO_COLOR is respected");
+    }
+}
+
+#[test]
+fn completions_and_manual() {
+    for shell in ["bash", "zsh", "fish"] {
+        let (code, out, _) = lampyris(&["completions", shell]);
+        assert!(code == 0 && out.contains("lampyris") && out.contains("tolerance"), "{shell}");
+    }
+    let (code, page, _) = lampyris(&["man"]);
+    assert!(code == 0 && page.contains(".TH lampyris"), "{page}");
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, _) = lampyris(&["man", "-o", folder.path().to_str().unwrap()]);
+    assert_eq!((code, out.as_str()), (0, ""));
+    let page = std::fs::read_to_string(folder.path().join("lampyris-trace.1")).unwrap();
+    assert!(page.contains("verify\\-pruning"), "{page}");
+}

@@ -1,0 +1,71 @@
+//! `check` with the real binary: rays that were answered differently can be written out and asked again.
+
+use crate::files::fixture;
+use crate::support::lampyris;
+use serde_json::Value;
+
+fn check(arguments: &[&str]) -> Value {
+    let file = fixture("step/reflector_freeform_trimmed.stp").display().to_string();
+    let (code, out, err) = lampyris(&[&["check", &file, "--json"], arguments].concat());
+    assert_eq!(code, 0, "{err}");
+    serde_json::from_str(&out).unwrap()
+}
+
+fn count(document: &Value, path: &str) -> u64 {
+    document.pointer(path).and_then(Value::as_u64).unwrap_or_else(|| panic!("{path} is missing"))
+}
+
+#[test]
+fn what_was_answered_differently_is_so_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("odd.rays").display().to_string();
+    let first = check(&["--rays", "9000", "--disagreements", &file]);
+    assert_eq!(count(&first, "/rays"), 9000);
+    assert_eq!(count(&first, "/facets_vs_exact/unexplained"), 0);
+    assert_eq!(count(&first, "/octree_vs_bvh/disagree"), 0);
+    // Seven little-endian numbers a ray.
+    let written = std::fs::metadata(&file).unwrap().len() / 56;
+    assert!(written > 0, "facets and spline must differ somewhere at silhouettes and trims");
+    let again = check(&["--replay", &file]);
+    assert_eq!(count(&again, "/rays"), written);
+    for path in [
+        "/facets_vs_exact/hit_miss",
+        "/facets_vs_exact/other_face",
+        "/facets_vs_exact/explained/silhouette",
+        "/facets_vs_exact/explained/trim_edge",
+        "/facets_vs_exact/explained/coincident",
+    ] {
+        assert_eq!(count(&first, path), count(&again, path), "{path}");
+    }
+    let differ = count(&again, "/facets_vs_exact/hit_miss") + count(&again, "/facets_vs_exact/other_face");
+    assert!(differ > 0 && differ <= written, "{again}");
+}
+
+#[test]
+fn the_page_of_a_check_shows_the_disagreeing_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().display().to_string();
+    let found = check(&["--rays", "9000", "-o", &output]);
+    assert_eq!(found["normals"], "bilinear");
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("Rays that are answered differently") && page.contains("trim edge"), "{}", &page[..500]);
+    assert!(folder.path().join("figures/disagreeing.png").is_file());
+    let rays = std::fs::read_to_string(folder.path().join("tables/odd-rays.csv")).unwrap();
+    let listed = rays.lines().count() as u64 - 1;
+    let differ = count(&found, "/facets_vs_exact/hit_miss") + count(&found, "/facets_vs_exact/other_face");
+    assert!(listed >= differ.min(500) && differ > 0, "{listed} of {differ}");
+    let causes = std::fs::read_to_string(folder.path().join("tables/causes.csv")).unwrap();
+    let trim = count(&found, "/facets_vs_exact/explained/trim_edge");
+    assert!(causes.lines().any(|l| l.starts_with(&format!("trim edge,{trim},"))), "{causes}");
+    let kept = std::fs::read_to_string(folder.path().join("check.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&kept).unwrap()["facets_vs_exact"], found["facets_vs_exact"]);
+}
+
+#[test]
+fn normals_that_an_accuracy_chose_are_those_that_are_measured() {
+    let found = check(&["--rays", "6000", "--accuracy", "0.0001deg"]);
+    assert_eq!((&found["normals"], &found["accuracy"]["normals"]), (&"exact".into(), &"exact".into()));
+    // Facets of this tolerance alone err by tenths of a degree.
+    let p99 = found.pointer("/facets_vs_exact/normal_error_deg/p99").and_then(Value::as_f64).unwrap();
+    assert!(p99 < 1e-4, "{p99}");
+}

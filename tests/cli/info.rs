@@ -1,0 +1,109 @@
+//! `info` and what bad STEP files get, with the real binary.
+
+use crate::files::fixture;
+use crate::support::lampyris;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn step(name: &str) -> String {
+    fixture("step").join(name).display().to_string()
+}
+
+fn written(folder: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+#[test]
+fn info_tells_what_the_lamp_holds() {
+    let (code, out, err) = lampyris(&["info", &step("lamp_multicavity.stp")]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert!(out.contains("housing") && out.contains("0 refused") && out.contains("mm"), "{out}");
+}
+
+#[test]
+fn info_json_is_one_document_with_the_agreed_keys() {
+    let (code, out, _) = lampyris(&["info", "--json", &step("lamp_multicavity_inch.stp")]);
+    assert_eq!(code, 0);
+    let document: Value = serde_json::from_str(&out).unwrap();
+    for key in [
+        "file",
+        "bytes",
+        "schema",
+        "units",
+        "parts",
+        "instances",
+        "shells",
+        "faces",
+        "faces_placed",
+        "by_surface",
+        "bbox_mm",
+        "refusals",
+        "names",
+        "seconds",
+        "peak_bytes",
+    ] {
+        assert!(document.get(key).is_some(), "{key} is missing");
+    }
+    let size = std::fs::metadata(step("lamp_multicavity_inch.stp")).unwrap().len();
+    assert_eq!(document["bytes"], size);
+    assert_eq!(document["faces"]["refused"], 0);
+    assert_eq!(document["faces"]["found"], document["faces"]["converted"]);
+    // The model's own millimetres, whatever the unit of the file: as in the millimetre version.
+    let (_, mm, _) = lampyris(&["info", "--json", &step("lamp_multicavity.stp")]);
+    let mm: Value = serde_json::from_str(&mm).unwrap();
+    for (a, b) in [(0, 0), (0, 2), (1, 1)] {
+        let at = |d: &Value| d["bbox_mm"][a][b].as_f64().unwrap();
+        assert!((at(&document) - at(&mm)).abs() < 1e-6, "{} {}", at(&document), at(&mm));
+    }
+}
+
+#[test]
+fn files_that_are_no_step_end_with_3_and_say_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let f = folder.path();
+    let empty = written(f, "empty.stp", b"");
+    let picture = written(f, "picture.stp", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
+    let text = written(f, "notes.stp", "ein Brief, kein Modell\n".as_bytes());
+    for (path, says) in [
+        (f.join("missing.stp"), "missing.stp"),
+        (f.to_path_buf(), "cannot be read"),
+        (empty, "not a STEP file"),
+        (picture, "not a STEP file"),
+        (text, "ISO-10303-21"),
+    ] {
+        for command in [["info", "-q"], ["facet", "-v"], ["check", "-q"]] {
+            let (code, out, err) = lampyris(&[command[0], command[1], &path.display().to_string()]);
+            assert_eq!((code, out.as_str()), (3, ""), "{command:?} {}: {err}", path.display());
+            assert!(err.contains(says), "{command:?} {}: {err}", path.display());
+            assert!(!err.contains("panicked"), "{err}");
+        }
+    }
+}
+
+#[test]
+fn a_truncated_file_is_read_as_far_as_it_goes_and_the_rest_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = std::fs::read(step("lamp_multicavity.stp")).unwrap();
+    for share in [0.1, 0.5, 0.9, 0.999] {
+        let cut = written(folder.path(), "cut.stp", &whole[..(whole.len() as f64 * share) as usize]);
+        let (code, out, err) = lampyris(&["info", "--json", &cut.display().to_string()]);
+        assert!(!err.contains("panicked"), "{err}");
+        // Whatever is left is accounted for, and the loss is never silent.
+        let document: Value = serde_json::from_str(&out).unwrap();
+        let count = |key: &str| document["faces"][key].as_u64().unwrap();
+        assert_eq!(count("found"), count("converted") + count("refused"));
+        let silent = document["problems"].as_array().is_none_or(Vec::is_empty) && count("refused") == 0;
+        assert!(!silent, "{share}: code {code}, nothing was said about the missing end");
+        assert_eq!(code == 4, count("refused") > 0, "{share}");
+    }
+}
+
+#[test]
+fn the_schema_of_a_scene_is_a_json_schema() {
+    let (code, out, _) = lampyris(&["schema"]);
+    let schema: Value = serde_json::from_str(&out).unwrap();
+    assert!(code == 0 && schema["$schema"].as_str().unwrap().contains("json-schema.org"));
+    assert!(schema["properties"]["receiver"].is_object() && schema["properties"]["source"].is_object());
+}

@@ -1,0 +1,15 @@
+//! The command as a user starts it: every test runs the real binary and judges its output, exit code and files.
+
+mod arguments;
+mod check;
+mod demo;
+#[path = "../support/files.rs"]
+mod files;
+mod info;
+mod overrides;
+mod race;
+mod receiver_files;
+mod runs;
+mod scene;
+mod studies;
+mod support;

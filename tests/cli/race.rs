@@ -1,0 +1,62 @@
+//! `study bvh` with the real binary: rows, pictures, the octree's shape as text and as boxes to turn around.
+
+use crate::files::fixture;
+use crate::support::lampyris;
+use serde_json::Value;
+use std::path::Path;
+
+#[test]
+fn the_race_writes_rows_pictures_and_the_octree() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
+    let path = folder.path().display().to_string();
+    let options = ["--json", "--tolerance", "0.01", "--rays", "600", "--threads", "2", "-o", &path, &model];
+    let (code, out, err) = lampyris(&[&["study", "bvh"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let rows = document["rows"].as_array().unwrap();
+    // Six entrants, three kinds of rays; batch and single on one thread, batch on two.
+    assert_eq!(rows.len(), 6 * 3 * 3);
+    for row in rows {
+        assert!(row["mrays_per_s_median"].as_f64().unwrap() > 0.0, "{row}");
+        assert!(row["facets"].as_u64().unwrap() > 100, "{row}");
+        if row["intersector"] != "cwbvh as shipped" {
+            assert_eq!((&row["wrong"], &row["undecided"]), (&Value::from(0), &Value::from(0)), "{row}");
+            assert_eq!(row["differs"], 0, "{row}");
+        }
+    }
+    for threads in [1, 2] {
+        assert!(rows.iter().any(|r| r["threads"] == threads && r["rays_kind"] == "adversarial"));
+    }
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let text = String::from_utf8(read("octree.txt")).unwrap();
+    for part in ["depth", "listed", "bytes a facet", "incoherent rays:", "nodes and", "blocks of 1, 2, 3, 4 facets"]
+    {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let csv = String::from_utf8(read("tables/bvh-rows.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + rows.len());
+    for file in [
+        "report.html",
+        "study.json",
+        "tables/octree.csv",
+        "figures/rates-incoherent.svg",
+        "figures/octree-depths.svg",
+    ] {
+        assert!(!read(file).is_empty());
+    }
+    boxes_are_closed_and_hold_the_lens(folder.path());
+}
+
+/// Boxes as other programs read them: six quads each, inside the lens' own box grown by a step of the nodes.
+fn boxes_are_closed_and_hold_the_lens(folder: &Path) {
+    let vtk = vtkio::Vtk::import(folder.join("octree.vtu")).unwrap();
+    let vtkio::model::DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
+    let vtkio::model::Piece::Inline(piece) = &pieces[0] else { panic!("no piece") };
+    let cells = piece.cells.types.len();
+    assert!(cells > 0 && cells % 6 == 0, "{cells}");
+    let (document, buffers, _) = gltf::import(folder.join("octree.glb")).unwrap();
+    assert!(document.meshes().count() > 0 && !buffers.is_empty());
+    let names: Vec<_> = document.nodes().filter_map(|n| n.name().map(str::to_owned)).collect();
+    assert!(names.iter().any(|n| n.starts_with("depth ")), "{names:?}");
+}

@@ -1,0 +1,222 @@
+//! What stands in the files of a receiver: every channel cell by cell, the flux of IES files, the rays of Data_3; and what a run says
+//! its facets did to the light. The readers here are the tests' own.
+
+use crate::files::fixture;
+use crate::support::lampyris_in;
+use serde_json::Value;
+use std::path::Path;
+
+/// A tilted cos² lobe of white light and a narrow cone, one scene for watts and one for lumens.
+fn trace(unit: &str, receivers: &str) -> (tempfile::TempDir, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let sources = "[[source]]\nkind = 'cosine'\nexponent = 2\ndirection = [0.2, 0.3, 1]\npower = 10\n\
+        spectrum = { kind = 'white_led' }\n\
+        [[source]]\nkind = 'cone'\nhalf_angle_deg = 20\ndirection = [-0.3, 0.1, 1]\npower = 3\nspectrum = { kind = 'd65' }\n";
+    let scene = format!("[run]\nrays = 40_000\nunit = '{unit}'\n{sources}{receivers}");
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let (code, out, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    (folder, serde_json::from_str(&out).unwrap())
+}
+
+/// The columns of a CSV file.
+fn columns(path: &Path) -> Vec<(String, Vec<f64>)> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',');
+    let mut columns: Vec<(String, Vec<f64>)> = names.map(|n| (n.to_owned(), Vec::new())).collect();
+    for line in lines {
+        let cells: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
+        assert_eq!(cells.len(), columns.len());
+        columns.iter_mut().zip(cells).for_each(|((_, column), x)| column.push(x));
+    }
+    columns
+}
+
+#[test]
+fn every_channel_stands_in_the_files_cell_by_cell() {
+    let (folder, found) = trace(
+        "W",
+        "[[receiver]]\nname = 'lumens'\nkind = 'far_field'\ncells = [18, 9]\nchannels = 'photometric'\n\
+         [[receiver]]\nname = 'colour'\nkind = 'far_field'\nangles = 'C'\ncells = [18, 9]\nchannels = 'xyz'\n\
+         [[receiver]]\nname = 'bins'\nat = [0, 0, 900]\nsize = [3000, 2000]\ncells = [6, 4]\nabsorbs = false\n\
+         bins_nm = [380, 480, 580.5, 780]\n",
+    );
+    let (rad, step) = (|deg: f64| deg.to_radians(), [10.0f64, 20.0]);
+    for (k, name, names) in [
+        (0, "lumens", vec!["luminous_intensity_cd"]),
+        (1, "colour", vec!["X_cd", "Y_cd", "Z_cd"]),
+        (2, "bins", vec!["380-480_nm_W_per_m2", "480-580.5_nm_W_per_m2", "580.5-780_nm_W_per_m2"]),
+    ] {
+        let columns = columns(&folder.path().join(format!("out/{name}.csv")));
+        let measure = |row: usize| match k {
+            0 => {
+                rad(step[0])
+                    * (rad(columns[1].1[row] + 0.5 * step[1]).sin() - rad(columns[1].1[row] - 0.5 * step[1]).sin())
+            }
+            1 => rad(20.0) * (rad(columns[1].1[row] - 10.0).cos() - rad(columns[1].1[row] + 10.0).cos()),
+            _ => 0.5 * 0.5,
+        };
+        for (c, wanted) in names.iter().enumerate() {
+            let [values, errors] = [&columns[4 + 2 * c], &columns[5 + 2 * c]];
+            assert_eq!((values.0.as_str(), errors.0.as_str()), (*wanted, &*format!("{wanted}_standard_error")));
+            let sum: f64 = values.1.iter().enumerate().map(|(row, v)| v * measure(row)).sum();
+            let total = found["receivers"][k]["channels"][c]["total"].as_f64().unwrap();
+            assert!(total > 0.1 && (sum / total - 1.0).abs() < 1e-12, "{name} {wanted}: {sum} {total}");
+            assert!(errors.1.iter().any(|e| *e > 0.0));
+        }
+    }
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(folder.path().join("out/colour.npz")).unwrap()).unwrap();
+    let y: Vec<f64> = npyz::NpyFile::new(zip.by_name("Y_cd.npy").unwrap()).unwrap().into_vec().unwrap();
+    assert_eq!(y, columns(&folder.path().join("out/colour.csv"))[6].1);
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("lumens: luminous intensity (cd)"));
+}
+
+/// Type, angles and candela of an LM-63 file, plane by plane.
+fn ies(path: &Path) -> (f64, [Vec<f64>; 2], Vec<f64>) {
+    let text = std::fs::read_to_string(path).unwrap();
+    for key in ["[TEST]", "[TESTLAB]", "[ISSUEDATE]", "[MANUFAC]"] {
+        assert!(text.contains(&format!("\r\n{key} ")), "LM-63-2002 wants {key}");
+    }
+    let (_, body) = text.split_once("TILT=NONE\r\n").unwrap();
+    let numbers: Vec<f64> = body.split_whitespace().map(|w| w.parse().unwrap()).collect();
+    let (rows, planes) = (numbers[3] as usize, numbers[4] as usize);
+    let (v, rest) = numbers[13..].split_at(rows);
+    let (h, candela) = rest.split_at(planes);
+    assert_eq!(candela.len(), rows * planes);
+    (numbers[5], [h.to_vec(), v.to_vec()], candela.to_vec())
+}
+
+/// Lumens of candela that are bilinear between their angles, by the midpoint rule with 40 × 40 points in each field.
+fn flux(kind: f64, [h, v]: &[Vec<f64>; 2], candela: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    for (i, hs) in h.windows(2).enumerate() {
+        for (j, vs) in v.windows(2).enumerate() {
+            let at = |i: usize, j: usize| candela[i * v.len() + j];
+            for k in 0..1600 {
+                let (a, b) = ((f64::from(k % 40) + 0.5) / 40.0, (f64::from(k / 40) + 0.5) / 40.0);
+                let value = (at(i, j) * (1.0 - a) + at(i + 1, j) * a) * (1.0 - b)
+                    + (at(i, j + 1) * (1.0 - a) + at(i + 1, j + 1) * a) * b;
+                let (x, y) = (hs[0] + a * (hs[1] - hs[0]), vs[0] + b * (vs[1] - vs[0]));
+                let weight = match kind {
+                    1.0 => y.to_radians().sin(),
+                    2.0 => x.to_radians().cos(),
+                    _ => y.to_radians().cos(),
+                };
+                sum += value * weight * (hs[1] - hs[0]).to_radians() * (vs[1] - vs[0]).to_radians() / 1600.0;
+            }
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_flux_of_an_ies_file_is_that_of_its_receiver() {
+    let far = "[[receiver]]\nname = 'A'\nkind = 'far_field'\ncells = [20, 20]\n\
+        [[receiver]]\nname = 'B'\nkind = 'far_field'\nangles = 'B'\ncells = [15, 30]\n\
+        [[receiver]]\nname = 'C'\nkind = 'far_field'\nangles = 'C'\ncells = [24, 20]\n";
+    let (lumens, found) = trace("lm", far);
+    for (k, name) in ["A", "B", "C"].iter().enumerate() {
+        let (kind, angles, candela) = ies(&lumens.path().join(format!("out/{name}.ies")));
+        let expected = found["receivers"][k]["power"].as_f64().unwrap();
+        let flux = flux(kind, &angles, &candela);
+        assert!((flux / expected - 1.0).abs() < 1e-4, "{name}: {flux} lm of {expected}");
+        // All planes meet in the poles, and so do their values.
+        let rows = angles[1].len();
+        let same = |first: usize, step: usize| candela[first..].iter().step_by(step).all(|c| *c == candela[first]);
+        match kind {
+            2.0 => assert!(candela[..rows].iter().all(|c| *c == candela[0])),
+            _ => assert!(same(0, rows) && same(rows - 1, rows)),
+        }
+    }
+    let (watts, found) = trace("W", &far.replace("cells", "channels = 'xyz'\ncells"));
+    let (kind, angles, candela) = ies(&watts.path().join("out/C.ies"));
+    let expected = found["receivers"][2]["channels"][1]["total"].as_f64().unwrap();
+    assert!((flux(kind, &angles, &candela) / expected - 1.0).abs() < 1e-4);
+}
+
+#[test]
+fn the_rays_of_data_3_are_those_that_arrived() {
+    let (folder, found) = trace(
+        "lm",
+        "[[receiver]]\nname = 'near'\nat = [0, 0, 100]\nsize = [300, 200]\ncells = [3, 2]\nabsorbs = false\n\
+         [[receiver]]\nname = 'far'\nat = [0, 0, 40_000]\nsize = [80_000, 30_000]\ncells = [3, 2]\n",
+    );
+    for (k, name, z, half) in [(0, "near", 100.0, [150.0, 100.0]), (1, "far", 40_000.0, [40_000.0, 15_000.0])] {
+        let text = std::fs::read_to_string(folder.path().join(format!("out/{name}.data3"))).unwrap();
+        let lines: Vec<Vec<f64>> =
+            text.lines().map(|l| l.split_whitespace().map(|w| w.parse().unwrap()).collect()).collect();
+        assert_eq!((&lines[0][..], lines[1].len(), lines[3][0] as usize), (&[2.0, 3.0][..], 3, lines.len() - 4));
+        let mut power = 0.0;
+        for ray in &lines[4..] {
+            assert!((ray[2] - z).abs() < 1e-6 && ray[0].abs() <= half[0] && ray[1].abs() <= half[1], "{ray:?}");
+            // All light starts in the origin.
+            assert!((ray[0] * ray[5] - ray[3] * ray[2]).abs() < 1e-6 * z);
+            power += ray[6];
+        }
+        let expected = found["receivers"][k]["power"].as_f64().unwrap();
+        assert!((power / expected - 1.0).abs() < 0.05, "{name}: {power} lm of {expected}");
+    }
+}
+
+/// What a far field wrote as LM-63 is the same light again as a source, the right way round.
+#[test]
+fn an_ies_file_read_as_a_source_is_the_light_it_was_written_from() {
+    let far = "[[receiver]]\nname = 'A'\nkind = 'far_field'\ncells = [18, 18]\n\
+        [[receiver]]\nname = 'B'\nkind = 'far_field'\nangles = 'B'\ncells = [18, 18]\n\
+        [[receiver]]\nname = 'C'\nkind = 'far_field'\nangles = 'C'\ncells = [24, 24]\n";
+    let (first, _) = trace("lm", far);
+    // Right of one who looks along +z with +y up is −x: there lies C 0.
+    for (name, x) in [("A", "[0, 1, 0]"), ("B", "[0, 1, 0]"), ("C", "[-1, 0, 0]")] {
+        let file = first.path().join(format!("out/{name}.ies"));
+        let scene = format!(
+            "[run]\nrays = 100_000\nunit = 'lm'\n[[source]]\nkind = 'ies'\nfile = '{}'\nx = {x}\n{far}",
+            file.display()
+        );
+        std::fs::write(first.path().join("again.toml"), scene).unwrap();
+        let (code, _, err) = lampyris_in(first.path(), &["trace", "again.toml", "-o", "again", "-q"]);
+        assert_eq!(code, 0, "{err}");
+        let [before, after] = ["out", "again"].map(|folder| {
+            let columns = columns(&first.path().join(format!("{folder}/{name}.csv")));
+            columns[2].1.clone()
+        });
+        let difference: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).abs()).sum();
+        // Cells of 10° and what lies between their middles; the mirror image differs by 0.4 and more.
+        let share = difference / before.iter().sum::<f64>();
+        assert!(share < 0.12, "{name}: {share}");
+    }
+}
+
+/// A spot that the facets widen is said to be so where people look; with exact normals there is nothing to say.
+#[test]
+fn a_trace_says_where_its_facets_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = fixture("scenes/s1_lens.toml").display().to_string();
+    let trace = |extra: &[&str]| {
+        let arguments: Vec<&str> = [&["trace", &scene, "-o", "out", "--rays", "20000"], extra].concat();
+        let (code, _, err) = lampyris_in(folder.path(), &arguments);
+        assert_eq!(code, 0, "{err}");
+        let text = std::fs::read_to_string(folder.path().join("out/results.json")).unwrap();
+        let said = err.split_whitespace().collect::<Vec<_>>().join(" ").contains("The facets show in the light");
+        (said, serde_json::from_str::<Value>(&text).unwrap())
+    };
+    let (said, flat) = trace(&["--normals", "flat"]);
+    let width = &flat["faceting"]["receivers"][0]["width"][1];
+    assert!(said && width[0].as_f64() > width[1].as_f64(), "{width}");
+    let (said, fine) = trace(&["--tolerance", "0.001"]);
+    assert!(!said && fine["faceting"]["rays"] == 16_384, "{}", fine["faceting"]);
+    let (said, exact) = trace(&["--normals", "exact"]);
+    assert!(!said && exact.get("faceting").is_none());
+}
+
+/// Without a model there are ray paths to look at all the same, and no empty arrays, which glTF forbids.
+#[test]
+fn a_scene_without_a_model_is_drawn() {
+    let (folder, _) = trace("lm", "[[receiver]]\nname = 'near'\nat = [0, 0, 100]\nsize = [300, 200]\n");
+    let bytes = std::fs::read(folder.path().join("out/facets.glb")).unwrap();
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let document: Value = serde_json::from_slice(&bytes[20..20 + length]).unwrap();
+    let accessors = document["accessors"].as_array().unwrap();
+    assert!(accessors.len() == 2 && accessors.iter().all(|a| a["count"].as_u64() > Some(100)), "{accessors:?}");
+}

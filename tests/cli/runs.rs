@@ -1,0 +1,221 @@
+//! Long runs in pieces, lost rays and ray paths, with the real binary.
+
+use crate::files::fixture;
+use crate::support::lampyris_in;
+use serde_json::Value;
+use std::io::Read;
+use std::path::Path;
+
+fn document(folder: &Path, arguments: &[&str], code: i32) -> Value {
+    let (found, out, err) = lampyris_in(folder, arguments);
+    assert_eq!(found, code, "{arguments:?}: {err}");
+    serde_json::from_str(&out).unwrap()
+}
+
+/// A folder with the lens of scene S1, its model under `model.stp`.
+fn lens(change: impl Fn(String) -> String) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let model = std::fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    std::fs::write(folder.path().join("model.stp"), change(model)).unwrap();
+    let scene = std::fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
+    let scene = scene.replace("../step/lens_planoconvex_nurbs.stp", "model.stp").replace("1_000_000", "20_000");
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    folder
+}
+
+/// The model with an open shell in place of its closed one, without the first face.
+fn opened(model: String) -> String {
+    let at = model.find("CLOSED_SHELL(").unwrap();
+    let list = at + model[at..].find('#').unwrap();
+    let rest = list + model[list..].find(',').unwrap() + 1;
+    model[..list].to_owned() + &model[rest..]
+}
+
+/// A lens without one of its faces loses the light that misses the face; each lost ray is in the ledger and ends the same way
+/// when it is traced again.
+#[test]
+fn lost_rays_are_written_down_and_can_be_traced_again() {
+    let folder = lens(opened);
+    let arguments = ["trace", "scene.toml", "-o", "out", "--json", "--max-refused", "1"];
+    let found = document(folder.path(), &arguments, 4);
+    let lost = found["lost_rays"].as_u64().unwrap();
+    assert!(lost > 0 && found["power"]["lost"].as_f64().unwrap() > 0.0);
+    assert_eq!(found["ledger"], "lost_rays.csv");
+    let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows.len() as u64, lost.min(1000));
+    assert!(ledger.starts_with("ray,branch,bounce,cause,power,x_mm,"));
+    let again = document(
+        folder.path(),
+        &["trace", "scene.toml", "-o", "again", "--replay", "out/lost_rays.csv", "--json"],
+        0,
+    );
+    let rays = again["rays"].as_array().unwrap();
+    assert_eq!(rays.len(), rows.len());
+    for (row, ray) in rows.iter().zip(rays) {
+        assert_eq!(ray["ray"].as_u64(), row[0].parse().ok());
+        let end = &ray["lost"][0];
+        assert_eq!(end["cause"].as_str(), Some(row[3]));
+        for k in 0..3 {
+            // The reader of JSON rounds the last bit in its own way.
+            let same = |a: &Value, b: &str| {
+                let (a, b) = (a.as_f64().unwrap(), b.parse::<f64>().unwrap());
+                (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()
+            };
+            assert!(same(&end["origin"][k], row[5 + k]) && same(&end["direction"][k], row[8 + k]));
+        }
+        let vertices = ray["vertices"].as_array().unwrap();
+        assert_eq!(
+            (vertices[0]["event"].as_str(), vertices.last().unwrap()["event"].as_str()),
+            (Some("emitted"), Some("lost"))
+        );
+    }
+    assert!(folder.path().join("again/replay.vtp").is_file());
+    let (code, out, err) =
+        lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", rows[0][0]]);
+    assert!(code == 0 && out.contains("lost: no exit"), "{out}{err}");
+    for (wrong, code, says) in
+        [("99999999", 2, "20000 rays"), ("gone.csv", 3, "gone.csv"), ("scene.toml", 3, "not a ledger")]
+    {
+        let (found, _, err) =
+            lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", wrong]);
+        assert!(found == code && err.contains(says), "{wrong}: {found} {err}");
+    }
+}
+
+/// Parts of a run, merged in any order, are the single run, file by file.
+#[test]
+fn shards_merge_to_the_bits_of_one_run() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let whole = document(path, &["trace", "scene.toml", "-o", "whole", "--json"], 0);
+    for k in ["1/3", "2/3", "3/3"] {
+        let file = format!("part{}.tally", &k[..1]);
+        let part =
+            document(path, &["trace", "scene.toml", "--shard", k, "-o", &file, "--json", "--threads", "1"], 0);
+        assert_eq!(part["of"], 128);
+    }
+    let merged =
+        document(path, &["merge", "part3.tally", "part1.tally", "part2.tally", "-o", "merged", "--json"], 0);
+    assert_eq!(whole["digest"], merged["digest"]);
+    assert_eq!(whole["power"], merged["power"]);
+    assert_eq!(merged["check"]["octree_vs_bvh"]["disagree"], 0);
+    for file in ["focus.csv", "focus.data3", "paths.vtp"] {
+        let read = |folder: &str| std::fs::read(path.join(folder).join(file)).unwrap();
+        assert!(read("whole") == read("merged"), "{file}");
+    }
+    // A part too few, one twice, one of another run, a damaged one.
+    let other = ["trace", "scene.toml", "--shard", "2/3", "-o", "other.tally", "--seed", "9"];
+    assert_eq!(lampyris_in(path, &other).0, 0);
+    let mut torn = std::fs::read(path.join("part2.tally")).unwrap();
+    torn.pop();
+    std::fs::write(path.join("torn.tally"), &torn).unwrap();
+    torn[200] ^= 1;
+    std::fs::write(path.join("bent.tally"), &torn).unwrap();
+    for (second, says) in [
+        ("part3.tally", "shard 2/3"),
+        ("part1.tally", "in an earlier part already"),
+        ("other.tally", "another run"),
+        ("torn.tally", "checksum"),
+        ("bent.tally", "checksum"),
+        ("model.stp", "not a tally file"),
+        ("gone.tally", "gone.tally"),
+    ] {
+        let (code, _, err) = lampyris_in(path, &["merge", "part1.tally", second, "-o", "no"]);
+        assert!(code == 3 && err.replace("\n", " ").contains(says), "{second}: {code} {err}");
+        assert!(!path.join("no").exists());
+    }
+    for wrong in ["0/3", "4/3", "x"] {
+        assert_eq!(lampyris_in(path, &["trace", "scene.toml", "--shard", wrong]).0, 2, "{wrong}");
+    }
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", "1/200"]);
+    assert!(code == 2 && err.contains("128 replicates"), "{err}");
+}
+
+/// A run that is killed goes on from where it was saved, to the bits of one that was not.
+#[test]
+fn a_killed_run_resumes_to_the_same_bits() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let whole = document(path, &["trace", "scene.toml", "--rays", "200000", "-o", "whole", "--json"], 0);
+    let options = ["trace", "scene.toml", "--rays", "200000", "-o", "out", "--threads", "1", "--checkpoint", "0"];
+    let binary = assert_cmd::cargo::cargo_bin("lampyris");
+    let mut child = std::process::Command::new(binary).current_dir(path).args(options).spawn().unwrap();
+    let saved = path.join("out/checkpoint.tally");
+    for _ in 0..2000 {
+        if saved.is_file() || child.try_wait().unwrap().is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(saved.is_file() && !path.join("out/results.json").exists(), "it was killed on the way");
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", "100000", "-o", "out", "--resume"]);
+    assert!(code == 2 && err.contains("another run"), "{err}");
+    let (code, out, err) =
+        lampyris_in(path, &["trace", "scene.toml", "--rays", "200000", "-o", "out", "--resume", "--json"]);
+    assert!(code == 0 && err.contains("going on from"), "{err}");
+    let resumed: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&whole["digest"], &whole["power"]), (&resumed["digest"], &resumed["power"]));
+    assert!(!saved.exists());
+}
+
+#[test]
+fn a_run_goes_on_until_its_error_is_small_enough() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let found = document(path, &["trace", "scene.toml", "-o", "out", "--until-error", "0.05%@focus", "--json"], 0);
+    let answer = &found["until_error"];
+    assert_eq!(answer["reached"], true);
+    let (power, error) = (&found["receivers"][0]["power"], &found["receivers"][0]["power_error"]);
+    assert!(error.as_f64().unwrap() <= 0.0005 * power.as_f64().unwrap());
+    // The very run with so many rays.
+    let rays = answer["rays"].to_string();
+    let same = document(path, &["trace", "scene.toml", "-o", "same", "--rays", &rays, "--json"], 0);
+    assert_eq!(same["digest"], found["digest"]);
+    let stopped =
+        ["trace", "scene.toml", "-o", "out", "--until-error", "0.0001%@focus", "--rays", "5000", "--json"];
+    assert_eq!(document(path, &stopped, 4)["until_error"]["reached"], false);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--until-error", "1%@fokus"]);
+    assert!(code == 2 && err.contains("fokus") && err.contains("focus"), "{err}");
+}
+
+/// An array of an NPZ file, by an independent reader.
+fn array<T: npyz::Deserialize>(path: &Path, name: &str) -> Vec<T> {
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(path).unwrap()).unwrap();
+    let mut bytes = Vec::new();
+    zip.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap()
+}
+
+/// Every path is in the file: one start a ray, as many hits as segments, and the power of the ends is that of the results.
+#[test]
+fn all_ray_paths_are_streamed() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let found = document(path, &["trace", "scene.toml", "-o", "out", "--paths", "paths.npz", "--json"], 0);
+    let file = path.join("paths.npz");
+    let (rays, events) = (array::<u64>(&file, "ray"), array::<u8>(&file, "event"));
+    let (points, power) = (array::<f64>(&file, "point"), array::<f64>(&file, "power"));
+    assert_eq!((events.len(), points.len(), power.len()), (rays.len(), 3 * rays.len(), rays.len()));
+    let of = |event: u8| (0..rays.len()).filter(|&k| events[k] == event).collect::<Vec<_>>();
+    let starts = of(0);
+    assert_eq!(starts.len(), 20_000);
+    let mut seen: Vec<u64> = starts.iter().map(|&k| rays[k]).collect();
+    seen.sort_unstable();
+    assert!(seen.iter().enumerate().all(|(i, r)| i as u64 == *r), "every ray starts once");
+    assert_eq!(found["segments"].as_u64(), Some((rays.len() - starts.len()) as u64));
+    let received: f64 = of(6).iter().map(|&k| power[k]).sum::<f64>() / 20_000.0;
+    assert!((received - found["power"]["received"].as_f64().unwrap()).abs() < 1e-12);
+    for k in of(6) {
+        assert!((points[3 * k + 2] - 107.026853).abs() < 1e-9, "light is received on the plane");
+    }
+    // The sample for pictures is as large as ever, and so are the results.
+    let without = document(path, &["trace", "scene.toml", "-o", "without", "--json"], 0);
+    assert_eq!(found["digest"], without["digest"]);
+    let size = |folder: &str| std::fs::metadata(path.join(folder).join("paths.vtp")).unwrap().len();
+    assert_eq!(size("out"), size("without"));
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--paths", "paths.parquet"]);
+    assert!(code == 2 && err.contains(".npz"), "{err}");
+}

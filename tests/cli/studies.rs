@@ -1,0 +1,45 @@
+//! Studies with the real binary: the table on the terminal, one row for each effect.
+
+use crate::files::fixture;
+use crate::support::lampyris;
+use serde_json::Value;
+
+#[test]
+fn every_effect_that_a_scene_does_not_call_for_is_priced_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().display().to_string();
+    let scene = fixture("scenes/s3_reflector.toml").display().to_string();
+    let (code, out, err) = lampyris(&["study", "effects", "--rays", "3000", "--json", "-o", &path, &scene]);
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let rows = document["rows"].as_array().unwrap();
+    // S3 is mirrors and black faces: eight of the nine effects are not called for.
+    assert_eq!((rows.len(), &rows[0]["choice"], &rows[9]["choice"]), (10, &"pruned".into(), &"full".into()));
+    assert_eq!(rows[0]["effects"], serde_json::json!(["reflection"]));
+    assert_eq!(rows[9]["effects"].as_array().unwrap().len(), 9);
+    assert_eq!((&rows[0]["kernel"], &rows[9]["kernel"]), (&"mirror".into(), &"full".into()));
+    let added: Vec<&str> = rows[1..9].iter().map(|r| r["added"].as_str().unwrap()).collect();
+    assert!(added.contains(&"polarisation") && added.contains(&"bulk_scatter") && !added.contains(&"reflection"));
+    for row in rows {
+        assert_eq!(row["identical"], true, "{row}");
+        assert!(row["seconds_trace_median"].as_f64().unwrap() > 0.0, "{row}");
+    }
+}
+
+#[test]
+fn the_terminal_shows_the_table_and_the_folder_holds_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().display().to_string();
+    let scene = fixture("scenes/s3_reflector.toml").display().to_string();
+    let (code, out, err) = lampyris(&["study", "effects", "--rays", "3000", "-o", &path, &scene]);
+    assert_eq!((code, out.as_str()), (0, ""), "{err}");
+    let words = |start: &str| {
+        let line =
+            err.lines().find(|l| l.trim_start().starts_with(start)).unwrap_or_else(|| panic!("{start}: {err}"));
+        line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(words("as called for: reflection").contains(&"mirror".into()));
+    assert!(words("+ polarisation").ends_with(&["yes".into()]));
+    let csv = std::fs::read_to_string(folder.path().join("tables/effects.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 11, "{csv}");
+}

@@ -1,0 +1,5 @@
+//! Files and pages that are written, opened by readers that others wrote.
+
+mod facets;
+mod grids;
+mod report_page;

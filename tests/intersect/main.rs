@@ -1,0 +1,7 @@
+//! The contract of intersectors on facets, and the shortcuts of the octree that must change no answer.
+
+mod facets;
+mod horizon;
+mod light;
+mod normals;
+mod support;

@@ -1,0 +1,72 @@
+//! Sources laid exactly on faces, edges and corners of solids: their light starts on the side it goes to, and none is lost.
+
+use crate::support::World;
+use lampyris::math::Point;
+
+const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
+
+/// A black block, as wide as the glass that lies on it.
+fn black() -> World {
+    let mut world = World::default();
+    world.cuboid("die", Point::new(-1e3, -1e3, -1.0), Point::new(1e3, 1e3, 0.0));
+    world
+}
+
+#[test]
+fn light_of_a_disc_on_an_opaque_solid_goes_out() {
+    for (source, out) in [
+        ("kind = 'lambertian'\nat = [0, 0, 0]\nradius = 0.5", 1.0),
+        ("kind = 'lambertian'\nat = [0.1, 0.2, 0]\nsize = [1, 1]", 1.0),
+        ("kind = 'point'\nat = [0.1, 0.3, 0]", 0.5),
+        ("kind = 'point'\nat = [-1e3, 0.3, 0]", 0.75),
+    ] {
+        let text = format!(
+            "[run]\nrays = 4000\n[[material]]\npart = 'die'\nsurface = 'absorber'\n[[source]]\n{source}\n{FAR}"
+        );
+        let r = black().run(&text, |_| ());
+        assert_eq!(r.lost_rays, 0, "{source}: {:?}", r.ledger.first());
+        assert!((r.power.received - out).abs() < 2e-3, "{source}: {:?}", r.power);
+    }
+}
+
+/// Glass glued on a black die that shines: its light starts in the glass. Of diffuse light inside, Walsh's 0.596346 is reflected at
+/// the far face and ends on the die.
+#[test]
+fn a_die_shines_into_what_is_glued_on_it() {
+    for (source, gap) in [
+        ("kind = 'lambertian'\nat = [0, 0, 0]\nradius = 0.5", 0.0),
+        ("kind = 'lambertian'\non = { part = 'die', face = 'z1' }", 0.0),
+        ("kind = 'lambertian'\non = { part = 'die', face = 'z1' }", 5e-4),
+        ("kind = 'lambertian'\non = { part = 'die', face = 'z1' }", -5e-4),
+    ] {
+        let mut world = black();
+        world.cuboid("glass", Point::new(-1e3, -1e3, gap), Point::new(1e3, 1e3, 1.0));
+        let text = format!(
+            "[run]\nrays = 10000\n[[medium]]\nname = 'glass'\nindex = 1.5
+            [[material]]\npart = 'die'\nsurface = 'absorber'\n[[material]]\npart = 'glass'\nmedium = 'glass'
+            [[source]]\n{source}\n{FAR}"
+        );
+        let r = world.run(&text, |_| ());
+        assert_eq!(r.lost_rays, 0, "{source} {gap}: {:?}", r.ledger.first());
+        // 1σ of random rays is 0.005; near the rim of the slab, some 1e-3 of it, light leaves by the sides.
+        assert!((r.power.absorbed - 0.596346).abs() < 0.012, "{source} {gap}: {:?}", r.power);
+    }
+}
+
+/// From the middle of a face half of an isotropic source goes out at once, and of what goes in, as from anywhere in the block,
+/// `3 cos θc − 2` is caught; from an edge a quarter goes in, from a corner an eighth.
+#[test]
+fn a_point_on_a_clear_block_shines_in_and_out() {
+    let caught = 3.0 * (1.0 - 1.0 / 2.25f64).sqrt() - 2.0;
+    for (at, inside) in [("[5, 5, 10]", 0.5), ("[4, 6, 0]", 0.5), ("[0, 0, 5]", 0.25), ("[10, 10, 10]", 0.125)] {
+        let mut world = World::default();
+        world.cuboid("block", Point::ZERO, Point::splat(10.0));
+        let text = format!(
+            "[run]\nrays = 2000\n[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'block'\nmedium = 'glass'
+            [[source]]\nkind = 'point'\nat = {at}\n{FAR}"
+        );
+        let r = world.run(&text, |_| ());
+        assert_eq!(r.lost_rays, 0, "{at}: {:?}", r.ledger.first());
+        assert!((r.power.cut_off - inside * caught).abs() < 0.015, "{at}: {:?}", r.power);
+    }
+}

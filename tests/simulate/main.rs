@@ -1,0 +1,19 @@
+//! Light through scenes: laws of physics, closed forms, and the scenes of the fixtures.
+
+mod caught;
+mod closed;
+mod contacts;
+mod effects;
+mod facets;
+#[path = "../support/files.rs"]
+mod files;
+mod fixture_scenes;
+mod hard;
+mod imaging;
+mod laid;
+mod laws;
+mod polished;
+mod refusals;
+mod scenes;
+mod sources;
+mod support;

@@ -1,0 +1,239 @@
+//! What a scene file says wrong is refused with its line, and what it says of a model is obeyed.
+
+use crate::files::fixture;
+use lampyris::simulate::Scene;
+use lampyris::step;
+use std::path::Path;
+
+const REST: &str = r#"
+    [[source]]
+    kind = "point"
+    at = [0, 0, 0]
+    power = 1
+"#;
+
+fn refusal(head: &str) -> String {
+    let text = format!("{head}\n{REST}");
+    Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(head).to_string()
+}
+
+#[test]
+fn values_out_of_range_are_refused_by_name() {
+    for (head, key) in [
+        ("[accuracy]\ntolerance_mm = [-0.1, 0.2]", "tolerance_mm"),
+        ("[accuracy]\ntolerance_mm = [0.2, 0.05]", "tolerance_mm"),
+        ("[accuracy]\nangle_deg = 95", "angle_deg"),
+        ("[[model]]\nfile = \"x.stp\"\nunit_mm = 0", "unit_mm"),
+        ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = -1 }", "scale"),
+        ("[run]\nrays = 0", "rays"),
+        ("[run]\nray = 10", "ray"),
+    ] {
+        let said = refusal(head);
+        assert!(said.contains(key), "{head}: {said}");
+        assert!(said.contains("scene.toml"), "{head}: {said}");
+    }
+}
+
+#[test]
+fn a_unit_given_by_the_user_replaces_that_of_the_file() {
+    let file = fixture("step/lens_planoconvex_nurbs.stp");
+    let box_of = |unit: Option<f64>| {
+        let settings = step::Settings { length_unit_mm: unit, ..step::Settings::default() };
+        step::read(&file, &settings).expect("the lens reads").report.bbox_mm.expect("a box")
+    };
+    let (own, inches) = (box_of(None), box_of(Some(25.4)));
+    for corner in 0..2 {
+        for axis in 0..3 {
+            assert!((inches[corner][axis] - 25.4 * own[corner][axis]).abs() < 1e-6);
+        }
+    }
+}
+
+const PLANE: &str = "[[receiver]]\nname = 'r'\nsize = [1, 1]\n";
+
+/// A list with more entries than belong there is no list that means something else.
+#[test]
+fn lists_that_are_too_long_are_refused() {
+    for (head, line) in [
+        ("[[receiver]]\nname = 'r'\nsize = [1, 1]\ncells = [3, 4, 5]", 4),
+        ("[[receiver]]\nname = 'r'\nsize = [1, 1]\nat = [0, 0, 10, 5]", 4),
+        ("[[medium]]\nname = 'g'\nschott = [2.2, 0, 0, 0, 0, 0, 7]", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = [[400, 1.5], [500, 1.4, 1.3]]", 3),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { at = [0, 0, 0, 0] }", 3),
+    ] {
+        let said = refusal(head);
+        assert!(said.contains("values where") && said.contains(&format!("scene.toml:{line}:")), "{head}: {said}");
+    }
+}
+
+/// Lumens of lumens are nothing, and no lumens come from light that the eye does not see.
+#[test]
+fn lumens_are_not_weighed_twice() {
+    let lumens = "[run]\nunit = 'lm'\n";
+    assert!(refusal(&format!("{lumens}{PLANE}channels = 'xyz'")).contains("scene.toml:6:"));
+    let dark = "[[source]]\nspectrum = { kind = 'lines', values = [[900, 1], [950, 1]] }";
+    assert!(refusal(&format!("{lumens}{dark}")).contains("sees nothing"));
+    for key in ["graded_index", "index_extraordinary"] {
+        let said = refusal(&format!("[[medium]]\nname = 'g'\nindex = 1.5\n{key} = 1"));
+        assert!(said.contains("is not simulated"), "{said}");
+    }
+}
+
+/// Whatever is written must mean something, or be refused by its name and line.
+#[test]
+fn what_means_nothing_is_refused_by_name() {
+    for (head, key, line) in [
+        (format!("{PLANE}radius = 3"), "radius", 4),
+        (format!("{PLANE}h_deg = [-5, 5]"), "h_deg", 4),
+        (format!("{PLANE}instance = 'x'"), "instance", 4),
+        ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nsize = [1, 1]".into(), "size", 4),
+        (format!("{PLANE}cells = [4000, 4000]\nbins_nm = [400, 500, 600, 700]"), "cells", 4),
+        ("[[model]]\nname = 'x'".into(), "file", 1),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { z = [0, 0, 0] }".into(), "z", 3),
+        ("[[model]]\nfile = 'x.stp'\nplacement = { at = [nan, 0, 0] }".into(), "at", 3),
+        ("[run]\nrays = 1.5".into(), "1e6", 2),
+        ("[run]\nglue_mm = 0".into(), "glue_mm", 2),
+        ("[run]\nmax_bounces = 0".into(), "max_bounces", 2),
+        ("[accuracy]\nintersector = 'otree'".into(), "octree", 2),
+        ("[accuracy]\nnormals = 'smooth'".into(), "bilinear", 2),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nscatter_per_mm = 1\nanisotropy = 1.5".into(), "anisotropy", 5),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nabsorption_per_mm = -1".into(), "absorption", 4),
+        ("[[source]]\nkind = 'point'\npower = 1e-300".into(), "power", 3),
+        ("[[source]]\nkind = 'point'\nspectrum = 'd65'".into(), "spectrum = { kind", 3),
+        ("[[source]]\nkind = 'point'\nx = [0, 0, 0]".into(), "x", 3),
+        ("[[source]]\nkind = 'ies'\nfile = 'a.ies'".into(), "lumens", 3),
+        ("[[source]]\nkind = 'rays'\nfile = 'a.csv'\nradius = 3".into(), "radius", 4),
+        ("[source]\nkind = 'point'".into(), "[[source]]", 1),
+        (
+            "[[material]]\npart = 'x'\nsurface = 'coating'\ncoating = 'ideal'".into(),
+            "`transmittance` in its place",
+            4,
+        ),
+        ("[[material]]\npart = 'x'\nscatter = { lobe = 'abg', abg = 0.1 }".into(), "A, B and g", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = 1.5".into(), "index_table = [[450", 3),
+        ("[[medium]]\nname = 'g'\nindex_table = [[450, 1.5], 3]".into(), "index_table = [[450", 3),
+        ("[[medium]]\nname = 'g'\ngradient_index = [1, 2]".into(), "gradient index is not simulated", 3),
+        ("[[medium]]\nname = 'g'\nindex = 1.5\nGRIN = 0.1".into(), "gradient index is not simulated", 4),
+        ("[[medium]]\nname = 'g'\nextraordinary_index = 1.5".into(), "birefringence is not simulated", 3),
+        (
+            "[[medium]]\nname = 'g'\nfluorescence = { quantum_yield = 0.9 }".into(),
+            "fluorescence is not simulated",
+            3,
+        ),
+        ("[[fluorescence]]\nmedium = 'g'".into(), "fluorescence is not simulated", 1),
+        ("[[material]]\npart = 'x'\nsurface = 'fluorescent'".into(), "fluorescence is not simulated", 3),
+        ("[[material]]\npart = 'x'\nsurface = 'grating'".into(), "diffraction is not simulated", 3),
+    ] {
+        let text = if head.contains("[source]") && !head.contains("[[") {
+            head.clone()
+        } else {
+            format!("{head}\n{REST}")
+        };
+        let e = Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(&head);
+        let said = e.to_string();
+        assert!(said.contains(key), "{head}: {said}");
+        assert_eq!(e.line().map(|l| l.0), Some(line), "{head}: {said}");
+    }
+    let text = "[run]\npolarisation = true\n[[source]]\nkind = 'point'\npolarised = [0, 0, 0]";
+    let said = Scene::parse(text, "scene.toml", Path::new(".")).unwrap_err().to_string();
+    assert!(said.contains("scene.toml:5"), "{said}");
+}
+
+#[test]
+fn numbers_may_be_written_as_people_write_them() {
+    let text = format!("[run]\nrays = 1e6\n[accuracy]\ntolerance_mm = 0.1\n{REST}");
+    let scene = Scene::parse(&text, "scene.toml", Path::new(".")).unwrap();
+    assert_eq!((scene.run.rays, scene.accuracy.tolerance_mm), (1_000_000, Some([0.1, 0.1])));
+}
+
+#[test]
+fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
+    let file = fixture("step/lens_planoconvex_nurbs.stp");
+    let model = step::read(&file, &step::Settings::default()).unwrap().model;
+    let part = model.parts[0].name.clone();
+    let glass = format!("[[material]]\npart = '{part}'\nmedium = 'N-BK7'\n");
+    for (text, says) in [
+        (format!("[[material]]\npart = '{part}'\nsurface = 'interface'\n{REST}"), "no medium"),
+        (format!("[[material]]\nat = [1e5, 0, 0]\nmedium = 'N-BK7'\n{REST}"), "mm from the nearest face"),
+        (format!("{glass}{REST}    inside = 'no such'\n"), "there are:"),
+        (format!("{glass}[[receiver]]\nname = 'a'\nkind = 'absorbed'\npart = 'housing'\n{REST}"), "'housing'"),
+        (
+            format!(
+                "[[medium]]\nname = 'g'\nsellmeier = [[1.2, 0.16]]\n[[material]]\npart = '{part}'\nmedium = 'g'\n{REST}    spectrum = {{ values = [[395, 1], [600, 1]] }}\n"
+            ),
+            "has no index at 395 nm",
+        ),
+    ] {
+        let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
+        let e = scene.bind(&model).expect_err(&text);
+        assert!(e.to_string().contains(says) && e.line().is_some(), "{text}: {e}");
+    }
+}
+
+/// Light of wavelengths that a table or a formula was not made for is used at the table's ends, and this is said by name.
+#[test]
+fn light_beyond_a_table_is_named() {
+    let file = fixture("step/lens_planoconvex_nurbs.stp");
+    let model = step::read(&file, &step::Settings::default()).unwrap().model;
+    let index = "index_table = [[420, 1.53], [700, 1.51]]";
+    let clear = "index = 1.5\nabsorption_per_mm = [[420, 0.01], [700, 0.02]]";
+    let coat = |from: f64| {
+        format!("coating = [[0, {from:?}, 0.1, 0.8], [0, 700, 0.1, 0.8], [90, {from:?}, 1, 0], [90, 700, 1, 0]]")
+    };
+    for (medium, coating, spectrum, says) in [
+        (index, String::new(), "kind = 'lines', values = [[450, 1], [650, 1]]", &[][..]),
+        (index, String::new(), "kind = 'lines', values = [[450, 1], [750, 1]]", &["index_table", "750"]),
+        (clear, String::new(), "kind = 'd65'", &["absorption_per_mm", "360 to 830"]),
+        ("index = 1.5", coat(400.0), "kind = 'white_led'", &["coating", "400 to 700", "380 to 780"]),
+        ("index = 1.5", coat(400.0), "kind = 'table', values = [[400, 1], [700, 2]]", &[]),
+        (
+            "index = 1.5",
+            "reflectance = [[0, 500, 0.5], [0, 600, 0.7]]".into(),
+            "kind = 'black_body', kelvin = 3000",
+            &["reflectance"],
+        ),
+        ("catalogue = 'PMMA'", String::new(), "values = [[405, 1]]", &["'PMMA'", "436.8", "405 nm", "formula"]),
+        ("catalogue = 'fused silica'", String::new(), "values = [[405, 1]]", &[]),
+    ] {
+        let surface = if coating.is_empty() { String::new() } else { format!("surface = 'coating'\n{coating}\n") };
+        let text = format!(
+            "[[medium]]\nname = 'g'\n{medium}\n[[material]]\npart = '*'\nmedium = 'g'\n{surface}{REST}    name = 'lamp'\n    spectrum = {{ {spectrum} }}\n"
+        );
+        let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
+        let notes = scene.bind(&model).expect(&text).notes().join("; ");
+        assert_eq!(notes.is_empty(), says.is_empty(), "{text}: {notes}");
+        assert!(says.iter().all(|word| notes.contains(word)), "{text}: {notes}");
+    }
+}
+
+/// The schema's conditions speak of keys that there are, and ask for those without which the reader refuses an entry.
+#[test]
+fn the_schema_asks_for_what_the_reader_asks_for() {
+    fn required<'a>(value: &'a serde_json::Value, into: &mut Vec<&'a str>) {
+        match value {
+            serde_json::Value::Object(map) => map.iter().for_each(|(key, v)| match (key.as_str(), v) {
+                ("required", serde_json::Value::Array(keys)) => into.extend(keys.iter().filter_map(|k| k.as_str())),
+                _ => required(v, into),
+            }),
+            serde_json::Value::Array(list) => list.iter().for_each(|v| required(v, into)),
+            _ => {}
+        }
+    }
+    let schema = Scene::schema();
+    assert_eq!(schema["required"][0], "source");
+    for (name, wanted) in [
+        ("Medium", "name"),
+        ("Receiver", "name"),
+        ("Receiver", "size"),
+        ("Source", "half_angle_deg"),
+        ("SpectrumKey", "kelvin"),
+        ("Material", "surface"),
+    ] {
+        let definition = &schema["$defs"][name];
+        let mut keys = Vec::new();
+        required(definition, &mut keys);
+        assert!(keys.contains(&wanted), "{name}: {keys:?}");
+        assert!(keys.iter().all(|k| definition["properties"].get(k).is_some()), "{name}: {keys:?}");
+    }
+    assert!(schema["$defs"]["Accuracy"]["properties"]["normals"]["pattern"].as_str().unwrap().contains("[fF][lL]"));
+}

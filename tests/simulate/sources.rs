@@ -1,0 +1,259 @@
+//! Sources on faces and from files, and the honesty of stated errors.
+
+use crate::support::World;
+use lampyris::formats::{LightRay, PhotometricType, Photometry, write_data1, write_ies, write_rays};
+use lampyris::math::{Point, Vector};
+use lampyris::simulate::{RunSettings, Scene, simulate};
+use std::f64::consts::PI;
+
+const ALL: &str = "[[receiver]]\nname = 'all'\nkind = 'far_field'\nh_deg = [-180, 180]\ncells = [4, 2]\n";
+
+/// A Lambertian sphere looks the same from everywhere: P/4π in every direction, and no ray meets its own surface.
+#[test]
+fn a_shining_sphere_shines_evenly() {
+    let mut world = World::default();
+    world.sphere("bulb", Point::new(3.0, 0.0, 0.0), 5.0);
+    let text = format!(
+        "[run]\nrays = 100_000\n[[source]]\nkind = 'lambertian'\npower = 12\non = {{ part = 'bulb' }}\n{ALL}"
+    );
+    let r = &world.run(&text, |_| ());
+    assert_eq!(r.segments, r.rays, "no ray hits the sphere it leaves");
+    for (cell, error) in r.receivers[0].cells.iter().zip(&r.receivers[0].errors) {
+        assert!((cell - 12.0 / (4.0 * PI)).abs() < 4.0 * error + 1e-3, "{cell} ± {error}");
+    }
+}
+
+/// Only the face that is named shines, outward.
+#[test]
+fn a_shining_face_of_a_box() {
+    let mut world = World::default();
+    world.cuboid("led", Point::new(-2.0, -1.0, 0.0), Point::new(2.0, 1.0, 0.3));
+    let screen = "[[receiver]]\nname = 'near'\nat = [0, 0, 0.31]\nsize = [10, 10]\ncells = [10, 10]\n";
+    let text = format!(
+        "[run]\nrays = 50_000\n[[source]]\nkind = 'cosine'\nexponent = 1\non = {{ part = 'led', face = 'z1' }}\n{screen}{ALL}"
+    );
+    let r = world.run(&text, |_| ());
+    assert_eq!(r.power.absorbed, 0.0);
+    // 0.01 mm above the face the light is still where it left: RMS of an even 4 × 2 rectangle is 2/√3 and 1/√3.
+    let rms = r.receivers[0].rms;
+    assert!((rms[0] - 2.0 / 3f64.sqrt()).abs() < 0.02 && (rms[1] - 1.0 / 3f64.sqrt()).abs() < 0.02, "{rms:?}");
+}
+
+#[test]
+fn ray_lists_are_drawn_by_power() {
+    let folder = tempfile::tempdir().unwrap();
+    let ray = |x: f64, power: f64, nm: f64| LightRay {
+        origin: Point::new(x, 0.0, 0.0),
+        direction: Vector::Z,
+        power,
+        wavelength_nm: Some(nm),
+    };
+    let rays = [ray(-1.0, 1.0, 450.0), ray(2.0, 3.0, 650.0), ray(0.0, 0.0, 500.0)];
+    let (csv, data) = (folder.path().join("rays.csv"), folder.path().join("rays.txt"));
+    write_rays(&csv, &rays).unwrap();
+    write_data1(&data, &rays).unwrap();
+    let screen =
+        "[[receiver]]\nname = 'x'\nat = [0, 0, 20]\nsize = [10, 10]\ncells = [1, 1]\nbins_nm = [400, 600, 700]\n";
+    for (file, kind) in [(&csv, "rays"), (&data, "data_1")] {
+        let source = format!("[[source]]\nkind = '{kind}'\nfile = '{}'\nat = [0, 0, 5]\n", file.display());
+        let r = World::default().run(&format!("[run]\nrays = 4000\n{source}{screen}"), |_| ());
+        let x = &r.receivers[0];
+        assert!((r.power.emitted - 4.0).abs() < 1e-9 && (x.power - 4.0).abs() < 1e-9);
+        assert!((x.centroid[0] - 1.25).abs() < 1e-9, "{:?}", x.centroid);
+        if kind == "rays" {
+            assert!((x.channels[0].total - 1.0).abs() < 1e-9 && (x.channels[1].total - 3.0).abs() < 1e-9);
+        }
+    }
+}
+
+/// What goes in as candela comes out as candela: an IES file of cosⁿ about its axis, n = 2, 100 cd at the peak.
+#[test]
+fn an_ies_file_comes_out_as_it_went_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("spot.ies");
+    let gamma: Vec<f64> = (0..=90).map(f64::from).collect();
+    let candela: Vec<f64> = gamma.iter().map(|g| 100.0 * g.to_radians().cos().powi(2)).collect();
+    let photometry = Photometry {
+        kind: PhotometricType::C,
+        horizontal_deg: vec![0.0],
+        vertical_deg: gamma,
+        candela,
+        lamp_lumens: None,
+        watts: 1.0,
+        opening_mm: [0.0; 3],
+        keywords: vec![("TEST".into(), "none".into()), ("MANUFAC".into(), "none".into())],
+    };
+    write_ies(&path, &photometry).unwrap();
+    let source = format!("[[source]]\nkind = 'ies'\nfile = '{}'\ndirection = [0, 0, -1]\n", path.display());
+    let far = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\nnormal = [0, 0, -1]\nv_deg = [0, 90]\ncells = [1, 9]\n";
+    let r = World::default().run(&format!("[run]\nrays = 100_000\nunit = 'lm'\n{source}{far}"), |_| ());
+    // Flux 2π·100/3; piecewise linear in γ, so a little less.
+    assert!((r.power.emitted - 200.0 * PI / 3.0).abs() < 0.05, "{}", r.power.emitted);
+    assert_eq!(r.receivers[0].unit, "cd");
+    for (j, cell) in r.receivers[0].cells.iter().enumerate() {
+        let c = |k: usize| (10.0 * k as f64).to_radians().cos();
+        let mean = 100.0 / 3.0 * (c(j).powi(3) - c(j + 1).powi(3)) / (c(j) - c(j + 1));
+        assert!((cell - mean).abs() < 0.3, "{j}: {cell} {mean}");
+    }
+}
+
+/// Stated errors cover the truth in 68 % and 95 % of 200 seeds, for random numbers and for nets.
+#[test]
+fn stated_errors_are_honest() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+    // Half of the light of a cone meets the glass; Walsh's share is replaced by a plain count on half a plane.
+    let receivers = "[[receiver]]\nname = 'quarter'\nat = [5, 5, -10]\nsize = [10, 10]\ncells = [1, 1]\n";
+    let source = "[[source]]\nkind = 'lambertian'\nat = [0.3, 0.1, -20]\n";
+    // Power on a rectangle from a Lambertian point: (1/2π) Σ edges γ (e·n), the exact form factor of a polygon.
+    let truth = {
+        let p = Vector::new(0.3, 0.1, -20.0);
+        let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]
+            .map(|[x, y]| (Vector::new(x, y, -10.0) - p).normalize());
+        let edge = |i: usize| {
+            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+            a.cross(b).normalize().z * a.dot(b).acos()
+        };
+        (0..4).map(edge).sum::<f64>() / (2.0 * PI)
+    };
+    for sampling in ["random", "sobol"] {
+        let text = format!("[run]\nrays = 4096\nsampling = '{sampling}'\n{source}{receivers}");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let (mut one, mut two) = (0, 0);
+        for seed in 0..200 {
+            let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
+            let r = &simulate(&bound, &world, &settings, &|_| true).receivers[0];
+            let away = (r.power - truth).abs() / r.power_error;
+            one += i32::from(away < 1.0);
+            two += i32::from(away < 2.0);
+        }
+        // Binomial of 200: 136.5 ± 6.6 within one and 190.9 ± 2.9 within two standard errors; 3 sigma allowed.
+        assert!((117..=156).contains(&one), "{sampling}: {one} of 200 within one standard error");
+        assert!((182..=200).contains(&two), "{sampling}: {two} of 200 within two standard errors");
+    }
+}
+
+/// The error of every cell of a map, over 200 seeds: cells of one run are not independent, so the share is that of all together.
+#[test]
+fn errors_of_cells_are_honest() {
+    let world = World::default();
+    let source = "[[source]]\nkind = 'lambertian'\nat = [0.3, 0.1, -20]\n";
+    let receiver = "[[receiver]]\nname = 'map'\nat = [5, 5, -10]\nsize = [12, 12]\ncells = [4, 4]\n";
+    let p = Vector::new(0.3, 0.1, -20.0);
+    let truth = |k: usize| {
+        let [x, y] = [(k % 4) as f64, (k / 4) as f64].map(|i| 3.0 * i - 1.0);
+        let corners = [[x, y], [x + 3.0, y], [x + 3.0, y + 3.0], [x, y + 3.0]]
+            .map(|[x, y]| (Vector::new(x, y, -10.0) - p).normalize());
+        let edge = |i: usize| {
+            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+            a.cross(b).normalize().z * a.dot(b).acos()
+        };
+        // W/m² on 9 mm².
+        (0..4).map(edge).sum::<f64>() / (2.0 * PI) / 9e-6
+    };
+    for sampling in ["random", "sobol"] {
+        let text = format!("[run]\nrays = 16384\nsampling = '{sampling}'\n{source}{receiver}");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let (mut one, mut two, mut all) = (0.0, 0.0, 0.0);
+        for seed in 0..200 {
+            let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
+            let r = &simulate(&bound, &world, &settings, &|_| true).receivers[0];
+            for k in 0..16 {
+                let away = (r.cells[k] - truth(k)).abs() / r.errors[k];
+                one += f64::from(away < 1.0);
+                two += f64::from(away < 2.0);
+                all += 1.0;
+            }
+        }
+        // 3200 of them: ±0.025 and ±0.011 at three sigma were they independent; cells of one seed are nearly so.
+        assert!((one / all - 0.6827f64).abs() < 0.03, "{sampling}: {} within one standard error", one / all);
+        assert!((two / all - 0.9545f64).abs() < 0.015, "{sampling}: {} within two standard errors", two / all);
+    }
+}
+
+/// Solid angle of a triangle seen from the origin (Van Oosterom and Strackee 1983).
+fn solid_angle([a, b, c]: [Vector; 3]) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let below = la * lb * lc + a.dot(b) * lc + a.dot(c) * lb + b.dot(c) * la;
+    2.0 * a.dot(b.cross(c)).abs().atan2(below)
+}
+
+/// The error of what a box absorbs on three faces together, whose ups and downs are not independent.
+#[test]
+fn errors_of_absorbed_flux_are_honest() {
+    let mut world = World::default();
+    world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
+    let from = Vector::new(3.0, 2.5, 2.0);
+    let truth = {
+        let side = |axis: usize| {
+            let corner = |u: f64, v: f64| {
+                let mut p = [0.0; 3];
+                (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (1.0, u, v);
+                Vector::from_array(p) - from
+            };
+            let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            solid_angle([a, b, c]) + solid_angle([a, c, d])
+        };
+        (0..3).map(side).sum::<f64>() / (4.0 * PI)
+    };
+    for sampling in ["random", "sobol"] {
+        let text =
+            format!("[run]\nrays = 4096\nsampling = '{sampling}'\n[[source]]\nkind = 'point'\nat = [3, 2.5, 2]\n");
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let (mut one, mut two, mut sum) = (0, 0, 0.0);
+        for seed in 0..200 {
+            let settings = RunSettings { seed, threads: 1, ..RunSettings::from(&scene.run) };
+            let r = simulate(&bound, &world, &settings, &|_| true);
+            let absorbed = &r.absorbed[0];
+            assert_eq!(absorbed.power, r.power.absorbed);
+            let away = (absorbed.power - truth).abs() / absorbed.error;
+            sum += absorbed.power / 200.0;
+            one += i32::from(away < 1.0);
+            two += i32::from(away < 2.0);
+        }
+        assert!((sum / truth - 1.0).abs() < 5e-3, "{sampling}: {sum}, not {truth}");
+        // Binomial of 200: 136.5 ± 6.6 within one and 190.9 ± 2.9 within two standard errors; 3 sigma allowed.
+        assert!((117..=156).contains(&one), "{sampling}: {one} of 200 within one standard error");
+        assert!((182..=200).contains(&two), "{sampling}: {two} of 200 within two standard errors");
+    }
+}
+
+/// 1 W at 450 nm and 1 W at 555 nm are lumens in the ratio of V(λ), 0.038 to 1; what a red filter lets through of a black body's lumens
+/// is what the eye sees of that part.
+#[test]
+fn lumens_of_a_spectrum_are_those_that_the_eye_sees() {
+    let bins = |spectrum: &str, bins: &str| -> Vec<f64> {
+        let text = format!(
+            "[run]\nrays = 100_000\nunit = 'lm'\n[[source]]\nkind = 'collimated'\npower = 100\nspectrum = {spectrum}\n\
+             [[receiver]]\nname = 'r'\nat = [0, 0, 5]\nsize = [1, 1]\ncells = [1, 1]\nbins_nm = {bins}\n"
+        );
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let world = World::default();
+        let bound = scene.bind(&world.model).unwrap();
+        let r = simulate(&bound, &world, &RunSettings::from(&scene.run), &|_| true);
+        r.receivers[0].channels.iter().map(|c| c.total).collect()
+    };
+    let lines = bins("{ kind = 'lines', values = [[450, 1], [555, 1]] }", "[400, 500, 600]");
+    assert!(
+        (lines[0] - 100.0 * 0.038 / 1.038).abs() < 0.01 && (lines[1] - 100.0 / 1.038).abs() < 0.01,
+        "{lines:?}"
+    );
+    // 2856 K (illuminant A) from 620 nm on: 12.47 % of its lumens, by the CIE's table at 5 nm and Planck's law.
+    let warm = bins("{ kind = 'black_body', kelvin = 2856 }", "[360, 620, 830]");
+    assert!((warm[1] - 12.47).abs() < 0.05, "{warm:?}");
+}
+
+/// With two replicates only three quarters of all runs lie within two errors, which a reader must know.
+#[test]
+fn few_replicates_are_named() {
+    let notes = |replicates: u32| {
+        let scene = Scene::parse("[[source]]\nkind = 'point'\n", "test.toml", std::path::Path::new(".")).unwrap();
+        let world = World::default();
+        let settings = RunSettings { rays: 1000, replicates, ..RunSettings::from(&scene.run) };
+        simulate(&scene.bind(&world.model).unwrap(), &world, &settings, &|_| true).notes
+    };
+    assert!(notes(2)[0].contains("12.71") && notes(8)[0].contains("2.36") && notes(32).is_empty());
+}

@@ -1,0 +1,9 @@
+//! Reading STEP files and the splines they hold, judged by quadrature and by figures of other programs.
+
+mod corpus;
+mod faces;
+#[path = "../support/files.rs"]
+mod files;
+mod fixtures;
+mod nurbs_properties;
+mod support;

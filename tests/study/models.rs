@@ -1,0 +1,115 @@
+//! The court, and accuracy asked for as an angle, on real files: fixtures always, the corpus where it is.
+
+use crate::files::{corpus, fixture, read_model, step_files};
+use lampyris::intersect::bvh::{self, Bvh};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::model::Model;
+use lampyris::study::aim::{Ask, aim};
+use lampyris::study::check::{Cause, Check, Court, Settings, check};
+use lampyris::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
+use lampyris::study::{Product, Workshop};
+use lampyris::tessellate;
+
+/// A third of the rays from a camera, a third at random, a third bouncing inside.
+fn judge(model: &Model, rays: u64) -> Check {
+    let made = tessellate::tessellate(model, &tessellate::Settings::default());
+    let octree = Octree::build(&made.mesh, &octree::Settings::default());
+    let bvh = Bvh::build(&made.mesh, &bvh::Settings::default());
+    let product = Product::new(model);
+    let bounds = made.mesh.bounds();
+    let camera = Camera::new(&bounds, rays / 3);
+    let uniform = Uniform::new(&bounds, 1, rays / 3);
+    let bounces = Bounces::new(&bounds, &octree, 0.8, 2, rays / 3);
+    let chain = Chain(vec![&camera, &uniform, &bounces]);
+    let court = Court { model, mesh: &made.mesh, octree: &octree, bvh: &bvh, exact: product.exact() };
+    assert_eq!(chain.len(), rays / 3 * 3);
+    check(&court, &chain, &Settings::default(), &|_| ())
+}
+
+fn line(name: &str, c: &Check) -> String {
+    let f = &c.facets_vs_exact;
+    let mut text = format!(
+        "{name}: {} rays, {} hits, {} facets; octree/bvh {} ({} ties); flips {}, other face {}, unexplained {}; {:?}; uncertified {}\n",
+        c.rays,
+        c.hits,
+        c.scene.facets,
+        c.octree_vs_bvh.disagree,
+        c.octree_vs_bvh.ties,
+        f.hit_miss,
+        f.other_face,
+        f.unexplained,
+        f.explained,
+        c.exact.uncertified
+    );
+    let odd = |d: &&lampyris::study::check::Disagreement| {
+        d.facets_differ || matches!(d.cause, Some(Cause::Unexplained(_)))
+    };
+    for d in c.disagreements.iter().filter(odd).take(4) {
+        let show = |h: Option<lampyris::intersect::Hit>| {
+            h.map(|h| format!("t {} face {} n {:.3} {:?}", h.t, h.face.0, h.geometric_normal, h.certainty))
+        };
+        text += &format!(
+            "    ray {} {} {}: {:?}\n      octree {:?}\n      bvh {:?}\n      exact {:?}\n",
+            d.index,
+            d.ray.origin,
+            d.ray.direction,
+            d.cause,
+            show(d.octree),
+            show(d.bvh),
+            show(d.exact)
+        );
+    }
+    text
+}
+
+#[test]
+fn fixtures_have_no_unexplained_difference() {
+    let folder = fixture("step");
+    let mut bad = String::new();
+    for path in step_files(&folder) {
+        let model = read_model(&path).expect("fixtures are readable");
+        let found = judge(&model, 30_000);
+        let text = line(&path.file_name().unwrap_or_default().to_string_lossy(), &found);
+        println!("{text}");
+        assert!(found.hits > 1000, "{text}");
+        if found.facets_vs_exact.unexplained + found.octree_vs_bvh.disagree > 0 {
+            bad += &text;
+        }
+    }
+    assert!(bad.is_empty(), "{bad}");
+}
+
+#[test]
+#[ignore = "minutes: the whole corpus, LAMPYRIS_RAYS rays a file"]
+fn corpus_through_the_court() {
+    let folder = corpus();
+    let rays = std::env::var("LAMPYRIS_RAYS").ok().and_then(|r| r.parse().ok()).unwrap_or(30_000);
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
+    let all = step_files(&folder);
+    if all.is_empty() {
+        println!("no corpus at {}: nothing judged", folder.display());
+    }
+    for path in all.iter().filter(|p| p.to_string_lossy().contains(&only)) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let start = std::time::Instant::now();
+        match read_model(path) {
+            Some(model) if model.placed_face_count() > 0 => {
+                let text = line(&name, &judge(&model, rays));
+                println!("{:.1} s {text}", start.elapsed().as_secs_f64());
+            }
+            _ => println!("{name}: not read"),
+        }
+    }
+}
+
+#[test]
+fn an_angle_asked_for_is_reached() {
+    let path = fixture("step/lens_planoconvex_nurbs.stp");
+    let model = read_model(&path).expect("fixtures are readable");
+    let product = Product::new(&model);
+    for degrees in [0.5, 0.02] {
+        let ask = Ask { check_rays: 20_000, ..Ask::degrees(degrees) };
+        let found = aim(&model, &product, &ask, &|_| ());
+        assert!(found.kept && found.reached_deg <= degrees && found.checked > 1000, "{found:?}");
+    }
+}

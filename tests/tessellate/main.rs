@@ -1,0 +1,16 @@
+//! Facets and what is promised of them, judged by sampling that shares nothing with the proof.
+
+mod borders;
+mod closed;
+mod creases;
+mod field;
+#[path = "../support/files.rs"]
+mod files;
+mod fixtures;
+mod folder;
+mod poles;
+mod promises;
+mod proof;
+mod repairs;
+mod shapes;
+mod support;
