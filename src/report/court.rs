@@ -4,14 +4,14 @@ use super::{AxisStyle, Cell, Chart, Content, Provenance, Report, Section, Table,
 use super::{figures, grouped};
 use crate::formats::{Facets, Polylines};
 use crate::math::{Point, Vector};
-use crate::study::check::{Cause, Check, Disagreement};
+use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
 
 /// Everything that the report of a check speaks of.
 pub struct Trial<'a> {
     /// Name of what was checked.
     pub title: String,
     /// What was found.
-    pub check: &'a Check,
+    pub check: &'a CrossCheck,
     /// The facets in their groups.
     pub facets: &'a Facets<'a>,
     /// Whose normals were measured: `bilinear`, `exact` and so on.
@@ -36,7 +36,7 @@ struct Kind {
     meaning: &'static str,
 }
 
-fn kinds(check: &Check) -> Vec<Kind> {
+fn kinds(check: &CrossCheck) -> Vec<Kind> {
     let e = &check.facets_vs_exact.explained;
     let kind = |name, count, colour, meaning| Kind { name, count, colour, meaning };
     vec![
@@ -99,7 +99,7 @@ fn kind_of(d: &Disagreement) -> &'static str {
 }
 
 /// What was found, in a sentence.
-pub fn verdict(check: &Check) -> String {
+pub fn verdict(check: &CrossCheck) -> String {
     let f = &check.facets_vs_exact;
     let between = match check.octree_vs_bvh.disagree {
         0 => "octree and BVH agree on every one".to_owned(),
@@ -113,7 +113,7 @@ pub fn verdict(check: &Check) -> String {
 }
 
 /// All counts in one table.
-pub(super) fn counts(check: &Check) -> Table {
+pub(super) fn counts(check: &CrossCheck) -> Table {
     let (f, e) = (&check.facets_vs_exact, &check.facets_vs_exact.explained);
     let mut table = Table::new("cross-check", "The same rays, three intersectors", &[("", ""), ("rays", "")]);
     for (name, count) in [
@@ -139,7 +139,7 @@ pub(super) fn counts(check: &Check) -> Table {
 }
 
 /// How far hits and normals are off, where both hit the same place.
-pub(super) fn errors(check: &Check, who: &str) -> Table {
+pub(super) fn errors(check: &CrossCheck, who: &str) -> Table {
     let f = &check.facets_vs_exact;
     let columns = [("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")];
     let title = format!("How far the {who} are from the spline, where both hit the same place");
@@ -152,7 +152,7 @@ pub(super) fn errors(check: &Check, who: &str) -> Table {
 }
 
 /// Facets and rays that facets and spline answer differently, by cause; `None` where there are none.
-pub(super) fn odd_rays(check: &Check, facets: &Facets) -> Option<View> {
+pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
     let diagonal = facets.mesh.bounds().diagonal();
     if check.disagreements.is_empty() || !diagonal.is_finite() {
         return None;
@@ -217,7 +217,7 @@ impl Trial<'_> {
     /// The whole report.
     pub fn report(&self) -> Report {
         let sections = vec![self.rays(), self.distance(), self.speed()];
-        let title = format!("Check of {}", self.title);
+        let title = format!("CrossCheck of {}", self.title);
         Report { title, answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 

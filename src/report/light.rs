@@ -8,7 +8,7 @@ use super::{figures, grouped, seconds};
 use crate::formats::file_stem;
 use crate::formats::{Facets, Grid, Polylines};
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
-use crate::study::check::Check;
+use crate::study::cross_check::CrossCheck;
 use crate::study::faceting::Faceting;
 
 /// Everything that the report of a traced scene speaks of.
@@ -22,7 +22,7 @@ pub struct Light<'a> {
     /// Unit of powers: `W` or `lm`.
     pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
-    pub check: Option<&'a Check>,
+    pub check: Option<&'a CrossCheck>,
     /// Some of the rays on facets and on the spline.
     pub faceting: Option<&'a Faceting>,
     /// More 3-D views: of the facets, of the octree.
@@ -280,7 +280,7 @@ impl Light<'_> {
         table
     }
 
-    fn cross_check(&self, check: &Check) -> Section {
+    fn cross_check(&self, check: &CrossCheck) -> Section {
         let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";

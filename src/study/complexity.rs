@@ -103,7 +103,7 @@ struct Ready<'r> {
 
 /// Runs all methods on the three lamps.
 ///
-/// # Errors
+/// # HitErrors
 /// Those of binding the generated scenes.
 pub fn complexity(
     methods: &[Method<'_>],
@@ -115,7 +115,7 @@ pub fn complexity(
     // Shares of the work, about: the traditional method has the same budget on every lamp, facets and rays grow.
     let shares = [0.0, 0.25, 0.5];
     for (lamp, share) in lamps().iter().zip(shares) {
-        clock.at(lamp.name, share);
+        clock.report(lamp.name, share);
         let bound = Scene::parse(&lamp.scene, "lamp.toml", Path::new("."))?.bind(&lamp.model)?;
         let mut rounds = Rounds::default();
         for method in methods {
@@ -126,7 +126,7 @@ pub fn complexity(
             rows.extend(race(lamp, &bound, (ready, &prepare), settings));
         });
     }
-    clock.at("done", 1.0);
+    clock.report("done", 1.0);
     let answer = sentence(&rows);
     rows.extend(PAPER.map(|(model, saved)| Row {
         model: model.into(),

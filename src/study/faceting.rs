@@ -3,7 +3,7 @@
 //! Random numbers are keyed by ray and bounce, so both follow the same paths until the facets turn them away, and most of the noise
 //! cancels in the differences. Errors of the differences come from replicate to replicate, of widths to first order.
 
-use super::receivers::{Part, by_replicate};
+use super::receivers::{ReplicateSums, trace_replicates};
 use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, ReceiverResult, Results, RunSettings};
 use serde::Serialize;
@@ -57,7 +57,7 @@ impl OnBoth {
 
 /// Traces `settings.rays` rays on both.
 pub fn faceting(bound: &BoundScene, [facets, spline]: [&dyn Intersector; 2], settings: &RunSettings) -> Faceting {
-    let both = [facets, spline].map(|i| by_replicate(bound, i, settings));
+    let both = [facets, spline].map(|i| trace_replicates(bound, i, settings));
     let receivers = (0..both[0].0.receivers.len())
         .filter(|&k| both[0].0.receivers[k].kind != "absorbed")
         .map(|k| on_both(k, &both))
@@ -66,12 +66,12 @@ pub fn faceting(bound: &BoundScene, [facets, spline]: [&dyn Intersector; 2], set
 }
 
 /// Width of a receiver's light along an axis, and what each replicate adds to it, to first order; in half sides of the receiver.
-fn width(k: usize, axis: usize, (_, parts): &(Results, Vec<Vec<Part>>)) -> (f64, Vec<f64>) {
-    let sum = |of: &dyn Fn(&Part) -> f64| -> f64 { parts.iter().filter_map(|p| p.get(k)).map(of).sum() };
+fn width(k: usize, axis: usize, (_, parts): &(Results, Vec<Vec<ReplicateSums>>)) -> (f64, Vec<f64>) {
+    let sum = |of: &dyn Fn(&ReplicateSums) -> f64| -> f64 { parts.iter().filter_map(|p| p.get(k)).map(of).sum() };
     let power = sum(&|p| p.power as f64).max(1.0);
     let (mean, square) = (sum(&|p| p.first[axis]) / power, sum(&|p| p.second[axis]) / power);
     let width = (square - mean * mean).max(0.0).sqrt();
-    let influence = |p: &Part| {
+    let influence = |p: &ReplicateSums| {
         let (w, first, second) = (p.power as f64, p.first[axis], p.second[axis]);
         let change = (second - square * w) - 2.0 * mean * (first - mean * w);
         if width > 0.0 { 0.5 * change / (power * width) } else { 0.0 }
@@ -79,7 +79,7 @@ fn width(k: usize, axis: usize, (_, parts): &(Results, Vec<Vec<Part>>)) -> (f64,
     (width, parts.iter().map(|p| p.get(k).map_or(0.0, influence)).collect())
 }
 
-fn on_both(k: usize, both: &[(Results, Vec<Vec<Part>>); 2]) -> OnBoth {
+fn on_both(k: usize, both: &[(Results, Vec<Vec<ReplicateSums>>); 2]) -> OnBoth {
     let [found, truth]: [&ReceiverResult; 2] = [&both[0].0.receivers[k], &both[1].0.receivers[k]];
     let quantum = both[1].0.quantum;
     let power = |i: usize| both[i].1.iter().map(move |p| p.get(k).map_or(0.0, |p| p.power as f64) * quantum);

@@ -1,14 +1,19 @@
 //! The seed paper's table 2: how the normal between the corners is got, its error and its time.
 
-use super::errors::Errors;
+use super::hit_errors::HitErrors;
+use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource, answer, with_intersectors};
 use super::rays::{RaySource, Uniform};
 use super::timing::Clock;
-use super::workshop::{Meshed, Tree, Workshop, answer, with_all};
 use super::{Progress, Rounds};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::Ray;
 use serde::{Deserialize, Serialize};
 use std::sync::Mutex;
+
+/// The search for a number of facets stays within these tolerances, mm: from a nanometre to a kilometre.
+const TOLERANCES_MM: [f64; 2] = [1e-6, 1e6];
+/// Mean error of bilinear normals below which a face is flat: far above rounding (1e-16), far below any curved facet.
+const FLAT: f64 = 1e-9;
 
 /// What is compared and how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,15 +72,15 @@ const ALGORITHMS: [NormalMode; 4] =
 
 /// Compares the ways on each model, on one thread.
 pub fn interpolation(
-    models: &[(&str, &dyn Workshop)],
+    models: &[(&str, &dyn MeshSource)],
     settings: &Settings,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Interpolation {
     let clock = Clock::new(progress);
     let mut rows = Vec::new();
-    for (i, (name, workshop)) in models.iter().enumerate() {
-        clock.at(name, i as f64 / models.len() as f64);
-        rows.extend(one(name, *workshop, settings));
+    for (i, (name, mesh_source)) in models.iter().enumerate() {
+        clock.report(name, i as f64 / models.len() as f64);
+        rows.extend(one(name, *mesh_source, settings));
     }
     let answer = sentence(&rows);
     rows.extend(PAPER.map(|(algorithm, error, seconds)| Row {
@@ -86,30 +91,30 @@ pub fn interpolation(
         seconds_median: seconds,
         ..Row::default()
     }));
-    clock.at("done", 1.0);
+    clock.report("done", 1.0);
     Interpolation { rows, answer }
 }
 
 /// A mesh of about the wanted number of facets: their number goes with 1/tolerance.
-pub(super) fn mesh_of(workshop: &dyn Workshop, facets: usize) -> Meshed {
+pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMesh {
     let mut tolerance = 0.1;
-    let mut meshed = workshop.mesh([tolerance; 2]);
+    let mut meshed = mesh_source.mesh([tolerance; 2]);
     for _ in 0..6 {
         let ratio = meshed.mesh.facets.len() as f64 / facets.max(1) as f64;
         if (0.8..1.25).contains(&ratio) || meshed.mesh.facets.is_empty() {
             break;
         }
-        tolerance = (tolerance * ratio.clamp(0.02, 50.0)).clamp(1e-6, 1e6);
-        meshed = workshop.mesh([tolerance; 2]);
+        tolerance = (tolerance * ratio.clamp(0.02, 50.0)).clamp(TOLERANCES_MM[0], TOLERANCES_MM[1]);
+        meshed = mesh_source.mesh([tolerance; 2]);
     }
     meshed
 }
 
-fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
-    let meshed = mesh_of(workshop, settings.facets);
-    let (rays, truth) = hitting(workshop, &meshed, settings);
+fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row> {
+    let meshed = mesh_of(mesh_source, settings.facets);
+    let (rays, truth) = hitting(mesh_source, &meshed, settings);
     let hits = ALGORITHMS.map(|_| Mutex::new(vec![None; rays.len()]));
-    let timings = with_all(workshop, &meshed.mesh, &[Tree::Octree], &ALGORITHMS, |trees| {
+    let timings = with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &ALGORITHMS, |trees| {
         let mut rounds = Rounds::default();
         for ((_, _, tree), hits) in trees.iter().zip(&hits) {
             let rays = &rays;
@@ -124,13 +129,13 @@ fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
     let row = |((algorithm, hits), (_, timing)): ((NormalMode, &Mutex<Vec<Option<Hit>>>), _)| {
         let timing: super::Timing = timing;
         let hits = hits.lock().map(|h| h.clone()).unwrap_or_default();
-        let errors = Errors::of(&rays, &hits, &truth);
+        let errors = HitErrors::between(&rays, &hits, &truth);
         Row {
             model: name.into(),
             facets: Some(meshed.mesh.facets.len()),
             algorithm: algorithm.name().into(),
             normal_error_mean: errors.normal.mean(),
-            normal_error_p99: Some(errors.normal.at(0.99)),
+            normal_error_p99: Some(errors.normal.quantile(0.99)),
             normal_error_max: Some(errors.normal.max()),
             seconds_min: Some(timing.min),
             seconds_median: timing.median,
@@ -140,7 +145,11 @@ fn one(name: &str, workshop: &dyn Workshop, settings: &Settings) -> Vec<Row> {
 }
 
 /// Rays that hit the spline, with their exact hits; fewer than wanted when the model is hard to hit.
-fn hitting(workshop: &dyn Workshop, meshed: &Meshed, settings: &Settings) -> (Vec<Ray>, Vec<Option<Hit>>) {
+fn hitting(
+    mesh_source: &dyn MeshSource,
+    meshed: &MeasuredMesh,
+    settings: &Settings,
+) -> (Vec<Ray>, Vec<Option<Hit>>) {
     let (mut rays, mut truth) = (Vec::new(), Vec::new());
     let source = Uniform::new(&meshed.mesh.bounds(), settings.seed, 20 * settings.rays);
     let mut begin = 0;
@@ -148,7 +157,7 @@ fn hitting(workshop: &dyn Workshop, meshed: &Meshed, settings: &Settings) -> (Ve
         let end = (begin + settings.rays).min(source.len());
         let tried = source.rays(begin..end);
         let mut hits = vec![None; tried.len()];
-        answer(workshop.exact(), &tried, rayon::current_num_threads(), &mut hits);
+        answer(mesh_source.exact(), &tried, rayon::current_num_threads(), &mut hits);
         let good = tried.into_iter().zip(hits).filter(|(_, h)| h.is_some());
         for (ray, hit) in good.take(settings.rays as usize - rays.len()) {
             rays.push(ray);
@@ -176,7 +185,7 @@ pub struct Ratios {
 
 impl Ratios {
     /// From the rows of one model; `None` when a kind is missing.
-    pub fn of(rows: &[Row]) -> Option<Self> {
+    pub fn from_rows(rows: &[Row]) -> Option<Self> {
         let row = |name: &str| rows.iter().find(|r| r.algorithm == name);
         let (nearest, bilinear, cubic) = (row("nearest")?, row("bilinear")?, row("cubic")?);
         let [n, b, c] = [nearest, bilinear, cubic].map(|r| r.normal_error_mean);
@@ -190,7 +199,7 @@ impl Ratios {
         let elsewhere = row("exact").is_some_and(|e| e.normal_error_mean > 0.5 * c);
         let why_not = match (mean_falls, at_p99.is_none_or(falls)) {
             (true, true) => None,
-            _ if b < 1e-9 => Some("the faces are flat: all errors are rounding"),
+            _ if b < FLAT => Some("the faces are flat: all errors are rounding"),
             (false, true) if elsewhere => {
                 Some("a few rays meet the face elsewhere on facets and make the mean; the 99th percentile falls")
             }
@@ -212,7 +221,7 @@ impl Ratios {
 fn sentence(rows: &[Row]) -> String {
     let models: Vec<(&str, Ratios)> = rows
         .chunk_by(|a, b| a.model == b.model)
-        .filter_map(|of| Some((of[0].model.as_str(), Ratios::of(of)?)))
+        .filter_map(|of| Some((of[0].model.as_str(), Ratios::from_rows(of)?)))
         .collect();
     let range = |value: &dyn Fn(&Ratios) -> f64| {
         let (low, high) =

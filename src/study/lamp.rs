@@ -1,6 +1,6 @@
 //! Three lamps of one generator: one cavity, three cavities, twelve cavities with thousands of spline patches.
 
-use super::specimen;
+use super::sample_models;
 use crate::math::{Homogeneous, Point};
 use crate::model::Model;
 use crate::nurbs::{ControlPoint, Surface};
@@ -49,7 +49,7 @@ fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp 
         );
     }
     scene.push_str("\n[[receiver]]\nname = \"wall\"\nkind = \"plane\"\nat = [0, 0, 5000]\nnormal = [0, 0, 1]\nsize = [4000, 4000]\ncells = [40, 40]\n");
-    Lamp { name, model: specimen::model(name, surfaces), patches: cavities * spans * spans, scene }
+    Lamp { name, model: sample_models::model(name, surfaces), patches: cavities * spans * spans, scene }
 }
 
 /// A rippled paraboloid over a square, as a bicubic spline: control points on the function at the Greville abscissae.

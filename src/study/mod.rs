@@ -1,4 +1,4 @@
-//! The court that judges every disagreement between intersectors, and the studies of what accuracy costs in time.
+//! The cross-check that explains every disagreement between intersectors, and the studies of what accuracy costs in time.
 //!
 //! Everything here works on `&dyn Intersector` and returns plain structs that serialise to the rows of the command's
 //! JSON; drawing and printing them is the work of `report` and `cli`. Expected figures come from closed forms, from the
@@ -10,30 +10,30 @@
 //! does not say that the facets are as good as they could be.
 
 pub mod accuracy;
-pub mod aim;
-pub mod check;
+pub mod accuracy_target;
+pub mod arbiter;
 pub mod complexity;
+pub mod cross_check;
 pub mod effects;
-mod errors;
 pub mod faceting;
+mod hit_errors;
 pub mod interpolation;
-pub mod judge;
 pub mod lamp;
-mod lit;
-mod product;
+mod mesh_source;
+mod model_mesh_source;
 mod quantiles;
 mod random;
 pub mod rays;
 pub mod receivers;
 pub mod records;
-pub mod specimen;
+pub mod sample_models;
+mod scene_accuracy;
 pub mod stability;
 mod timing;
-mod workshop;
 
-pub use lit::accuracy_of_scene;
-pub use product::Product;
+pub use mesh_source::{FacetTree, MeasuredMesh, MeshSource};
+pub use model_mesh_source::ModelMeshSource;
 pub use quantiles::{Quantiles, Summary};
 pub use random::Random;
+pub use scene_accuracy::scene_accuracy;
 pub use timing::{Progress, Rounds, Timing};
-pub use workshop::{Meshed, Tree, Workshop};

@@ -1,3 +1,5 @@
+//! Quantiles of millions of values in fixed memory: a histogram with logarithmic bins.
+
 use serde::Serialize;
 
 /// Bins per factor of two: a quantile is read off with a relative error of at most 0.6 %.
@@ -91,7 +93,7 @@ impl Quantiles {
     }
 
     /// The value below which a share of the values lies, within 0.6 %; 0 without any value.
-    pub fn at(&self, share: f64) -> f64 {
+    pub fn quantile(&self, share: f64) -> f64 {
         let wanted = (share.clamp(0.0, 1.0) * self.count as f64).ceil().max(1.0) as u64;
         let mut seen = self.zeros;
         if self.count == 0 || seen >= wanted {
@@ -108,7 +110,7 @@ impl Quantiles {
 
     /// Median, 99th percentile and maximum.
     pub fn summary(&self) -> Summary {
-        Summary { p50: self.at(0.5), p99: self.at(0.99), max: self.max }
+        Summary { p50: self.quantile(0.5), p99: self.quantile(0.99), max: self.max }
     }
 }
 
@@ -123,13 +125,13 @@ mod tests {
             if i % 2 == 0 { &mut low } else { &mut high }.add(i as f64 * 1e-6);
         }
         low.merge(&high);
-        assert!((low.at(0.5) / 500e-6 - 1.0).abs() < 0.006);
-        assert!((low.at(0.99) / 990e-6 - 1.0).abs() < 0.006);
+        assert!((low.quantile(0.5) / 500e-6 - 1.0).abs() < 0.006);
+        assert!((low.quantile(0.99) / 990e-6 - 1.0).abs() < 0.006);
         assert_eq!(low.max(), 1e-3);
         assert!((low.mean() / 500.5e-6 - 1.0).abs() < 1e-12);
         let mut zeros = Quantiles::default();
         zeros.add(0.0);
-        assert_eq!(zeros.at(0.9), 0.0);
+        assert_eq!(zeros.quantile(0.9), 0.0);
         assert_eq!(Quantiles::default().summary(), Summary::default());
     }
 }

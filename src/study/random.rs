@@ -1,3 +1,5 @@
+//! Random numbers for picking the rays of a study, each a pure function of seed, index and draw.
+
 use crate::math::Vector;
 
 /// Random numbers that are a pure function of (seed, index, draw): any ray can be made again alone.

@@ -5,8 +5,8 @@
 //! would be comes from the spread over the run's replicates.
 
 use super::Progress;
+use super::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use super::timing::Countdown;
-use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{
     BoundScene, Hooks, Moments, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
@@ -15,6 +15,9 @@ use serde::Serialize;
 use std::sync::Mutex;
 use std::time::Duration;
 use std::time::Instant;
+
+/// Times are never taken as shorter, s: the resolution of the clock, so that no pace is infinite.
+const LEAST_SECONDS: f64 = 1e-9;
 
 /// One receiver under one combination.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -51,7 +54,7 @@ pub struct Row {
 
 /// What facets change of a receiver's power, from the same rays on both.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Paired {
+pub struct PowerComparison {
     /// Name of the receiver.
     pub name: String,
     /// Power on facets.
@@ -67,13 +70,13 @@ pub struct Paired {
 }
 
 /// Traces the same rays on facets and on the spline, replicate by replicate.
-pub fn paired(
+pub fn compare_power(
     bound: &BoundScene,
     facets: &dyn Intersector,
     exact: &dyn Intersector,
     settings: &RunSettings,
-) -> Vec<Paired> {
-    let [(found, ours), (truth, theirs)] = [facets, exact].map(|i| by_replicate(bound, i, settings));
+) -> Vec<PowerComparison> {
+    let [(found, ours), (truth, theirs)] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
     (found.receivers.iter().zip(&truth.receivers).enumerate())
         .map(|(k, (f, e))| {
             let differences = ours.iter().zip(&theirs).map(|(a, b)| a[k].power as f64 - b[k].power as f64);
@@ -81,7 +84,7 @@ pub fn paired(
             let n = differences.len().max(2) as f64;
             let mean = differences.iter().sum::<f64>() / n;
             let spread: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
-            Paired {
+            PowerComparison {
                 name: f.name.clone(),
                 power_facets: f.power,
                 power_exact: e.power,
@@ -95,18 +98,18 @@ pub fn paired(
 
 /// What one replicate brought to one receiver: quanta, and their moments in half sides.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Part {
+pub(super) struct ReplicateSums {
     pub(super) power: u128,
     pub(super) first: [f64; 2],
     pub(super) second: [f64; 2],
 }
 
 /// Results of a run, and what each replicate brought to each receiver.
-pub(super) fn by_replicate(
+pub(super) fn trace_replicates(
     bound: &BoundScene,
     intersector: &dyn Intersector,
     settings: &RunSettings,
-) -> (Results, Vec<Vec<Part>>) {
+) -> (Results, Vec<Vec<ReplicateSums>>) {
     let count = replicates(bound, settings) as usize;
     type Sums = Vec<(u128, Moments)>;
     let parts = Mutex::new((Vec::<u32>::new(), Sums::new(), vec![Vec::new(); count]));
@@ -117,7 +120,7 @@ pub(super) fn by_replicate(
             p.tallies.receivers.iter().map(|s| s.total).zip(p.tallies.moments.iter().copied()).collect();
         sums.resize(now.len(), Default::default());
         if let Some(&new) = p.done.iter().find(|r| done.binary_search(r).is_err()) {
-            by[new as usize] = now.iter().zip(sums.iter()).map(part).collect();
+            by[new as usize] = now.iter().zip(sums.iter()).map(difference).collect();
         }
         done.clone_from(&p.done);
         *sums = now;
@@ -129,9 +132,9 @@ pub(super) fn by_replicate(
 }
 
 /// What came between two states of a receiver's sums; exact until the last step.
-fn part(((now, m), (before, o)): (&(u128, Moments), &(u128, Moments))) -> Part {
+fn difference(((now, m), (before, o)): (&(u128, Moments), &(u128, Moments))) -> ReplicateSums {
     let unit = Moments::GRAIN;
-    Part {
+    ReplicateSums {
         power: now - before,
         first: [0, 1].map(|a| (m.first[a] - o.first[a]) as f64 / unit),
         second: [0, 1].map(|a| (m.second[a] - o.second[a]) as f64 / unit),
@@ -153,7 +156,7 @@ pub(super) struct Combination {
 pub(super) fn receivers(
     name: &str,
     bound: &BoundScene,
-    workshop: &dyn Workshop,
+    mesh_source: &dyn MeshSource,
     (combinations, seconds_spline): (&[Combination], f64),
     settings: &RunSettings,
     (begun, progress): (Instant, &(dyn Fn(Progress) + Sync)),
@@ -161,7 +164,7 @@ pub(super) fn receivers(
     let mut countdown = Countdown::since(begun, progress);
     let seconds = |of: &[Combination]| -> f64 { of.iter().map(|c| c.seconds).sum() };
     countdown.stage("receivers on the spline", Some(seconds_spline + seconds(combinations)));
-    let truth = simulate(bound, workshop.exact(), settings, &|_| true);
+    let truth = simulate(bound, mesh_source.exact(), settings, &|_| true);
     let start = Instant::now();
     let (mut rows, mut done) = (Vec::new(), 0);
     for of_one in combinations.chunk_by(|a, b| a.tolerance == b.tolerance) {
@@ -170,14 +173,14 @@ pub(super) fn receivers(
         // as expected, for the first few alone led to forecasts a third too long.
         let kept = 0.25 * seconds(combinations);
         let spent = if done == 0 { 0.0 } else { start.elapsed().as_secs_f64() };
-        let pace = (spent + kept) / (seconds(&combinations[..done]) + kept).max(1e-9);
+        let pace = (spent + kept) / (seconds(&combinations[..done]) + kept).max(LEAST_SECONDS);
         let ahead = pace * seconds(&combinations[done..]);
         countdown.stage(&format!("receivers at {tolerance} mm"), Some(ahead));
         done += of_one.len();
-        let meshed = workshop.mesh([tolerance; 2]);
+        let meshed = mesh_source.mesh([tolerance; 2]);
         let normals: Vec<NormalMode> = of_one.iter().map(|c| c.normals).collect();
-        let found = with_all(workshop, &meshed.mesh, &[Tree::Octree], &normals, |trees| {
-            let run = |tree: &(Tree, NormalMode, &dyn Intersector)| {
+        let found = with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &normals, |trees| {
+            let run = |tree: &(FacetTree, NormalMode, &dyn Intersector)| {
                 countdown.tick();
                 simulate(bound, tree.2, settings, &|_| true)
             };
@@ -192,7 +195,7 @@ pub(super) fn receivers(
                     rays: found.rays,
                     seconds_trace: found.seconds.trace,
                     seconds_trace_exact: truth.seconds.trace,
-                    ..split(f, e)
+                    ..split_errors(f, e)
                 });
             }
         }
@@ -201,7 +204,7 @@ pub(super) fn receivers(
     rows
 }
 
-fn split(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
+fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
     let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
     let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);
     let geometric = norm(&mut found.cells.iter().zip(&truth.cells).map(|(a, b)| a - b)) / scale;

@@ -5,6 +5,9 @@
 use crate::math::{Point, Ray, Vector};
 use std::io::{self, Read, Write};
 
+/// A direction this close to unit length is kept as it is: written with six digits by whoever made the file.
+const UNIT_LENGTH: f64 = 1e-6;
+
 /// Bytes of one record.
 pub const RECORD: usize = 56;
 
@@ -53,7 +56,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Vec<(Ray, Option<f64>)>> {
             return Err(bad(i, "origin and direction must be finite"));
         }
         let given = Vector::new(x[3], x[4], x[5]);
-        let direction = if (given.length() - 1.0).abs() < 1e-6 {
+        let direction = if (given.length() - 1.0).abs() < UNIT_LENGTH {
             given
         } else {
             given.try_normalize().ok_or_else(|| bad(i, "the direction is zero"))?

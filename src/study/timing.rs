@@ -1,3 +1,5 @@
+//! Timing for studies: repeated alternating rounds, and progress with the time left.
+
 use serde::Serialize;
 use std::time::Instant;
 
@@ -27,7 +29,7 @@ pub struct Timing {
 
 impl Timing {
     /// From the seconds of each run; all zero without any.
-    pub fn of(mut seconds: Vec<f64>) -> Self {
+    pub fn from_seconds(mut seconds: Vec<f64>) -> Self {
         if seconds.is_empty() {
             return Self::default();
         }
@@ -73,7 +75,7 @@ impl<'a> Rounds<'a> {
                 seconds[i].push(start.elapsed().as_secs_f64());
             }
         }
-        self.competitors.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::of(s))).collect()
+        self.competitors.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::from_seconds(s))).collect()
     }
 }
 
@@ -89,7 +91,7 @@ impl<'a> Clock<'a> {
     }
 
     /// `done` is the share of the expected work, not of the number of steps.
-    pub(super) fn at(&self, stage: &str, done: f64) {
+    pub(super) fn report(&self, stage: &str, done: f64) {
         let elapsed = self.start.elapsed().as_secs_f64();
         let remaining_seconds = (done > 0.01).then(|| elapsed * (1.0 - done).max(0.0) / done);
         (self.report)(Progress { stage: stage.into(), done, remaining_seconds });
@@ -137,9 +139,9 @@ mod tests {
 
     #[test]
     fn figures_of_ten_runs() {
-        let t = Timing::of((1..=10).rev().map(f64::from).collect());
+        let t = Timing::from_seconds((1..=10).rev().map(f64::from).collect());
         assert_eq!((t.min, t.median, t.p90, t.runs), (1.0, 5.5, 9.0, 10));
-        assert_eq!(Timing::of(Vec::new()).runs, 0);
+        assert_eq!(Timing::from_seconds(Vec::new()).runs, 0);
     }
 
     #[test]

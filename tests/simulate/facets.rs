@@ -9,7 +9,7 @@ use lampyris::model::Model;
 use lampyris::simulate::scene::Interfaces;
 use lampyris::simulate::{BoundScene, Results, RunSettings, simulate};
 use lampyris::study::faceting::faceting;
-use lampyris::study::receivers::paired;
+use lampyris::study::receivers::compare_power;
 use lampyris::tessellate::{self, tessellate};
 
 struct Case {
@@ -99,7 +99,7 @@ fn paired_differences_are_sharper_than_the_flux() {
     let case = Case { settings: RunSettings { interfaces: Interfaces::Roulette, ..case.settings.clone() }, ..case };
     let made = tessellate(&case.model, &tessellate::Settings { tolerance: [0.05, 0.2], ..Default::default() });
     let octree = Octree::build(&made.mesh, &octree::Settings::default());
-    let found = paired(&case.bound, &octree, &case.exact, &case.settings);
+    let found = compare_power(&case.bound, &octree, &case.exact, &case.settings);
     let (facets, exact) = (case.run(&octree), case.run(&case.exact));
     for (pair, (f, e)) in found.iter().zip(facets.receivers.iter().zip(&exact.receivers)) {
         assert_eq!((pair.power_facets, pair.power_exact), (f.power, e.power), "the very same runs");
@@ -107,7 +107,7 @@ fn paired_differences_are_sharper_than_the_flux() {
         assert!(pair.difference_error < pair.power_error && pair.difference_error > 0.0, "{pair:?}");
         // Other seeds must agree within the stated error.
         let settings = RunSettings { seed: 77, ..case.settings.clone() };
-        let again = paired(&case.bound, &octree, &case.exact, &settings);
+        let again = compare_power(&case.bound, &octree, &case.exact, &settings);
         let other = again.iter().find(|p| p.name == pair.name).unwrap();
         let error = pair.difference_error.hypot(other.difference_error);
         assert!((pair.difference - other.difference).abs() < 4.0 * error, "{pair:?} {other:?}");

@@ -8,7 +8,7 @@ use lampyris::model::Model;
 use lampyris::nurbs::{ControlPoint, Surface, sweep};
 use lampyris::study::accuracy::{Settings, accuracy};
 use lampyris::study::rays::{RaySource, Uniform};
-use lampyris::study::{Meshed, Product, Tree, Workshop, specimen};
+use lampyris::study::{FacetTree, MeasuredMesh, MeshSource, ModelMeshSource, sample_models};
 use std::f64::consts::PI;
 
 struct Plain {
@@ -18,15 +18,15 @@ struct Plain {
 
 /// The product's mesher, octree and polish, judged by the closed form.
 struct Ours<'a> {
-    product: Product<'a>,
+    product: ModelMeshSource<'a>,
     plain: &'a Plain,
 }
 
-impl Workshop for Ours<'_> {
-    fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
+impl MeshSource for Ours<'_> {
+    fn mesh(&self, tolerance: [f64; 2]) -> MeasuredMesh {
         self.product.mesh(tolerance)
     }
-    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: FacetTree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
         self.product.build(mesh, tree, normals)
     }
     fn polish<'m>(&'m self, facets: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm> {
@@ -37,17 +37,18 @@ impl Workshop for Ours<'_> {
     }
 }
 
-impl Workshop for Plain {
+impl MeshSource for Plain {
     /// The coarsest grid of 2, 4, 8 … facets a side that keeps the tolerance.
-    fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
+    fn mesh(&self, tolerance: [f64; 2]) -> MeasuredMesh {
         let sag = |m: &FacetMesh| m.sag.iter().copied().fold(0.0, f64::max) / 1.15;
-        let halvings = (sag(&specimen::grid_mesh(&self.model, 2)) / tolerance[1]).sqrt().log2().ceil().max(0.0);
+        let halvings =
+            (sag(&sample_models::grid_mesh(&self.model, 2)) / tolerance[1]).sqrt().log2().ceil().max(0.0);
         let divisions = 2 << halvings as usize;
-        let mesh = specimen::grid_mesh(&self.model, divisions);
+        let mesh = sample_models::grid_mesh(&self.model, divisions);
         let sag_mean = mesh.sag.iter().sum::<f64>() / mesh.sag.len() as f64 / 1.15;
-        Meshed { sag_max: sag(&mesh), mesh, seconds: 1e-3 * divisions as f64, sag_mean }
+        MeasuredMesh { sag_max: sag(&mesh), mesh, seconds: 1e-3 * divisions as f64, sag_mean }
     }
-    fn build<'m>(&'m self, mesh: &'m FacetMesh, _: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, _: FacetTree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
         Box::new(Boxes::new(mesh, normals))
     }
     fn polish<'m>(&'m self, _: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm> {
@@ -60,7 +61,7 @@ impl Workshop for Plain {
 
 fn ball(radius: f64) -> Plain {
     let s = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
-    Plain { model: specimen::model("ball", [s]), exact: Box::new(Balls(vec![(Point::ZERO, radius)])) }
+    Plain { model: sample_models::model("ball", [s]), exact: Box::new(Balls(vec![(Point::ZERO, radius)])) }
 }
 
 fn bowl(focus: f64, half: f64) -> Plain {
@@ -70,7 +71,7 @@ fn bowl(focus: f64, half: f64) -> Plain {
     let knots = vec![-half, -half, -half, half, half, half];
     let points = (0..3).flat_map(|i| (0..3).map(move |j| at(i, j))).collect();
     let surface = Surface { degree: [2, 2], knots: [knots.clone(), knots], points };
-    Plain { model: specimen::model("bowl", [surface]), exact: Box::new(Bowl { focus, half }) }
+    Plain { model: sample_models::model("bowl", [surface]), exact: Box::new(Bowl { focus, half }) }
 }
 
 fn settings() -> Settings {
@@ -78,7 +79,7 @@ fn settings() -> Settings {
         // Five halvings of the facets' length.
         tolerances: [2.0, 0.5, 0.125, 0.031, 0.0078].map(|t| [t, t]).into(),
         normals: vec![NormalMode::Flat, NormalMode::Bilinear],
-        trees: vec![Tree::Octree],
+        trees: vec![FacetTree::Octree],
         rays: 10_000,
         rounds: 1,
         threads: vec![1],
@@ -89,10 +90,10 @@ fn settings() -> Settings {
 
 #[test]
 fn slopes_on_ball_and_paraboloid_are_those_of_theory() {
-    for (name, workshop) in
+    for (name, mesh_source) in
         [("ball lens", ball(50.0)), ("sphere mirror", ball(200.0)), ("paraboloid", bowl(25.0, 40.0))]
     {
-        let study = accuracy(name, &workshop, &settings(), &|_| ());
+        let study = accuracy(name, &mesh_source, &settings(), &|_| ());
         assert_eq!(study.rows.len(), 1 + 5 * 2);
         assert!(study.slopes.len() == 2);
         for s in &study.slopes {
@@ -109,7 +110,7 @@ fn slopes_of_the_products_own_facets_are_those_of_theory() {
     for (name, plain) in
         [("ball lens", ball(50.0)), ("sphere mirror", ball(200.0)), ("paraboloid", bowl(25.0, 40.0))]
     {
-        let ours = Ours { product: Product::measuring(&plain.model), plain: &plain };
+        let ours = Ours { product: ModelMeshSource::measuring(&plain.model), plain: &plain };
         // Four halvings of the facets' length.
         let coarse = if name == "sphere mirror" { 8.0 } else { 2.0 };
         let tolerances = [1.0, 0.25, 0.0625, 0.0156, 0.0039].map(|t| [coarse * t; 2]).into();
@@ -136,9 +137,9 @@ fn polished_hits_and_normals_are_the_true_ones() {
         ("sphere mirror", ball(200.0), 200.0, &round),
         ("paraboloid", bowl(25.0, 40.0), 0.0, &bowl_at),
     ] {
-        let ours = Ours { product: Product::new(&plain.model), plain: &plain };
+        let ours = Ours { product: ModelMeshSource::new(&plain.model), plain: &plain };
         let meshed = ours.mesh([0.1; 2]);
-        let facets = ours.build(&meshed.mesh, Tree::Octree, NormalMode::Bilinear);
+        let facets = ours.build(&meshed.mesh, FacetTree::Octree, NormalMode::Bilinear);
         let polished = ours.polish(&*facets, &meshed.mesh);
         let source = Uniform::new(&meshed.mesh.bounds(), 5, 20_000);
         let (mut hits, mut fallen, mut off, mut turned) = (0, 0, 0f64, 0f64);

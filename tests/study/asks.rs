@@ -6,9 +6,9 @@ use lampyris::math::Vector;
 use lampyris::model::Model;
 use lampyris::step;
 use lampyris::study::accuracy::{Row, Settings, accuracy};
-use lampyris::study::aim::{Aim, Ask, aim};
+use lampyris::study::accuracy_target::{AccuracyPlan, AccuracyTarget, meet_target};
 use lampyris::study::rays::{RaySource, Uniform};
-use lampyris::study::{Product, Tree, Workshop};
+use lampyris::study::{FacetTree, MeshSource, ModelMeshSource};
 use std::path::{Path, PathBuf};
 
 fn fixtures() -> Vec<PathBuf> {
@@ -28,14 +28,14 @@ fn swept(model: &Model) -> Vec<(f64, Row)> {
     let settings = Settings {
         tolerances: uniform.map(|t| [t, t]).into_iter().chain([[0.05, 0.2]]).collect(),
         normals: NormalMode::ALL.to_vec(),
-        trees: vec![Tree::Octree],
+        trees: vec![FacetTree::Octree],
         rays: 100_000,
         rounds: 3,
         threads: vec![rayon::current_num_threads()],
         seed: 77,
         seconds_after: 0.0,
     };
-    let rows = accuracy("", &Product::new(model), &settings, &|_| ()).rows;
+    let rows = accuracy("", &ModelMeshSource::new(model), &settings, &|_| ()).rows;
     let cost =
         |r: &Row| r.seconds_tessellate.unwrap_or(0.0) + r.seconds_build + r.seconds_trace_min * JOB / r.rays as f64;
     rows.into_iter().map(|r| (cost(&r), r)).collect()
@@ -88,9 +88,9 @@ impl Costs {
 }
 
 /// The 99th percentile of the error of mirrored directions, degrees, on 100,000 rays that the search has not seen.
-fn judged_again(product: &Product<'_>, found: &Aim) -> f64 {
+fn judged_again(product: &ModelMeshSource<'_>, found: &AccuracyPlan) -> f64 {
     let mesh = product.mesh_plan(&found.plan).mesh;
-    let facets = product.build(&mesh, Tree::Octree, found.normals.on_facets());
+    let facets = product.build(&mesh, FacetTree::Octree, found.normals.on_facets());
     let polished = (found.normals == NormalMode::Exact).then(|| product.polish(&*facets, &mesh));
     let who: &dyn Intersector = polished.as_deref().unwrap_or(&*facets);
     let rays = Uniform::new(&mesh.bounds(), 4711, 100_000).rays(0..100_000);
@@ -123,12 +123,17 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
     );
     for path in fixtures().iter().filter(|p| p.to_string_lossy().contains(&only)) {
         let model = read(path);
-        let product = Product::new(&model);
+        let product = ModelMeshSource::new(&model);
         let sweep = swept(&model);
         let costs = Costs::of(&sweep);
         let spline = sweep.iter().find(|(_, r)| r.intersector == "exact").map_or(f64::NAN, |x| x.0);
         for degrees in asked {
-            let found = aim(&model, &product, &Ask { job_rays: JOB, ..Ask::degrees(degrees) }, &|_| ());
+            let found = meet_target(
+                &model,
+                &product,
+                &AccuracyTarget { job_rays: JOB, ..AccuracyTarget::degrees(degrees) },
+                &|_| (),
+            );
             let seconds = found.seconds_prepare + found.seconds_trace;
             let other = judged_again(&product, &found);
             let good =
@@ -156,7 +161,7 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
             ratios.push(seconds / best.0);
             smoothed.push(smooth);
             if found.seconds > 2.0 {
-                found.tries.iter().for_each(|t| println!("  tried {t:?}"));
+                found.trials.iter().for_each(|t| println!("  tried {t:?}"));
             }
         }
     }

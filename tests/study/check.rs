@@ -1,4 +1,4 @@
-//! The court is judged with intersectors that are obviously right, and with defects planted in them.
+//! The subjects is judged with intersectors that are obviously right, and with defects planted in them.
 
 use crate::support::{Balls, Brute, Changed};
 use lampyris::intersect::Hit;
@@ -6,16 +6,16 @@ use lampyris::math::{Frame, Point, Ray};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::Model;
 use lampyris::nurbs::sweep;
-use lampyris::study::check::{Cause, Check, Court, Defect, Settings, check};
+use lampyris::study::cross_check::{Cause, CrossCheck, Defect, Intersectors, Settings, cross_check};
 use lampyris::study::rays::{Camera, Chain, RaySource, Uniform};
-use lampyris::study::{records, specimen};
+use lampyris::study::{records, sample_models};
 use std::f64::consts::PI;
 
 const FULL: [f64; 2] = [0.0, 2.0 * PI];
 
 fn balls(at: &[(Point, f64)]) -> Model {
     let ball = |&(p, r): &(Point, f64)| sweep::sphere(&Frame::translation(p), r, FULL, [-PI / 2.0, PI / 2.0]);
-    specimen::model("balls", at.iter().map(ball))
+    sample_models::model("balls", at.iter().map(ball))
 }
 
 fn rays(mesh: &FacetMesh, count: u64) -> Vec<Ray> {
@@ -24,19 +24,19 @@ fn rays(mesh: &FacetMesh, count: u64) -> Vec<Ray> {
     chain.rays(0..chain.len())
 }
 
-fn run(court: &Court<'_>, rays: &[Ray]) -> Check {
-    check(court, rays, &Settings::default(), &|_| ())
+fn run(subjects: &Intersectors<'_>, rays: &[Ray]) -> CrossCheck {
+    cross_check(subjects, rays, &Settings::default(), &|_| ())
 }
 
 #[test]
 fn every_difference_of_a_faceted_ball_is_explained() {
     let at = [(Point::ZERO, 50.0)];
     let model = balls(&at);
-    let mesh = specimen::grid_mesh(&model, 8);
+    let mesh = sample_models::grid_mesh(&model, 8);
     let (facets, exact) = (Brute(&mesh), Balls(at.to_vec()));
-    let court = Court { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
+    let subjects = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
     let rays = rays(&mesh, 20_000);
-    let found = run(&court, &rays);
+    let found = run(&subjects, &rays);
     assert_eq!(found.rays, 20_000);
     assert_eq!(found.octree_vs_bvh.disagree, 0);
     let f = &found.facets_vs_exact;
@@ -57,11 +57,11 @@ fn two_balls_that_touch_within_their_sag_swap_as_coincident() {
     let turned = [PI / 32.0, PI / 32.0 + 2.0 * PI];
     let second = sweep::sphere(&Frame::translation(at[1].0), 50.0, turned, [-PI / 2.0, PI / 2.0]);
     let first = sweep::sphere(&Frame::IDENTITY, 50.0, FULL, [-PI / 2.0, PI / 2.0]);
-    let model = specimen::model("balls", [first, second]);
-    let mesh = specimen::grid_mesh(&model, 8);
+    let model = sample_models::model("balls", [first, second]);
+    let mesh = sample_models::grid_mesh(&model, 8);
     let (facets, exact) = (Brute(&mesh), Balls(at.to_vec()));
-    let court = Court { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
-    let found = run(&court, &rays(&mesh, 4_000)).facets_vs_exact;
+    let subjects = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
+    let found = run(&subjects, &rays(&mesh, 4_000)).facets_vs_exact;
     assert_eq!(found.unexplained, 0, "{found:?}");
     assert!(found.other_face > 100 && found.explained.coincident > 100, "{found:?}");
 }
@@ -70,8 +70,8 @@ fn two_balls_that_touch_within_their_sag_swap_as_coincident() {
 fn an_open_shell_differs_at_its_border() {
     // The upper half of a ball: facets end on a polygon, the spline on a circle.
     let surface = sweep::sphere(&Frame::IDENTITY, 50.0, FULL, [0.0, PI / 2.0]);
-    let model = specimen::model("dome", [surface]);
-    let mesh = specimen::grid_mesh(&model, 6);
+    let model = sample_models::model("dome", [surface]);
+    let mesh = sample_models::grid_mesh(&model, 6);
     let whole = Balls(vec![(Point::ZERO, 50.0)]);
     let dome = Changed(&whole, |ray: &Ray, first: Option<Hit>| {
         let first = first?;
@@ -84,8 +84,8 @@ fn an_open_shell_differs_at_its_border() {
         (t >= ray.t_min && n.z >= 0.0).then_some(Hit { t, normal: n, geometric_normal: n, ..first })
     });
     let facets = Brute(&mesh);
-    let court = Court { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &dome };
-    let found = run(&court, &rays(&mesh, 10_000)).facets_vs_exact;
+    let subjects = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &dome };
+    let found = run(&subjects, &rays(&mesh, 10_000)).facets_vs_exact;
     assert_eq!(found.unexplained, 0, "{found:?}");
     assert!(found.explained.trim_edge > 0 && found.explained.silhouette > 0, "{found:?}");
 }
@@ -94,36 +94,36 @@ fn an_open_shell_differs_at_its_border() {
 fn planted_defects_are_found() {
     let at = [(Point::ZERO, 50.0)];
     let model = balls(&at);
-    let mesh = specimen::grid_mesh(&model, 8);
+    let mesh = sample_models::grid_mesh(&model, 8);
     let (facets, exact) = (Brute(&mesh), Balls(at.to_vec()));
-    let honest = Court { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
+    let honest = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
     let rays = rays(&mesh, 4_000);
     let hits = run(&honest, &rays).hits;
-    let unexplained = |c: &Check, d: Defect| {
+    let unexplained = |c: &CrossCheck, d: Defect| {
         c.disagreements.iter().filter(|x| x.cause == Some(Cause::Unexplained(d))).count() as u64
     };
 
     let dropped = |ray: &Ray| ray.direction.x > 0.9;
     let leaky = Changed(&facets, |ray: &Ray, h: Option<Hit>| h.filter(|_| !dropped(ray)));
-    let found = run(&Court { octree: &leaky, ..honest }, &rays);
+    let found = run(&Intersectors { octree: &leaky, ..honest }, &rays);
     assert_eq!(found.octree_vs_bvh.disagree, hits - found.hits);
     assert!(found.octree_vs_bvh.disagree > 20);
     let missed = unexplained(&found, Defect::MissedCrossing);
     assert!(missed > 20 && missed == found.facets_vs_exact.unexplained, "{:?}", found.facets_vs_exact);
 
     let swollen = Balls(vec![(Point::ZERO, 52.0)]);
-    let found = run(&Court { exact: &swollen, ..honest }, &rays);
+    let found = run(&Intersectors { exact: &swollen, ..honest }, &rays);
     assert!(unexplained(&found, Defect::OffTheSurface) > hits / 2);
 
     let turned = Changed(&exact, |_: &Ray, h: Option<Hit>| h.map(|h| Hit { geometric_normal: -h.normal, ..h }));
-    let found = run(&Court { exact: &turned, ..honest }, &rays);
+    let found = run(&Intersectors { exact: &turned, ..honest }, &rays);
     assert!(unexplained(&found, Defect::Orientation) > hits / 2);
 
     let mut torn = mesh.clone();
     torn.facets.remove(37);
     torn.sag.remove(37);
     let with_hole = Brute(&torn);
-    let found = run(&Court { mesh: &torn, octree: &with_hole, bvh: &with_hole, ..honest }, &rays);
+    let found = run(&Intersectors { mesh: &torn, octree: &with_hole, bvh: &with_hole, ..honest }, &rays);
     assert_eq!(found.octree_vs_bvh.disagree, 0, "both have the same hole");
     assert!(unexplained(&found, Defect::MissedCrossing) > 0);
 
@@ -132,7 +132,7 @@ fn planted_defects_are_found() {
     let defects = found.disagreements.iter().filter(|d| matches!(d.cause, Some(Cause::Unexplained(_))));
     records::write(&mut bytes, defects.map(|d| (d.ray, d.octree.map(|h| h.t)))).unwrap();
     let again: Vec<Ray> = records::read(&mut bytes.as_slice()).unwrap().into_iter().map(|r| r.0).collect();
-    let replayed = run(&Court { mesh: &torn, octree: &with_hole, bvh: &with_hole, ..honest }, &again);
+    let replayed = run(&Intersectors { mesh: &torn, octree: &with_hole, bvh: &with_hole, ..honest }, &again);
     assert_eq!(replayed.facets_vs_exact.unexplained, again.len() as u64);
 }
 
@@ -140,13 +140,13 @@ fn planted_defects_are_found() {
 fn verdicts_do_not_depend_on_threads_and_serialise_as_promised() {
     let at = [(Point::new(3.0, 1.0, -2.0), 20.0)];
     let model = balls(&at);
-    let mesh = specimen::grid_mesh(&model, 4);
+    let mesh = sample_models::grid_mesh(&model, 4);
     let (facets, exact) = (Brute(&mesh), Balls(at.to_vec()));
-    let court = Court { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
+    let subjects = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
     let rays = rays(&mesh, 20_000);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| serde_json::to_value(run(&court, &rays)).unwrap())
+        pool.install(|| serde_json::to_value(run(&subjects, &rays)).unwrap())
     };
     let one = on(1);
     assert_eq!(one, on(3));

@@ -1,32 +1,32 @@
-//! The court, and accuracy asked for as an angle, on real files: fixtures always, the corpus where it is.
+//! The cross-check, and accuracy asked for as an angle, on real files: fixtures always, the corpus where it is.
 
 use crate::files::{corpus, fixture, read_model, step_files};
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::model::Model;
-use lampyris::study::aim::{Ask, aim};
-use lampyris::study::check::{Cause, Check, Court, Settings, check};
+use lampyris::study::accuracy_target::{AccuracyTarget, meet_target};
+use lampyris::study::cross_check::{Cause, CrossCheck, Intersectors, Settings, cross_check};
 use lampyris::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
-use lampyris::study::{Product, Workshop};
+use lampyris::study::{MeshSource, ModelMeshSource};
 use lampyris::tessellate;
 
 /// A third of the rays from a camera, a third at random, a third bouncing inside.
-fn judge(model: &Model, rays: u64) -> Check {
+fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
     let made = tessellate::tessellate(model, &tessellate::Settings::default());
     let octree = Octree::build(&made.mesh, &octree::Settings::default());
     let bvh = Bvh::build(&made.mesh, &bvh::Settings::default());
-    let product = Product::new(model);
+    let product = ModelMeshSource::new(model);
     let bounds = made.mesh.bounds();
     let camera = Camera::new(&bounds, rays / 3);
     let uniform = Uniform::new(&bounds, 1, rays / 3);
     let bounces = Bounces::new(&bounds, &octree, 0.8, 2, rays / 3);
     let chain = Chain(vec![&camera, &uniform, &bounces]);
-    let court = Court { model, mesh: &made.mesh, octree: &octree, bvh: &bvh, exact: product.exact() };
+    let subjects = Intersectors { model, mesh: &made.mesh, octree: &octree, bvh: &bvh, exact: product.exact() };
     assert_eq!(chain.len(), rays / 3 * 3);
-    check(&court, &chain, &Settings::default(), &|_| ())
+    cross_check(&subjects, &chain, &Settings::default(), &|_| ())
 }
 
-fn line(name: &str, c: &Check) -> String {
+fn line(name: &str, c: &CrossCheck) -> String {
     let f = &c.facets_vs_exact;
     let mut text = format!(
         "{name}: {} rays, {} hits, {} facets; octree/bvh {} ({} ties); flips {}, other face {}, unexplained {}; {:?}; uncertified {}\n",
@@ -41,7 +41,7 @@ fn line(name: &str, c: &Check) -> String {
         f.explained,
         c.exact.uncertified
     );
-    let odd = |d: &&lampyris::study::check::Disagreement| {
+    let odd = |d: &&lampyris::study::cross_check::Disagreement| {
         d.facets_differ || matches!(d.cause, Some(Cause::Unexplained(_)))
     };
     for d in c.disagreements.iter().filter(odd).take(4) {
@@ -68,7 +68,7 @@ fn fixtures_have_no_unexplained_difference() {
     let mut bad = String::new();
     for path in step_files(&folder) {
         let model = read_model(&path).expect("fixtures are readable");
-        let found = judge(&model, 30_000);
+        let found = cross_checked(&model, 30_000);
         let text = line(&path.file_name().unwrap_or_default().to_string_lossy(), &found);
         println!("{text}");
         assert!(found.hits > 1000, "{text}");
@@ -94,7 +94,7 @@ fn corpus_through_the_court() {
         let start = std::time::Instant::now();
         match read_model(path) {
             Some(model) if model.placed_face_count() > 0 => {
-                let text = line(&name, &judge(&model, rays));
+                let text = line(&name, &cross_checked(&model, rays));
                 println!("{:.1} s {text}", start.elapsed().as_secs_f64());
             }
             _ => println!("{name}: not read"),
@@ -106,10 +106,10 @@ fn corpus_through_the_court() {
 fn an_angle_asked_for_is_reached() {
     let path = fixture("step/lens_planoconvex_nurbs.stp");
     let model = read_model(&path).expect("fixtures are readable");
-    let product = Product::new(&model);
+    let product = ModelMeshSource::new(&model);
     for degrees in [0.5, 0.02] {
-        let ask = Ask { check_rays: 20_000, ..Ask::degrees(degrees) };
-        let found = aim(&model, &product, &ask, &|_| ());
+        let ask = AccuracyTarget { check_rays: 20_000, ..AccuracyTarget::degrees(degrees) };
+        let found = meet_target(&model, &product, &ask, &|_| ());
         assert!(found.kept && found.reached_deg <= degrees && found.checked > 1000, "{found:?}");
     }
 }

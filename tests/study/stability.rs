@@ -4,7 +4,7 @@ use crate::support::Brute;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::study::stability::{Ground, Row, Variant, cases};
+use lampyris::study::stability::{Geometry, Row, Variant, cases};
 
 fn table(rows: &[Row]) -> String {
     let line = |r: &Row| {
@@ -28,7 +28,7 @@ fn brute_force_over_the_facets_signs() {
                 continue;
             }
             let scene = case.scene(variant);
-            rows.push(scene.ask("brute", &Brute(&scene.mesh), Ground::Facets));
+            rows.push(scene.ask("brute", &Brute(&scene.mesh), Geometry::Facets));
         }
     }
     let bad: Vec<Row> = rows.iter().filter(|r| r.wrong > 0).cloned().collect();
@@ -54,11 +54,11 @@ macro_rules! signs {
     };
 }
 
-signs!(exact_spline, Ground::Spline, |s| Exact::build(&s.model, &exact::Settings::default()));
-signs!(octree_of_facets, Ground::Facets, |s| Octree::build(&s.mesh, &octree::Settings::default()));
-signs!(textbook_octree, Ground::Facets, |s| Octree::build(&s.mesh, &octree::Settings::textbook()));
-signs!(cwbvh, Ground::Facets, |s| Bvh::build(&s.mesh, &bvh::Settings::default()));
-signs!(bvh2, Ground::Facets, |s| Bvh::build(
+signs!(exact_spline, Geometry::Spline, |s| Exact::build(&s.model, &exact::Settings::default()));
+signs!(octree_of_facets, Geometry::Facets, |s| Octree::build(&s.mesh, &octree::Settings::default()));
+signs!(textbook_octree, Geometry::Facets, |s| Octree::build(&s.mesh, &octree::Settings::textbook()));
+signs!(cwbvh, Geometry::Facets, |s| Bvh::build(&s.mesh, &bvh::Settings::default()));
+signs!(bvh2, Geometry::Facets, |s| Bvh::build(
     &s.mesh,
     &bvh::Settings { kind: Kind::Bvh2, ..bvh::Settings::default() }
 ));

@@ -39,7 +39,7 @@ pub(crate) struct Meshing {
     pub(crate) role: Vec<(String, [f64; 2])>,
     /// Local tolerances that an accuracy came to.
     #[arg(skip)]
-    pub(crate) plan: Option<crate::study::aim::Plan>,
+    pub(crate) plan: Option<crate::study::accuracy_target::TolerancePlan>,
 }
 
 /// Options of everything that traces.

@@ -19,7 +19,7 @@ use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::report::{Trial, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::check::{self, Check, Competitor, Court, measure};
+use crate::study::cross_check::{self, Competitor, CrossCheck, Intersectors, measure};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::{Quantiles, Summary, records};
 use std::path::{Path, PathBuf};
@@ -73,10 +73,11 @@ pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         None => own_rays(scene, model, mesh, &octree, &tracing, lift)?,
     };
     let bar = context.bar("judging", "rays", rays.len() as u64);
-    let court = Court { model, mesh, octree: &octree, bvh: &cwbvh, exact: &exact };
-    let band = check::Settings { fallback_band_mm: settings.loosest(), ..Default::default() };
+    let intersectors = Intersectors { model, mesh, octree: &octree, bvh: &cwbvh, exact: &exact };
+    let band = cross_check::Settings { fallback_band_mm: settings.loosest(), ..Default::default() };
     let total = rays.len() as f64;
-    let mut found = check::check(&court, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
+    let mut found =
+        cross_check::cross_check(&intersectors, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
     bar.finish_and_clear();
     if chosen == NormalMode::Exact {
         let [t, normal] = polished_errors(&polish, &exact, &rays, settings.loosest());
@@ -239,7 +240,7 @@ fn spread(q: &Summary, unit: &str) -> String {
     format!("off by {p50}{unit} (median), {p99}{unit} (99 %), {max}{unit} (largest)")
 }
 
-fn described(c: &Check, normals: NormalMode) -> String {
+fn described(c: &CrossCheck, normals: NormalMode) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
     let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));

@@ -62,7 +62,7 @@ pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
             #[serde(skip_serializing_if = "Option::is_none")]
             baseline: Option<Baseline>,
             #[serde(skip_serializing_if = "Option::is_none")]
-            accuracy: Option<crate::study::aim::Aim>,
+            accuracy: Option<crate::study::accuracy_target::AccuracyPlan>,
         }
         let both = Both { report: &made.report, baseline, accuracy: aimed };
         let text = serde_json::to_string_pretty(&both).map_err(|e| Failure::running(e.to_string()))?;

@@ -14,8 +14,8 @@ use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::report::{figures, grouped};
 use crate::study::Progress;
-use crate::study::check::{Competitor, measure};
-use crate::study::judge::{Verdict, judge, same_distance};
+use crate::study::arbiter::{Verdict, arbitrate, same_distance};
+use crate::study::cross_check::{Competitor, measure};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
 use crate::tessellate::{self, tessellate};
 use rayon::prelude::*;
@@ -205,8 +205,9 @@ impl Judgement {
             _ => false,
         };
         let differing: Vec<usize> = (0..rays.len()).filter(|&i| !same(&octree[i], &hits[i])).collect();
-        let verdicts: Vec<Verdict> =
-            (differing.par_iter()).map(|&i| judge(mesh, &rays[i], octree[i].as_ref(), hits[i].as_ref())).collect();
+        let verdicts: Vec<Verdict> = (differing.par_iter())
+            .map(|&i| arbitrate(mesh, &rays[i], octree[i].as_ref(), hits[i].as_ref()))
+            .collect();
         let count = |which: Verdict| verdicts.iter().filter(|v| **v == which).count();
         Self {
             differs: differing.len(),

@@ -19,7 +19,9 @@ use crate::model::Model;
 use crate::report::{Section, View, study_report};
 use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
-use crate::study::{self, Product, Progress, Workshop, accuracy, complexity, effects, interpolation, stability};
+use crate::study::{
+    self, MeshSource, ModelMeshSource, Progress, accuracy, complexity, effects, interpolation, stability,
+};
 use crate::tessellate::tessellate;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -154,7 +156,7 @@ type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
     let (scene, loaded, name) = model_of(asked.file, context)?;
-    let product = Product::measuring(&loaded.model);
+    let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = asked.meshing.tolerance {
         settings.tolerances = vec![range];
@@ -167,8 +169,8 @@ fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) ->
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
     let run = RunSettings { rays: own.rays.min(LIT_RAYS), seed, threads: 0, path_samples: 0, ..own };
-    let plain = Product::new(&loaded.model);
-    let (study, light) = study::accuracy_of_scene(&name, [&product, &plain], (&bound, &run), &settings, progress);
+    let plain = ModelMeshSource::new(&loaded.model);
+    let (study, light) = study::scene_accuracy(&name, [&product, &plain], (&bound, &run), &settings, progress);
     Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes)?.beside("receivers", &light)
 }
 
@@ -195,9 +197,9 @@ fn interpolation_of(asked: &Asked, seed: u64, context: &Context, progress: Repor
     if asked.file.is_none() {
         models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
     }
-    let products: Vec<Product> = models.iter().map(|(_, m)| Product::new(m)).collect();
-    let named: Vec<(&str, &dyn Workshop)> =
-        models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn Workshop)).collect();
+    let products: Vec<ModelMeshSource> = models.iter().map(|(_, m)| ModelMeshSource::new(m)).collect();
+    let named: Vec<(&str, &dyn MeshSource)> =
+        models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn MeshSource)).collect();
     let mut settings = interpolation::Settings { seed, ..Default::default() };
     settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
     let study = interpolation::interpolation(&named, &settings, progress);
@@ -243,7 +245,7 @@ fn complexity_of(asked: &Asked, seed: u64, threads: usize, progress: Report) -> 
 }
 
 fn stability_of(progress: Report) -> Result<Found, Failure> {
-    use stability::{Ground, Variant, cases};
+    use stability::{Geometry, Variant, cases};
     let all = cases();
     let mut rows = Vec::new();
     for (k, case) in all.iter().enumerate() {
@@ -253,12 +255,12 @@ fn stability_of(progress: Report) -> Result<Found, Failure> {
             let cured = Bvh::build(&scene.mesh, &bvh::Settings::default());
             let shipped = Bvh::build(&scene.mesh, &bvh::Settings { cured: false, ..Default::default() });
             let exact = Exact::build(&scene.model, &Default::default());
-            rows.push(scene.ask("octree", &octree, Ground::Facets));
-            rows.push(scene.ask("cwbvh", &cured, Ground::Facets));
-            rows.push(scene.ask("cwbvh as shipped", &shipped, Ground::Facets));
-            rows.push(scene.ask("exact", &exact, Ground::Spline));
+            rows.push(scene.ask("octree", &octree, Geometry::Facets));
+            rows.push(scene.ask("cwbvh", &cured, Geometry::Facets));
+            rows.push(scene.ask("cwbvh as shipped", &shipped, Geometry::Facets));
+            rows.push(scene.ask("exact", &exact, Geometry::Spline));
             let newton = Traditional::new(&scene.model, &exact, Seeds::Middle);
-            rows.push(scene.ask("plain newton", &newton, Ground::Spline));
+            rows.push(scene.ask("plain newton", &newton, Geometry::Spline));
         }
         let done = (k + 1) as f64 / all.len() as f64;
         progress(Progress { stage: case.name.into(), done, remaining_seconds: None });

@@ -8,8 +8,8 @@ use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::model::Model;
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::Product;
-use crate::study::aim::{Aim, Ask, aim, aim_at};
+use crate::study::ModelMeshSource;
+use crate::study::accuracy_target::{AccuracyPlan, AccuracyTarget, meet_target, meet_target_for_rays};
 
 /// The options with tolerances and normals put in that reach what was asked, and how that went; unchanged when nothing was asked.
 /// With a scene, its own rays are what the accuracy is about.
@@ -19,7 +19,7 @@ pub(crate) fn meshing(
     scene: Option<&Scene>,
     model: &Model,
     context: &Context,
-) -> Result<(Meshing, Tracing, Option<Aim>), Failure> {
+) -> Result<(Meshing, Tracing, Option<AccuracyPlan>), Failure> {
     let Some(mut ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), tracing.clone(), None)) };
     let (mut meshing, mut tracing) = (meshing.clone(), tracing.clone());
     let choice = super::engine::Choice::new(&tracing, scene)?;
@@ -32,18 +32,18 @@ pub(crate) fn meshing(
     if let Some(normals) = tracing.normals {
         ask.kinds = vec![normals];
     }
-    let product = Product::new(model);
+    let product = ModelMeshSource::new(model);
     let bar = context.stages("aiming");
     let progress = |p: crate::study::Progress| show(&bar, &p);
     let found = match scene {
-        None => aim(model, &product, &ask, &progress),
+        None => meet_target(model, &product, &ask, &progress),
         Some(scene) => {
             let bound = scene.bind(model)?;
             let rays = |seed: u64, count: u64| {
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
                 rays_of(&product, model, &settings, &bound)
             };
-            aim_at(model, &product, &ask, &rays, &progress)
+            meet_target_for_rays(model, &product, &ask, &rays, &progress)
         }
     };
     bar.finish_and_clear();
@@ -59,29 +59,29 @@ pub(crate) fn facets(
     meshing: &Meshing,
     model: &Model,
     context: &Context,
-) -> Result<(Meshing, Option<Aim>), Failure> {
+) -> Result<(Meshing, Option<AccuracyPlan>), Failure> {
     let Some(ask) = ask(asked, meshing)? else { return Ok((meshing.clone(), None)) };
-    let ask = Ask { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
+    let ask = AccuracyTarget { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
     let bar = context.stages("aiming");
-    let found = aim(model, &Product::new(model), &ask, &|p| show(&bar, &p));
+    let found = meet_target(model, &ModelMeshSource::new(model), &ask, &|p| show(&bar, &p));
     bar.finish_and_clear();
     context.say(&found.answer);
     Ok((Meshing { plan: Some(found.plan.clone()), ..meshing.clone() }, Some(found)))
 }
 
-fn ask(asked: Option<&str>, meshing: &Meshing) -> Result<Option<Ask>, Failure> {
+fn ask(asked: Option<&str>, meshing: &Meshing) -> Result<Option<AccuracyTarget>, Failure> {
     let Some(text) = asked else { return Ok(None) };
     let degrees = options::accuracy(text).map_err(|e| Failure::arguments(format!("--accuracy {text}: {e}")))?;
     if meshing.tolerance.is_some() {
         let failure = Failure::arguments("--accuracy and --tolerance both say how fine the facets are to be");
         return Err(failure.help("leave one of them out; --part NAME=MIN..MAX may stand beside --accuracy"));
     }
-    Ok(Some(Ask::degrees(degrees)))
+    Ok(Some(AccuracyTarget::degrees(degrees)))
 }
 
 /// Rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as asked.
 fn rays_of(
-    product: &Product<'_>,
+    product: &ModelMeshSource<'_>,
     model: &Model,
     settings: &RunSettings,
     bound: &crate::simulate::BoundScene,

@@ -20,8 +20,8 @@ use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, Results, RunSettings, Scene, Traced, Verification,
     arrivals, replay, trace, verify_pruning,
 };
-use crate::study::aim::Aim;
-use crate::study::check::{self, Check, Court, check};
+use crate::study::accuracy_target::AccuracyPlan;
+use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
 use crate::study::faceting::{Faceting, faceting};
 use crate::tessellate::{self, Tessellation};
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ pub(crate) struct Job<'a> {
     /// Rays of the run to ask again of BVH and spline; 0 for none.
     pub(crate) recheck: usize,
     /// How an accuracy that was asked for was reached.
-    pub(crate) aimed: Option<&'a Aim>,
+    pub(crate) aimed: Option<&'a AccuracyPlan>,
 }
 
 /// A job whose scene fits its model and whose facets are made.
@@ -71,7 +71,7 @@ pub(crate) struct Ways<'a> {
 /// What came of it.
 pub(crate) struct Outcome {
     pub(crate) results: Results,
-    pub(crate) check: Option<Check>,
+    pub(crate) check: Option<CrossCheck>,
     /// What the facets change of the light, where the run was on facets.
     pub(crate) faceting: Option<Faceting>,
     /// The pruned kernel against the full one, when asked for.
@@ -133,7 +133,7 @@ impl Prepared<'_> {
                 spinner.finish_and_clear();
                 exact
             });
-            let check = exact.as_ref().map(|exact| self.court(intersector, exact, &rays, context));
+            let check = exact.as_ref().map(|exact| self.cross_check(intersector, exact, &rays, context));
             let faceting = exact.as_ref().and_then(|exact| self.faceting(&results, [intersector, exact]));
             Outcome { results, check, faceting, verification }
         })
@@ -195,21 +195,29 @@ impl Prepared<'_> {
         Some(faceting(&self.bound, both, &settings))
     }
 
-    fn court(&self, octree: &dyn Intersector, exact: &Exact, rays: &Vec<Ray>, context: &Context) -> Check {
+    fn cross_check(
+        &self,
+        octree: &dyn Intersector,
+        exact: &Exact,
+        rays: &Vec<Ray>,
+        context: &Context,
+    ) -> CrossCheck {
         let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
         let spinner = context.spinner("building BVH for the cross-check");
         let bvh = Bvh::build(mesh, &Default::default());
-        // The court is about facets: a run on the spline, or polished to it, is no witness for the octree.
+        // The cross-check is about facets: a run on the spline, or polished to it, says nothing of the octree.
         let facets = self.choice.intersector == IntersectorKind::Octree && self.choice.normals != NormalMode::Exact;
         let own = (!facets).then(|| Octree::build(mesh, &Default::default()));
         let octree = own.as_ref().map_or(octree, |own| own as &dyn Intersector);
         spinner.finish_and_clear();
         let bar = context.bar("checking", "rays", rays.len() as u64);
-        let court = Court { model, mesh, octree, bvh: &bvh, exact };
-        let settings =
-            check::Settings { fallback_band_mm: self.mesh_settings.loosest(), ..check::Settings::default() };
+        let intersectors = Intersectors { model, mesh, octree, bvh: &bvh, exact };
+        let settings = cross_check::Settings {
+            fallback_band_mm: self.mesh_settings.loosest(),
+            ..cross_check::Settings::default()
+        };
         let total = rays.len() as f64;
-        let found = check(&court, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
+        let found = cross_check(&intersectors, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
         bar.finish_and_clear();
         found
     }

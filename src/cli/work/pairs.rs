@@ -5,7 +5,7 @@ use crate::cli::context::Context;
 use crate::intersect::Intersector;
 use crate::report::{Cell, Table, figures};
 use crate::simulate::{BoundScene, RunSettings, Scene};
-use crate::study::receivers::{Paired, paired};
+use crate::study::receivers::{PowerComparison, compare_power};
 
 /// Rays at most: a second or two on the spline of a lamp.
 const MOST: u64 = 100_000;
@@ -17,7 +17,7 @@ pub(crate) fn find(
     [facets, exact]: [&dyn Intersector; 2],
     tracing: &Tracing,
     context: &Context,
-) -> Vec<Paired> {
+) -> Vec<PowerComparison> {
     let settings = RunSettings {
         rays: tracing.rays.unwrap_or(scene.run.rays).min(MOST),
         seed: tracing.seed.unwrap_or(scene.run.seed),
@@ -25,13 +25,13 @@ pub(crate) fn find(
         ..RunSettings::from(&scene.run)
     };
     let spinner = context.spinner("tracing the scene on facets and on the spline");
-    let found = paired(bound, facets, exact, &settings);
+    let found = compare_power(bound, facets, exact, &settings);
     spinner.finish_and_clear();
     found
 }
 
 /// The same for the report.
-pub(crate) fn table(pairs: &[Paired]) -> Table {
+pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     let columns = [
         ("receiver", ""),
         ("power on the spline", "W or lm"),
@@ -56,7 +56,7 @@ pub(crate) fn table(pairs: &[Paired]) -> Table {
 }
 
 /// One line a receiver.
-pub(crate) fn described(pairs: &[Paired]) -> String {
+pub(crate) fn described(pairs: &[PowerComparison]) -> String {
     let mut text = String::new();
     for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
         let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);

@@ -88,7 +88,7 @@ fn ratios(rows: &[&Value]) -> Table {
     for model in distinct(rows, "model") {
         let of = |r: &&&Value| text(r, "model") == model;
         let own: Vec<Row> = rows.iter().filter(of).filter_map(|r| Row::deserialize(*r).ok()).collect();
-        let Some(r) = Ratios::of(&own) else { continue };
+        let Some(r) = Ratios::from_rows(&own) else { continue };
         let times = |x: f64| Cell::Number(x, 3);
         let p99 = |k: usize| r.at_p99.map_or(Cell::Empty, |p| times(p[k]));
         table.row([

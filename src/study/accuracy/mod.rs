@@ -7,10 +7,13 @@ mod sweep;
 
 pub use sweep::accuracy;
 
-use super::errors::slope;
-use super::workshop::Tree;
+use super::hit_errors::slope;
+use super::mesh_source::FacetTree;
 use crate::intersect::NormalMode;
 use serde::Serialize;
+
+/// Direction errors below this are rounding, degrees: 8e6 units in the last place of a radian.
+const ROUNDING_DEG: f64 = 1e-7;
 
 /// What is swept and how long.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +23,7 @@ pub struct Settings {
     /// Kinds of normals.
     pub normals: Vec<NormalMode>,
     /// Structures over the facets.
-    pub trees: Vec<Tree>,
+    pub trees: Vec<FacetTree>,
     /// Rays: both the timed and the judged ones.
     pub rays: u64,
     /// Timed rounds.
@@ -40,7 +43,7 @@ impl Default for Settings {
         Self {
             tolerances: uniform.into_iter().chain([[0.05, 0.2]]).collect(),
             normals: NormalMode::ALL.to_vec(),
-            trees: vec![Tree::Octree, Tree::CwBvh],
+            trees: vec![FacetTree::Octree, FacetTree::CwBvh],
             rays: 50_000,
             rounds: 3,
             threads: if all == 1 { vec![1] } else { vec![1, all] },
@@ -157,9 +160,9 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
         };
         let all: Vec<&Row> = rows.iter().filter(own).filter(|r| r.tolerance_mm.is_some()).collect();
         // Below 1e-7° an error is rounding and follows no power law.
-        let planes = all.iter().any(|r| r.direction_error_deg_p50 <= 1e-7);
+        let planes = all.iter().any(|r| r.direction_error_deg_p50 <= ROUNDING_DEG);
         let error = |r: &Row| if planes { r.direction_error_deg_p99 } else { r.direction_error_deg_p50 };
-        let used: Vec<&Row> = all.into_iter().filter(|r| error(r) > 1e-7).collect();
+        let used: Vec<&Row> = all.into_iter().filter(|r| error(r) > ROUNDING_DEG).collect();
         let sag: Vec<_> = used.iter().map(|r| (r.sag_mean_mm.unwrap_or(0.0), error(r))).collect();
         let length: Vec<_> = used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), error(r))).collect();
         let theory_in_sag = match name {

@@ -3,10 +3,10 @@
 use super::{Accuracy, Row, Settings, front, sentence, slopes};
 use crate::intersect::{Hit, Intersector, NormalMode};
 use crate::math::Ray;
-use crate::study::errors::Errors;
+use crate::study::hit_errors::HitErrors;
+use crate::study::mesh_source::{FacetTree, MeasuredMesh, MeshSource, answer, with_intersectors};
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Countdown;
-use crate::study::workshop::{Meshed, Tree, Workshop, answer, with_all};
 use crate::study::{Progress, Rounds, Timing};
 use std::sync::Mutex;
 use std::time::Instant;
@@ -14,16 +14,17 @@ use std::time::Instant;
 /// Sweeps a model. Runs on the current rayon pool.
 pub fn accuracy(
     name: &str,
-    workshop: &dyn Workshop,
+    mesh_source: &dyn MeshSource,
     settings: &Settings,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Accuracy {
     let mut countdown = Countdown::new(progress);
     countdown.stage("the exact spline", None);
-    let coarse = workshop.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
+    let coarse = mesh_source.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
     let source = Uniform::new(&coarse.mesh.bounds(), settings.seed, settings.rays);
     let rays = source.rays(0..source.len());
-    let mut study = Sweep { name, workshop, settings, rays: &rays, truth: Vec::new(), rows: Vec::new(), countdown };
+    let mut study =
+        Sweep { name, mesh_source, settings, rays: &rays, truth: Vec::new(), rows: Vec::new(), countdown };
     study.exact();
     // Facets in either structure take about four fifths of the spline's time, all kinds of normals and meshing taken together.
     let combinations = (settings.trees.len() * settings.normals.len() * (settings.rounds + 1)) as f64;
@@ -103,7 +104,7 @@ impl Forecast {
 
 struct Sweep<'a> {
     name: &'a str,
-    workshop: &'a dyn Workshop,
+    mesh_source: &'a dyn MeshSource,
     settings: &'a Settings,
     rays: &'a [Ray],
     truth: Vec<Option<Hit>>,
@@ -136,7 +137,7 @@ impl Sweep<'_> {
     }
 
     fn exact(&mut self) {
-        let who = self.workshop.exact();
+        let who = self.mesh_source.exact();
         let runners = [self.runner(who)];
         for &threads in &self.settings.threads {
             let timing = self.race(&runners, threads)[0];
@@ -157,10 +158,10 @@ impl Sweep<'_> {
     /// Gives the seconds of meshing and building.
     fn tolerance(&mut self, tolerance: [f64; 2]) -> f64 {
         let start = Instant::now();
-        let meshed = self.workshop.mesh(tolerance);
+        let meshed = self.mesh_source.mesh(tolerance);
         let settings = self.settings;
-        let workshop = self.workshop;
-        with_all(workshop, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
+        let mesh_source = self.mesh_source;
+        with_intersectors(mesh_source, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
             let prepare = start.elapsed().as_secs_f64();
             let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
             for &threads in &settings.threads {
@@ -178,11 +179,11 @@ impl Sweep<'_> {
     fn row(
         &self,
         tolerance: [f64; 2],
-        meshed: &Meshed,
-        (tree, normals, who): (Tree, NormalMode, &dyn Intersector),
+        meshed: &MeasuredMesh,
+        (tree, normals, who): (FacetTree, NormalMode, &dyn Intersector),
         hits: &[Option<Hit>],
     ) -> Row {
-        let errors = Errors::of(self.rays, hits, &self.truth);
+        let errors = HitErrors::between(self.rays, hits, &self.truth);
         let footprint = who.footprint();
         Row {
             tolerance_mm: Some(tolerance[0]),
@@ -195,14 +196,14 @@ impl Sweep<'_> {
             sag_max_mm: Some(meshed.sag_max),
             seconds_tessellate: Some(meshed.seconds),
             seconds_build: footprint.build_seconds,
-            hit_error_mm_p50: errors.position.at(0.5),
-            hit_error_mm_p99: errors.position.at(0.99),
-            direction_error_deg_p50: errors.reflected.at(0.5),
+            hit_error_mm_p50: errors.position.quantile(0.5),
+            hit_error_mm_p99: errors.position.quantile(0.99),
+            direction_error_deg_p50: errors.reflected.quantile(0.5),
             direction_error_deg_rms: errors.reflected.rms(),
-            direction_error_deg_p99: errors.reflected.at(0.99),
+            direction_error_deg_p99: errors.reflected.quantile(0.99),
             direction_error_deg_max: errors.reflected.max(),
             refracted_error_deg_rms: errors.refracted.rms(),
-            refracted_error_deg_p99: errors.refracted.at(0.99),
+            refracted_error_deg_p99: errors.refracted.quantile(0.99),
             flips: errors.flips,
             ..Row::default()
         }

@@ -1,7 +1,7 @@
 //! Cases on surfaces swept from plane curves and on polynomial graphs: creases, cusps, crossing sheets, rulings, tangents,
 //! collapsed edges, huge radii.
 
-use super::{Case, Question, Truth};
+use super::case::{Case, Question, Truth};
 use crate::math::{Frame, Homogeneous, Point, Ray, Vector};
 use crate::nurbs::{ControlPoint, Curve, Surface, sweep};
 use crate::study::Random;

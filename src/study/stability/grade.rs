@@ -1,6 +1,20 @@
-use super::{Ground, Question, Scene, Truth};
+//! Grades for an intersector: each question of a case is asked, and the answer held against the known truth.
+
+use super::case::{Geometry, Question, Scene, Truth};
 use crate::intersect::{Certainty, Cost, Hit, Intersector};
 use crate::math::{Departure, Point, Ray, Vector};
+use serde::Serialize;
+
+/// Error of a normal that no facet reaches, rad.
+const NORMAL: f64 = 1e-6;
+/// Distance from a pole at which coordinates rounded to r turn the normal by r over it, mm.
+const NEAR_POLE: f64 = 1e-6;
+/// A point this near counts as on the surface, mm, beside rounding.
+const ON_SURFACE: f64 = 1e-9;
+/// A hit nearer to its start than this share of the chord is the start itself.
+const AT_START: f64 = 1e-9;
+/// |cos| of the incidence below which the band is taken as no longer.
+const GRAZING: f64 = 1e-3;
 
 /// What an answer is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,14 +27,57 @@ pub enum Grade {
     Wrong,
 }
 
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the case.
+    pub case: String,
+    /// Name of the variant.
+    pub variant: String,
+    /// Name of the intersector.
+    pub intersector: String,
+    /// Rays or paths asked.
+    pub rays: u64,
+    /// Right answers.
+    pub right: u64,
+    /// Answers that say they are not sure.
+    pub flagged: u64,
+    /// Wrong without a word.
+    pub wrong: u64,
+}
+
+impl Scene<'_> {
+    /// What an intersector makes of every question.
+    pub fn ask(&self, name: &str, who: &dyn Intersector, geometry: Geometry) -> Row {
+        let mut row = Row {
+            case: self.case.name.into(),
+            variant: self.variant.name().into(),
+            intersector: name.into(),
+            rays: 0,
+            right: 0,
+            flagged: 0,
+            wrong: 0,
+        };
+        for grade in self.grades(who, geometry) {
+            row.rays += 1;
+            match grade {
+                Grade::Right => row.right += 1,
+                Grade::Flagged => row.flagged += 1,
+                Grade::Wrong => row.wrong += 1,
+            }
+        }
+        row
+    }
+}
+
 /// Steps of the search for a missed crossing of the band.
 const STEPS: usize = 256;
 
 impl Scene<'_> {
     /// One grade per question, in order.
-    pub fn grades(&self, who: &dyn Intersector, ground: Ground) -> Vec<Grade> {
-        let asker = Asker { scene: self, who, ground, band: self.band() };
-        self.case.questions.iter().map(|q| asker.grade(q)).collect()
+    pub fn grades(&self, who: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
+        let grader = Grader { scene: self, who, geometry, band: self.band() };
+        self.case.questions.iter().map(|q| grader.grade(q)).collect()
     }
 
     /// The ray of a question where the scene stands; for paths the first ray.
@@ -50,10 +107,10 @@ impl Scene<'_> {
     }
 }
 
-struct Asker<'a> {
+struct Grader<'a> {
     scene: &'a Scene<'a>,
     who: &'a dyn Intersector,
-    ground: Ground,
+    geometry: Geometry,
     band: f64,
 }
 
@@ -61,7 +118,7 @@ fn flagged(hit: &Hit) -> bool {
     matches!(hit.certainty, Certainty::Tangent | Certainty::Uncertified)
 }
 
-impl Asker<'_> {
+impl Grader<'_> {
     fn ask(&self, ray: &Ray) -> Option<Hit> {
         self.who.intersect(ray, &mut Cost::default())
     }
@@ -70,7 +127,7 @@ impl Asker<'_> {
     /// it counts a fallback.
     fn unsure_miss(&self, ray: &Ray) -> bool {
         let mut cost = Cost::default();
-        self.ground == Ground::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
+        self.geometry == Geometry::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
     }
 
     fn grade(&self, question: &Question) -> Grade {
@@ -90,10 +147,10 @@ impl Asker<'_> {
     }
 
     fn first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
-        match self.ground {
-            Ground::Spline => self.first_on_spline(ray, truth, hit),
-            Ground::Facets if self.right_within_sag(ray, truth, hit) => Grade::Right,
-            Ground::Facets => Grade::Wrong,
+        match self.geometry {
+            Geometry::Spline => self.first_on_spline(ray, truth, hit),
+            Geometry::Facets if self.right_within_sag(ray, truth, hit) => Grade::Right,
+            Geometry::Facets => Grade::Wrong,
         }
     }
 
@@ -109,7 +166,7 @@ impl Asker<'_> {
                 let normal = truth.normal.map(|n| self.scene.frame.normal(n));
                 // 1e-6 rad is far below what any facet reaches; coordinates rounded to r turn the normal of the surface
                 // itself by r/1e-6 at 1e-6 mm from a pole.
-                let along = normal.is_none_or(|n| h.normal.cross(n).length() < 1e-6 + 1e6 * resolution);
+                let along = normal.is_none_or(|n| h.normal.cross(n).length() < NORMAL + resolution / NEAR_POLE);
                 (close && along) || (open && self.on_surface(ray, h, resolution))
             }
         };
@@ -123,7 +180,7 @@ impl Asker<'_> {
     }
 
     fn on_surface(&self, ray: &Ray, hit: &Hit, resolution: f64) -> bool {
-        (self.scene.case.distance)(ray.at(self.local_t(hit))).abs() <= 64.0 * resolution + 1e-9
+        (self.scene.case.distance)(ray.at(self.local_t(hit))).abs() <= 64.0 * resolution + ON_SURFACE
     }
 
     fn in_band(&self, ray: &Ray, t: f64) -> bool {
@@ -160,15 +217,15 @@ impl Asker<'_> {
                 Ray::new(p, next.direction).leaving(Departure { face: h.face, primitive: h.primitive, uv: h.uv });
         }
         let resolution = self.scene.resolution(ray, truths.last().and_then(|t| t.t).unwrap_or(0.0));
-        let right = match self.ground {
-            Ground::Facets => {
+        let right = match self.geometry {
+            Geometry::Facets => {
                 let sure = truths.iter().filter(|t| t.margin > self.band).count();
                 let sequence = hits.len() >= sure
                     && hits.len() <= truths.len()
                     && (truths.len() - hits.len()).is_multiple_of(2);
                 sequence && hits.iter().all(|h| self.in_band(ray, self.local_t(h)))
             }
-            Ground::Spline => {
+            Geometry::Spline => {
                 let close = |(t, h): (&Truth, &Hit)| {
                     t.t.is_some_and(|t_true| {
                         (self.local_t(h) - t_true).abs() <= 64.0 * resolution * (1.0 + 1.0 / t.cos)
@@ -178,7 +235,7 @@ impl Asker<'_> {
             }
         };
         match right {
-            _ if self.ground == Ground::Spline && hits.iter().any(flagged) => Grade::Flagged,
+            _ if self.geometry == Geometry::Spline && hits.iter().any(flagged) => Grade::Flagged,
             true => Grade::Right,
             false => Grade::Wrong,
         }
@@ -197,18 +254,18 @@ impl Asker<'_> {
         let truth = Truth::hit(true_t, cos, radius * cos * cos * 0.5);
         let answer = self.ask(&second);
         let Some(a) = answer else {
-            return if self.ground == Ground::Facets && truth.margin <= self.band {
+            return if self.geometry == Geometry::Facets && truth.margin <= self.band {
                 Grade::Right
             } else {
                 Grade::Wrong
             };
         };
-        match self.ground {
-            Ground::Spline => self.first_on_spline(&local, &truth, Some(&a)),
-            Ground::Facets => {
+        match self.geometry {
+            Geometry::Spline => self.first_on_spline(&local, &truth, Some(&a)),
+            Geometry::Facets => {
                 let t = self.local_t(&a);
                 // From inside, a chord is missed only if the ray got out of the band on the far side.
-                let right = self.in_band(&local, t) && t > 1e-9 * true_t && t <= true_t + self.reach(&truth);
+                let right = self.in_band(&local, t) && t > AT_START * true_t && t <= true_t + self.reach(&truth);
                 if right { Grade::Right } else { Grade::Wrong }
             }
         }
@@ -216,7 +273,7 @@ impl Asker<'_> {
 
     /// How far along the ray the sag band stretches behind a hit.
     fn reach(&self, truth: &Truth) -> f64 {
-        4.0 * self.band / truth.cos.max(1e-3)
+        4.0 * self.band / truth.cos.max(GRAZING)
     }
 
     fn guide(&self, ray: &Ray, size: Vector, reflections: usize) -> Grade {

@@ -1,6 +1,6 @@
 //! Cases on boxes: walls of cells, coincident faces, slivers, thin gaps, light guides.
 
-use super::{Case, Question, Truth};
+use super::case::{Case, Question, Truth};
 use crate::math::{Frame, Point, Ray, Vector};
 use crate::nurbs::{Surface, sweep};
 use crate::study::Random;

@@ -1,6 +1,6 @@
 //! Cases on spheres and tori: grazing, silhouettes, poles, knot lines, thin tubes, weights, starts on the surface.
 
-use super::{Case, Question, Truth};
+use super::case::{Case, Question, Truth};
 use crate::math::{Frame, Homogeneous, Point, Ray, Vector, orthonormal_pair};
 use crate::nurbs::{BezierPatch, Surface, sweep};
 use crate::study::Random;
@@ -241,7 +241,8 @@ fn from_inside() -> Case {
 fn facet_features() -> Case {
     let divisions = 12;
     let case = ball("facet edge and vertex", Vec::new());
-    let mesh = super::specimen::grid_mesh(&super::specimen::model("ball", [sphere(R)]), divisions);
+    let mesh =
+        crate::study::sample_models::grid_mesh(&crate::study::sample_models::model("ball", [sphere(R)]), divisions);
     let mut questions = Vec::new();
     for i in 0..600 {
         let mut random = Random::new(11, i);

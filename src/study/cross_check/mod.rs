@@ -1,4 +1,4 @@
-//! The court: the same rays through octree, BVH and exact spline, and a cause for every difference.
+//! The cross-check: the same rays through octree, BVH and exact spline, and a cause for every difference.
 //!
 //! Octree and BVH hold the same facets, so any difference between them is a defect of one. Facets and spline may differ,
 //! but only inside the band that the facets' sag allows. Each difference is put to geometric tests that use neither
@@ -6,20 +6,20 @@
 //! the cause ([`Cause`]). A ray that crosses the whole band away from any border must be seen by both: if it is not, the
 //! difference is *unexplained*, a defect.
 //!
-//! Guarantee: every ray is judged, none is sampled, and counts do not depend on the number of threads.
+//! Guarantee: every ray is checked, none is sampled, and counts do not depend on the number of threads.
 //! The band is the largest proved sag of those facets of the face that the ray passes within their own sag.
 //! Known weakness: a facet without a proved sag counts with [`Settings::fallback_band_mm`].
 
 mod border;
-mod judge;
+mod classify;
 mod measure;
-mod sheet;
+mod placed_surface;
 mod verdict;
 
 pub use measure::{Competitor, measure};
 pub use verdict::{
-    Cause, Certainties, Check, Defect, Disagreement, Entrants, Explained, FacetsAgainstExact, FacetsDiffer,
-    SceneSize,
+    Cause, Certainties, CrossCheck, Defect, Disagreement, Explained, FacetsAgainstExact, FacetsDiffer,
+    PerIntersector, SceneSize,
 };
 
 use super::rays::RaySource;
@@ -29,13 +29,13 @@ use crate::intersect::{Certainty, Cost, Hit, Intersector};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
-use judge::Judge;
+use classify::Classifier;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Who is asked.
 #[derive(Clone, Copy)]
-pub struct Court<'a> {
+pub struct Intersectors<'a> {
     /// The model the facets were made of.
     pub model: &'a Model,
     /// The facets.
@@ -48,7 +48,7 @@ pub struct Court<'a> {
     pub exact: &'a dyn Intersector,
 }
 
-/// How the court works.
+/// How the cross-check works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Sag assumed for facets without a proved one, mm: the tolerance that was asked of the mesher.
@@ -63,17 +63,17 @@ impl Default for Settings {
     }
 }
 
-/// Rays judged by one task.
+/// Rays checked by one task.
 const CHUNK: u64 = 8192;
 
-/// Asks all rays of all three and judges every difference. Runs on the current rayon pool.
-pub fn check(
-    court: &Court<'_>,
+/// Asks octree, BVH and spline about every ray and classifies every difference. Runs on the current rayon pool.
+pub fn cross_check(
+    intersectors: &Intersectors<'_>,
     rays: &(impl RaySource + ?Sized),
     settings: &Settings,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Check {
-    let judge = Judge::new(court.model, court.mesh, settings.fallback_band_mm);
+) -> CrossCheck {
+    let classifier = Classifier::new(intersectors.model, intersectors.mesh, settings.fallback_band_mm);
     let clock = Clock::new(progress);
     let (count, done) = (rays.len(), AtomicU64::new(0));
     let chunks = count.div_ceil(CHUNK);
@@ -82,9 +82,9 @@ pub fn check(
         .map(|c| {
             let range = c * CHUNK..((c + 1) * CHUNK).min(count);
             let length = range.end - range.start;
-            let tally = Tally::of(court, &judge, range.start, &rays.rays(range));
+            let tally = Tally::of_rays(intersectors, &classifier, range.start, &rays.rays(range));
             let so_far = done.fetch_add(length, Ordering::Relaxed) + length;
-            clock.at("judging rays", so_far as f64 / count as f64);
+            clock.report("checking rays", so_far as f64 / count as f64);
             tally
         })
         .collect();
@@ -94,7 +94,8 @@ pub fn check(
     }
     let mut check = all.check;
     check.rays = count;
-    check.scene = SceneSize { facets: court.mesh.facets.len(), patches: court.exact.footprint().primitives };
+    check.scene =
+        SceneSize { facets: intersectors.mesh.facets.len(), patches: intersectors.exact.footprint().primitives };
     check.facets_vs_exact.t_error_mm = all.t_errors.summary();
     check.facets_vs_exact.normal_error_deg = all.normal_errors.summary();
     check.disagreements = all.kept;
@@ -108,30 +109,30 @@ pub(super) fn angle_deg(a: crate::math::Vector, b: crate::math::Vector) -> f64 {
 
 #[derive(Default)]
 struct Tally {
-    check: Check,
+    check: CrossCheck,
     t_errors: Quantiles,
     normal_errors: Quantiles,
     kept: Vec<Disagreement>,
 }
 
 impl Tally {
-    fn of(court: &Court<'_>, judge: &Judge<'_>, first: u64, rays: &[Ray]) -> Self {
+    fn of_rays(intersectors: &Intersectors<'_>, classifier: &Classifier<'_>, first: u64, rays: &[Ray]) -> Self {
         let ask = |who: &dyn Intersector| {
             let mut hits = vec![None; rays.len()];
             who.intersect_batch(rays, &mut hits, &mut Cost::default());
             hits
         };
-        let (octree, bvh, exact) = (ask(court.octree), ask(court.bvh), ask(court.exact));
+        let (octree, bvh, exact) = (ask(intersectors.octree), ask(intersectors.bvh), ask(intersectors.exact));
         let mut tally = Self::default();
         for (i, ray) in rays.iter().enumerate() {
-            tally.add(judge, first + i as u64, ray, [octree[i], bvh[i], exact[i]]);
+            tally.add(classifier, first + i as u64, ray, [octree[i], bvh[i], exact[i]]);
         }
         tally
     }
 
-    fn add(&mut self, judge: &Judge<'_>, index: u64, ray: &Ray, [octree, bvh, exact]: [Option<Hit>; 3]) {
+    fn add(&mut self, classifier: &Classifier<'_>, index: u64, ray: &Ray, [octree, bvh, exact]: [Option<Hit>; 3]) {
         self.check.hits += u64::from(octree.is_some());
-        let facets_differ = match judge.same_facets(ray, octree.as_ref(), bvh.as_ref()) {
+        let facets_differ = match classifier.same_facets(ray, octree.as_ref(), bvh.as_ref()) {
             Ok(tie) => {
                 self.check.octree_vs_bvh.ties += u64::from(tie);
                 false
@@ -148,7 +149,7 @@ impl Tally {
                 _ => self.check.exact.uncertified += 1,
             }
         }
-        let cause = judge.compare(ray, octree.as_ref(), exact.as_ref());
+        let cause = classifier.compare(ray, octree.as_ref(), exact.as_ref());
         self.count(cause, octree, exact);
         let flipped = octree.is_some() != exact.is_some();
         if facets_differ || flipped || cause.is_some_and(|c| c != Cause::WithinSag) {

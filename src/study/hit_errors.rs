@@ -1,14 +1,19 @@
-use super::workshop::{reflect, refract};
-use super::{Quantiles, check::angle_deg};
+//! Errors of the hits of one intersector against the exact hits of the same rays, and the order at which they fall.
+
+use super::mesh_source::{reflect, refract};
+use super::{Quantiles, cross_check::angle_deg};
 use crate::intersect::Hit;
 use crate::math::Ray;
+
+/// Sum of squares of logarithms below which all points stand at one abscissa and have no slope.
+const SAME_ABSCISSA: f64 = 1e-12;
 
 /// Relative index of the refraction that direction errors are given for: air to glass.
 pub(super) const GLASS: f64 = 1.5;
 
-/// Errors of one intersector's hits against the exact hits of the same rays.
+/// HitErrors of one intersector's hits against the exact hits of the same rays.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Errors {
+pub(super) struct HitErrors {
     /// Distance between the two hit points, mm.
     pub(super) position: Quantiles,
     /// Angle between the mirrored directions, degrees.
@@ -21,8 +26,8 @@ pub(super) struct Errors {
     pub(super) flips: u64,
 }
 
-impl Errors {
-    pub(super) fn of(rays: &[Ray], hits: &[Option<Hit>], exact: &[Option<Hit>]) -> Self {
+impl HitErrors {
+    pub(super) fn between(rays: &[Ray], hits: &[Option<Hit>], exact: &[Option<Hit>]) -> Self {
         let mut e = Self::default();
         for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {
             let (h, t) = match (hit, truth) {
@@ -53,7 +58,7 @@ pub(super) fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let n = logs.len() as f64;
     let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
     let (sxy, sxx) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));
-    (logs.len() >= 2 && sxx > 1e-12).then(|| sxy / sxx)
+    (logs.len() >= 2 && sxx > SAME_ABSCISSA).then(|| sxy / sxx)
 }
 
 #[cfg(test)]

@@ -1,3 +1,5 @@
+//! What a cross-check reports: causes, defects, counts and the rays that were answered differently.
+
 use crate::intersect::Hit;
 use crate::math::Ray;
 use crate::study::Summary;
@@ -18,7 +20,7 @@ pub enum Cause {
     Coincident,
     /// The spline's hit is a touch within 1e-9 mm.
     Tangent,
-    /// The facet has no proved sag, and the court's own measure of it is more than was asked and explains the difference.
+    /// The facet has no proved sag, and the cross-check's own measure of it is more than was asked and explains the difference.
     Unproved,
     /// The face was not meshed, so the facets cannot answer.
     Unmeshed,
@@ -39,7 +41,7 @@ pub enum Defect {
     MissedCrossing,
     /// Same crossing, opposite normals.
     Orientation,
-    /// The court's own walk along the ray did not end.
+    /// The cross-check's own walk along the ray did not end.
     Inconclusive,
 }
 
@@ -82,9 +84,9 @@ pub struct Disagreement {
     pub facets_differ: bool,
 }
 
-/// What the court found, as `check --json` gives it.
+/// What the cross-check found, as `check --json` gives it.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Check {
+pub struct CrossCheck {
     /// Rays asked.
     pub rays: u64,
     /// Rays with a hit on the facets.
@@ -98,11 +100,11 @@ pub struct Check {
     /// Certainty of the spline's hits.
     pub exact: Certainties,
     /// Million rays a second on one thread; filled by [`super::measure`].
-    pub mrays_per_s: Entrants,
+    pub mrays_per_s: PerIntersector,
     /// Seconds to build each structure.
-    pub build_seconds: Entrants,
+    pub build_seconds: PerIntersector,
     /// Bytes of each structure per facet (per patch for the spline).
-    pub bytes_per_facet: Entrants,
+    pub bytes_per_facet: PerIntersector,
     /// The rays that were answered differently, the largest cause `within_sag` left out; at most
     /// [`super::Settings::keep`] of them.
     #[serde(skip)]
@@ -178,7 +180,7 @@ pub struct Certainties {
 
 /// One figure for each intersector; `None` where it was not run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Entrants {
+pub struct PerIntersector {
     /// The octree, all rays in one batch.
     pub octree: Option<f64>,
     /// The octree, ray by ray.

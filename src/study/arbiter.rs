@@ -14,6 +14,17 @@ use crate::math::{Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use std::ops::{Add, Mul, Sub};
 
+/// Relative to 1 mm plus the distance: single precision (2⁻²⁴ = 6e-8) behind a grazing angle of 1/1700, with room.
+const SAME_DISTANCE: f64 = 1e-4;
+/// Crossings this near, relative to 1 mm plus the distance, are of facets that share an edge or corner.
+const NEIGHBOURS: f64 = 1e-9;
+/// Slack of the test that spares far facets, relative to the facet's reach; a facet too many only costs time.
+const CULL_RELATIVE: f64 = 1e-6;
+/// The same for the rounding of coordinates, relative to 1 mm plus the distance of the facet.
+const CULL_ROUNDING: f64 = 1e-9;
+/// Rounding of a distance against the ends of the ray's range, relative: 4500 units in the last place.
+const RANGE_ROUNDING: f64 = 1e-12;
+
 /// Which of two differing answers is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -27,11 +38,11 @@ pub enum Verdict {
 
 /// By how much two distances may differ and still be the same hit, mm: single precision with room.
 pub fn same_distance(a: f64, b: f64) -> bool {
-    (a - b).abs() <= 1e-4 * (1.0 + a.abs())
+    (a - b).abs() <= SAME_DISTANCE * (1.0 + a.abs())
 }
 
 /// Judges two answers to one ray.
-pub fn judge(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Verdict {
+pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Verdict {
     let mut met = Vec::new();
     for f in (0..mesh.facets.len()).filter(|&f| passes_near(ray, &mesh.corners(f))) {
         let [a, b, c, d] = mesh.corners(f);
@@ -40,9 +51,12 @@ pub fn judge(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&H
     }
     // Of a hit within the band, a neighbour that faces the same way makes the surface go on; at a silhouette, where
     // they face both ways, and on a border the ray may as well pass by.
-    let certain = |hit: &Meeting| {
-        let beside: Vec<bool> =
-            met.iter().filter(|m| (m.t - hit.t).abs() <= 1e-9 * (1.0 + hit.t.abs())).map(|m| m.front).collect();
+    let certain = |hit: &Crossing| {
+        let beside: Vec<bool> = met
+            .iter()
+            .filter(|m| (m.t - hit.t).abs() <= NEIGHBOURS * (1.0 + hit.t.abs()))
+            .map(|m| m.front)
+            .collect();
         hit.inside || (hit.exact && beside.len() > 1 && beside.iter().all(|&front| front == hit.front))
     };
     let nearest = met.iter().filter(|m| certain(m)).map(|m| m.t).reduce(f64::min);
@@ -65,14 +79,14 @@ fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     let from_corner = corners[0] - ray.origin;
     let aside: Vector = from_corner - ray.direction * from_corner.dot(ray.direction);
     let reach = corners.iter().map(|p| p.distance_squared(corners[0])).fold(0.0, f64::max).sqrt();
-    aside.length() <= reach * (1.0 + 1e-6) + 1e-9 * (1.0 + from_corner.length())
+    aside.length() <= reach * (1.0 + CULL_RELATIVE) + CULL_ROUNDING * (1.0 + from_corner.length())
 }
 
 /// What an f64 test may be wrong by, in the lengths involved.
 const BAND: f64 = 1e-13;
 
 /// A triangle that the ray meets as far as rounding can tell.
-struct Meeting {
+struct Crossing {
     t: f64,
     /// Beyond the band of rounding.
     inside: bool,
@@ -83,14 +97,14 @@ struct Meeting {
 }
 
 /// Where the ray meets a triangle within its range.
-fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Meeting> {
-    let d = ray.direction.to_array().map(Twice::from);
+fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
+    let d = ray.direction.to_array().map(DoubleDouble::from);
     let from = ray.origin.to_array();
     let [a, b, c] = corners.map(|p| {
         let p = p.to_array();
-        std::array::from_fn(|k| Twice::sum(p[k], -from[k]))
+        std::array::from_fn(|k| DoubleDouble::sum(p[k], -from[k]))
     });
-    let size = |v: &[Twice; 3]| v.iter().fold(0.0, |m: f64, x| m.max(x.high.abs()));
+    let size = |v: &[DoubleDouble; 3]| v.iter().fold(0.0, |m: f64, x| m.max(x.high.abs()));
     let largest = size(&a).max(size(&b)).max(size(&c));
     let scale = largest * largest * size(&d);
     let volumes = [volume(&d, &c, &b), volume(&d, &a, &c), volume(&d, &b, &a)];
@@ -107,26 +121,26 @@ fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Meeting> {
     let main = (0..3).fold(0, |m, k| if d[k].high.abs() > d[m].high.abs() { k } else { m });
     let along = a[main] * volumes[0] + b[main] * volumes[1] + c[main] * volumes[2];
     let t = along.high / det.high / d[main].high;
-    let rounding = 1e-12 * t.abs() + f64::MIN_POSITIVE;
+    let rounding = RANGE_ROUNDING * t.abs() + f64::MIN_POSITIVE;
     let in_range = t >= ray.t_min - rounding && t <= ray.t_max + rounding;
     let inside = volumes.iter().all(|v| v.high.abs() > BAND * scale) && one_sided(0.0);
-    in_range.then(|| Meeting { t, inside, exact: one_sided(exact), front: det.high > 0.0 })
+    in_range.then(|| Crossing { t, inside, exact: one_sided(exact), front: det.high > 0.0 })
 }
 
 /// `u · (v × w)`.
-fn volume(u: &[Twice; 3], v: &[Twice; 3], w: &[Twice; 3]) -> Twice {
+fn volume(u: &[DoubleDouble; 3], v: &[DoubleDouble; 3], w: &[DoubleDouble; 3]) -> DoubleDouble {
     let cross = |p: usize, q: usize| v[p] * w[q] - v[q] * w[p];
     u[0] * cross(1, 2) + u[1] * cross(2, 0) + u[2] * cross(0, 1)
 }
 
 /// The unevaluated sum of two f64.
 #[derive(Clone, Copy, Debug)]
-struct Twice {
+struct DoubleDouble {
     high: f64,
     low: f64,
 }
 
-impl Twice {
+impl DoubleDouble {
     /// The exact sum of two numbers.
     fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
@@ -140,13 +154,13 @@ impl Twice {
     }
 }
 
-impl From<f64> for Twice {
+impl From<f64> for DoubleDouble {
     fn from(high: f64) -> Self {
         Self { high, low: 0.0 }
     }
 }
 
-impl Add for Twice {
+impl Add for DoubleDouble {
     type Output = Self;
     fn add(self, o: Self) -> Self {
         let (high, low) = (Self::sum(self.high, o.high), Self::sum(self.low, o.low));
@@ -155,14 +169,14 @@ impl Add for Twice {
     }
 }
 
-impl Sub for Twice {
+impl Sub for DoubleDouble {
     type Output = Self;
     fn sub(self, o: Self) -> Self {
         self + Self { high: -o.high, low: -o.low }
     }
 }
 
-impl Mul for Twice {
+impl Mul for DoubleDouble {
     type Output = Self;
     fn mul(self, o: Self) -> Self {
         let high = self.high * o.high;
@@ -203,28 +217,28 @@ mod tests {
         let (upper, lower) = (hit(2.0), hit(3.0));
         let down = Ray::new(Point::new(0.3, 0.4, 2.0), -Vector::Z);
         let beside = Ray::new(Point::new(1.0 + 1e-9, 0.4, 2.0), -Vector::Z);
-        assert_eq!(judge(&mesh, &down, Some(&lower), Some(&upper)), Verdict::Second);
-        assert_eq!(judge(&mesh, &down, Some(&upper), None), Verdict::First);
-        assert_eq!(judge(&mesh, &beside, Some(&upper), None), Verdict::Second);
-        assert_eq!(judge(&mesh, &down.within(0.0, 1.0), None, Some(&upper)), Verdict::First);
-        assert_eq!(judge(&mesh, &down.within(2.5, 9.0), Some(&upper), Some(&lower)), Verdict::Second);
+        assert_eq!(arbitrate(&mesh, &down, Some(&lower), Some(&upper)), Verdict::Second);
+        assert_eq!(arbitrate(&mesh, &down, Some(&upper), None), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &beside, Some(&upper), None), Verdict::Second);
+        assert_eq!(arbitrate(&mesh, &down.within(0.0, 1.0), None, Some(&upper)), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &down.within(2.5, 9.0), Some(&upper), Some(&lower)), Verdict::Second);
     }
 
     #[test]
     fn a_ray_on_an_edge_is_a_hit_and_on_the_border_may_be() {
         let mesh = sheets();
         let diagonal = Ray::new(Point::new(0.25, 0.25, 2.0), -Vector::Z);
-        assert_eq!(judge(&mesh, &diagonal, Some(&hit(2.0)), None), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &diagonal, Some(&hit(2.0)), None), Verdict::First);
         let border = Ray::new(Point::new(1.0 + 1e-15, 0.3, 2.0), -Vector::Z);
-        assert_eq!(judge(&mesh, &border, Some(&hit(2.0)), None), Verdict::Undecided);
+        assert_eq!(arbitrate(&mesh, &border, Some(&hit(2.0)), None), Verdict::Undecided);
     }
 
     #[test]
     fn products_are_exact_to_twice_the_digits() {
         let tiny = 2f64.powi(-60);
-        let x = Twice::sum(1.0, tiny);
-        let square = x * x - Twice::from(1.0);
+        let x = DoubleDouble::sum(1.0, tiny);
+        let square = x * x - DoubleDouble::from(1.0);
         assert_eq!(square.high, 2.0 * tiny);
-        assert_eq!((Twice::sum(0.1, 1e17) - Twice::from(1e17)).high, 0.1);
+        assert_eq!((DoubleDouble::sum(0.1, 1e17) - DoubleDouble::from(1e17)).high, 0.1);
     }
 }

@@ -1,4 +1,6 @@
-use super::sheet::Sheet;
+//! Finds the cause of each difference between the hits on facets and on the spline.
+
+use super::placed_surface::PlacedSurface;
 use super::verdict::{Cause, Defect};
 use crate::intersect::{Certainty, Hit};
 use crate::math::{Aabb, FaceId, Ray};
@@ -6,11 +8,22 @@ use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use std::sync::OnceLock;
 
+/// Rounding of a hit, as a share of the reach of the coordinates: 45,000 units in the last place, for grazing rays.
+const ROUNDING: f64 = 1e-11;
+/// How far foot points may lie from the true ones, as a share of the size of the surface.
+const FOOT_POINT: f64 = 1e-9;
+/// |cos| of the incidence below which the distance of a hit is no longer held to more digits.
+const GRAZING: f64 = 1e-9;
+/// Unit normals of one facet from two intersectors agree to this at normal incidence: interpolation at hits that differ by rounding.
+const SAME_NORMAL: f64 = 1e-9;
+/// |cos| of the incidence below which normals are no longer held to more digits.
+const GRAZING_NORMAL: f64 = 1e-6;
+
 /// Decides why facets and spline differ: geometry of its own, none of the intersectors'.
-pub(super) struct Judge<'a> {
+pub(super) struct Classifier<'a> {
     mesh: &'a FacetMesh,
     placed: Vec<PlacedFace<'a>>,
-    sheets: Vec<OnceLock<Option<Sheet>>>,
+    surfaces: Vec<OnceLock<Option<PlacedSurface>>>,
     /// The facets of each face.
     facets: Vec<Vec<u32>>,
     fallback: f64,
@@ -18,7 +31,7 @@ pub(super) struct Judge<'a> {
     pub(super) rounding: f64,
 }
 
-impl<'a> Judge<'a> {
+impl<'a> Classifier<'a> {
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
         let placed: Vec<_> = model.placed_faces().collect();
         let mut facets = vec![Vec::new(); placed.len()];
@@ -27,16 +40,16 @@ impl<'a> Judge<'a> {
                 own.push(i);
             }
         }
-        let sheets = placed.iter().map(|_| OnceLock::new()).collect();
+        let surfaces = placed.iter().map(|_| OnceLock::new()).collect();
         let bounds = mesh.bounds();
         let reach = Aabb::around([bounds.min.abs(), bounds.max.abs()]).max;
         let size = if bounds.is_empty() { 1.0 } else { reach.length() + bounds.diagonal() };
-        Self { mesh, placed, sheets, facets, fallback, rounding: 1e-11 * size }
+        Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
     }
 
-    fn sheet(&self, face: FaceId) -> Option<&Sheet> {
+    fn surface(&self, face: FaceId) -> Option<&PlacedSurface> {
         let placed = self.placed.get(face.index())?;
-        self.sheets[face.index()].get_or_init(|| Sheet::of(placed)).as_ref()
+        self.surfaces[face.index()].get_or_init(|| PlacedSurface::new(placed)).as_ref()
     }
 
     /// Sag of a facet, mm: proved, or what was asked of the mesher.
@@ -63,13 +76,13 @@ impl<'a> Judge<'a> {
     }
 
     /// How far a facet that nobody proved strays from the spline: the farthest of 25 of its points.
-    fn measured(&self, hit: &Hit, sheet: &Sheet, ray: &Ray) -> f64 {
+    fn measured(&self, hit: &Hit, surface: &PlacedSurface, ray: &Ray) -> f64 {
         let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
         let points = (0..25).map(|k| {
             let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
             if u >= v { a + (b - a) * (u - v) + (c - a) * v } else { a + (d - a) * (v - u) + (c - a) * u }
         });
-        points.map(|p| sheet.foot(p, hit.uv, ray.direction).offset.abs()).fold(0.0, f64::max)
+        points.map(|p| surface.foot(p, hit.uv, ray.direction).offset.abs()).fold(0.0, f64::max)
     }
 
     /// `None` when the answers agree to rounding.
@@ -105,15 +118,15 @@ impl<'a> Judge<'a> {
         if self.facets.get(first.face.index()).is_none_or(|f| f.is_empty()) {
             return Cause::Unmeshed;
         }
-        let Some(sheet) = self.sheet(first.face) else { return Cause::NoSurface };
-        let sag = self.band(first.face, ray, sheet.gap);
-        let cause = self.cause(ray, first, other, sheet, sag);
+        let Some(surface) = self.surface(first.face) else { return Cause::NoSurface };
+        let sag = self.band(first.face, ray, surface.gap);
+        let cause = self.cause(ray, first, other, surface, sag);
         // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
         if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved(f.primitive).is_none()))
-            && let Some(its) = self.sheet(f.face)
+            && let Some(its) = self.surface(f.face)
         {
             let measured = self.measured(f, its, ray);
-            let again = if measured > sag { self.cause(ray, first, other, sheet, measured) } else { cause };
+            let again = if measured > sag { self.cause(ray, first, other, surface, measured) } else { cause };
             if !matches!(again, Cause::Unexplained(_)) {
                 return Cause::Unproved;
             }
@@ -122,9 +135,9 @@ impl<'a> Judge<'a> {
     }
 
     /// The cause when facets may stray from the first hit's face by `sag`.
-    fn cause(&self, ray: &Ray, first: &Hit, other: Option<&Hit>, sheet: &Sheet, sag: f64) -> Cause {
-        let band = sag + sheet.gap + self.rounding + 1e-9 * sheet.size();
-        let Some(stretch) = sheet.stretch(ray, first.t, first.uv, band) else {
+    fn cause(&self, ray: &Ray, first: &Hit, other: Option<&Hit>, surface: &PlacedSurface, sag: f64) -> Cause {
+        let band = sag + surface.gap + self.rounding + FOOT_POINT * surface.size();
+        let Some(stretch) = surface.stretch(ray, first.t, first.uv, band) else {
             return Cause::Unexplained(Defect::OffTheSurface);
         };
         let [begin, end] = stretch.range;
@@ -142,8 +155,8 @@ impl<'a> Judge<'a> {
             return Cause::Silhouette;
         }
         if let Some(o) = other.filter(|o| o.face != first.face) {
-            let both = band + self.band(o.face, ray, sheet.gap);
-            if sheet.foot(ray.at(o.t), first.uv, ray.direction).offset.abs() <= both {
+            let both = band + self.band(o.face, ray, surface.gap);
+            if surface.foot(ray.at(o.t), first.uv, ray.direction).offset.abs() <= both {
                 return Cause::Coincident;
             }
         }
@@ -158,13 +171,13 @@ impl<'a> Judge<'a> {
             _ => return Err(()),
         };
         let cos = a.geometric_normal.dot(ray.direction).abs().min(b.geometric_normal.dot(ray.direction).abs());
-        let scale = ray.origin.length() + a.t.abs() + self.rounding * 1e11;
-        if (a.t - b.t).abs() > 16.0 * f64::EPSILON * scale / cos.max(1e-9) {
+        let scale = ray.origin.length() + a.t.abs() + self.rounding / ROUNDING;
+        if (a.t - b.t).abs() > 16.0 * f64::EPSILON * scale / cos.max(GRAZING) {
             return Err(());
         }
         if a.primitive != b.primitive {
             return Ok(true);
         }
-        if a.normal.distance(b.normal) > 1e-9 / cos.max(1e-6) { Err(()) } else { Ok(false) }
+        if a.normal.distance(b.normal) > SAME_NORMAL / cos.max(GRAZING_NORMAL) { Err(()) } else { Ok(false) }
     }
 }

@@ -2,20 +2,23 @@
 
 use super::Progress;
 use super::accuracy::{self, Accuracy};
+use super::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use super::receivers::{self, Combination};
-use super::workshop::{Tree, Workshop, with_all};
 use crate::intersect::{Intersector, NormalMode};
 use crate::simulate::{BoundScene, RunSettings, simulate};
 use std::time::Instant;
 
+/// Times are never taken as shorter, s: the resolution of the clock, so that no ratio is infinite.
+const LEAST_SECONDS: f64 = 1e-9;
+
 /// Kinds of normals that the receivers are asked about.
 const KINDS: [NormalMode; 4] = [NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
 
-/// Sweeps a model, then traces its light on facets of every uniform tolerance of the sweep and on the spline. `workshop` makes
+/// Sweeps a model, then traces its light on facets of every uniform tolerance of the sweep and on the spline. `mesh_source` makes
 /// the sweep's meshes, with their sag measured; `plain` those of the light, which need none.
-pub fn accuracy_of_scene(
+pub fn scene_accuracy(
     name: &str,
-    [workshop, plain]: [&dyn Workshop; 2],
+    [mesh_source, plain]: [&dyn MeshSource; 2],
     (bound, run): (&BoundScene, &RunSettings),
     settings: &accuracy::Settings,
     progress: &(dyn Fn(Progress) + Sync),
@@ -23,22 +26,22 @@ pub fn accuracy_of_scene(
     let begun = Instant::now();
     let uniform: Vec<f64> = settings.tolerances.iter().filter(|t| t[0] == t[1]).map(|t| t[0]).collect();
     let Some(&middle) = uniform.get(uniform.len() / 2) else {
-        return (accuracy::accuracy(name, workshop, settings, progress), Vec::new());
+        return (accuracy::accuracy(name, mesh_source, settings, progress), Vec::new());
     };
-    let pilot = Pilot::of(plain, bound, run, middle);
+    let pilot = Pilot::time(plain, bound, run, middle);
     let seconds_after = pilot.spline + uniform.iter().flat_map(|&t| pilot.expected(t, |_| None)).sum::<f64>();
     let settings = accuracy::Settings { seconds_after, ..settings.clone() };
-    let study = accuracy::accuracy(name, workshop, &settings, progress);
+    let study = accuracy::accuracy(name, mesh_source, &settings, progress);
     let threads = study.rows.iter().map(|r| r.threads).max().unwrap_or(1);
-    let of = |tolerance: f64, normals: NormalMode| {
+    let swept_row = |tolerance: f64, normals: NormalMode| {
         let mut rows = study.rows.iter().filter(|r| r.threads == threads && !r.adaptive);
-        let octree = Tree::Octree.name();
+        let octree = FacetTree::Octree.name();
         rows.find(|r| r.tolerance_mm == Some(tolerance) && r.intersector == octree && r.normals == normals.name())
     };
     // The sweep's rays are not the scene's, but finer facets slow both alike.
     let slower = |tolerance: f64, normals: NormalMode| {
-        let [now, then] = [tolerance, middle].map(|t| of(t, normals).map(|r| r.seconds_trace_median));
-        Some(now? / then?.max(1e-12))
+        let [now, then] = [tolerance, middle].map(|t| swept_row(t, normals).map(|r| r.seconds_trace_median));
+        Some(now? / then?.max(LEAST_SECONDS))
     };
     let mut combinations = Vec::new();
     for &t in &uniform {
@@ -64,7 +67,7 @@ struct Pilot {
 }
 
 impl Pilot {
-    fn of(workshop: &dyn Workshop, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
+    fn time(mesh_source: &dyn MeshSource, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
         let timed = |who: &dyn Intersector, rays: u64| {
             let few = RunSettings { rays, path_samples: 0, ..run.clone() };
             let start = Instant::now();
@@ -79,10 +82,10 @@ impl Pilot {
             let (a, b) = (timed(who, few), timed(who, more));
             b + (b - a).max(0.0) * (run.rays - more) as f64 / (more - few).max(1) as f64
         };
-        let spline = seconds(workshop.exact());
+        let spline = seconds(mesh_source.exact());
         let start = Instant::now();
-        let meshed = workshop.mesh([middle; 2]);
-        with_all(workshop, &meshed.mesh, &[Tree::Octree], &KINDS, |trees| {
+        let meshed = mesh_source.mesh([middle; 2]);
+        with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &KINDS, |trees| {
             let prepare = start.elapsed().as_secs_f64();
             let mut traced = [0.0; 4];
             traced.iter_mut().zip(trees).for_each(|(slot, tree)| *slot = seconds(tree.2));

@@ -1,14 +1,29 @@
-use super::plan::{Plan, Survey, factor, p99};
-use super::{Aim, Ask, Try};
+//! The search for the cheapest tolerances and normals that meet an accuracy target.
+
+use super::tolerance_plan::{Survey, TolerancePlan, factor, p99};
+use super::{AccuracyPlan, AccuracyTarget, Trial};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
 use crate::model::Model;
 use crate::study::Progress;
-use crate::study::check::angle_deg;
+use crate::study::cross_check::angle_deg;
+use crate::study::mesh_source::{FacetTree, MeshSource, answer, reflect, with_intersectors};
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Clock;
-use crate::study::workshop::{Tree, Workshop, answer, reflect, with_all};
 use std::time::Instant;
+
+/// Numbers written without an exponent.
+const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
+/// The coarse end of what users ask for, mm.
+const COARSEST: f64 = 0.2;
+/// Of a small model the coarse tolerance is its diagonal over this.
+const SMALL_MODEL: f64 = 500.0;
+/// And never finer than this, mm: a model of a micrometre.
+const FINEST_COARSE: f64 = 1e-6;
+/// Finest local tolerance of a plan over the coarse one: facets go with its inverse, and ten thousand times as many are given up.
+const FINEST: f64 = 1e-4;
+/// Coarsest local tolerance of a plan over the coarse one.
+const COARSEST_FACTOR: f64 = 4.0;
 
 /// Rays that look at the model first, and that facets are tuned on.
 const PILOTS: u64 = 65_536;
@@ -22,52 +37,57 @@ const ATTEMPTS: usize = 6;
 const MOST_FACETS: f64 = 6e6;
 
 /// Rays of a seed, and how many: those that the job will meet.
-pub type RaysOf<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
+pub type RayGenerator<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
 
 /// Finds the cheapest way to an accuracy for random rays through the model. Runs on the current rayon pool.
-pub fn aim(model: &Model, workshop: &dyn Workshop, ask: &Ask, progress: &(dyn Fn(Progress) + Sync)) -> Aim {
+pub fn meet_target(
+    model: &Model,
+    mesh_source: &dyn MeshSource,
+    target: &AccuracyTarget,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> AccuracyPlan {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
     let uniform = |seed: u64, count: u64| {
         let source = Uniform::new(&bounds, seed, count);
         source.rays(0..source.len())
     };
-    aim_at(model, workshop, ask, &uniform, progress)
+    meet_target_for_rays(model, mesh_source, target, &uniform, progress)
 }
 
 /// The same for rays of one's own, such as those of a scene.
-pub fn aim_at(
+pub fn meet_target_for_rays(
     model: &Model,
-    workshop: &dyn Workshop,
-    ask: &Ask,
-    rays: &RaysOf<'_>,
+    mesh_source: &dyn MeshSource,
+    target: &AccuracyTarget,
+    rays: &RayGenerator<'_>,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Aim {
+) -> AccuracyPlan {
     let start = Instant::now();
     let clock = Clock::new(progress);
-    clock.at("pilot rays", 0.0);
-    let pilots = Judged::new(workshop, rays(ask.seed, PILOTS));
+    clock.report("pilot rays", 0.0);
+    let pilots = ReferenceRays::new(mesh_source, rays(target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
-    let search = Search { workshop, ask, rays, pilots, survey, coarse: coarse(model), fresh: 0.into() };
-    let local = ask.kinds.iter().map(|&normals| search.candidate(normals, true));
+    let search = Search { mesh_source, target, rays, pilots, survey, coarse: coarse(model), fresh: 0.into() };
+    let local = target.kinds.iter().map(|&normals| search.candidate(normals, true));
     // Where few rays meet the sharp places, they may err: one tolerance for all then costs less than holding every face to the angle.
     // On the two reflectors 0.3° cost twice the cheapest combination without it.
     let even =
-        ask.kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| search.candidate(normals, false));
+        target.kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| search.candidate(normals, false));
     let mut kinds: Vec<Candidate> = local.chain(even).collect();
     kinds.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
-    let mut tries: Vec<Try> = Vec::new();
-    let mut best: Option<Found> = None;
+    let mut trials: Vec<Trial> = Vec::new();
+    let mut best: Option<Solution> = None;
     for (k, candidate) in kinds.iter().enumerate() {
         // A kind that is dearer by its own forecast than what another was measured to cost is not worth the wait.
-        let beaten = best.as_ref().is_some_and(|b| b.kept(ask) && candidate.predicted > 0.8 * b.seconds());
+        let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.predicted > 0.8 * b.seconds());
         if beaten || (candidate.facets > MOST_FACETS && best.is_some()) {
             continue;
         }
         let stage = format!("{} normals", candidate.normals);
-        clock.at(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
-        let found = search.reach(candidate, &mut tries);
-        let better = |b: &Found| match (found.kept(ask), b.kept(ask)) {
+        clock.report(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
+        let found = search.reach(candidate, &mut trials);
+        let better = |b: &Solution| match (found.is_kept(target), b.is_kept(target)) {
             (true, true) => found.seconds() < b.seconds(),
             (a, b_kept) => a && !b_kept || a == b_kept && found.reached < b.reached,
         };
@@ -75,23 +95,23 @@ pub fn aim_at(
             best = Some(found);
         }
     }
-    clock.at("done", 1.0);
-    let found = best.unwrap_or_else(|| search.nothing());
-    let kept = found.kept(ask);
+    clock.report("done", 1.0);
+    let found = best.unwrap_or_else(|| search.no_solution());
+    let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
     let range =
         if low == high { format!("{} mm", brief(low)) } else { format!("{} to {} mm", brief(low), brief(high)) };
     let answer = format!(
         "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline) with {} normals on {} facets within {range}{}.",
-        ask.degrees,
+        target.degrees,
         brief(found.reached),
         found.checked,
         found.normals,
         found.facets,
         if kept { "" } else { ": not reached" }
     );
-    Aim {
-        asked_deg: ask.degrees,
+    AccuracyPlan {
+        asked_deg: target.degrees,
         reached_deg: found.reached,
         kept,
         normals: found.normals,
@@ -100,7 +120,7 @@ pub fn aim_at(
         seconds_prepare: found.prepare,
         seconds_trace: found.trace,
         plan: found.plan,
-        tries,
+        trials,
         checked: found.checked,
         flips: found.flips,
         seconds: start.elapsed().as_secs_f64(),
@@ -110,30 +130,30 @@ pub fn aim_at(
 
 /// Three digits.
 fn brief(x: f64) -> String {
-    if !(1e-4..1e4).contains(&x) {
+    if !PLAIN_NUMBERS.contains(&x) {
         return format!("{x:.1e}");
     }
     let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
     format!("{x:.decimals$}")
 }
 
-/// 0.2 mm, the coarse end of what users ask for, or 1/500 of a small model.
+/// 0.2 mm, the coarse end of what users target for, or 1/500 of a small model.
 fn coarse(model: &Model) -> f64 {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
-    (bounds.diagonal() / 500.0).clamp(1e-6, 0.2)
+    (bounds.diagonal() / SMALL_MODEL).clamp(FINEST_COARSE, COARSEST)
 }
 
 /// Rays with their exact hits.
-struct Judged {
+struct ReferenceRays {
     rays: Vec<Ray>,
     truth: Vec<Option<Hit>>,
 }
 
-impl Judged {
-    fn new(workshop: &dyn Workshop, rays: Vec<Ray>) -> Self {
+impl ReferenceRays {
+    fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>) -> Self {
         let mut truth = vec![None; rays.len()];
-        answer(workshop.exact(), &rays, rayon::current_num_threads(), &mut truth);
+        answer(mesh_source.exact(), &rays, rayon::current_num_threads(), &mut truth);
         Self { rays, truth }
     }
 }
@@ -141,7 +161,7 @@ impl Judged {
 /// A kind of normals with the tolerances that should do.
 struct Candidate {
     normals: NormalMode,
-    plan: Plan,
+    plan: TolerancePlan,
     /// Order of the error in the sag.
     order: f64,
     facets: f64,
@@ -149,9 +169,9 @@ struct Candidate {
 }
 
 /// What a kind of normals came to.
-struct Found {
+struct Solution {
     normals: NormalMode,
-    plan: Plan,
+    plan: TolerancePlan,
     facets: usize,
     prepare: f64,
     trace: f64,
@@ -160,9 +180,9 @@ struct Found {
     flips: u64,
 }
 
-impl Found {
-    fn kept(&self, ask: &Ask) -> bool {
-        self.reached <= ask.degrees
+impl Solution {
+    fn is_kept(&self, target: &AccuracyTarget) -> bool {
+        self.reached <= target.degrees
     }
     fn seconds(&self) -> f64 {
         self.prepare + self.trace
@@ -180,10 +200,10 @@ struct Measured {
 }
 
 struct Search<'a> {
-    workshop: &'a dyn Workshop,
-    ask: &'a Ask,
-    rays: &'a RaysOf<'a>,
-    pilots: Judged,
+    mesh_source: &'a dyn MeshSource,
+    target: &'a AccuracyTarget,
+    rays: &'a RayGenerator<'a>,
+    pilots: ReferenceRays,
     survey: Survey,
     coarse: f64,
     /// Sets of fresh rays used so far: none is used twice for the same candidate.
@@ -191,22 +211,23 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn measure(&self, plan: &Plan, normals: NormalMode, on: &Judged) -> Measured {
-        let meshed = self.workshop.mesh_plan(plan);
+    fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
+        let meshed = self.mesh_source.mesh_plan(plan);
         let mut hits = vec![None; on.rays.len()];
         let start = Instant::now();
-        let mut measured = with_all(self.workshop, &meshed.mesh, &[Tree::Octree], &[normals], |trees| {
-            let build = start.elapsed().as_secs_f64();
-            let seconds = [0, 1].map(|_| {
-                let start = Instant::now();
-                answer(trees[0].2, &on.rays, rayon::current_num_threads(), &mut hits);
-                start.elapsed().as_secs_f64()
+        let mut measured =
+            with_intersectors(self.mesh_source, &meshed.mesh, &[FacetTree::Octree], &[normals], |trees| {
+                let build = start.elapsed().as_secs_f64();
+                let seconds = [0, 1].map(|_| {
+                    let start = Instant::now();
+                    answer(trees[0].2, &on.rays, rayon::current_num_threads(), &mut hits);
+                    start.elapsed().as_secs_f64()
+                });
+                let per_ray = seconds[0].min(seconds[1]) / on.rays.len().max(1) as f64;
+                let prepare = meshed.seconds + build;
+                let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
+                Measured { made, prepare, per_ray, errors: Vec::new(), flips: 0 }
             });
-            let per_ray = seconds[0].min(seconds[1]) / on.rays.len().max(1) as f64;
-            let prepare = meshed.seconds + build;
-            let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
-            Measured { made, prepare, per_ray, errors: Vec::new(), flips: 0 }
-        });
         for ((ray, hit), truth) in on.rays.iter().zip(&hits).zip(&on.truth) {
             match (hit, truth) {
                 (None, None) => {}
@@ -223,15 +244,15 @@ impl Search<'_> {
     /// The plan by the formulas, or one tolerance for all places, corrected once by what the pilots measure on coarse facets.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
         let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
-        let epsilon = (MARGIN * self.ask.degrees).to_radians();
-        let range = [1e-4 * self.coarse, 4.0 * self.coarse];
+        let epsilon = (MARGIN * self.target.degrees).to_radians();
+        let range = [FINEST * self.coarse, COARSEST_FACTOR * self.coarse];
         let mut plan = match normals {
-            NormalMode::Exact => Plan::uniform(self.coarse),
+            NormalMode::Exact => TolerancePlan::uniform(self.coarse),
             _ if local => self.survey.plan(epsilon, order == 0.5, range),
-            _ => Plan::even(0.25 * self.coarse, range),
+            _ => TolerancePlan::even(0.25 * self.coarse, range),
         };
         // The pilot's facets: the plan itself where it is coarse, else as much coarser as keeps the pilot quick.
-        // Flat normals ask for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
+        // Flat normals target for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
         // 0.001° took a minute.
         let finest = if order == 0.5 { plan.unbounded_mm() } else { plan.tolerance_mm()[0] };
         let coarser = (0.25 * self.coarse / finest).max(1.0);
@@ -240,7 +261,7 @@ impl Search<'_> {
         let m = self.measure(&pilot, normals, &self.pilots);
         let mut facets = m.made.len() as f64;
         if normals != NormalMode::Exact {
-            let expected = self.ask.degrees * MARGIN * coarser.powf(order);
+            let expected = self.target.degrees * MARGIN * coarser.powf(order);
             plan = pilot.clone();
             self.survey.adapt(&mut plan, &m.errors, expected, order);
             plan.scale(1.0 / coarser);
@@ -248,64 +269,65 @@ impl Search<'_> {
         }
         let ratio = facets / m.made.len().max(1) as f64;
         // Facets, and with them meshing and building, go with 1/tolerance; tracing grows by about a tenth per halving.
-        let trace = m.per_ray * self.ask.job_rays * (1.0 + 0.1 * ratio.log2().max(0.0));
+        let trace = m.per_ray * self.target.job_rays * (1.0 + 0.1 * ratio.log2().max(0.0));
         Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
     }
 
     /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste.
-    fn reach(&self, candidate: &Candidate, tries: &mut Vec<Try>) -> Found {
+    fn reach(&self, candidate: &Candidate, trials: &mut Vec<Trial>) -> Solution {
         let (mut plan, normals) = (candidate.plan.clone(), candidate.normals);
-        let mut best: Option<Found> = None;
+        let mut best: Option<Solution> = None;
         for attempt in 0..ATTEMPTS {
             self.fresh.set(self.fresh.get() + 1);
-            let seed = self.ask.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let fresh = Judged::new(self.workshop, (self.rays)(seed, self.ask.check_rays));
+            let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let fresh = ReferenceRays::new(self.mesh_source, (self.rays)(seed, self.target.check_rays));
             let m = self.measure(&plan, normals, &fresh);
             let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();
             let reached = p99(&mut errors);
-            let found = Found {
+            let found = Solution {
                 normals,
                 plan: plan.clone(),
                 facets: m.made.len(),
                 prepare: m.prepare,
-                trace: m.per_ray * self.ask.job_rays,
+                trace: m.per_ray * self.target.job_rays,
                 reached,
                 checked: m.errors.len() as u64,
                 flips: m.flips,
             };
-            tries.push(Try {
+            trials.push(Trial {
                 normals: normals.name().into(),
                 tolerance_mm: plan.tolerance_mm(),
                 facets: m.made.len(),
                 reached_deg: reached,
                 seconds: found.seconds(),
             });
-            let good = reached <= ACCEPTED * self.ask.degrees;
-            let wasteful = reached < 0.6 * self.ask.degrees && attempt < 2 && found.prepare > 0.2 * found.seconds();
-            let better = |b: &Found| match (good, b.reached <= ACCEPTED * self.ask.degrees) {
+            let good = reached <= ACCEPTED * self.target.degrees;
+            let wasteful =
+                reached < 0.6 * self.target.degrees && attempt < 2 && found.prepare > 0.2 * found.seconds();
+            let better = |b: &Solution| match (good, b.reached <= ACCEPTED * self.target.degrees) {
                 (true, true) => found.seconds() < b.seconds(),
                 (a, b_good) => a && !b_good || a == b_good && found.reached < b.reached,
             };
-            let was_good = best.as_ref().is_some_and(|b| b.reached <= ACCEPTED * self.ask.degrees);
+            let was_good = best.as_ref().is_some_and(|b| b.reached <= ACCEPTED * self.target.degrees);
             if best.as_ref().is_none_or(better) {
                 best = Some(found);
             }
             if normals == NormalMode::Exact || good && !wasteful || !good && was_good {
                 break;
             }
-            let growth = factor(reached, MARGIN * self.ask.degrees, candidate.order);
+            let growth = factor(reached, MARGIN * self.target.degrees, candidate.order);
             if m.made.len() as f64 / growth > MOST_FACETS {
                 break;
             }
             plan.scale(growth);
         }
-        best.unwrap_or_else(|| self.nothing())
+        best.unwrap_or_else(|| self.no_solution())
     }
 
-    fn nothing(&self) -> Found {
-        Found {
+    fn no_solution(&self) -> Solution {
+        Solution {
             normals: NormalMode::Exact,
-            plan: Plan::uniform(self.coarse),
+            plan: TolerancePlan::uniform(self.coarse),
             facets: 0,
             prepare: 0.0,
             trace: 0.0,

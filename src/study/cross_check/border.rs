@@ -5,6 +5,10 @@ use crate::model::Face;
 use crate::nurbs::{Surface, UvCurve};
 use rustc_hash::FxHashMap;
 
+/// Sides of the domain this near, as a share of the surface's size, are one seam or one pole: far above rounding (1e-15), far below
+/// what a CAD system closes (1e-6).
+const COINCIDENT: f64 = 1e-9;
+
 /// Samples of a curve between two of its knots, to begin with.
 pub(super) const SAMPLES: usize = 16;
 /// How often the stretch between two samples is halved.
@@ -120,8 +124,8 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
         (0..=SAMPLES).map(|i| surface.evaluate(c.evaluate(i as f64 / SAMPLES as f64))).collect()
     };
     let traced: Vec<Vec<Point>> = sides.iter().map(points).collect();
-    let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < 1e-9 * size);
-    let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < 1e-9 * size);
+    let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < COINCIDENT * size);
+    let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < COINCIDENT * size);
     (0..4).filter(|&i| !close(&traced[i], &traced[i ^ 1]) && !pole(&traced[i])).map(|i| sides[i].clone()).collect()
 }
 

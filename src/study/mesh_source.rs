@@ -1,4 +1,6 @@
-use super::aim::Plan;
+//! Where a study gets its meshes and intersectors from, and how it asks them about many rays.
+
+use super::accuracy_target::TolerancePlan;
 use crate::intersect::{Cost, Hit, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::mesh::FacetMesh;
@@ -7,7 +9,7 @@ use serde::Serialize;
 
 /// A mesh and what it took.
 #[derive(Clone, Debug)]
-pub struct Meshed {
+pub struct MeasuredMesh {
     /// The facets.
     pub mesh: FacetMesh,
     /// Seconds to make it.
@@ -21,14 +23,14 @@ pub struct Meshed {
 /// Which structure answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Tree {
+pub enum FacetTree {
     /// The octree.
     Octree,
     /// obvhs' 8-wide BVH, cured.
     CwBvh,
 }
 
-impl Tree {
+impl FacetTree {
     /// As on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -38,16 +40,16 @@ impl Tree {
     }
 }
 
-/// Makes what a study compares. The product's is [`super::Product`]; tests bring their own to judge the studies.
-pub trait Workshop: Sync {
+/// Makes what a study compares. The product's is [`super::ModelMeshSource`]; tests bring their own to judge the studies.
+pub trait MeshSource: Sync {
     /// Facets within a tolerance `[min, max]`, mm.
-    fn mesh(&self, tolerance: [f64; 2]) -> Meshed;
+    fn mesh(&self, tolerance: [f64; 2]) -> MeasuredMesh;
     /// Facets within the local tolerances of a plan; without a mesher that can do so, within the least of them everywhere.
-    fn mesh_plan(&self, plan: &Plan) -> Meshed {
+    fn mesh_plan(&self, plan: &TolerancePlan) -> MeasuredMesh {
         self.mesh([plan.tolerance_mm()[0]; 2])
     }
-    /// A structure over facets whose hits carry normals of that kind (`Exact` is [`Workshop::polish`]'s).
-    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
+    /// A structure over facets whose hits carry normals of that kind (`Exact` is [`MeshSource::polish`]'s).
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: FacetTree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
     /// A structure over facets with its hits moved to the spline.
     fn polish<'m>(&'m self, facets: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm>;
     /// The certified spline.
@@ -55,19 +57,19 @@ pub trait Workshop: Sync {
 }
 
 /// Structures of one tree over a mesh, for each kind of normals in turn; those of exact normals stand on bilinear ones.
-pub(super) fn with_all<R>(
-    workshop: &dyn Workshop,
+pub(super) fn with_intersectors<R>(
+    mesh_source: &dyn MeshSource,
     mesh: &FacetMesh,
-    trees: &[Tree],
+    trees: &[FacetTree],
     normals: &[NormalMode],
-    then: impl FnOnce(&[(Tree, NormalMode, &dyn Intersector)]) -> R,
+    then: impl FnOnce(&[(FacetTree, NormalMode, &dyn Intersector)]) -> R,
 ) -> R {
     let pairs: Vec<_> = trees.iter().flat_map(|&t| normals.iter().map(move |&n| (t, n))).collect();
-    let facets: Vec<_> = pairs.iter().map(|&(t, n)| workshop.build(mesh, t, n.on_facets())).collect();
+    let facets: Vec<_> = pairs.iter().map(|&(t, n)| mesh_source.build(mesh, t, n.on_facets())).collect();
     let polished: Vec<_> = pairs
         .iter()
         .zip(&facets)
-        .map(|(&(_, n), f)| (n == NormalMode::Exact).then(|| workshop.polish(&**f, mesh)))
+        .map(|(&(_, n), f)| (n == NormalMode::Exact).then(|| mesh_source.polish(&**f, mesh)))
         .collect();
     let all: Vec<_> = pairs
         .iter()

@@ -7,13 +7,24 @@ use crate::tessellate::{Law, Override, Place, Settings};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 
+/// Least |cos| of the incidence of a pilot: beyond 89.94° a mirrored ray errs by more than any tolerance mends.
+const GRAZING: f64 = 1e-3;
+/// Least 2·tan i of a place: hits within 0.03° of the normal ask for no tolerance of their own.
+const LEAST_TILT: f64 = 1e-3;
+/// Least radius of curvature that a tolerance follows is kept within these, mm.
+const RADII_MM: [f64; 2] = [1e-9, 1e9];
+/// Largest radius, mm: flat.
+const FLATTEST_MM: f64 = 1e12;
+/// Least and largest factor of one correction.
+const STEPS: [f64; 2] = [1e-3, 30.0];
+
 /// Local tolerances for a model: on each face in proportion to the radius of curvature.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Plan {
+pub struct TolerancePlan {
     /// Faces that enough rays met to be judged on their own.
-    pub places: Vec<Share>,
+    pub places: Vec<RelativeTolerance>,
     /// For all others.
-    pub other: Share,
+    pub other: RelativeTolerance,
     /// No tolerance is larger, mm.
     pub coarsest_mm: f64,
     /// No tolerance is smaller, mm.
@@ -22,7 +33,7 @@ pub struct Plan {
 
 /// A tolerance in proportion to the radius of curvature.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Share {
+pub struct RelativeTolerance {
     /// The placed faces; those of one face of a part stand together.
     #[serde(serialize_with = "numbers")]
     pub faces: Vec<FaceId>,
@@ -38,7 +49,7 @@ fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Err
 
 /// What is known of one pilot's hit.
 #[derive(Clone, Copy, Debug)]
-struct Pilot {
+struct PilotHit {
     /// Index of the face among the distinct ones.
     face: usize,
     radius: f64,
@@ -52,7 +63,7 @@ pub(super) struct Survey {
     faces: Vec<Vec<FaceId>>,
     /// Which distinct face a placed one is of.
     of: Vec<Option<usize>>,
-    pilots: Vec<Pilot>,
+    pilots: Vec<PilotHit>,
 }
 
 /// Hits that a face needs for a plan of its own.
@@ -81,9 +92,9 @@ impl Survey {
             let (Some(&Some(face)), Some(p)) = (survey.of.get(i), placed.get(i)) else { continue };
             let Some(forms) = p.face.and_then(|f| f.surface.forms(h.uv)) else { continue };
             let radius = p.placement.scale / forms.sharpest();
-            let cos = h.normal.dot(ray.direction).abs().clamp(1e-3, 1.0);
+            let cos = h.normal.dot(ray.direction).abs().clamp(GRAZING, 1.0);
             if radius > 0.0 {
-                survey.pilots.push(Pilot { face, radius, tilt: 2.0 * (1.0 - cos * cos).sqrt() / cos });
+                survey.pilots.push(PilotHit { face, radius, tilt: 2.0 * (1.0 - cos * cos).sqrt() / cos });
             }
         }
         survey
@@ -91,20 +102,20 @@ impl Survey {
 
     /// The plan by the formulas: sag ≤ ε·R/(2·tan i) for interpolated normals, 1 − cos(ε/2) of R for flat ones, each for 99 % of a
     /// face's hits.
-    pub(super) fn plan(&self, epsilon: f64, flat: bool, [finest_mm, coarsest_mm]: [f64; 2]) -> Plan {
-        let of = |faces: Vec<FaceId>, pilots: &mut [Pilot]| {
+    pub(super) fn plan(&self, epsilon: f64, flat: bool, [finest_mm, coarsest_mm]: [f64; 2]) -> TolerancePlan {
+        let of = |faces: Vec<FaceId>, pilots: &mut [PilotHit]| {
             pilots.sort_by(|a, b| a.tilt.total_cmp(&b.tilt));
             let count = pilots.len();
             let at = |share: f64| ((count as f64 * share) as usize).min(count.saturating_sub(1));
-            let tilt = pilots.get(at(0.99)).map_or(1.0, |p| p.tilt.max(1e-3));
+            let tilt = pilots.get(at(0.99)).map_or(1.0, |p| p.tilt.max(LEAST_TILT));
             let of_radius = if flat { 1.0 - (0.5 * epsilon).cos() } else { epsilon / tilt };
             pilots.sort_by(|a, b| a.radius.total_cmp(&b.radius));
             let end = |k: usize| pilots.get(k).map_or(1.0, |p| p.radius);
             // Beyond the radius at which the coarsest tolerance is reached nothing changes; infinity is no length.
-            let least = end(at(0.02)).clamp(1e-9, 1e9);
-            Share { faces, of_radius, radii_mm: [least, end(at(0.98)).clamp(least, 1e12)] }
+            let least = end(at(0.02)).clamp(RADII_MM[0], RADII_MM[1]);
+            RelativeTolerance { faces, of_radius, radii_mm: [least, end(at(0.98)).clamp(least, FLATTEST_MM)] }
         };
-        let mut own: Vec<Vec<Pilot>> = vec![Vec::new(); self.faces.len()];
+        let mut own: Vec<Vec<PilotHit>> = vec![Vec::new(); self.faces.len()];
         for p in &self.pilots {
             own[p.face].push(*p);
         }
@@ -112,11 +123,11 @@ impl Survey {
         for (faces, pilots) in self.faces.iter().zip(&mut own).filter(|(_, pilots)| pilots.len() >= ENOUGH) {
             places.push(of(faces.clone(), pilots));
         }
-        Plan { other: of(Vec::new(), &mut self.pilots.clone()), places, coarsest_mm, finest_mm }
+        TolerancePlan { other: of(Vec::new(), &mut self.pilots.clone()), places, coarsest_mm, finest_mm }
     }
 
     /// Which of the plan's places each placed face belongs to.
-    fn place_of(&self, plan: &Plan) -> Vec<Option<usize>> {
+    fn place_of(&self, plan: &TolerancePlan) -> Vec<Option<usize>> {
         let mut all = vec![None; self.of.len()];
         for (k, place) in plan.places.iter().enumerate() {
             for f in &place.faces {
@@ -127,9 +138,9 @@ impl Survey {
     }
 
     /// Facets that a plan makes, from those that another made: on each face they go with the inverse of the tolerance.
-    pub(super) fn facets(&self, plan: &Plan, other: &Plan, made: &[FaceId]) -> f64 {
+    pub(super) fn facets(&self, plan: &TolerancePlan, other: &TolerancePlan, made: &[FaceId]) -> f64 {
         let places = self.place_of(plan);
-        let mean = |plan: &Plan, k: Option<usize>| {
+        let mean = |plan: &TolerancePlan, k: Option<usize>| {
             let [a, b] = plan.range(k.and_then(|k| plan.places.get(k)).unwrap_or(&plan.other)).0;
             (a * b).sqrt()
         };
@@ -143,7 +154,7 @@ impl Survey {
     }
 
     /// Tightens or loosens every place by what was measured there: the error goes with the sag to the power `order`.
-    pub(super) fn adapt(&self, plan: &mut Plan, errors: &[(FaceId, f64)], epsilon_deg: f64, order: f64) {
+    pub(super) fn adapt(&self, plan: &mut TolerancePlan, errors: &[(FaceId, f64)], epsilon_deg: f64, order: f64) {
         let places = self.place_of(plan);
         let mut own: Vec<Vec<f64>> = vec![Vec::new(); plan.places.len()];
         for &(face, error) in errors {
@@ -161,7 +172,7 @@ impl Survey {
 
 /// What to multiply a tolerance with, in moderate steps: the power law holds near where it was measured.
 pub(super) fn factor(error: f64, wanted: f64, order: f64) -> f64 {
-    (wanted / error.max(1e-300)).powf(1.0 / order).clamp(1e-3, 30.0)
+    (wanted / error.max(f64::MIN_POSITIVE)).powf(1.0 / order).clamp(STEPS[0], STEPS[1])
 }
 
 /// The 99th percentile; 0 of nothing.
@@ -173,10 +184,10 @@ pub(super) fn p99(errors: &mut [f64]) -> f64 {
     *errors.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
-impl Plan {
+impl TolerancePlan {
     /// The same tolerance everywhere.
     pub fn uniform(tolerance_mm: f64) -> Self {
-        let other = Share { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
+        let other = RelativeTolerance { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
         Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
     }
 
@@ -193,18 +204,18 @@ impl Plan {
     }
 
     /// Tolerances at the ends of the radii, mm, and the radii.
-    fn range(&self, share: &Share) -> ([f64; 2], [f64; 2]) {
+    fn range(&self, share: &RelativeTolerance) -> ([f64; 2], [f64; 2]) {
         let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
         let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
         // The radii at which exactly these are reached, so that in between it is in proportion.
-        let radii = [0, 1].map(|k| tolerance[k] / share.of_radius.max(1e-300));
+        let radii = [0, 1].map(|k| tolerance[k] / share.of_radius.max(f64::MIN_POSITIVE));
         (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
     }
 
     /// What the least tolerance would be without the bounds, mm.
     pub(super) fn unbounded_mm(&self) -> f64 {
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
-        shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(1e-300)
+        shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(f64::MIN_POSITIVE)
     }
 
     /// Least and largest tolerance, mm.

@@ -7,6 +7,9 @@ use crate::model::{Face, Model, Part, PlacedFace, Shell};
 use crate::nurbs::Surface;
 use rustc_hash::FxHashMap;
 
+/// Points this near, as a share of the model's diagonal, are one: far above rounding, far below any facet.
+const WELD: f64 = 1e-9;
+
 /// A face that is the whole domain of its surface.
 pub fn face(surface: Surface) -> Face {
     Face::whole(surface)
@@ -37,7 +40,7 @@ pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
         let b = f.surface.bounds().corners();
         b.map(|c| p.placement.point(c))
     }));
-    let cell = (1e-9 * bounds.diagonal()).max(f64::MIN_POSITIVE);
+    let cell = (WELD * bounds.diagonal()).max(f64::MIN_POSITIVE);
     let mut weld = Weld { origin: bounds.min, cell, seen: FxHashMap::default() };
     let mut mesh = FacetMesh::default();
     for placed in model.placed_faces() {

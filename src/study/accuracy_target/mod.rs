@@ -1,25 +1,25 @@
 //! Accuracy asked for as an angle: the local tolerances and the kind of normals that reach it most cheaply, checked.
 //!
 //! A facet of sag s on a surface of radius R met at incidence i misdirects the mirrored ray by up to 2·(s/R)·tan i with
-//! interpolated normals and 2·acos(1 − s/R) with flat ones. Pilot rays on the spline give radius and incidence on every face, and
+//! interpolated normals and 2·acos(1 − s/R) with flat ones. PilotHit rays on the spline give radius and incidence on every face, and
 //! with them a tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i); the same rays on such facets then tell how far each face
 //! is from what was asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
 //!
 //! Every kind of normals that could be the cheapest is made to reach what is asked and then timed. Known weakness: the 99th
 //! percentile is over all hits of these rays; other rays (more grazing ones) err more.
 
-mod plan;
 mod search;
+mod tolerance_plan;
 
-pub use plan::{Plan, Share};
-pub use search::{RaysOf, aim, aim_at};
+pub use search::{RayGenerator, meet_target, meet_target_for_rays};
+pub use tolerance_plan::{RelativeTolerance, TolerancePlan};
 
 use crate::intersect::NormalMode;
 use serde::Serialize;
 
 /// What is asked.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ask {
+pub struct AccuracyTarget {
     /// Direction error that 99 % of the mirrored rays must keep, degrees.
     pub degrees: f64,
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
@@ -33,7 +33,7 @@ pub struct Ask {
     pub seed: u64,
 }
 
-impl Ask {
+impl AccuracyTarget {
     /// The defaults for an angle: a job of a million rays, checked on 100,000.
     pub fn degrees(degrees: f64) -> Self {
         let kinds = vec![NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
@@ -43,7 +43,7 @@ impl Ask {
 
 /// What to do.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Aim {
+pub struct AccuracyPlan {
     /// Asked, degrees.
     pub asked_deg: f64,
     /// Reached on fresh rays (p99), degrees.
@@ -56,15 +56,16 @@ pub struct Aim {
     /// Least and largest local tolerance, mm.
     pub tolerance_mm: [f64; 2],
     /// Tolerances to mesh with.
-    pub plan: Plan,
+    pub plan: TolerancePlan,
     /// Facets that this makes.
     pub facets: usize,
     /// Seconds of meshing and building, measured.
     pub seconds_prepare: f64,
     /// Seconds of the job's trace, from the time of the check's rays.
     pub seconds_trace: f64,
-    /// Every combination that was judged on fresh rays.
-    pub tries: Vec<Try>,
+    /// Every combination that was measured on fresh rays.
+    #[serde(rename = "tries")]
+    pub trials: Vec<Trial>,
     /// Rays of the check that hit.
     pub checked: u64,
     /// Rays of the check that hit on one of facets and spline only, or different faces: no angle stands for them.
@@ -75,9 +76,9 @@ pub struct Aim {
     pub answer: String,
 }
 
-/// One combination judged on fresh rays.
+/// One combination measured on fresh rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Try {
+pub struct Trial {
     /// Kind of normals.
     pub normals: String,
     /// Least and largest local tolerance, mm.

@@ -1,10 +1,29 @@
+//! The surface of a placed face with foot points, border and sag band: the geometry that causes are found with.
+
 use super::border::{Border, SAMPLES, border_curves};
 use crate::math::{Point, Ray, Uv, Vector};
 use crate::model::PlacedFace;
 use crate::nurbs::Surface;
 
-/// A placed face as the court sees it: its surface, and its border in space.
-pub(super) struct Sheet {
+/// Foot points whose distances differ by less, relative, are equally near; also the rounding of a foot point, as a share of the size.
+const EQUALLY_NEAR: f64 = 1e-9;
+/// Slant of the line to a foot point against the normal beyond which the foot is held back by the end of the domain.
+const HELD_SLANT: f64 = 1e-6;
+/// The Hessian counts as convex when its determinant is more than this share of the product of its diagonal; what is added to the
+/// diagonal where it is not.
+const CONVEX: f64 = 1e-6;
+/// Added to a diagonal that may be zero, so that nothing is divided by it, mm² per parameter².
+const VANISHING: f64 = 1e-300;
+/// Shortest damped step of Newton, as a share of the whole one.
+const SHORTEST_STEP: f64 = 1e-3;
+/// Newton ends when a step is shorter, as a share of the size: 450 units in the last place.
+const CONVERGED: f64 = 1e-13;
+/// Curvature term of the way through the band, against the straight one, below which the root is taken by its first term: exact to
+/// this, where the closed form would cancel.
+const STRAIGHT: f64 = 1e-6;
+
+/// A placed face with a geometry of its own, apart from the intersectors: its surface, and its border in space.
+pub(super) struct PlacedSurface {
     surface: Surface,
     sign: f64,
     size: f64,
@@ -14,7 +33,7 @@ pub(super) struct Sheet {
     seeds: Vec<(Uv, Point)>,
 }
 
-/// The point of a sheet nearest to a given one.
+/// The point of a surface nearest to a given one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Foot {
     pub(super) uv: Uv,
@@ -22,15 +41,15 @@ pub(super) struct Foot {
     pub(super) normal: Vector,
     /// Distance, negative inside.
     pub(super) offset: f64,
-    /// Curvature of the sheet along the ray's tangential direction, 1/mm.
+    /// Curvature of the surface along the ray's tangential direction, 1/mm.
     curvature: f64,
     /// Whether the foot is held back by the end of the domain.
     held: bool,
 }
 
-/// The stretch of a ray that stays within a band about a sheet.
+/// The stretch of a ray that stays within a band about a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stretch {
+pub(super) struct BandInterval {
     /// Range of `t`.
     pub(super) range: [f64; 2],
     /// The side on which the ray leaves the band, before and after; 0 where the ray itself ends inside.
@@ -43,9 +62,9 @@ pub(super) struct Stretch {
 
 const STEPS: usize = 1000;
 
-impl Sheet {
+impl PlacedSurface {
     /// `None` for a face without a surface.
-    pub(super) fn of(placed: &PlacedFace<'_>) -> Option<Self> {
+    pub(super) fn new(placed: &PlacedFace<'_>) -> Option<Self> {
         let face = placed.face?;
         let surface = face.surface.transformed(|p| placed.placement.point(p));
         let flips = [face.reversed, placed.placement.is_mirrored()].iter().filter(|&&f| f).count();
@@ -77,7 +96,9 @@ impl Sheet {
                 let other = self.describe(p, self.project(p, uv), direction);
                 // Nearest alone counts: a foot that nothing holds may lie on the next turn of a screw.
                 let (far, near) = (other.offset.abs(), best.offset.abs());
-                if far < near * (1.0 - 1e-9) || (best.held && !other.held && far <= near * (1.0 + 1e-9)) {
+                if far < near * (1.0 - EQUALLY_NEAR)
+                    || (best.held && !other.held && far <= near * (1.0 + EQUALLY_NEAR))
+                {
                     best = other;
                 }
             }
@@ -91,7 +112,7 @@ impl Sheet {
         let away = p - d.point;
         let height = away.dot(normal);
         let offset = if height < 0.0 { -away.length() } else { away.length() };
-        let held = (away - normal * height).length() > 1e-6 * away.length() + 1e-9 * self.size;
+        let held = (away - normal * height).length() > HELD_SLANT * away.length() + EQUALLY_NEAR * self.size;
         let tangential = direction - normal * direction.dot(normal);
         let (e, f, g) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
         let det = e * g - f * f;
@@ -117,8 +138,8 @@ impl Sheet {
             ];
             let (e, f, k) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
             let (mut a, mut b, mut c) = (e + r.dot(d.duu), f + r.dot(d.duv), k + r.dot(d.dvv));
-            if !(a > 0.0 && c > 0.0 && a * c - b * b > 1e-6 * a * c) {
-                (a, b, c) = (e * (1.0 + 1e-6) + 1e-300, f, k * (1.0 + 1e-6) + 1e-300);
+            if !(a > 0.0 && c > 0.0 && a * c - b * b > CONVEX * a * c) {
+                (a, b, c) = (e * (1.0 + CONVEX) + VANISHING, f, k * (1.0 + CONVEX) + VANISHING);
             }
             let det = a * c - b * b;
             let step = match fixed {
@@ -132,20 +153,20 @@ impl Sheet {
             }
             let mut scale = 1.0;
             let mut next = self.surface.clamp(uv + step);
-            while self.surface.evaluate(next).distance_squared(p) > r.length_squared() && scale > 1e-3 {
+            while self.surface.evaluate(next).distance_squared(p) > r.length_squared() && scale > SHORTEST_STEP {
                 scale *= 0.5;
                 next = self.surface.clamp(uv + step * scale);
             }
             let moved = (next - uv).abs();
             uv = next;
-            if moved.x * e.sqrt() + moved.y * k.sqrt() < 1e-13 * self.size {
+            if moved.x * e.sqrt() + moved.y * k.sqrt() < CONVERGED * self.size {
                 break;
             }
         }
         uv
     }
 
-    /// Distance from a point of the sheet to its border; infinite for a closed face.
+    /// Distance from a point of the surface to its border; infinite for a closed face.
     fn border_distance(&self, p: Point, enough: f64) -> f64 {
         let mut best = f64::INFINITY;
         for border in self.borders.iter().filter(|b| b.reaches(p, enough)) {
@@ -154,13 +175,13 @@ impl Sheet {
         best
     }
 
-    /// Walks from `t` in both directions for as long as the ray stays within `band` of the sheet.
-    pub(super) fn stretch(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> Option<Stretch> {
+    /// Walks from `t` in both directions for as long as the ray stays within `band` of the surface.
+    pub(super) fn stretch(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> Option<BandInterval> {
         let start = self.foot(ray.at(t), guess, ray.direction);
         if start.offset.abs() > band {
             return None;
         }
-        let mut found = Stretch { range: [t, t], sides: [0, 0], border: false, complete: true };
+        let mut found = BandInterval { range: [t, t], sides: [0, 0], border: false, complete: true };
         for (end, sign) in [(0, -1.0), (1, 1.0)] {
             let mut foot = start;
             let mut at = t;
@@ -186,7 +207,7 @@ impl Sheet {
                 let longest = band * if steps < STEPS / 2 { 2.0 } else { 2.0 + (steps - STEPS / 2) as f64 };
                 let mut step = self.step(&foot, ray, band).min(longest);
                 let (before, last) = (at, foot);
-                // On the hollow side of the sheet the foot runs ahead of the ray; where it jumps no step is short enough.
+                // On the hollow side of the surface the foot runs ahead of the ray; where it jumps no step is short enough.
                 for _ in 0..4 {
                     at = before + sign * step;
                     at = if end == 0 { at.max(limit) } else { at.min(limit) };
@@ -205,7 +226,8 @@ impl Sheet {
     /// A length over which the offset changes by at most about half the band.
     fn step(&self, foot: &Foot, ray: &Ray, band: f64) -> f64 {
         let (g, k) = (foot.normal.dot(ray.direction).abs(), foot.curvature.abs());
-        let by_offset = if k * band < 1e-6 * g * g { 0.5 * band / g } else { ((g * g + k * band).sqrt() - g) / k };
+        let by_offset =
+            if k * band < STRAIGHT * g * g { 0.5 * band / g } else { ((g * g + k * band).sqrt() - g) / k };
         by_offset.clamp(0.05 * band, (0.02 * self.size).max(band))
     }
 }
@@ -218,12 +240,12 @@ mod tests {
     use crate::nurbs::{UvCurve, sweep};
     use std::f64::consts::PI;
 
-    fn sphere(radius: f64) -> Sheet {
+    fn sphere(radius: f64) -> PlacedSurface {
         let surface = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
-        of(&Face::whole(surface))
+        whole(&Face::whole(surface))
     }
 
-    fn of(face: &Face) -> Sheet {
+    fn whole(face: &Face) -> PlacedSurface {
         let placed = PlacedFace {
             id: crate::math::FaceId(0),
             instance: 0,
@@ -233,7 +255,7 @@ mod tests {
             tessellated: None,
             placement: &Frame::IDENTITY,
         };
-        Sheet::of(&placed).unwrap()
+        PlacedSurface::new(&placed).unwrap()
     }
 
     #[test]
@@ -255,7 +277,7 @@ mod tests {
         let points = [row(0.0, 0.0), row(10.0, 0.0), row(10.0, 1.0), row(-5.0, 1.0)].concat();
         let knots = [vec![0.0, 0.0, 1.0, 2.0, 3.0, 3.0], vec![0.0, 0.0, 1.0, 1.0]];
         let face = Face::whole(Surface { degree: [1, 1], knots, points });
-        let s = of(&face);
+        let s = whole(&face);
         let foot = s.foot(Point::new(-0.03, 2.5, 0.04), Uv::new(0.01, 0.5), Vector::X);
         assert!((foot.offset.abs() - 0.05).abs() < 1e-12 && foot.held, "{foot:?}");
     }
@@ -280,7 +302,7 @@ mod tests {
     #[test]
     fn no_step_along_the_hollow_side_jumps_over_a_border() {
         let surface = sweep::cylinder(&Frame::IDENTITY, 1.0, [0.0, 2.0 * PI], [-10.0, 10.0]);
-        // The ray passes 0.03 inside of the sheet, where feet are 3 % farther apart than their points.
+        // The ray passes 0.03 inside of the surface, where feet are 3 % farther apart than their points.
         let (band, start) = (0.05, 1.0f64);
         let (sin, cos) = start.sin_cos();
         let ray = Ray::new(Point::new(0.97 * cos, 0.97 * sin, 0.0), Vector::new(-sin, cos, 0.0));
@@ -295,7 +317,7 @@ mod tests {
             let uses = (0..4).map(side).collect();
             let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(surface.clone()) };
             let forward = ray.within(-1.0, 1.0);
-            let stretch = of(&face).stretch(&forward, 0.0, Uv::new(start, 0.0), band).expect("in the band");
+            let stretch = whole(&face).stretch(&forward, 0.0, Uv::new(start, 0.0), band).expect("in the band");
             assert!(stretch.border, "end {end}");
         }
     }

@@ -1,5 +1,7 @@
-use super::aim::Plan;
-use super::workshop::{Meshed, Tree, Workshop};
+//! The [`MeshSource`] of a model: the tessellator, octree, BVH, polishing and exact spline that `trace` itself uses.
+
+use super::accuracy_target::TolerancePlan;
+use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
@@ -10,14 +12,14 @@ use crate::model::Model;
 use crate::tessellate::{self, tessellate};
 
 /// The product's own mesher, trees and spline, for studies of a model.
-pub struct Product<'a> {
+pub struct ModelMeshSource<'a> {
     model: &'a Model,
     exact: Exact,
     /// Everything of the mesher but the tolerance.
     pub mesher: tessellate::Settings,
 }
 
-impl<'a> Product<'a> {
+impl<'a> ModelMeshSource<'a> {
     /// Builds the exact spline of the model.
     pub fn new(model: &'a Model) -> Self {
         let exact = Exact::build(model, &exact::Settings::default());
@@ -30,10 +32,10 @@ impl<'a> Product<'a> {
         Self { mesher: tessellate::Settings { measure: true, ..product.mesher }, ..product }
     }
 
-    fn made(&self, settings: &tessellate::Settings) -> Meshed {
+    fn tessellate_with(&self, settings: &tessellate::Settings) -> MeasuredMesh {
         let made = tessellate(self.model, settings);
         let sag = made.report.sag_mm;
-        Meshed {
+        MeasuredMesh {
             mesh: made.mesh,
             seconds: made.report.seconds.tessellate,
             sag_mean: sag.sampled_mean.unwrap_or(sag.bound_max),
@@ -52,20 +54,20 @@ impl<'a> Product<'a> {
     }
 }
 
-impl Workshop for Product<'_> {
-    fn mesh(&self, tolerance: [f64; 2]) -> Meshed {
-        self.made(&tessellate::Settings { tolerance, ..self.mesher.clone() })
+impl MeshSource for ModelMeshSource<'_> {
+    fn mesh(&self, tolerance: [f64; 2]) -> MeasuredMesh {
+        self.tessellate_with(&tessellate::Settings { tolerance, ..self.mesher.clone() })
     }
 
-    fn mesh_plan(&self, plan: &Plan) -> Meshed {
+    fn mesh_plan(&self, plan: &TolerancePlan) -> MeasuredMesh {
         let mut settings = self.mesher.clone();
         plan.apply(&mut settings);
-        self.made(&settings)
+        self.tessellate_with(&settings)
     }
-    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: Tree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
+    fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: FacetTree, normals: NormalMode) -> Box<dyn Intersector + 'm> {
         match tree {
-            Tree::Octree => Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() })),
-            Tree::CwBvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
+            FacetTree::Octree => Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() })),
+            FacetTree::CwBvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
         }
     }
 

@@ -1,4 +1,6 @@
-use super::Entrants;
+//! Alternating timing of intersectors over the same rays.
+
+use super::PerIntersector;
 use crate::intersect::{Cost, Intersector};
 use crate::math::Ray;
 use crate::study::{Rounds, Timing};
@@ -7,7 +9,7 @@ use std::hint::black_box;
 /// One intersector in a race.
 #[derive(Clone, Copy)]
 pub struct Competitor<'a> {
-    /// As in [`Entrants`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
+    /// As in [`PerIntersector`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
     pub name: &'a str,
     /// Who answers.
     pub who: &'a dyn Intersector,
@@ -36,7 +38,7 @@ pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> V
     race.run(rounds)
 }
 
-impl Entrants {
+impl PerIntersector {
     /// The figures with what people call the intersectors.
     pub fn named(&self) -> [(&'static str, Option<f64>); 7] {
         [
