@@ -1,4 +1,4 @@
-//! The subjects is judged with intersectors that are obviously right, and with defects planted in them.
+//! The cross-check with intersectors that are obviously right, and with defects planted in them.
 
 use crate::support::{Balls, Brute, Changed};
 use lampyris::intersect::Hit;

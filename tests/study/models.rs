@@ -81,7 +81,7 @@ fn fixtures_have_no_unexplained_difference() {
 
 #[test]
 #[ignore = "minutes: the whole corpus, LAMPYRIS_RAYS rays a file"]
-fn corpus_through_the_court() {
+fn corpus_cross_checked() {
     let folder = corpus();
     let rays = std::env::var("LAMPYRIS_RAYS").ok().and_then(|r| r.parse().ok()).unwrap_or(30_000);
     let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();

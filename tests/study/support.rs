@@ -73,7 +73,7 @@ fn triangle(ray: &Ray, [a, b, c]: [Point; 3]) -> Option<(f64, f64, f64)> {
     let v = s.dot(p) / det;
     let q = s.cross(e);
     let w = ray.direction.dot(q) / det;
-    // A hair of overlap: leaks of this test are none of the court's business.
+    // A hair of overlap: leaks of this test are none of the cross-check's business.
     let inside = v >= -1e-12 && w >= -1e-12 && v + w <= 1.0 + 1e-12;
     inside.then(|| (f.dot(q) / det, v, w))
 }
