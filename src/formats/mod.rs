@@ -25,6 +25,7 @@ mod photometry;
 mod ply;
 mod png;
 mod polylines;
+mod ray_files;
 mod rays;
 mod stl;
 mod stream;
@@ -44,6 +45,9 @@ pub use npz::{NpyArray, write_npz};
 pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
+pub use ray_files::{
+    Flux, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_set, read_tm25, write_tm25,
+};
 pub use rays::{LightRay, read_rays, write_rays};
 pub use stream::{Column, NpzStream};
 pub use vtk::{write_vti, write_vtp};

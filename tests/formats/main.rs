@@ -2,4 +2,5 @@
 
 mod facets;
 mod grids;
+mod ray_sets;
 mod report_page;

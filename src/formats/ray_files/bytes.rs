@@ -1,0 +1,133 @@
+//! Little-endian fields of a binary file, read in order; an end that comes too early names the byte and the field.
+
+use super::super::{Error, ErrorKind, LightRay};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+/// Bytes of one read from the disk.
+const BUFFER: usize = 1 << 18;
+
+/// Rays for which memory is set aside before they are read: a header that promises more than there is must not take it.
+const RESERVED_RAYS: u64 = 1 << 20;
+
+/// A binary file, read from its start.
+pub(super) struct ByteReader {
+    path: PathBuf,
+    file: BufReader<File>,
+    position: u64,
+    length: u64,
+}
+
+impl ByteReader {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+        let unreadable = |e| Error::new(path, ErrorKind::Read(e));
+        let file = File::open(path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        Ok(Self { path: path.to_owned(), file: BufReader::with_capacity(BUFFER, file), position: 0, length })
+    }
+
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Bytes of the whole file.
+    pub(super) fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// An error about the content.
+    pub(super) fn malformed(&self, message: impl Into<String>) -> Error {
+        Error::new(&self.path, ErrorKind::Malformed(message.into()))
+    }
+
+    pub(super) fn fill(&mut self, bytes: &mut [u8], field: &str) -> Result<(), Error> {
+        let start = self.position;
+        self.file.read_exact(bytes).map_err(|e| match e.kind() {
+            std::io::ErrorKind::UnexpectedEof => self.malformed(format!(
+                "the file ends within {field}, which starts at byte {start} and needs {} bytes; it was cut short",
+                bytes.len()
+            )),
+            _ => Error::new(&self.path, ErrorKind::Read(e)),
+        })?;
+        self.position += bytes.len() as u64;
+        Ok(())
+    }
+
+    pub(super) fn array<const N: usize>(&mut self, field: &str) -> Result<[u8; N], Error> {
+        let mut bytes = [0; N];
+        self.fill(&mut bytes, field)?;
+        Ok(bytes)
+    }
+
+    /// So many bytes, which the file is known to hold.
+    pub(super) fn block(&mut self, bytes: u64, field: &str) -> Result<Vec<u8>, Error> {
+        if bytes > self.length.saturating_sub(self.position) {
+            return Err(self.malformed(format!(
+                "{field} at byte {} would need {bytes} bytes, but the file has {} in all",
+                self.position, self.length
+            )));
+        }
+        let mut block = vec![0; bytes as usize];
+        self.fill(&mut block, field)?;
+        Ok(block)
+    }
+
+    pub(super) fn i32(&mut self, field: &str) -> Result<i32, Error> {
+        Ok(i32::from_le_bytes(self.array(field)?))
+    }
+
+    pub(super) fn u32(&mut self, field: &str) -> Result<u32, Error> {
+        Ok(u32::from_le_bytes(self.array(field)?))
+    }
+
+    pub(super) fn u64(&mut self, field: &str) -> Result<u64, Error> {
+        Ok(u64::from_le_bytes(self.array(field)?))
+    }
+
+    pub(super) fn f32(&mut self, field: &str) -> Result<f32, Error> {
+        Ok(f32::from_le_bytes(self.array(field)?))
+    }
+
+    /// One row of numbers; `None` at the end of the file.
+    pub(super) fn row(&mut self, row: &mut [f32], field: &str) -> Result<(), Error> {
+        for number in row {
+            *number = self.f32(field)?;
+        }
+        Ok(())
+    }
+
+    /// Rows of f32, each made a ray by `ray`, which may refuse it; the message then names the ray, counted from 1.
+    pub(super) fn rays(
+        &mut self,
+        count: u64,
+        columns: usize,
+        mut ray: impl FnMut(u64, &[f32]) -> Result<LightRay, String>,
+    ) -> Result<Vec<LightRay>, Error> {
+        let mut rays = Vec::with_capacity(count.min(RESERVED_RAYS) as usize);
+        let mut row = vec![0.0; columns];
+        for index in 0..count {
+            self.row(&mut row, "the rays")?;
+            rays.push(ray(index, &row).map_err(|m| self.malformed(format!("ray {}: {m}", index + 1)))?);
+        }
+        Ok(rays)
+    }
+}
+
+/// A ray from the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm.
+pub(super) fn light_ray(row: &[f32], scale: f64, wavelength_nm: Option<f64>) -> Result<LightRay, String> {
+    let mut numbers = [0.0; 8];
+    for (number, value) in numbers.iter_mut().zip(&row[..7]) {
+        *number = f64::from(*value);
+    }
+    for coordinate in &mut numbers[..3] {
+        *coordinate *= scale;
+    }
+    match wavelength_nm {
+        Some(wavelength) => {
+            numbers[7] = wavelength;
+            LightRay::from_numbers(&numbers)
+        }
+        None => LightRay::from_numbers(&numbers[..7]),
+    }
+}

@@ -1,0 +1,124 @@
+//! Zemax OpticStudio binary source files (`.dat`, `.sdf`), layout as the program's help gives it under "Binary Source File format".
+
+use super::bytes::{ByteReader, light_ray};
+use super::{Flux, RaySet};
+use crate::formats::Error;
+use std::path::Path;
+
+/// The version of the format that is in use, the first number of a file.
+pub(super) const IDENTIFIER: i32 = 1010;
+
+/// Length of a unit in mm, by `DimensionUnits`.
+const UNITS_MM: [f64; 5] = [1000.0, 25.4, 10.0, 304.8, 1.0];
+
+/// Micrometres, in which the format counts wavelengths, in nm.
+const MICROMETRE: f64 = 1000.0;
+
+/// Reads the rays of a binary source file. Location, rotation and scale of the header are not applied: OpticStudio itself uses only
+/// the number of rays, the unit, the ray format and the flux type.
+pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
+    let mut file = ByteReader::open(path)?;
+    file.i32("the identifier")?;
+    let count = file.u32("the number of rays")?;
+    file.array::<100>("the description")?;
+    file.f32("the flux of the source")?;
+    let stated = file.f32("the flux of the ray set")?;
+    let composite = file.f32("the wavelength")?;
+    file.array::<16>("the angular range")?;
+    let unit = file.u32("the unit of length")?;
+    file.array::<52>("the placement")?;
+    let format = file.i32("the ray format")?;
+    let flux = file.i32("the flux type")?;
+    file.array::<8>("the reserved numbers")?;
+
+    let scale = UNITS_MM.get(unit as usize).copied();
+    let scale = scale.ok_or_else(|| {
+        file.malformed(format!("unit of length {unit} at byte 136; 0 to 4 (m, inch, cm, foot, mm) are known"))
+    })?;
+    let columns = match format {
+        0 => 7,
+        2 => 8,
+        other => {
+            return Err(
+                file.malformed(format!("ray format {other} at byte 192; 0 (flux) and 2 (spectral) are known"))
+            );
+        }
+    };
+    let flux = match flux {
+        0 => Flux::Radiant,
+        1 => Flux::Luminous,
+        other => return Err(file.malformed(format!("flux type {other} at byte 196; 0 (W) and 1 (lm) are known"))),
+    };
+    // Without a wavelength per ray, the header may give one for all; 0 stands for a composite.
+    let common = (composite > 0.0).then(|| f64::from(composite) * MICROMETRE);
+    let rays = file.rays(u64::from(count), columns, |_, row| {
+        let own = row.get(7).map(|w| f64::from(*w) * MICROMETRE);
+        light_ray(row, scale, own.or(common))
+    })?;
+    let mut set = RaySet { rays, flux: Some(flux), spectrum: None, notes: Vec::new() };
+    set.scale_to(Some(f64::from(stated)));
+    Ok(set)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::formats::ray_files::{Flux, read_ray_set};
+
+    /// A file of one ray, made field by field as the help describes it.
+    fn file(unit: u32, format: i32, flux_type: i32, stated: f32, ray: &[f32]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        bytes.extend(1010i32.to_le_bytes());
+        bytes.extend(1u32.to_le_bytes());
+        bytes.extend([0; 100]);
+        bytes.extend([stated, stated, 0.633, 0.0, 0.0, 0.0, 0.0].iter().flat_map(|x: &f32| x.to_le_bytes()));
+        bytes.extend(unit.to_le_bytes());
+        bytes.extend([0; 52]);
+        bytes.extend(format.to_le_bytes());
+        bytes.extend(flux_type.to_le_bytes());
+        bytes.extend([0; 8]);
+        assert_eq!(bytes.len(), 208);
+        bytes.extend(ray.iter().flat_map(|x| x.to_le_bytes()));
+        bytes
+    }
+
+    #[test]
+    fn units_wavelengths_and_flux_are_brought_to_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("source.sdf");
+        std::fs::write(&path, file(1, 2, 0, 0.0, &[1.0, -2.0, 0.5, 0.0, 0.0, -1.0, 0.25, 0.5])).unwrap();
+        let set = read_ray_set(&path, Flux::Luminous).unwrap();
+        assert_eq!(set.rays[0].origin.to_array(), [25.4, -50.8, 12.7]);
+        assert_eq!(set.rays[0].direction.to_array(), [0.0, 0.0, -1.0]);
+        assert_eq!((set.rays[0].power, set.rays[0].wavelength_nm), (0.25, Some(500.0)));
+        assert_eq!(set.flux, Some(Flux::Radiant));
+
+        std::fs::write(&path, file(4, 0, 1, 2.0, &[1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 4.0])).unwrap();
+        let set = read_ray_set(&path, Flux::Luminous).unwrap();
+        assert_eq!((set.rays[0].origin.x, set.rays[0].power, set.flux), (1.0, 2.0, Some(Flux::Luminous)));
+        assert!((set.rays[0].wavelength_nm.unwrap() - 633.0).abs() < 1e-4);
+        assert_eq!(set.notes.len(), 1);
+    }
+
+    #[test]
+    fn damaged_files_are_refused_by_the_byte() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("source.dat");
+        let whole = file(4, 0, 0, 0.0, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
+        for cut in [10, 207, whole.len() - 1] {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
+            assert!(error.contains("cut short"), "{error}");
+        }
+        for (bytes, message) in [
+            (file(9, 0, 0, 0.0, &[0.0; 7]), "unit of length 9 at byte 136"),
+            (file(4, 1, 0, 0.0, &[0.0; 7]), "ray format 1 at byte 192"),
+            (file(4, 0, 7, 0.0, &[0.0; 7]), "flux type 7 at byte 196"),
+            (file(4, 0, 0, 0.0, &[0.0; 7]), "ray 1: the direction has no length"),
+            (file(4, 0, 0, 0.0, &[0.0, 0.0, f32::NAN, 0.0, 0.0, 1.0, 1.0]), "ray 1: NaN is no finite number"),
+        ] {
+            std::fs::write(&path, bytes).unwrap();
+            let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}
