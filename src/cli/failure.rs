@@ -1,4 +1,6 @@
-use super::context::Context;
+//! Why a command stops: the message, what to do, the line at fault, the exit code.
+
+use super::console::Console;
 use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 use std::io::Write;
 use std::ops::Range;
@@ -11,12 +13,12 @@ pub(crate) struct Failure {
     code: u8,
     message: String,
     help: Option<String>,
-    place: Option<Box<Place>>,
+    excerpt: Option<Box<Excerpt>>,
 }
 
 /// A stretch of a text file.
 #[derive(Debug)]
-struct Place {
+struct Excerpt {
     source: NamedSource<String>,
     span: Range<usize>,
     label: String,
@@ -24,7 +26,7 @@ struct Place {
 
 impl Failure {
     fn new(code: u8, message: impl Into<String>) -> Self {
-        Self { code, message: message.into(), help: None, place: None }
+        Self { code, message: message.into(), help: None, excerpt: None }
     }
 
     /// Exit code 1.
@@ -43,22 +45,23 @@ impl Failure {
     }
 
     /// Adds what to do about it.
-    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+    pub(crate) fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
     /// Shows this stretch of a text file.
-    pub(crate) fn shows(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
+    pub(crate) fn with_excerpt(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
         let source = NamedSource::new(file, text.to_owned());
-        self.place = Some(Box::new(Place { source, span, label: label.to_owned() }));
+        self.excerpt = Some(Box::new(Excerpt { source, span, label: label.to_owned() }));
         self
     }
 
     /// Prints the failure on stderr.
-    pub(crate) fn show(&self, context: &Context) -> ExitCode {
-        let theme = if context.colours() { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
-        let handler = GraphicalReportHandler::new_themed(theme).with_width(context.width()).with_context_lines(1);
+    pub(crate) fn print(&self, console: &Console) -> ExitCode {
+        let theme =
+            if console.has_colour() { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+        let handler = GraphicalReportHandler::new_themed(theme).with_width(console.width()).with_context_lines(1);
         let mut text = String::new();
         if handler.render_report(&mut text, self).is_err() {
             text = format!("{self}\n");
@@ -74,11 +77,11 @@ impl Diagnostic for Failure {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.place.as_ref().map(|p| &p.source as &dyn SourceCode)
+        self.excerpt.as_ref().map(|p| &p.source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let Place { span, label, .. } = self.place.as_deref()?;
+        let Excerpt { span, label, .. } = self.excerpt.as_deref()?;
         let label = LabeledSpan::new(Some(label.clone()), span.start, span.len());
         Some(Box::new(std::iter::once(label)))
     }

@@ -1,3 +1,5 @@
+//! What the machine is, as far as the system tells: processor, cores, memory.
+
 use std::fs;
 
 /// Processor, number of cores and memory, as far as the system tells.

@@ -1,10 +1,8 @@
-use super::{Error, ErrorKind, Polylines, data2, glb, obj, ply, stl, vtk};
+//! A mesh with what its file may say beside the facets: groups, colours, measured errors, ray paths.
+
+use super::Polylines;
 use crate::math::{FaceId, Vector};
 use crate::mesh::FacetMesh;
-use std::path::Path;
-
-/// Extensions [`write_facets`] knows, for people.
-pub const FACET_EXTENSIONS: &str = ".obj .ply .stl .vtu .glb .data2";
 
 /// A mesh with what its file may say beside the facets.
 #[derive(Clone, Debug)]
@@ -78,27 +76,4 @@ pub(super) fn flat_normal(mesh: &FacetMesh, facet: usize) -> Vector {
     let [a, b, c, d] = mesh.corners(facet);
     // With c = d the diagonals are two edges of the triangle, so one formula serves both.
     (c - a).cross(d - b).normalize_or_zero()
-}
-
-/// Writes facets in the format that the extension names: one of [`FACET_EXTENSIONS`].
-///
-/// # Errors
-/// For an unknown extension, and when the file cannot be written.
-pub fn write_facets(path: &Path, facets: &Facets) -> Result<(), Error> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    match extension.as_str() {
-        "obj" => obj::write(path, facets),
-        "ply" => ply::write(path, facets),
-        "stl" => stl::write(path, facets),
-        "vtu" => vtk::write_vtu(path, facets),
-        "glb" => glb::write(path, facets),
-        "data2" => data2::write(path, facets),
-        _ => Err(Error::new(path, ErrorKind::Extension { given: extension, known: FACET_EXTENSIONS })),
-    }
-}
-
-/// Whether [`write_facets`] knows the extension of this name.
-pub fn is_facet_file(path: &Path) -> bool {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    FACET_EXTENSIONS.split(' ').any(|known| known[1..] == extension)
 }

@@ -8,17 +8,18 @@
 //! WebGL to turn; without it their static picture remains.
 
 mod chart;
-mod court;
+mod chart_png;
+mod cross_check;
 mod document;
 mod faceting;
 mod html;
-mod light;
+
 mod maps;
 mod number;
 mod plotly;
 mod provenance;
 mod raster;
-mod still;
+mod simulation;
 mod studies;
 mod svg;
 mod table;
@@ -27,12 +28,12 @@ mod write;
 
 pub use crate::formats::file_stem;
 pub use chart::{AxisStyle, Chart, Content, Series, SeriesStyle};
-pub use court::{Trial, verdict};
+pub use cross_check::{CheckReport, verdict};
 pub use document::{Block, Report, Section};
-pub use light::{Light, path_lines};
 pub use maps::{photometric_grid, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};
 pub use provenance::Provenance;
+pub use simulation::{SimulationReport, path_lines};
 pub use studies::study_report;
 pub use table::{Cell, Column, Table};
 pub use view::{Shape, View};

@@ -1,5 +1,5 @@
 use super::document::{Block, Report};
-use super::{html, raster, still, svg};
+use super::{chart_png, html, raster, svg};
 use crate::formats::{Error, ErrorKind, write_atomic, write_png};
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ impl Report {
                     let path = inside("figures", format!("{}.svg", chart.name))?;
                     write_atomic(&path, |w| w.write_all(svg::render(chart).as_bytes()))?;
                     written.push(path.clone());
-                    if let Some(png) = still::png(chart) {
+                    if let Some(png) = chart_png::png(chart) {
                         let path = path.with_extension("png");
                         write_atomic(&path, |w| w.write_all(&png))?;
                         written.push(path);

@@ -1,6 +1,6 @@
 //! What is asked on the command line.
 
-pub(super) mod args;
+pub(super) mod command;
+mod help_text;
 pub(super) mod options;
 pub(super) mod suggest;
-mod words;

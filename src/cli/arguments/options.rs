@@ -7,7 +7,7 @@ use clap::builder::PossibleValue;
 
 /// A direction error asked for in place of a tolerance.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub(crate) struct Precision {
+pub(crate) struct AccuracyOption {
     /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
     #[arg(
         long,
@@ -21,7 +21,7 @@ pub(crate) struct Precision {
 
 /// Options of everything that tessellates.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub(crate) struct Meshing {
+pub(crate) struct MeshingOptions {
     /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform; 0.05..0.2 by default
     #[arg(long, help_heading = "Facets", value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
     pub(crate) tolerance: Option<[f64; 2]>,
@@ -44,7 +44,7 @@ pub(crate) struct Meshing {
 
 /// Options of everything that traces.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub(crate) struct Tracing {
+pub(crate) struct TracingOptions {
     /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command
     #[arg(long, help_heading = "Rays", value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub(crate) rays: Option<u64>,

@@ -1,14 +1,18 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
-use crate::cli::arguments::args::Refusals;
-use crate::cli::arguments::options::{Meshing, Tracing};
-use crate::cli::context::{Context, print};
-use crate::cli::output::look;
-use crate::cli::work::engine::Choice;
-use crate::cli::work::load::Input;
-use crate::cli::work::witness::Witness;
-use crate::cli::work::{aim, engine, load, pairs};
-use crate::cli::{Failure, Outcome};
+use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::completion::Completion;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::appearance;
+use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::terminal_tables::blank_table;
+use crate::cli::work::cross_check::LIFT_IN_TOLERANCES;
+use crate::cli::work::input_files::{self, Input};
+use crate::cli::work::intersectors::IntersectorChoice;
+use crate::cli::work::ray_sampler::RaySampler;
+use crate::cli::work::{accuracy_target, facets, paired_receivers, threads};
 use crate::formats::write_atomic;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::Exact;
@@ -17,7 +21,8 @@ use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
-use crate::report::{Trial, figures, grouped, verdict};
+use crate::model::Model;
+use crate::report::{CheckReport, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::cross_check::{self, Competitor, CrossCheck, Intersectors, measure};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
@@ -25,154 +30,204 @@ use crate::study::{Quantiles, Summary, records};
 use std::path::{Path, PathBuf};
 
 /// What `check` was asked for.
-pub(crate) struct Asked<'a> {
+pub(crate) struct CheckCommand<'a> {
     pub(crate) file: &'a Path,
-    pub(crate) meshing: &'a Meshing,
-    pub(crate) tracing: &'a Tracing,
+    pub(crate) meshing: &'a MeshingOptions,
+    pub(crate) tracing: &'a TracingOptions,
     pub(crate) accuracy: Option<&'a str>,
     pub(crate) rays_out: Option<&'a PathBuf>,
     pub(crate) rays_in: Option<&'a PathBuf>,
     pub(crate) disagreements: Option<&'a PathBuf>,
     pub(crate) output: Option<&'a PathBuf>,
-    pub(crate) limits: Refusals,
+    pub(crate) limits: RefusalLimit,
 }
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;
-/// Rays of a timed round, and rounds.
-const TIMED: (usize, usize) = (20_000, 3);
+/// Rays of a timed round: enough for a tenth of a second on the slowest.
+const TIMED_RAYS: usize = 20_000;
+/// Timed rounds of every intersector, alternating.
+const TIMED_ROUNDS: usize = 3;
+/// Shortest time of a round that a rate is made of, s: below it a clock tells nothing.
+const SHORTEST_ROUND: f64 = 1e-12;
+/// Rays of a million rays per second.
+const MILLION: f64 = 1e6;
+/// Fewest rays of a scene's run that the sample is taken from.
+const FEWEST_SCENE_RAYS: u64 = 64;
+/// Columns of the table of rates.
+const TABLE_WIDTH: usize = 100;
 
-pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
-    let threads = engine::threads(asked.tracing.threads)?;
-    let given = asked.rays_in.map(|p| read_rays(p)).transpose()?;
-    let input = load::either(asked.file, context)?;
+/// Every intersector over the same facets and the same model.
+struct Contenders<'a> {
+    octree: Octree<'a>,
+    bvh2: Bvh<'a>,
+    cwbvh: Bvh<'a>,
+    cwbvh_as_shipped: Bvh<'a>,
+    exact: Exact,
+}
+
+impl<'a> Contenders<'a> {
+    fn build(mesh: &'a FacetMesh, model: &Model, normals: NormalMode, console: &Console) -> Self {
+        let spinner = console.spinner("building octree, BVHs and spline");
+        let cwbvh = bvh::Settings { normals, ..Default::default() };
+        let contenders = Self {
+            octree: Octree::build(mesh, &octree::Settings { normals, ..Default::default() }),
+            bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
+            cwbvh: Bvh::build(mesh, &cwbvh),
+            cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
+            exact: Exact::build(model, &Default::default()),
+        };
+        spinner.finish_and_clear();
+        contenders
+    }
+
+    /// Under the names of the document, with whether whole batches are asked.
+    fn named<'s>(&'s self, polish: &'s dyn Intersector) -> [Competitor<'s>; 7] {
+        let competitor = |name, who, batch| Competitor { name, who, batch };
+        [
+            competitor("octree", &self.octree as &dyn Intersector, true),
+            competitor("octree_single", &self.octree, false),
+            competitor("bvh2", &self.bvh2, true),
+            competitor("cwbvh", &self.cwbvh, true),
+            competitor("cwbvh_as_shipped", &self.cwbvh_as_shipped, true),
+            competitor("polish", polish, true),
+            competitor("exact", &self.exact, true),
+        ]
+    }
+}
+
+pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
+    let threads = threads::set_threads(command.tracing.threads)?;
+    let given = command.rays_in.map(|p| read_rays(p)).transpose()?;
+    let input = input_files::either(command.file, console)?;
     let (scene, loaded) = match &input {
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
     let model = &loaded.model;
-    let options = (asked.meshing, asked.tracing);
-    let (meshing, tracing, aimed) = aim::meshing(asked.accuracy, options, scene, model, context)?;
-    let settings = engine::mesh_settings(&meshing, scene, model)?;
-    let (made, _) = engine::facets(model, &settings, context);
-    let mesh = &made.mesh;
-    let chosen = Choice::new(&tracing, scene)?.normals;
-    let normals = chosen.on_facets();
-    let spinner = context.spinner("building octree, BVHs and spline");
-    let octree = Octree::build(mesh, &octree::Settings { normals, ..Default::default() });
-    let wide = bvh::Settings { normals, ..Default::default() };
-    let cwbvh = Bvh::build(mesh, &wide);
-    let bvh2 = Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..wide });
-    let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..wide });
-    let exact = Exact::build(model, &Default::default());
-    let polish = Polished::new(&octree, mesh, &exact);
-    spinner.finish_and_clear();
-    let lift = 4.0 * settings.loosest();
+    let options = (command.meshing, command.tracing);
+    let (meshing, tracing, reached) =
+        accuracy_target::meshing_for(command.accuracy, options, scene, model, console)?;
+    let settings = facets::mesh_settings(&meshing, scene, model)?;
+    let (tessellation, _) = facets::facets(model, &settings, console);
+    let mesh = &tessellation.mesh;
+    let normals = IntersectorChoice::new(&tracing, scene)?.normals;
+    let contenders = Contenders::build(mesh, model, normals.on_facets(), console);
+    let Contenders { octree, exact, .. } = &contenders;
+    let polish = Polished::new(octree, mesh, exact);
+
+    // The same rays through all three, and a cause for every difference.
+    let lift = LIFT_IN_TOLERANCES * settings.loosest();
     let rays = match given {
         Some(rays) => rays,
-        None => own_rays(scene, model, mesh, &octree, &tracing, lift)?,
+        None => own_rays(scene, model, mesh, octree, &tracing, lift)?,
     };
-    let bar = context.bar("judging", "rays", rays.len() as u64);
-    let intersectors = Intersectors { model, mesh, octree: &octree, bvh: &cwbvh, exact: &exact };
+    let bar = console.progress_bar("judging", "rays", rays.len() as u64);
+    let intersectors = Intersectors { model, mesh, octree, bvh: &contenders.cwbvh, exact };
     let band = cross_check::Settings { fallback_band_mm: settings.loosest(), ..Default::default() };
     let total = rays.len() as f64;
     let mut found =
         cross_check::cross_check(&intersectors, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
     bar.finish_and_clear();
-    if chosen == NormalMode::Exact {
-        let [t, normal] = polished_errors(&polish, &exact, &rays, settings.loosest());
-        (found.facets_vs_exact.t_error_mm, found.facets_vs_exact.normal_error_deg) = (t, normal);
+    if normals == NormalMode::Exact {
+        let [distance, angle] = polished_errors(&polish, exact, &rays, settings.loosest());
+        found.facets_vs_exact.t_error_mm = distance;
+        found.facets_vs_exact.normal_error_deg = angle;
     }
-    let spinner = context.spinner("timing");
-    let race = |name: &'static str, who: &dyn Intersector| -> (&'static str, f64, f64) {
-        let f = who.footprint();
-        (name, f.build_seconds, f.bytes as f64 / f.primitives.max(1) as f64)
+    time_all(&mut found, &contenders.named(&polish), &rays, console);
+    write_rays(command, &found, octree, &rays, console)?;
+
+    // What the facets change of the light, which only a scene has.
+    let facets: &dyn Intersector = if normals == NormalMode::Exact { &polish } else { octree };
+    let receivers = match scene {
+        Some(scene) => paired_receivers::trace_both(scene, &scene.bind(model)?, [facets, exact], &tracing, console),
+        None => Vec::new(),
     };
-    for (name, build, bytes) in [
-        race("octree", &octree),
-        race("octree_single", &octree),
-        race("bvh2", &bvh2),
-        race("cwbvh", &cwbvh),
-        race("cwbvh_as_shipped", &shipped),
-        race("polish", &polish),
-        race("exact", &exact),
-    ] {
-        found.build_seconds.set(name, build);
-        found.bytes_per_facet.set(name, bytes);
+    let mut document = json_value(&found)?;
+    document["normals"] = normals.to_string().into();
+    if scene.is_some() {
+        document["receivers"] = json_value(&receivers)?;
     }
-    let entrant = |name, who, batch| Competitor { name, who, batch };
-    let competitors = [
-        entrant("octree", &octree as &dyn Intersector, true),
-        entrant("octree_single", &octree, false),
-        entrant("bvh2", &bvh2, true),
-        entrant("cwbvh", &cwbvh, true),
-        entrant("cwbvh_as_shipped", &shipped, true),
-        entrant("polish", &polish, true),
-        entrant("exact", &exact, true),
-    ];
+    if let Some(reached) = &reached {
+        document["accuracy"] = json_value(reached)?;
+    }
+    let text = json_text(&document)?;
+    if let Some(folder) = command.output {
+        let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
+        let report = CheckReport {
+            title: command.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+            check: &found,
+            facets: &appearance::grouped_facets(model, mesh, scene),
+            normals: &normals.to_string(),
+            tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers)] },
+            also: reached.iter().map(|a| a.answer.clone()).collect(),
+            provenance: console.provenance(Some(seed), threads),
+        };
+        report.report().write(folder)?;
+        write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?;
+    }
+    if console.json {
+        print(&text)?;
+    } else {
+        print(&(summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
+        say_files(command, &found, console);
+    }
+    Ok(input_files::report_refusals(&loaded.reports, command.limits.max_refused, console))
+}
+
+/// Build time, size and rate of every intersector.
+fn time_all(found: &mut CrossCheck, contenders: &[Competitor], rays: &[Ray], console: &Console) {
+    let spinner = console.spinner("timing");
+    for contender in contenders {
+        let footprint = contender.who.footprint();
+        found.build_seconds.set(contender.name, footprint.build_seconds);
+        let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
+        found.bytes_per_facet.set(contender.name, bytes_per_facet);
+    }
     // Evenly over the rays, so that every kind of them is among the timed.
-    let timed: Vec<Ray> = rays.iter().copied().step_by(rays.len().div_ceil(TIMED.0).max(1)).collect();
-    for (name, timing) in measure(&competitors, &timed, TIMED.1) {
-        found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(1e-12) / 1e6);
+    let timed: Vec<Ray> = rays.iter().copied().step_by(rays.len().div_ceil(TIMED_RAYS).max(1)).collect();
+    for (name, timing) in measure(contenders, &timed, TIMED_ROUNDS) {
+        found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
     }
     spinner.finish_and_clear();
-    if let Some(path) = asked.rays_out {
+}
+
+/// The files of rays that were asked for.
+fn write_rays(
+    command: &CheckCommand,
+    found: &CrossCheck,
+    octree: &dyn Intersector,
+    rays: &[Ray],
+    console: &Console,
+) -> Result<(), Failure> {
+    if let Some(path) = command.rays_out {
         let mut hits = vec![None; rays.len()];
-        octree.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        octree.intersect_batch(rays, &mut hits, &mut Cost::default());
         write_atomic(path, |mut w| {
             records::write(&mut w, rays.iter().copied().zip(hits.iter().map(|h| h.map(|h| h.t))))
         })?;
-        context.say(format_args!("wrote {}", path.display()));
+        console.say(format_args!("wrote {}", path.display()));
     }
-    if let Some(path) = asked.disagreements {
+    if let Some(path) = command.disagreements {
         let kept = found.disagreements.iter().map(|d| (d.ray, d.octree.map(|h| h.t)));
         write_atomic(path, |mut w| records::write(&mut w, kept.clone()))?;
-        context.say(format_args!("wrote {}", path.display()));
+        console.say(format_args!("wrote {}", path.display()));
     }
-    let pairs = match scene {
-        Some(scene) => {
-            let facets: &dyn Intersector = if chosen == NormalMode::Exact { &polish } else { &octree };
-            pairs::find(scene, &scene.bind(model)?, [facets, &exact], &tracing, context)
+    Ok(())
+}
+
+/// Which files were written, or how to get them.
+fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
+    match command.output {
+        Some(folder) => {
+            console.say(format_args!("\n  {}", console.bold(&folder.join("report.html").display().to_string())));
+            console.say(format_args!("  {}", folder.join("check.json").display()));
         }
-        None => Vec::new(),
-    };
-    let wrong = |e: serde_json::Error| Failure::running(e.to_string());
-    let mut document = serde_json::to_value(&found).map_err(wrong)?;
-    document["normals"] = chosen.to_string().into();
-    if scene.is_some() {
-        document["receivers"] = serde_json::to_value(&pairs).map_err(wrong)?;
+        None if !found.disagreements.is_empty() => {
+            console.say(console.dim("  -o DIR writes a page with the rays that differ in 3-D"));
+        }
+        None => {}
     }
-    if let Some(aimed) = &aimed {
-        document["accuracy"] = serde_json::to_value(aimed).map_err(wrong)?;
-    }
-    let text = serde_json::to_string_pretty(&document).map_err(wrong)? + "\n";
-    if let Some(folder) = asked.output {
-        let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
-        let trial = Trial {
-            title: asked.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
-            check: &found,
-            facets: &look::facets(model, mesh, scene),
-            normals: &chosen.to_string(),
-            tables: if pairs.is_empty() { Vec::new() } else { vec![pairs::table(&pairs)] },
-            also: aimed.iter().map(|a| a.answer.clone()).collect(),
-            provenance: context.provenance(Some(seed), threads),
-        };
-        trial.report().write(folder)?;
-        write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?;
-    }
-    if context.json {
-        print(&text)?;
-    } else {
-        print(&(described(&found, chosen) + &pairs::described(&pairs)))?;
-    }
-    if asked.output.is_none() && !found.disagreements.is_empty() && !context.json {
-        context.say(context.faint("  -o DIR writes a page with the rays that differ in 3-D"));
-    }
-    if let Some(folder) = asked.output {
-        context.say(format_args!("\n  {}", context.strong(&folder.join("report.html").display().to_string())));
-        context.say(format_args!("  {}", folder.join("check.json").display()));
-    }
-    Ok(load::account(&loaded.reports, asked.limits.max_refused, context))
 }
 
 fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
@@ -188,10 +243,10 @@ fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
 /// The rays of a scene's own run, or a camera's, random and bouncing ones for a bare model.
 fn own_rays(
     scene: Option<&Scene>,
-    model: &crate::model::Model,
+    model: &Model,
     mesh: &FacetMesh,
     octree: &dyn Intersector,
-    tracing: &Tracing,
+    tracing: &TracingOptions,
     lift: f64,
 ) -> Result<Vec<Ray>, Failure> {
     let count = tracing.rays.unwrap_or(RAYS);
@@ -207,13 +262,13 @@ fn own_rays(
     let bound = scene.bind(model)?;
     // About four segments a ray; a few more rays, so that there are enough.
     let settings = RunSettings {
-        rays: count.div_ceil(2).max(64),
+        rays: count.div_ceil(2).max(FEWEST_SCENE_RAYS),
         seed: tracing.seed.unwrap_or(scene.run.seed),
         ..RunSettings::from(&scene.run)
     };
-    let witness = Witness::new(octree, count, count);
-    simulate(&bound, &witness, &settings, &|_| true);
-    Ok(witness.rays(count as usize, model, lift))
+    let sampler = RaySampler::new(octree, count, count);
+    simulate(&bound, &sampler, &settings, &|_| true);
+    Ok(sampler.rays(count as usize, model, lift))
 }
 
 /// How far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
@@ -235,12 +290,12 @@ fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ra
     [distance.summary(), angle.summary()]
 }
 
-fn spread(q: &Summary, unit: &str) -> String {
+fn spread_text(q: &Summary, unit: &str) -> String {
     let [p50, p99, max] = [q.p50, q.p99, q.max].map(|x| figures(x, 2));
     format!("off by {p50}{unit} (median), {p99}{unit} (99 %), {max}{unit} (largest)")
 }
 
-fn described(c: &CrossCheck, normals: NormalMode) -> String {
+fn summary(c: &CrossCheck, normals: NormalMode) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
     let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));
@@ -273,8 +328,8 @@ fn described(c: &CrossCheck, normals: NormalMode) -> String {
         ),
     );
     let moved = if normals == NormalMode::Exact { "moved to the spline, " } else { "" };
-    line("distance", format!("{moved}{}", spread(&f.t_error_mm, " mm")));
-    line("normals", format!("{normals}, {}", spread(&f.normal_error_deg, "°")));
+    line("distance", format!("{moved}{}", spread_text(&f.t_error_mm, " mm")));
+    line("normals", format!("{normals}, {}", spread_text(&f.normal_error_deg, "°")));
     line(
         "spline",
         format!(
@@ -284,10 +339,11 @@ fn described(c: &CrossCheck, normals: NormalMode) -> String {
             c.exact.uncertified
         ),
     );
-    let mut table = crate::cli::output::tables::blank(100);
+    let mut table = blank_table(TABLE_WIDTH);
     table.set_header(["", "Mrays/s, 1 thread", "build", "bytes per facet"]);
-    let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);
-    for (((name, rate), (_, build)), (_, size)) in m.named().into_iter().zip(b.named()).zip(s.named()) {
+    let rates = c.mrays_per_s.named().into_iter();
+    for (((name, rate), (_, build)), (_, size)) in rates.zip(c.build_seconds.named()).zip(c.bytes_per_facet.named())
+    {
         let shown = |x: Option<f64>| x.map_or("–".into(), |x| figures(x, 3));
         let time = build.map_or("–".into(), crate::report::seconds);
         table.add_row([name.to_owned(), shown(rate), time, shown(size)]);

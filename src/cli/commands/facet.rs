@@ -1,11 +1,12 @@
 //! `lampyris facet`: quad facets within a proved tolerance, written in as many formats as asked for.
 
-use crate::cli::arguments::args::Refusals;
-use crate::cli::arguments::options::Meshing;
-use crate::cli::context::{Context, print};
-use crate::cli::output::look;
-use crate::cli::work::{aim, engine, load};
-use crate::cli::{Failure, Outcome, machine};
+use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::arguments::options::MeshingOptions;
+use crate::cli::console::{Console, print};
+use crate::cli::output::appearance;
+use crate::cli::output::json::json_text;
+use crate::cli::work::{accuracy_target, facets, input_files, threads};
+use crate::cli::{completion::Completion, failure::Failure, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
 use crate::kernel::baseline;
 use crate::mesh::FacetMesh;
@@ -16,45 +17,46 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// What `facet` was asked for.
-pub(crate) struct Asked<'a> {
+pub(crate) struct FacetCommand<'a> {
     pub(crate) file: &'a Path,
     pub(crate) output: &'a [PathBuf],
-    pub(crate) meshing: &'a Meshing,
+    pub(crate) meshing: &'a MeshingOptions,
     pub(crate) accuracy: Option<&'a str>,
     /// Whether truck's mesher runs too.
     pub(crate) baseline: bool,
     pub(crate) threads: Option<usize>,
-    pub(crate) limits: Refusals,
+    pub(crate) limits: RefusalLimit,
 }
 
-pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
-    if let Some(path) = asked.output.iter().find(|p| !is_facet_file(p)) {
+    if let Some(path) = command.output.iter().find(|p| !is_facet_file(p)) {
         let given = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
         return Err(
             crate::formats::Error::new(path, ErrorKind::Extension { given, known: FACET_EXTENSIONS }).into()
         );
     }
-    engine::threads(asked.threads)?;
-    let loaded = load::model_file(asked.file, context)?;
-    let (meshing, aimed) = aim::facets(asked.accuracy, asked.meshing, &loaded.model, context)?;
-    let mut settings = engine::mesh_settings(&meshing, None, &loaded.model)?;
+    threads::set_threads(command.threads)?;
+    let loaded = input_files::model_file(command.file, console)?;
+    let (meshing, reached) =
+        accuracy_target::meshing_for_facets(command.accuracy, command.meshing, &loaded.model, console)?;
+    let mut settings = facets::mesh_settings(&meshing, None, &loaded.model)?;
     settings.measure = true;
-    let (mut made, _) = engine::facets(&loaded.model, &settings, context);
+    let (mut made, _) = facets::facets(&loaded.model, &settings, console);
     made.report.seconds.read = loaded.seconds;
     made.report.peak_bytes = machine::peak_bytes();
-    let mut facets = look::facets(&loaded.model, &made.mesh, None);
-    if asked.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
-        (facets.normal_error_deg, facets.curvature_per_mm) = per_facet(&loaded.model, &made.mesh);
+    let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
+    if command.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
+        (facets.normal_error_deg, facets.curvature_per_mm) = normal_errors(&loaded.model, &made.mesh);
     }
-    for path in asked.output {
-        let spinner = context.spinner(&format!("writing {}", path.display()));
+    for path in command.output {
+        let spinner = console.spinner(&format!("writing {}", path.display()));
         write_facets(path, &facets)?;
         spinner.finish_and_clear();
-        context.say(format_args!("wrote {}", path.display()));
+        console.say(format_args!("wrote {}", path.display()));
     }
-    let baseline = asked.baseline.then(|| Baseline::run(&loaded.model, made.report.tolerance_mm.min));
-    if context.json {
+    let baseline = command.baseline.then(|| Baseline::run(&loaded.model, made.report.tolerance_mm.min));
+    if console.json {
         #[derive(Serialize)]
         struct Both<'r> {
             #[serde(flatten)]
@@ -64,26 +66,24 @@ pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
             #[serde(skip_serializing_if = "Option::is_none")]
             accuracy: Option<crate::study::accuracy_target::AccuracyPlan>,
         }
-        let both = Both { report: &made.report, baseline, accuracy: aimed };
-        let text = serde_json::to_string_pretty(&both).map_err(|e| Failure::running(e.to_string()))?;
-        print(&(text + "\n"))?;
+        let both = Both { report: &made.report, baseline, accuracy: reached };
+        print(&json_text(&both)?)?;
     } else {
-        print(&described(&made.report))?;
-        if asked.output.is_empty() {
-            context
-                .say(context.faint("  no facets were written: -o NAME.glb does (.obj .ply .stl .vtu .data2 too)"));
+        print(&summary(&made.report))?;
+        if command.output.is_empty() {
+            console.say(console.dim("  no facets were written: -o NAME.glb does (.obj .ply .stl .vtu .data2 too)"));
         }
         if let Some(b) = baseline {
-            print(&b.described(&made.report))?;
+            print(&b.comparison(&made.report))?;
         }
     }
-    let refused = load::account(&loaded.reports, asked.limits.max_refused, context);
+    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     let placed = made.report.faces.meshed + made.report.faces.failed;
     if made.report.faces.failed > 0 {
-        context.say(format_args!("{} of {placed} faces got no facets", made.report.faces.failed));
+        console.say(format_args!("{} of {placed} faces got no facets", made.report.faces.failed));
     }
-    let over = made.report.faces.failed as f64 > asked.limits.max_refused * placed as f64;
-    Ok(if over { Outcome::Incomplete } else { refused })
+    let over = made.report.faces.failed as f64 > command.limits.max_refused * placed as f64;
+    Ok(refused.and(Completion::incomplete_if(over)))
 }
 
 /// What truck-meshalgo makes of the same model; `facet --json` has it under `baseline`.
@@ -121,7 +121,7 @@ impl Baseline {
     }
 
     /// Both meshers, one below the other.
-    fn described(&self, r: &Report) -> String {
+    fn comparison(&self, r: &Report) -> String {
         let sag = |max: f64, mean: f64| format!("{} ({})", figures(max, 4), figures(mean, 3));
         let rows = [
             (
@@ -151,7 +151,7 @@ impl Baseline {
     }
 }
 
-fn described(r: &Report) -> String {
+fn summary(r: &Report) -> String {
     let mut text = String::new();
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     let n = |x: usize| grouped(x as u64);
@@ -223,7 +223,7 @@ fn described(r: &Report) -> String {
 
 /// For each facet the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
 /// the largest curvature there, 1/mm.
-pub(crate) fn per_facet(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
     use rayon::prelude::*;
     let faces: Vec<PlacedFace> = model.placed_faces().collect();
     (0..mesh.facets.len())

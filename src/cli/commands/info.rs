@@ -1,32 +1,37 @@
 //! `lampyris info`: what a STEP file holds and what could not be read.
 
-use crate::cli::arguments::args::Refusals;
-use crate::cli::context::{Context, print};
-use crate::cli::work::load;
-use crate::cli::{Failure, Outcome};
+use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::console::{Console, print};
+use crate::cli::output::json::json_text;
+use crate::cli::output::terminal_tables::blank_table;
+use crate::cli::work::input_files;
+use crate::cli::{completion::Completion, failure::Failure};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::step::ImportReport;
 use std::path::Path;
 
-pub(crate) fn run(path: &Path, limits: Refusals, context: &Context) -> Result<Outcome, Failure> {
-    let report = load::step_file(path, None, context)?.report;
-    if context.json {
-        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::running(e.to_string()))?;
-        print(&(text + "\n"))?;
+/// Names and notes shown without -v: what fits a screen.
+const SHOWN_NAMES: usize = 12;
+const SHOWN_NOTES: usize = 20;
+
+pub(crate) fn run(path: &Path, limits: RefusalLimit, console: &Console) -> Result<Completion, Failure> {
+    let report = input_files::step_file(path, None, console)?.report;
+    if console.json {
+        print(&json_text(&report)?)?;
     } else {
-        print(&described(&report, context))?;
+        print(&summary(&report, console))?;
     }
     let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
-    Ok(if over { Outcome::Incomplete } else { Outcome::Done })
+    Ok(Completion::incomplete_if(over))
 }
 
-fn described(r: &ImportReport, context: &Context) -> String {
+fn summary(r: &ImportReport, console: &Console) -> String {
     let list = |words: &[String]| if words.is_empty() { "none named".to_owned() } else { words.join(", ") };
     let mut text = format!("{}  {}, {}\n", r.file, bytes(r.bytes), list(&r.schema));
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     line("units", format!("length {}; angle {}", list(&r.units.length), list(&r.units.angle)));
-    let some = |n: usize, name: &str| format!("{} {name}{}", grouped(n as u64), if n == 1 { "" } else { "s" });
-    let shapes = [some(r.parts, "part"), some(r.instances, "instance"), some(r.shells, "shell")];
+    let count = |n: usize, name: &str| format!("{} {name}{}", grouped(n as u64), if n == 1 { "" } else { "s" });
+    let shapes = [count(r.parts, "part"), count(r.instances, "instance"), count(r.shells, "shell")];
     line("shapes", shapes.join(", "));
     let f = &r.faces;
     line(
@@ -48,15 +53,19 @@ fn described(r: &ImportReport, context: &Context) -> String {
         }
         None => line("box", "nothing to bound".into()),
     }
-    let shown: Vec<String> = r.names.iter().take(12).cloned().collect();
-    let more = if r.names.len() > 12 { format!(" and {} more", r.names.len() - 12) } else { String::new() };
+    let shown: Vec<String> = r.names.iter().take(SHOWN_NAMES).cloned().collect();
+    let more = if r.names.len() > SHOWN_NAMES {
+        format!(" and {} more", r.names.len() - SHOWN_NAMES)
+    } else {
+        String::new()
+    };
     line("names", list(&shown) + &more);
     line("read in", format!("{} (parse) + {} (convert)", seconds(r.seconds.parse), seconds(r.seconds.convert)));
     let notes = (r.refusals.iter().map(|n| ("refused", n))).chain(r.repairs.iter().map(|n| ("repaired", n)));
     let notes: Vec<_> = notes.collect();
-    let most = if context.verbose > 0 { usize::MAX } else { 20 };
+    let most = if console.verbose > 0 { usize::MAX } else { SHOWN_NOTES };
     if !notes.is_empty() {
-        let mut table = crate::cli::output::tables::blank(context.width());
+        let mut table = blank_table(console.width());
         table.set_header(["", "entity", "why"]);
         for (what, note) in notes.iter().take(most) {
             table.add_row([(*what).to_owned(), format!("#{} {}", note.id, note.entity), note.reason.clone()]);

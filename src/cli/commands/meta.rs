@@ -1,25 +1,25 @@
 //! Commands about the command itself.
 
-use crate::cli::arguments::args::Arguments;
-use crate::cli::context::{Context, print};
-use crate::cli::{Failure, Outcome};
+use crate::cli::arguments::command::Arguments;
+use crate::cli::console::{Console, print};
+use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::write_atomic;
 use clap::CommandFactory;
 use std::path::Path;
 
-pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Outcome, Failure> {
+pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Completion, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "lampyris", &mut script);
     print(&String::from_utf8_lossy(&script))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Complete)
 }
 
-pub(crate) fn schema() -> Result<Outcome, Failure> {
+pub(crate) fn schema() -> Result<Completion, Failure> {
     print(&format!("{:#}\n", crate::simulate::Scene::schema()))?;
-    Ok(Outcome::Done)
+    Ok(Completion::Complete)
 }
 
-pub(crate) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, Failure> {
+pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
     let mut command = Arguments::command();
     command.build();
     let render = |command: clap::Command| -> std::io::Result<Vec<u8>> {
@@ -29,7 +29,7 @@ pub(crate) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, F
     };
     let Some(folder) = folder else {
         print(&String::from_utf8_lossy(&render(command)?))?;
-        return Ok(Outcome::Done);
+        return Ok(Completion::Complete);
     };
     std::fs::create_dir_all(folder)?;
     let subcommands: Vec<clap::Command> =
@@ -42,7 +42,7 @@ pub(crate) fn man(folder: Option<&Path>, context: &Context) -> Result<Outcome, F
         let path = folder.join(format!("{name}.1"));
         let page = render(command)?;
         write_atomic(&path, |w| w.write_all(&page))?;
-        context.say(format_args!("wrote {}", path.display()));
+        console.say(format_args!("wrote {}", path.display()));
     }
-    Ok(Outcome::Done)
+    Ok(Completion::Complete)
 }

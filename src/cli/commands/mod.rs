@@ -1,26 +1,27 @@
 //! The commands, a file each.
 
+mod bvh_benchmark;
 mod check;
 mod demo;
 mod facet;
 mod info;
+mod merge;
 mod meta;
-mod portion;
-mod race;
+mod replay;
 mod study;
 mod trace;
 
-use crate::cli::arguments::args::Command;
-use crate::cli::context::Context;
-use crate::cli::{Failure, Outcome};
+use crate::cli::arguments::command::Command;
+use crate::cli::console::Console;
+use crate::cli::{completion::Completion, failure::Failure};
 
 /// Does what a command asks for.
-pub(super) fn execute(command: Command, context: &Context) -> Result<Outcome, Failure> {
+pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     match command {
-        Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, context),
-        Command::Info { file, limits } => info::run(&file, limits, context),
+        Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, console),
+        Command::Info { file, limits } => info::run(&file, limits, console),
         Command::Facet { file, output, meshing, precision, baseline, threads, limits } => {
-            let asked = facet::Asked {
+            let command = facet::FacetCommand {
                 file: &file,
                 output: &output,
                 meshing: &meshing,
@@ -29,13 +30,20 @@ pub(super) fn execute(command: Command, context: &Context) -> Result<Outcome, Fa
                 threads,
                 limits,
             };
-            facet::run(&asked, context)
+            facet::run(&command, console)
         }
         Command::Trace { scene, output, meshing, tracing, extra } => {
-            trace::run(&scene, &output, &meshing, &tracing, &extra, context)
+            let command = trace::TraceCommand {
+                scene: &scene,
+                folder: &output,
+                meshing: &meshing,
+                tracing: &tracing,
+                extra: &extra,
+            };
+            trace::run(&command, console)
         }
         Command::Check { file, meshing, tracing, precision, output, rays_out, rays_in, disagreements, limits } => {
-            let asked = check::Asked {
+            let command = check::CheckCommand {
                 file: &file,
                 meshing: &meshing,
                 tracing: &tracing,
@@ -46,15 +54,15 @@ pub(super) fn execute(command: Command, context: &Context) -> Result<Outcome, Fa
                 output: output.as_ref(),
                 limits,
             };
-            check::run(&asked, context)
+            check::run(&command, console)
         }
         Command::Study { kind, file, output, meshing, tracing } => {
             let (file, output) = (file.as_deref(), output.as_ref());
-            study::run(&study::Asked { kind, file, output, meshing: &meshing, tracing: &tracing }, context)
+            study::run(&study::StudyCommand { kind, file, output, meshing: &meshing, tracing: &tracing }, console)
         }
-        Command::Merge { parts, output } => portion::merge(&parts, &output, context),
+        Command::Merge { parts, output } => merge::run(&parts, &output, console),
         Command::Schema => meta::schema(),
         Command::Completions { shell } => meta::completions(shell),
-        Command::Man { output } => meta::man(output.as_deref(), context),
+        Command::Man { output } => meta::man(output.as_deref(), console),
     }
 }

@@ -1,13 +1,18 @@
 //! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
 use super::demo;
-use crate::cli::arguments::args::StudyKind;
-use crate::cli::arguments::options::{Meshing, Tracing};
-use crate::cli::context::{Context, print, show};
-use crate::cli::output::{cells, tables};
-use crate::cli::work::engine::{self, Choice};
-use crate::cli::work::load::{self, Input, Loaded};
-use crate::cli::{Failure, Outcome};
+use crate::cli::arguments::command::StudyKind;
+use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::console::{Console, print, show_progress};
+use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::{octree_shape, terminal_tables};
+use crate::cli::work::input_files::{self, Input, LoadedModel};
+use crate::cli::work::{
+    facets,
+    intersectors::{self, IntersectorChoice},
+    threads,
+};
+use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{
@@ -28,46 +33,48 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// What `study` was asked for.
-pub(crate) struct Asked<'a> {
+pub(crate) struct StudyCommand<'a> {
     pub(crate) kind: StudyKind,
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
-    pub(crate) meshing: &'a Meshing,
-    pub(crate) tracing: &'a Tracing,
+    pub(crate) meshing: &'a MeshingOptions,
+    pub(crate) tracing: &'a TracingOptions,
 }
 
 /// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
-const LIT_RAYS: u64 = 200_000;
+const SCENE_RAYS: u64 = 200_000;
 
 /// Rows with the sentence that the study made of them.
-struct Found {
+struct StudyResult {
     rows: Value,
     answer: String,
     /// More rows, by name.
-    beside: Vec<(&'static str, Value)>,
+    extra_rows: Vec<(&'static str, Value)>,
 }
 
-impl Found {
+impl StudyResult {
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
-        let rows = serde_json::to_value(rows).map_err(|e| Failure::running(e.to_string()))?;
-        Ok(Self { rows, answer: answer.into(), beside: Vec::new() })
+        let rows = json_value(rows)?;
+        Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new() })
     }
 
-    fn beside(mut self, name: &'static str, rows: &impl Serialize) -> Result<Self, Failure> {
-        self.beside.push((name, serde_json::to_value(rows).map_err(|e| Failure::running(e.to_string()))?));
+    fn with_rows(mut self, name: &'static str, rows: &impl Serialize) -> Result<Self, Failure> {
+        self.extra_rows.push((name, json_value(rows)?));
         Ok(self)
     }
 }
 
 /// Options that a study would not look at are refused: whoever gives one believes that it changes the rows.
-fn refuse_idle(asked: &Asked) -> Result<(), Failure> {
+fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
-    let (kind, m, t) = (asked.kind, asked.meshing, asked.tracing);
-    let lit = matches!(kind, Effects);
+    let kind = command.kind;
+    let m = command.meshing;
+    let t = command.tracing;
+    let traces_scene = kind == Effects;
     let faceted = matches!(kind, Effects | Bvh | Accuracy);
     let given = [
-        ("--intersector", t.intersector.is_some(), lit, "it compares those that it is about"),
-        ("--normals", t.normals.is_some(), lit, "it compares those that it is about"),
+        ("--intersector", t.intersector.is_some(), traces_scene, "it compares those that it is about"),
+        ("--normals", t.normals.is_some(), traces_scene, "it compares those that it is about"),
         ("--rays", t.rays.is_some(), kind != Stability, "its questions are fixed"),
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
         ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
@@ -77,32 +84,33 @@ fn refuse_idle(asked: &Asked) -> Result<(), Failure> {
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
     let Some((option, _, _, why)) = idle else { return Ok(()) };
     let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
-    Err(failure.help("leave it out"))
+    Err(failure.with_help("leave it out"))
 }
 
-pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> {
-    refuse_idle(asked)?;
-    let threads = engine::threads(asked.tracing.threads)?;
-    let seed = asked.tracing.seed.unwrap_or(1);
-    let bar = context.stages(asked.kind.name());
-    let progress = |p: Progress| show(&bar, &p);
+pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completion, Failure> {
+    refuse_unused_options(command)?;
+    let threads = threads::set_threads(command.tracing.threads)?;
+    let seed = command.tracing.seed.unwrap_or(1);
+    let bar = console.stage_bar(command.kind.name());
+    let progress = |p: Progress| show_progress(&bar, &p);
     let mut shapes = Vec::new();
-    let found = match asked.kind {
-        StudyKind::Accuracy => accuracy_of(asked, seed, context, &progress)?,
-        StudyKind::Interpolation => interpolation_of(asked, seed, context, &progress)?,
-        StudyKind::Complexity => complexity_of(asked, seed, threads, &progress)?,
-        StudyKind::Stability => stability_of(&progress)?,
+    let found = match command.kind {
+        StudyKind::Accuracy => study_accuracy(command, seed, console, &progress)?,
+        StudyKind::Interpolation => study_interpolation(command, seed, console, &progress)?,
+        StudyKind::Complexity => study_complexity(command, seed, threads, &progress)?,
+        StudyKind::Stability => study_stability(&progress)?,
         StudyKind::Bvh => {
-            let race = super::race::run(asked.file, asked.meshing, asked.tracing, context, &progress)?;
-            shapes = race.shapes;
-            Found::new(&race.rows, race.answer)?
+            let benchmark =
+                super::bvh_benchmark::run(command.file, command.meshing, command.tracing, console, &progress)?;
+            shapes = benchmark.shapes;
+            StudyResult::new(&benchmark.rows, benchmark.answer)?
         }
-        StudyKind::Effects => effects_of(asked, threads, context)?,
+        StudyKind::Effects => study_effects(command, threads, console)?,
     };
     bar.finish_and_clear();
-    let provenance = context.provenance(Some(seed), threads);
+    let provenance = console.provenance(Some(seed), threads);
     let mut document = json!({
-        "study": asked.kind.name(),
+        "study": command.kind.name(),
         "command": provenance.command,
         "version": provenance.version,
         "commit": provenance.commit,
@@ -111,42 +119,43 @@ pub(crate) fn run(asked: &Asked, context: &Context) -> Result<Outcome, Failure> 
         "answer": found.answer,
         "rows": found.rows,
     });
-    for (name, rows) in found.beside {
+    for (name, rows) in found.extra_rows {
         document[name] = rows;
     }
-    let folder = asked.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", asked.kind.name()).into());
+    let folder =
+        command.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", command.kind.name()).into());
     std::fs::create_dir_all(&folder)
         .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
-    let text = format!("{document:#}\n");
+    let text = json_text(&document)?;
     write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
     let mut report = study_report(&document, provenance);
-    if asked.kind == StudyKind::Accuracy {
-        report.sections.insert(1, error_view(asked, context)?);
+    if command.kind == StudyKind::Accuracy {
+        report.sections.insert(1, error_view(command, console)?);
     }
-    if asked.kind == StudyKind::Bvh {
-        report.sections.insert(1, cells::section(&shapes));
-        cells::write(&folder, &shapes)?;
+    if command.kind == StudyKind::Bvh {
+        report.sections.insert(1, octree_shape::octree_section(&shapes));
+        octree_shape::write_octree_files(&folder, &shapes)?;
     }
     report.write(&folder)?;
-    if context.json {
+    if console.json {
         print(&text)?;
     } else {
-        context.say(format_args!("{}", tables::of_study(&report, context.width())));
-        context.say(format_args!("  {}\n", report.answer.replace("**", "")));
-        context.say(format_args!("  {}", context.strong(&folder.join("report.html").display().to_string())));
-        context.say(format_args!("  {}", folder.join("study.json").display()));
+        console.say(format_args!("{}", terminal_tables::study_tables(&report, console.width())));
+        console.say(format_args!("  {}\n", report.answer.replace("**", "")));
+        console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));
+        console.say(format_args!("  {}", folder.join("study.json").display()));
     }
-    Ok(Outcome::Done)
+    Ok(Completion::Complete)
 }
 
 /// The model of the file, or the built-in lamp.
-fn model_of(file: Option<&Path>, context: &Context) -> Result<(Option<Scene>, Loaded, String), Failure> {
+fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, LoadedModel, String), Failure> {
     let Some(path) = file else {
         let (scene, loaded) = demo::lamp()?;
         return Ok((Some(scene), loaded, "three-cavity lamp".into()));
     };
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    Ok(match load::either(path, context)? {
+    Ok(match input_files::either(path, console)? {
         Input::Step(loaded) => (None, loaded, name),
         Input::Scene(scene, loaded) => (Some(*scene), loaded, name),
     })
@@ -154,33 +163,38 @@ fn model_of(file: Option<&Path>, context: &Context) -> Result<(Option<Scene>, Lo
 
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
-fn accuracy_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
-    let (scene, loaded, name) = model_of(asked.file, context)?;
+fn study_accuracy(
+    command: &StudyCommand,
+    seed: u64,
+    console: &Console,
+    progress: Report,
+) -> Result<StudyResult, Failure> {
+    let (scene, loaded, name) = read_model(command.file, console)?;
     let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
-    if let Some(range) = asked.meshing.tolerance {
+    if let Some(range) = command.meshing.tolerance {
         settings.tolerances = vec![range];
     }
-    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
     let Some(scene) = scene else {
         let study = accuracy::accuracy(&name, &product, &settings, progress);
-        return Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes);
+        return StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes);
     };
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
-    let run = RunSettings { rays: own.rays.min(LIT_RAYS), seed, threads: 0, path_samples: 0, ..own };
+    let run = RunSettings { rays: own.rays.min(SCENE_RAYS), seed, threads: 0, path_samples: 0, ..own };
     let plain = ModelMeshSource::new(&loaded.model);
     let (study, light) = study::scene_accuracy(&name, [&product, &plain], (&bound, &run), &settings, progress);
-    Found::new(&study.rows, study.answer)?.beside("slopes", &study.slopes)?.beside("receivers", &light)
+    StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
 }
 
 /// Where on the surface the normals err, on facets of the tolerance asked for.
-fn error_view(asked: &Asked, context: &Context) -> Result<Section, Failure> {
-    let (scene, loaded, _) = model_of(asked.file, context)?;
-    let settings = engine::mesh_settings(asked.meshing, scene.as_ref(), &loaded.model)?;
-    let (made, _) = engine::facets(&loaded.model, &settings, context);
-    let (errors, _) = super::facet::per_facet(&loaded.model, &made.mesh);
-    let facets = crate::cli::output::look::facets(&loaded.model, &made.mesh, scene.as_ref());
+fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Failure> {
+    let (scene, loaded, _) = read_model(command.file, console)?;
+    let settings = facets::mesh_settings(command.meshing, scene.as_ref(), &loaded.model)?;
+    let (made, _) = facets::facets(&loaded.model, &settings, console);
+    let (errors, _) = super::facet::normal_errors(&loaded.model, &made.mesh);
+    let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, scene.as_ref());
     let [low, high] = settings.tolerance;
     let text = format!(
         "Largest angle between the bilinear normal and the spline's on each of {} facets within {low}..{high} mm.",
@@ -191,24 +205,34 @@ fn error_view(asked: &Asked, context: &Context) -> Result<Section, Failure> {
     Ok(Section::new("Where the error sits").with(view.caption(&text)))
 }
 
-fn interpolation_of(asked: &Asked, seed: u64, context: &Context, progress: Report) -> Result<Found, Failure> {
-    let (_, loaded, name) = model_of(asked.file, context)?;
+fn study_interpolation(
+    command: &StudyCommand,
+    seed: u64,
+    console: &Console,
+    progress: Report,
+) -> Result<StudyResult, Failure> {
+    let (_, loaded, name) = read_model(command.file, console)?;
     let mut models: Vec<(String, Model)> = vec![(name, loaded.model)];
-    if asked.file.is_none() {
+    if command.file.is_none() {
         models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
     }
     let products: Vec<ModelMeshSource> = models.iter().map(|(_, m)| ModelMeshSource::new(m)).collect();
     let named: Vec<(&str, &dyn MeshSource)> =
         models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn MeshSource)).collect();
     let mut settings = interpolation::Settings { seed, ..Default::default() };
-    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
     let study = interpolation::interpolation(&named, &settings, progress);
-    Found::new(&study.rows, study.answer)
+    StudyResult::new(&study.rows, study.answer)
 }
 
-fn complexity_of(asked: &Asked, seed: u64, threads: usize, progress: Report) -> Result<Found, Failure> {
+fn study_complexity(
+    command: &StudyCommand,
+    seed: u64,
+    threads: usize,
+    progress: Report,
+) -> Result<StudyResult, Failure> {
     let mesh_settings = crate::tessellate::Settings {
-        tolerance: asked.meshing.tolerance.unwrap_or([0.05, 0.2]),
+        tolerance: command.meshing.tolerance.unwrap_or([0.05, 0.2]),
         ..Default::default()
     };
     let methods = [
@@ -239,12 +263,12 @@ fn complexity_of(asked: &Asked, seed: u64, threads: usize, progress: Report) -> 
         },
     ];
     let mut settings = complexity::Settings { seed, threads, ..Default::default() };
-    settings.rays = asked.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
     let study = complexity::complexity(&methods, &settings, progress)?;
-    Found::new(&study.rows, study.answer)
+    StudyResult::new(&study.rows, study.answer)
 }
 
-fn stability_of(progress: Report) -> Result<Found, Failure> {
+fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
     use stability::{Geometry, Variant, cases};
     let all = cases();
     let mut rows = Vec::new();
@@ -265,24 +289,24 @@ fn stability_of(progress: Report) -> Result<Found, Failure> {
         let done = (k + 1) as f64 / all.len() as f64;
         progress(Progress { stage: case.name.into(), done, remaining_seconds: None });
     }
-    Found::new(&rows, stability::answer(&rows))
+    StudyResult::new(&rows, stability::answer(&rows))
 }
 
-fn effects_of(asked: &Asked, threads: usize, context: &Context) -> Result<Found, Failure> {
-    let (scene, loaded, name) = model_of(asked.file, context)?;
+fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> Result<StudyResult, Failure> {
+    let (scene, loaded, name) = read_model(command.file, console)?;
     let Some(scene) = scene else {
         let failure = Failure::arguments("study effects needs a scene: a STEP file alone has no light");
-        return Err(failure.help("give a scene file (.toml), or nothing for the built-in lamp"));
+        return Err(failure.with_help("give a scene file (.toml), or nothing for the built-in lamp"));
     };
     let bound = scene.bind(&loaded.model)?;
-    let settings = engine::mesh_settings(asked.meshing, Some(&scene), &loaded.model)?;
-    let (made, _) = engine::facets(&loaded.model, &settings, context);
-    let choice = Choice::new(asked.tracing, Some(&scene))?;
+    let settings = facets::mesh_settings(command.meshing, Some(&scene), &loaded.model)?;
+    let (made, _) = facets::facets(&loaded.model, &settings, console);
+    let choice = IntersectorChoice::new(command.tracing, Some(&scene))?;
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
-    run.rays = asked.tracing.rays.unwrap_or(run.rays.min(1_000_000));
-    run.seed = asked.tracing.seed.unwrap_or(run.seed);
-    let rows = engine::with_intersector(choice, &loaded.model, &made.mesh, context, |who, _| {
+    run.rays = command.tracing.rays.unwrap_or(run.rays.min(1_000_000));
+    run.seed = command.tracing.seed.unwrap_or(run.seed);
+    let rows = intersectors::with_intersector(choice, &loaded.model, &made.mesh, console, |who, _| {
         effects::effects(&name, &bound, who, &run, 5)
     });
-    Found::new(&rows, effects::answer(&rows))
+    StudyResult::new(&rows, effects::answer(&rows))
 }

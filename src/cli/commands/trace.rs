@@ -1,184 +1,242 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::portion::{self, Checkpoint};
-use crate::cli::arguments::args::TraceOptions;
-use crate::cli::arguments::options::{Meshing, Tracing};
-use crate::cli::context::{Context, print};
-use crate::cli::work::job::{self, Job, Prepared, Ways};
-use crate::cli::work::paths::Paths;
-use crate::cli::work::{aim, ledger, load, until};
-use crate::cli::{Failure, Outcome};
+use super::replay;
+use crate::cli::arguments::command::TraceOptions;
+use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::completion::Completion;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::closing::{self, LEDGER};
+use crate::cli::output::json::{json_text, json_value};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
+use crate::cli::work::cross_check::{self, SceneResults};
+use crate::cli::work::error_target::{ErrorTarget, TargetResult};
+use crate::cli::work::path_file::PathFile;
+use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
+use crate::cli::work::{accuracy_target, input_files, lost_rays, results_folder, shards};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::simulate::Portion;
 use serde_json::json;
 use std::path::Path;
 
-/// Rays of a run that are asked again of BVH and spline.
-pub(crate) const RECHECKED: usize = 10_000;
+/// What `trace` was asked for.
+pub(crate) struct TraceCommand<'a> {
+    pub(crate) scene: &'a Path,
+    pub(crate) folder: &'a Path,
+    pub(crate) meshing: &'a MeshingOptions,
+    pub(crate) tracing: &'a TracingOptions,
+    pub(crate) extra: &'a TraceOptions,
+}
 
-pub(crate) fn run(
-    path: &Path,
-    folder: &Path,
-    meshing: &Meshing,
-    tracing: &Tracing,
-    extra: &TraceOptions,
-    context: &Context,
-) -> Result<Outcome, Failure> {
-    let shard = extra.shard.as_deref().map(portion::shard).transpose()?;
-    let replay = ledger::asked(&extra.replay)?;
+/// Reads and prepares the scene, then does the one of its jobs that the options ask for.
+pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completion, Failure> {
+    let TraceCommand { folder, extra, .. } = *command;
+    // What is wrong with the options themselves is said before any file is read.
+    let shard = extra.shard.as_deref().map(shards::parse_shard).transpose()?;
+    let replay = replay::parse_request(&extra.replay)?;
     if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
-    let (scene, loaded) = load::scene_file(path, context)?;
-    if extra.precision.accuracy.is_some() && (shard.is_some() || extra.resume) {
+    let (scene, loaded) = input_files::scene_file(command.scene, console)?;
+    let accuracy = extra.precision.accuracy.as_deref();
+    if accuracy.is_some() && (shard.is_some() || extra.resume) {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
-        return Err(Failure::arguments(message).help("give --tolerance and --normals with --shard and --resume"));
+        return Err(
+            Failure::arguments(message).with_help("give --tolerance and --normals with --shard and --resume")
+        );
     }
-    let options = (meshing, tracing);
-    let (meshing, tracing, aimed) =
-        aim::meshing(extra.precision.accuracy.as_deref(), options, Some(&scene), &loaded.model, context)?;
-    let aimed = aimed.as_ref();
-    let job =
-        Job { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, recheck: RECHECKED, aimed };
-    let mut prepared = job::prepare(job, context)?;
-    let until = extra.until_error.as_deref().map(|text| until::Until::new(text, &scene)).transpose()?;
-    ledger::warn(&prepared, context);
+    let options = (command.meshing, command.tracing);
+    let (meshing, tracing, reached) =
+        accuracy_target::meshing_for(accuracy, options, Some(&scene), &loaded.model, console)?;
+    let job = SceneJob {
+        scene: &scene,
+        loaded: &loaded,
+        meshing: &meshing,
+        tracing: &tracing,
+        accuracy: reached.as_ref(),
+    };
+    let mut prepared = scene_run::prepare(job, console)?;
+    let target = extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &scene)).transpose()?;
+    lost_rays::warn(&prepared, console);
     if extra.dry_run {
-        return dry_run(&prepared, folder, context);
+        return dry_run(&prepared, folder, console);
     }
-    let refused = load::account(&loaded.reports, extra.limits.max_refused, context);
+    let refused = input_files::report_refusals(&loaded.reports, extra.limits.max_refused, console);
     if !replay.is_empty() {
-        ledger::run(&prepared, &replay, folder, context)?;
+        replay::run(&prepared, &replay, folder, console)?;
         return Ok(refused);
     }
-    if let Some(shard @ [_, n]) = shard {
-        let replicates = prepared.replicates();
-        if n > replicates {
-            let message =
-                format!("--shard: the run has {replicates} replicates and so at most as many shards, not {n}");
-            return Err(Failure::arguments(message).help("raise `replicates` in [run] of the scene"));
-        }
-        let file = portion::shard_file(folder, shard);
-        let checkpoint = Checkpoint::new(&prepared, path, file, Some(shard), extra.checkpoint, context);
-        let from = if extra.resume { checkpoint.read()? } else { None };
-        portion::trace_shard(&prepared, &checkpoint, from, shard, context)?;
-        return Ok(refused);
-    }
-    let (mut traced, mut reached) = (None, None);
-    if let Some(until) = &until {
-        let (portion, answer) = until.trace(&mut prepared, context);
-        (traced, reached) = (Some(portion), Some(answer));
-    }
-    let checkpoint =
-        Checkpoint::new(&prepared, path, folder.join(portion::CHECKPOINT), None, extra.checkpoint, context);
-    let from = if extra.resume { checkpoint.read()? } else { None };
+    let done = match shard {
+        Some(shard) => trace_shard(&prepared, command, shard, console)?,
+        None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
+    };
+    Ok(done.and(refused))
+}
+
+/// Traces the whole run, or what is left of it, and writes its results.
+fn trace_whole(
+    prepared: &mut PreparedScene,
+    command: &TraceCommand,
+    target: Option<&ErrorTarget>,
+    console: &Console,
+) -> Result<Completion, Failure> {
+    let TraceCommand { folder, extra, .. } = *command;
+    let target = target.map(|target| {
+        let (portion, result) = target.trace(prepared, console);
+        (target.sentence(&result), portion, result)
+    });
+    let (sentence, portion, result) = match target {
+        Some((sentence, portion, result)) => (Some(sentence), Some(portion), Some(result)),
+        None => (None, None, None),
+    };
+    let prepared = &*prepared;
+    let file = folder.join(CHECKPOINT);
+    let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console);
+    let saved = if extra.resume { checkpoint.read()? } else { None };
     if extra.resume {
-        context.say(match &from {
+        console.say(match &saved {
             Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
             None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
         });
     }
-    let paths = extra.paths.as_deref().map(Paths::create).transpose()?;
-    let finished = |p: &Portion| checkpoint.finished(p);
-    let ways = Ways {
-        verify: extra.verify_pruning,
-        from: traced.or(from),
-        finished: until.is_none().then_some(&finished),
-        every: checkpoint.often(),
+    let paths = extra.paths.as_deref().map(PathFile::create).transpose()?;
+    let save = |p: &Portion| checkpoint.save_when_due(p);
+    let request = TraceRequest {
+        verify_pruning: extra.verify_pruning,
+        finished: portion.is_none().then_some(&save),
+        from: portion.or(saved),
+        every: checkpoint.interval(),
         paths: paths.as_ref(),
-        ..Ways::default()
+        ..TraceRequest::default()
     };
-    let mut outcome = prepared.trace(ways, context);
+    let mut run = cross_check::trace_and_check(prepared, request, console);
     if let (Some(paths), Some(file)) = (paths, &extra.paths) {
         let vertices = paths.finish()?;
-        context.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
+        console.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
     }
-    if let Some(v) = &outcome.verification {
-        if !v.identical {
-            let message = format!(
-                "the {} kernel gives other tallies than the {} one: a defect of lampyris",
-                v.full, v.pruned
-            );
-            return Err(Failure::running(message)
-                .help(format!("nothing was written; what differs: {}", v.differing.join(", "))));
-        }
-        context.say(format_args!(
-            "the {} kernel ({}) gives the same tallies as the {} one ({}), bit by bit",
-            v.full,
-            seconds(v.seconds_full),
-            v.pruned,
-            seconds(v.seconds_pruned)
-        ));
+    say_verification(&run, console)?;
+    let sentences = sentence.into_iter().collect();
+    let (mut document, report) = results_folder::write(prepared, folder, &mut run, sentences, console)?;
+    if let Some(result) = &result {
+        document["until_error"] = json_value(result)?;
     }
-    let said = until.iter().zip(&reached).map(|(u, answer)| u.sentence(answer)).collect();
-    let (mut document, report) = prepared.write(folder, &mut outcome, said, context)?;
-    if let Some(answer) = &reached {
-        document["until_error"] = serde_json::to_value(answer).map_err(|e| Failure::running(e.to_string()))?;
-    }
-    tell(&document, &report.answer, folder, &outcome.results, context)?;
+    closing::print_results(&document, &report.answer, folder, &run.results, console)?;
     checkpoint.remove();
-    if reached.is_some_and(|answer| !answer.reached) {
-        return Ok(Outcome::Incomplete);
-    }
-    let p = &outcome.results.power;
-    let share = p.lost / p.emitted;
-    if share > extra.max_lost {
-        context.say(format_args!(
-            "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
-            figures(100.0 * share, 2),
-            ledger::reasons(&outcome.results, &prepared),
-            folder.join(ledger::LEDGER).display()
-        ));
-        return Ok(Outcome::Incomplete);
-    }
-    Ok(refused)
+    Ok(completion(&run, prepared, command, result.as_ref(), console))
 }
 
-/// The results on stdout as JSON, or the closing lines.
-pub(crate) fn tell(
-    document: &serde_json::Value,
-    answer: &str,
-    folder: &Path,
-    results: &crate::simulate::Results,
-    context: &Context,
-) -> Result<(), Failure> {
-    if context.json {
-        let text = serde_json::to_string_pretty(document).map_err(|e| Failure::running(e.to_string()))?;
-        return Ok(print(&(text + "\n"))?);
+/// Whether the error that was asked for was reached, and no more energy lost than allowed.
+fn completion(
+    run: &SceneResults,
+    prepared: &PreparedScene,
+    command: &TraceCommand,
+    target: Option<&TargetResult>,
+    console: &Console,
+) -> Completion {
+    if target.is_some_and(|result| !result.reached) {
+        return Completion::Incomplete;
     }
-    closing(answer, folder, results, context);
+    let power = &run.results.power;
+    let share = power.lost / power.emitted;
+    if share <= command.extra.max_lost {
+        return Completion::Complete;
+    }
+    console.say(format_args!(
+        "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
+        figures(100.0 * share, 2),
+        lost_rays::reasons(&run.results, prepared),
+        command.folder.join(LEDGER).display()
+    ));
+    Completion::Incomplete
+}
+
+/// Says that both kernels agree.
+///
+/// # Errors
+/// When they do not.
+fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure> {
+    let Some(v) = &run.verification else { return Ok(()) };
+    if !v.identical {
+        let message =
+            format!("the {} kernel gives other tallies than the {} one: a defect of lampyris", v.full, v.pruned);
+        let help = format!("nothing was written; what differs: {}", v.differing.join(", "));
+        return Err(Failure::running(message).with_help(help));
+    }
+    console.say(format_args!(
+        "the {} kernel ({}) gives the same tallies as the {} one ({}), bit by bit",
+        v.full,
+        seconds(v.seconds_full),
+        v.pruned,
+        seconds(v.seconds_pruned)
+    ));
     Ok(())
 }
 
-/// The last lines of a traced scene: what was found, which file to open.
-pub(crate) fn closing(answer: &str, folder: &Path, results: &crate::simulate::Results, context: &Context) {
-    context.say("");
-    for line in wrapped(&answer.replace("**", ""), context.width().min(96)) {
-        context.say(format_args!("  {line}"));
+/// Traces a shard, or goes on with it, into its file.
+fn trace_shard(
+    prepared: &PreparedScene,
+    command: &TraceCommand,
+    shard: [u32; 2],
+    console: &Console,
+) -> Result<Completion, Failure> {
+    let [_, shard_count] = shard;
+    let replicates = prepared.replicates();
+    if shard_count > replicates {
+        let message = format!(
+            "--shard: the run has {replicates} replicates and so at most as many shards, not {shard_count}"
+        );
+        return Err(Failure::arguments(message).with_help("raise `replicates` in [run] of the scene"));
     }
-    context.say("");
-    let files = job::highlights(folder, results);
-    let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).max().unwrap_or(0);
-    for (k, (path, what)) in files.iter().enumerate() {
-        let name = format!("{:<widest$}", path.display().to_string());
-        let name = if k == 0 { context.strong(&name) } else { name };
-        context.say(format_args!("  {name}  {}", context.faint(what)));
-    }
+    let file = shards::shard_file(command.folder, shard);
+    let checkpoint = Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console);
+    let from = if command.extra.resume { checkpoint.read()? } else { None };
+    let save = |p: &Portion| checkpoint.save_when_due(p);
+    let request = TraceRequest {
+        from,
+        shard: Some(shard),
+        finished: Some(&save),
+        every: checkpoint.interval(),
+        ..TraceRequest::default()
+    };
+    let portion = prepared.trace_part(request, console);
+    checkpoint.save(&portion)?;
+    say_shard(&checkpoint.file, &portion, shard, console)?;
+    Ok(Completion::Complete)
 }
 
-fn dry_run(prepared: &Prepared, folder: &Path, context: &Context) -> Result<Outcome, Failure> {
+/// Says what a finished shard holds.
+fn say_shard(file: &Path, portion: &Portion, [index, count]: [u32; 2], console: &Console) -> Result<(), Failure> {
+    let counts = &portion.tallies.counts;
+    if console.json {
+        let document = json!({"shard": [index + 1, count], "replicates": portion.done.len(),
+            "of": portion.replicates, "rays": counts.rays, "segments": counts.segments, "lost_rays": counts.lost,
+            "seconds": {"trace": portion.seconds}, "file": file.display().to_string()});
+        return Ok(print(&json_text(&document)?)?);
+    }
+    console.say(format_args!(
+        "shard {} of {count}: {} rays in {}; `lampyris merge` puts all {count} together",
+        index + 1,
+        grouped(counts.rays),
+        file.display()
+    ));
+    Ok(())
+}
+
+/// Says what would be done.
+fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
     let settings = prepared.run_settings();
     let mesh = &prepared.tessellation.mesh;
-    let faces: usize = prepared.job.loaded.reports.iter().map(|r| r.faces.converted).sum();
+    let loaded = prepared.job.loaded;
+    let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let effects = crate::simulate::Required::by(&prepared.bound);
-    if context.json {
+    if console.json {
         let document = json!({"dry_run": true, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
             "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
-            "seconds": {"read": prepared.job.loaded.seconds, "tessellate": prepared.seconds}});
-        print(&format!("{document:#}\n"))?;
-        return Ok(Outcome::Done);
+            "seconds": {"read": loaded.seconds, "tessellate": prepared.tessellation_seconds}});
+        print(&json_text(&document)?)?;
+        return Ok(Completion::Complete);
     }
     print(&format!(
         "would trace {} rays (seed {}) on {} threads through {} facets ({}) of {faces} faces, {} with {} normals,\n\
@@ -191,28 +249,11 @@ fn dry_run(prepared: &Prepared, folder: &Path, context: &Context) -> Result<Outc
         prepared.choice.intersector,
         prepared.choice.normals,
         folder.display(),
-        seconds(prepared.job.loaded.seconds),
-        seconds(prepared.seconds)
+        seconds(loaded.seconds),
+        seconds(prepared.tessellation_seconds)
     ))?;
     for because in &effects.simulated {
         print(&format!("simulated: {:?}, because {}\n", because.effect, because.because))?;
     }
-    Ok(Outcome::Done)
-}
-
-/// Words in lines of at most `width` characters.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().map(|l| (l.chars().count(), l));
-        match line {
-            Some((0, line)) => line.push_str(word),
-            Some((n, line)) if n + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
+    Ok(Completion::Complete)
 }

@@ -1,6 +1,8 @@
 //! How answers are shown on the terminal and written to files.
 
-pub(super) mod cells;
-pub(super) mod files;
-pub(super) mod look;
-pub(super) mod tables;
+pub(super) mod appearance;
+pub(super) mod closing;
+pub(super) mod json;
+pub(super) mod octree_shape;
+pub(super) mod receiver_files;
+pub(super) mod terminal_tables;

@@ -1,6 +1,6 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
-use super::{distinct, number, text};
+use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, figures, seconds};
 use serde_json::Value;
 

@@ -1,6 +1,6 @@
 //! What each effect costs on a scene: the smallest kernel, each effect added alone, everything.
 
-use super::{number, text};
+use super::rows::{number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, figures, seconds};
 use serde_json::Value;
 

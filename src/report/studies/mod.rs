@@ -4,6 +4,7 @@ mod accuracy;
 mod effects;
 mod others;
 mod receivers;
+mod rows;
 mod stability;
 
 use super::{Cell, Provenance, Report, Section, Table};
@@ -32,27 +33,6 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     }
     sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
-}
-
-/// A number of a row; `None` when absent or null.
-fn number(row: &Value, key: &str) -> Option<f64> {
-    row[key].as_f64().filter(|x| x.is_finite())
-}
-
-/// A text of a row, empty when absent.
-fn text<'a>(row: &'a Value, key: &str) -> &'a str {
-    row[key].as_str().unwrap_or_default()
-}
-
-/// The different texts of a key, in order of appearance.
-fn distinct<'a>(rows: &[&'a Value], key: &str) -> Vec<&'a str> {
-    let mut seen = Vec::new();
-    for value in rows.iter().map(|r| text(r, key)) {
-        if !value.is_empty() && !seen.contains(&value) {
-            seen.push(value);
-        }
-    }
-    seen
 }
 
 /// Title and unit of a key, by the suffixes that keys carry.

@@ -1,6 +1,6 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
-use super::{distinct, number, text};
+use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table, figures, grouped};
 use crate::study::interpolation::{Ratios, Row};
 use serde::Deserialize;

@@ -1,6 +1,6 @@
 //! What facets do to the light of a scene: a picture for each receiver, and the rows.
 
-use super::{distinct, number, text};
+use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Section, Series, Table, file_stem};
 use serde_json::Value;
 

@@ -1,6 +1,6 @@
 //! Right, flagged and wrong: per intersector, and per hard case.
 
-use super::{distinct, text};
+use super::rows::{distinct, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, grouped};
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! How a model looks: parts as groups, in the colours of the file or of a palette, media clear.
+//! How a model is shown: parts as groups, in the colours of the file or of a palette, media clear.
 
 use crate::formats::{Facets, Group};
 use crate::mesh::FacetMesh;
@@ -18,7 +18,7 @@ const PALETTE: [[f64; 3]; 8] = [
 ];
 
 /// The mesh with a group for every instance.
-pub(crate) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scene>) -> Facets<'a> {
+pub(crate) fn grouped_facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scene>) -> Facets<'a> {
     let colours: Vec<_> = {
         let mut first = vec![None; model.instances.len()];
         for face in model.placed_faces() {
@@ -32,7 +32,7 @@ pub(crate) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scen
             let part = &model.part(instance.part).name;
             let colour = colours[k].map_or(PALETTE[k % PALETTE.len()], |c| c.0);
             let name = model.label(k);
-            match scene.and_then(|s| medium(s, part, &instance.name)) {
+            match scene.and_then(|s| medium_index(s, part, &instance.name)) {
                 Some(index) => {
                     Group { opacity: 0.2, index_ratio: 1.0 / index, ..Group::solid(&name, [0.62, 0.80, 0.95]) }
                 }
@@ -49,7 +49,7 @@ pub(crate) fn facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scen
 }
 
 /// Index of the medium that a rule of the scene gives a part or instance by its very name; 1.5 for one without a constant index.
-fn medium(scene: &Scene, part: &str, instance: &str) -> Option<f64> {
+fn medium_index(scene: &Scene, part: &str, instance: &str) -> Option<f64> {
     let named = |list: &Option<crate::simulate::scene::OneOrMany<String>>, name: &str| {
         list.as_ref().is_some_and(|l| l.as_slice().iter().any(|n| n == name))
     };

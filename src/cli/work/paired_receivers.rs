@@ -1,36 +1,36 @@
 //! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
 
-use crate::cli::arguments::options::Tracing;
-use crate::cli::context::Context;
+use crate::cli::arguments::options::TracingOptions;
+use crate::cli::console::Console;
 use crate::intersect::Intersector;
 use crate::report::{Cell, Table, figures};
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{PowerComparison, compare_power};
 
 /// Rays at most: a second or two on the spline of a lamp.
-const MOST: u64 = 100_000;
+const MOST_RAYS: u64 = 100_000;
 
 /// Traces the scene on both.
-pub(crate) fn find(
+pub(crate) fn trace_both(
     scene: &Scene,
     bound: &BoundScene,
     [facets, exact]: [&dyn Intersector; 2],
-    tracing: &Tracing,
-    context: &Context,
+    tracing: &TracingOptions,
+    console: &Console,
 ) -> Vec<PowerComparison> {
     let settings = RunSettings {
-        rays: tracing.rays.unwrap_or(scene.run.rays).min(MOST),
+        rays: tracing.rays.unwrap_or(scene.run.rays).min(MOST_RAYS),
         seed: tracing.seed.unwrap_or(scene.run.seed),
         threads: tracing.threads.unwrap_or(0),
         ..RunSettings::from(&scene.run)
     };
-    let spinner = context.spinner("tracing the scene on facets and on the spline");
+    let spinner = console.spinner("tracing the scene on facets and on the spline");
     let found = compare_power(bound, facets, exact, &settings);
     spinner.finish_and_clear();
     found
 }
 
-/// The same for the report.
+/// What facets change of every receiver, for the report.
 pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     let columns = [
         ("receiver", ""),
@@ -42,7 +42,7 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     let mut table = Table::new("receivers", "What facets change of the light", &columns)
         .caption("The same rays are traced on facets and on the spline, so that most of the noise cancels in the difference.");
     for p in pairs {
-        let percent = |x: f64| Cell::Number(100.0 * x / p.power_exact.abs().max(1e-300), 2);
+        let percent = |x: f64| Cell::Number(100.0 * x / p.power_exact.abs().max(f64::MIN_POSITIVE), 2);
         let power = Cell::Number(p.power_exact, 5);
         table.row([
             p.name.as_str().into(),
@@ -55,8 +55,8 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     table
 }
 
-/// One line a receiver.
-pub(crate) fn described(pairs: &[PowerComparison]) -> String {
+/// What facets change of every receiver, a line each.
+pub(crate) fn summary(pairs: &[PowerComparison]) -> String {
     let mut text = String::new();
     for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
         let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);

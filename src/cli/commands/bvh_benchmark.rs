@@ -2,11 +2,11 @@
 //! thread and on all; answers that differ are judged with twice the digits.
 
 use super::demo;
-use crate::cli::Failure;
-use crate::cli::arguments::options::{Meshing, Tracing};
-use crate::cli::context::Context;
-use crate::cli::output::cells::Shape;
-use crate::cli::work::{engine, load};
+use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::cli::output::octree_shape::OctreeShape;
+use crate::cli::work::{input_files, threads};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
@@ -29,41 +29,49 @@ const RAYS: u64 = 50_000;
 const ROUNDS: usize = 11;
 
 /// Rows, the sentence that answers, and what the octrees look like.
-pub(crate) struct Race {
+pub(crate) struct BvhBenchmark {
     pub(crate) rows: Vec<Value>,
     pub(crate) answer: String,
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<OctreeShape>,
 }
 
 pub(crate) fn run(
     file: Option<&Path>,
-    meshing: &Meshing,
-    tracing: &Tracing,
-    context: &Context,
+    meshing: &MeshingOptions,
+    tracing: &TracingOptions,
+    console: &Console,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Race, Failure> {
+) -> Result<BvhBenchmark, Failure> {
     let loaded = match file {
         None => demo::lamp()?.1,
-        Some(path) => match load::either(path, context)? {
-            load::Input::Step(loaded) | load::Input::Scene(_, loaded) => loaded,
+        Some(path) => match input_files::either(path, console)? {
+            input_files::Input::Step(loaded) | input_files::Input::Scene(_, loaded) => loaded,
         },
     };
     let name = file.map_or("three-cavity lamp".into(), |p| p.display().to_string());
-    let threads = engine::threads(tracing.threads)?;
+    let threads = threads::set_threads(tracing.threads)?;
     let tolerances = meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
-    let mut race = Race { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
+    let mut benchmark = BvhBenchmark { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
     for (k, &tolerance) in tolerances.iter().enumerate() {
         let done = k as f64 / tolerances.len() as f64;
         progress(Progress { stage: format!("{tolerance} mm"), done, remaining_seconds: None });
         let mesh = tessellate(&loaded.model, &tessellate::Settings::uniform(tolerance)).mesh;
-        race.at(&name, &mesh, tolerance, tracing, threads);
+        benchmark.measure_mesh(&name, &mesh, tolerance, tracing, threads);
     }
-    race.answer = sentence(&race.rows);
-    Ok(race)
+    benchmark.answer = sentence(&benchmark.rows);
+    Ok(benchmark)
 }
 
-impl Race {
-    fn at(&mut self, name: &str, mesh: &FacetMesh, tolerance: f64, tracing: &Tracing, threads: usize) {
+impl BvhBenchmark {
+    /// All intersectors on one mesh.
+    fn measure_mesh(
+        &mut self,
+        name: &str,
+        mesh: &FacetMesh,
+        tolerance: f64,
+        tracing: &TracingOptions,
+        threads: usize,
+    ) {
         let count = tracing.rays.unwrap_or(RAYS);
         let seed = tracing.seed.unwrap_or(1);
         let octree = Octree::build(mesh, &octree::Settings::default());
@@ -85,40 +93,41 @@ impl Race {
         let kinds: [(&str, Vec<Ray>); 3] = [
             ("coherent", Camera::new(&bounds, count).rays(0..count)),
             ("incoherent", bounces.rays(0..count)),
-            ("adversarial", edges(mesh, &bounds, seed, count)),
+            ("adversarial", edge_rays(mesh, &bounds, seed, count)),
         ];
-        let mut shape = Shape::of(&octree);
+        let mut shape = OctreeShape::new(&octree);
         for (kind, rays) in &kinds {
             let truth = answers(&octree, rays).0;
-            let judged: Vec<(Judgement, Cost)> = (entrants.iter())
+            let judged: Vec<(Comparison, Cost)> = (entrants.iter())
                 .map(|(_, _, who)| {
                     let (hits, cost) = answers(*who, rays);
-                    (Judgement::of(mesh, rays, &truth, &hits), cost)
+                    (Comparison::new(mesh, rays, &truth, &hits), cost)
                 })
                 .collect();
             // The octree errs where any other is right against it.
             let octree_wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
             shape.costs.push(((*kind).into(), judged[0].1));
             for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
-                if call == "batch" && threads == 1 && self.has(mesh, kind, call, 1) {
+                if call == "batch" && threads == 1 && self.has_row(mesh, kind, call, 1) {
                     continue;
                 }
                 // As many rays for each thread as for one: waking the threads took a tenth of a shorter round.
                 let crowd = rays.repeat(threads);
-                let shared: Vec<Shared> = entrants.iter().map(|(_, _, who)| Shared(*who)).collect();
+                let shared: Vec<ParallelBatches> =
+                    entrants.iter().map(|(_, _, who)| ParallelBatches(*who)).collect();
                 let competitors: Vec<Competitor> = (entrants.iter().zip(&shared))
                     .map(|((name, _, who), shared)| {
                         let who: &dyn Intersector = if threads > 1 { shared } else { *who };
                         Competitor { name, who, batch }
                     })
                     .collect();
-                for (((who, build, structure), (_, t)), (judgement, cost)) in
+                for (((who, build, structure), (_, t)), (comparison, cost)) in
                     entrants.iter().zip(measure(&competitors, &crowd, ROUNDS)).zip(&judged)
                 {
                     let footprint = structure.footprint();
                     let rate = |seconds: f64| crowd.len() as f64 / seconds.max(1e-12) / 1e6;
                     let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
-                    let wrong = if *who == "octree" { octree_wrong } else { judgement.wrong };
+                    let wrong = if *who == "octree" { octree_wrong } else { comparison.wrong };
                     self.rows.push(json!({
                         "model": name, "facets": mesh.facets.len(), "intersector": who, "build": build,
                         "rays_kind": kind, "call": call, "threads": threads,
@@ -126,7 +135,7 @@ impl Race {
                         "build_seconds": footprint.build_seconds,
                         "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
                         "nodes_per_ray": per_ray(cost.nodes), "tests_per_ray": per_ray(cost.tests),
-                        "wrong": wrong, "differs": judgement.differs, "undecided": judgement.undecided,
+                        "wrong": wrong, "differs": comparison.differs, "undecided": comparison.undecided,
                     }));
                 }
             }
@@ -134,7 +143,7 @@ impl Race {
         self.shapes.push(shape);
     }
 
-    fn has(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
+    fn has_row(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
         self.rows.iter().any(|r| {
             r["facets"] == mesh.facets.len()
                 && r["rays_kind"] == kind
@@ -145,18 +154,18 @@ impl Race {
 }
 
 /// An intersector whose batches all threads share.
-struct Shared<'a>(&'a dyn Intersector);
+struct ParallelBatches<'a>(&'a dyn Intersector);
 
 /// Rays that a thread takes at a time; few, so that all threads end together.
-const PIECE: usize = 512;
+const RAYS_AT_A_TIME: usize = 512;
 
-impl Intersector for Shared<'_> {
+impl Intersector for ParallelBatches<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         self.0.intersect(ray, cost)
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], _: &mut Cost) {
-        (rays.par_chunks(PIECE).zip(hits.par_chunks_mut(PIECE)))
+        (rays.par_chunks(RAYS_AT_A_TIME).zip(hits.par_chunks_mut(RAYS_AT_A_TIME)))
             .for_each(|(rays, hits)| self.0.intersect_batch(rays, hits, &mut Cost::default()));
     }
 
@@ -166,7 +175,7 @@ impl Intersector for Shared<'_> {
 }
 
 /// Random rays aimed at corners and at points of edges, where careless tests leak.
-fn edges(mesh: &crate::mesh::FacetMesh, bounds: &crate::math::Aabb, seed: u64, count: u64) -> Vec<Ray> {
+fn edge_rays(mesh: &crate::mesh::FacetMesh, bounds: &crate::math::Aabb, seed: u64, count: u64) -> Vec<Ray> {
     let random = Uniform::new(bounds, seed ^ 0xad5e, count).rays(0..count);
     let facets = mesh.facets.len().max(1);
     (random.into_iter().enumerate())
@@ -189,7 +198,7 @@ fn answers(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
 }
 
 /// How the answers of one structure stand to those of the octree.
-struct Judgement {
+struct Comparison {
     /// Rays that hit only one of the two, or at distances that differ by more than single precision explains.
     differs: usize,
     wrong: usize,
@@ -197,8 +206,8 @@ struct Judgement {
     undecided: usize,
 }
 
-impl Judgement {
-    fn of(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
+impl Comparison {
+    fn new(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
         let same = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
             (None, None) => true,
             (Some(a), Some(b)) => same_distance(a.t, b.t),

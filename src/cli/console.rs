@@ -1,11 +1,19 @@
-use super::arguments::args::Arguments;
+//! How a command talks: messages and progress on stderr, data on stdout, colours where the terminal has them.
+
 use crate::report::Provenance;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 
+/// Columns for messages where neither `COLUMNS` nor a terminal says how many there are.
+const DEFAULT_WIDTH: usize = 120;
+/// Columns between which messages stay readable.
+const READABLE_WIDTHS: std::ops::RangeInclusive<usize> = 60..=140;
+/// Steps of a progress bar over shares of a work.
+const STAGE_STEPS: u64 = 1000;
+
 /// How a command talks: what was asked for, what the terminal can do.
-pub(crate) struct Context {
+pub(crate) struct Console {
     /// One JSON document on stdout.
     pub(crate) json: bool,
     /// Nothing on stderr but errors.
@@ -18,16 +26,17 @@ pub(crate) struct Context {
     terminal: bool,
 }
 
-impl Context {
-    pub(crate) fn new(arguments: &Arguments, line: &[OsString]) -> Self {
+impl Console {
+    /// From the options that every command has, and the command line as typed.
+    pub(crate) fn new(json: bool, quiet: bool, verbose: u8, typed: &[OsString]) -> Self {
         let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
         let dumb = std::env::var_os("TERM").is_some_and(|t| t == "dumb");
         let terminal = io::stderr().is_terminal();
         Self {
-            json: arguments.json,
-            quiet: arguments.quiet,
-            verbose: arguments.verbose,
-            command: command_line(line),
+            json,
+            quiet,
+            verbose,
+            command: command_line(typed),
             colour: terminal && !no_colour && !dumb,
             terminal: terminal && !dumb,
         }
@@ -42,30 +51,31 @@ impl Context {
     }
 
     /// Emphasis, where the terminal has it.
-    pub(crate) fn strong(&self, text: &str) -> String {
+    pub(crate) fn bold(&self, text: &str) -> String {
         if self.colour { format!("\x1b[1m{text}\x1b[0m") } else { text.to_owned() }
     }
 
     /// Less than normal, where the terminal has it.
-    pub(crate) fn faint(&self, text: &str) -> String {
+    pub(crate) fn dim(&self, text: &str) -> String {
         if self.colour { format!("\x1b[2m{text}\x1b[0m") } else { text.to_owned() }
     }
 
     /// Whether messages may be coloured.
-    pub(crate) fn colours(&self) -> bool {
+    pub(crate) fn has_colour(&self) -> bool {
         self.colour
     }
 
     /// Columns for messages: as `COLUMNS` says, as the terminal has, or 120 where there is none.
     pub(crate) fn width(&self) -> usize {
-        let asked = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok());
-        let own =
+        let requested = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok());
+        let of_terminal =
             || if self.terminal { comfy_table::Table::new().use_stderr().width().map(usize::from) } else { None };
-        asked.or_else(own).unwrap_or(120).clamp(60, 140)
+        let width = requested.or_else(of_terminal).unwrap_or(DEFAULT_WIDTH);
+        width.clamp(*READABLE_WIDTHS.start(), *READABLE_WIDTHS.end())
     }
 
     /// A progress bar with rate and remaining time; invisible where stderr is no terminal.
-    pub(crate) fn bar(&self, label: &str, unit: &str, total: u64) -> ProgressBar {
+    pub(crate) fn progress_bar(&self, label: &str, unit: &str, total: u64) -> ProgressBar {
         let bar = ProgressBar::new(total);
         if !self.terminal || self.quiet {
             bar.set_draw_target(ProgressDrawTarget::hidden());
@@ -83,9 +93,9 @@ impl Context {
         bar
     }
 
-    /// A progress bar over shares of a work whose stages and remaining time it is told; of length 1000.
-    pub(crate) fn stages(&self, label: &str) -> ProgressBar {
-        let bar = ProgressBar::new(1000);
+    /// A progress bar over shares of a work whose stages and remaining time it is told; of length [`STAGE_STEPS`].
+    pub(crate) fn stage_bar(&self, label: &str) -> ProgressBar {
+        let bar = ProgressBar::new(STAGE_STEPS);
         if !self.terminal || self.quiet {
             bar.set_draw_target(ProgressDrawTarget::hidden());
             return bar;
@@ -146,10 +156,10 @@ fn command_line(line: &[OsString]) -> String {
 }
 
 /// The bar follows the study's own clock, remaining time included.
-pub(crate) fn show(bar: &ProgressBar, p: &crate::study::Progress) {
-    let left = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
-    bar.set_message(format!("{}{left}", p.stage));
-    bar.set_position((1000.0 * p.done.clamp(0.0, 1.0)) as u64);
+pub(crate) fn show_progress(bar: &ProgressBar, p: &crate::study::Progress) {
+    let remaining = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
+    bar.set_message(format!("{}{remaining}", p.stage));
+    bar.set_position((STAGE_STEPS as f64 * p.done.clamp(0.0, 1.0)) as u64);
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Tables on the terminal: one look for all commands, numbers to the right.
+//! Tables on the terminal: one style for all commands, numbers to the right.
 
 use crate::report::{Block, Cell, Report, Table};
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
@@ -6,8 +6,8 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
 /// A line under the heading and nothing else, so that rows stay close together.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
-/// An empty table of the house's look that wraps its cells at the width.
-pub(crate) fn blank(width: usize) -> comfy_table::Table {
+/// An empty table in the common style that wraps its cells at the width.
+pub(crate) fn blank_table(width: usize) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     let width = u16::try_from(width).unwrap_or(u16::MAX);
     table.load_style(STYLE).set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
@@ -15,8 +15,8 @@ pub(crate) fn blank(width: usize) -> comfy_table::Table {
 }
 
 /// A report's table for the terminal, its title above it.
-pub(crate) fn shown(table: &Table, width: usize) -> String {
-    let mut grid = blank(width);
+pub(crate) fn table_text(table: &Table, width: usize) -> String {
+    let mut grid = blank_table(width);
     let heading = |c: &crate::report::Column| {
         if c.unit.is_empty() { c.title.clone() } else { format!("{} [{}]", c.title, c.unit) }
     };
@@ -32,11 +32,11 @@ pub(crate) fn shown(table: &Table, width: usize) -> String {
 }
 
 /// The tables of a study's page, its list of every measurement left to the page.
-pub(crate) fn of_study(report: &Report, width: usize) -> String {
+pub(crate) fn study_tables(report: &Report, width: usize) -> String {
     let blocks = report.sections.iter().flat_map(|s| &s.blocks);
     let tables = blocks.filter_map(|b| if let Block::Table(t) = b { Some(t) } else { None });
     let wanted = tables.filter(|t| !t.name.ends_with("-rows") && !t.rows.is_empty());
-    wanted.map(|t| shown(t, width) + "\n").collect()
+    wanted.map(|t| table_text(t, width) + "\n").collect()
 }
 
 #[cfg(test)]
@@ -48,7 +48,7 @@ mod tests {
         let mut table = Table::new("t", "Sags", &[("face", ""), ("sag", "mm")]);
         table.row(["a".into(), Cell::from(0.5)]);
         table.row(["long".into(), Cell::from(12.25)]);
-        let lines: Vec<String> = shown(&table, 80).lines().map(|l| l.trim_end().to_owned()).collect();
+        let lines: Vec<String> = table_text(&table, 80).lines().map(|l| l.trim_end().to_owned()).collect();
         assert_eq!(
             lines,
             ["  Sags", " face   sag [mm]", "─────────────────", " a           0.5", " long      12.25"]
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn the_list_of_every_measurement_is_left_out() {
         let document = serde_json::json!({"study": "complexity", "rows": [{"model": "simple", "method": "octree", "rays": 7}]});
-        let text = of_study(&crate::report::study_report(&document, Default::default()), 100);
+        let text = study_tables(&crate::report::study_report(&document, Default::default()), 100);
         assert!(text.contains("Before and after") && !text.contains("Every measurement"), "{text}");
     }
 }

@@ -1,5 +1,5 @@
-use super::options::{Meshing, Precision, Tracing};
-use super::words;
+use super::help_text;
+use super::options::{AccuracyOption, MeshingOptions, TracingOptions};
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -32,19 +32,19 @@ pub(crate) enum Command {
         #[arg(short, long, default_value = "lampyris-demo", value_name = "DIR")]
         output: PathBuf,
         #[command(flatten)]
-        meshing: Meshing,
+        meshing: MeshingOptions,
         #[command(flatten)]
-        tracing: Tracing,
+        tracing: TracingOptions,
     },
     /// Say what a STEP file holds and what could not be read
     Info {
         /// STEP file
         file: PathBuf,
         #[command(flatten)]
-        limits: Refusals,
+        limits: RefusalLimit,
     },
     /// Tessellate a STEP file into quad facets
-    #[command(after_help = words::FACET, after_long_help = words::FACET_LONG)]
+    #[command(after_help = help_text::FACET, after_long_help = help_text::FACET_LONG)]
     Facet {
         /// STEP file
         file: PathBuf,
@@ -52,9 +52,9 @@ pub(crate) enum Command {
         #[arg(short, long, value_name = "OUT")]
         output: Vec<PathBuf>,
         #[command(flatten)]
-        meshing: Meshing,
+        meshing: MeshingOptions,
         #[command(flatten)]
-        precision: Precision,
+        precision: AccuracyOption,
         /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
         #[arg(long)]
         baseline: bool,
@@ -62,10 +62,10 @@ pub(crate) enum Command {
         #[arg(long, value_name = "N")]
         threads: Option<usize>,
         #[command(flatten)]
-        limits: Refusals,
+        limits: RefusalLimit,
     },
     /// Simulate a scene and write a report, results.json and the receiver files
-    #[command(after_help = words::TRACE)]
+    #[command(after_help = help_text::TRACE)]
     Trace {
         /// Scene file
         scene: PathBuf,
@@ -73,23 +73,23 @@ pub(crate) enum Command {
         #[arg(short, long, default_value = "lampyris-results", value_name = "DIR")]
         output: PathBuf,
         #[command(flatten)]
-        meshing: Meshing,
+        meshing: MeshingOptions,
         #[command(flatten)]
-        tracing: Tracing,
+        tracing: TracingOptions,
         #[command(flatten)]
         extra: Box<TraceOptions>,
     },
     /// Compare octree, BVH and exact spline ray by ray
-    #[command(after_help = words::CHECK, after_long_help = words::CHECK_LONG)]
+    #[command(after_help = help_text::CHECK, after_long_help = help_text::CHECK_LONG)]
     Check {
         /// STEP file or scene
         file: PathBuf,
         #[command(flatten)]
-        meshing: Meshing,
+        meshing: MeshingOptions,
         #[command(flatten)]
-        tracing: Tracing,
+        tracing: TracingOptions,
         #[command(flatten)]
-        precision: Precision,
+        precision: AccuracyOption,
         /// Folder for a report with the disagreeing rays in 3-D, and for check.json
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
@@ -103,10 +103,10 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         disagreements: Option<PathBuf>,
         #[command(flatten)]
-        limits: Refusals,
+        limits: RefusalLimit,
     },
     /// Measure what accuracy costs in time
-    #[command(after_help = words::STUDY)]
+    #[command(after_help = help_text::STUDY)]
     Study {
         /// Which question
         kind: StudyKind,
@@ -116,9 +116,9 @@ pub(crate) enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
         #[command(flatten)]
-        meshing: Meshing,
+        meshing: MeshingOptions,
         #[command(flatten)]
-        tracing: Tracing,
+        tracing: TracingOptions,
     },
     /// Merge the results of shards into one
     Merge {
@@ -148,7 +148,7 @@ pub(crate) enum Command {
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct TraceOptions {
     #[command(flatten)]
-    pub(crate) precision: Precision,
+    pub(crate) precision: AccuracyOption,
     /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<String>,
@@ -180,12 +180,12 @@ pub(crate) struct TraceOptions {
     #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
     pub(crate) max_lost: f64,
     #[command(flatten)]
-    pub(crate) limits: Refusals,
+    pub(crate) limits: RefusalLimit,
 }
 
 /// What of a model may be missing.
 #[derive(Clone, Copy, Debug, clap::Args)]
-pub(crate) struct Refusals {
+pub(crate) struct RefusalLimit {
     /// Largest share of faces that may be refused before the exit code becomes 4
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     pub(crate) max_refused: f64,

@@ -5,24 +5,27 @@ use crate::math::{Point, Ray};
 use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
 
+/// Rays noted over rays wanted: a fifth more, as some cannot be asked again.
+const SPARE: f64 = 1.2;
+
 /// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
-pub(crate) struct Witness<'a> {
+pub(crate) struct RaySampler<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
-    noted: Mutex<Vec<(u64, Ray)>>,
+    sample: Mutex<Vec<(u64, Ray)>>,
 }
 
-impl<'a> Witness<'a> {
+impl<'a> RaySampler<'a> {
     /// Notes about `wanted` and a fifth more of `expected` rays.
     pub(crate) fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
-        let share = (1.2 * wanted as f64 / expected.max(1) as f64).min(1.0);
-        Self { inner, threshold: (share * u64::MAX as f64) as u64, noted: Mutex::new(Vec::new()) }
+        let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
+        Self { inner, threshold: (share * u64::MAX as f64) as u64, sample: Mutex::new(Vec::new()) }
     }
 
     fn note(&self, ray: &Ray) {
         let hash = hash(ray);
         if hash <= self.threshold {
-            self.noted.lock().unwrap_or_else(|e| e.into_inner()).push((hash, *ray));
+            self.sample.lock().unwrap_or_else(|e| e.into_inner()).push((hash, *ray));
         }
     }
 
@@ -31,13 +34,14 @@ impl<'a> Witness<'a> {
     /// left a ready mesh, which has no surface, is left out.
     pub(crate) fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
-        let mut noted = self.noted.into_inner().unwrap_or_else(|e| e.into_inner());
+        let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
         noted.sort_by_key(|(hash, _)| *hash);
-        noted.into_iter().filter_map(|(_, ray)| lifted(ray, &faces, lift)).take(wanted).collect()
+        noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, lift)).take(wanted).collect()
     }
 }
 
-fn lifted(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
+/// The ray a little above the surface that it left; `None` where there is no surface.
+fn lift_off(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
     let Some(departure) = ray.from else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;
     let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
@@ -54,7 +58,7 @@ fn hash(ray: &Ray) -> u64 {
     z ^ (z >> 31)
 }
 
-impl Intersector for Witness<'_> {
+impl Intersector for RaySampler<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         self.note(ray);
         self.inner.intersect(ray, cost)
@@ -103,9 +107,9 @@ mod tests {
         let rays: Vec<Ray> =
             (0..20_000).map(|k| Ray::new(Point::splat(f64::from(k)), Vector::new(0.6, 0.0, 0.8))).collect();
         let sample = |rays: &[Ray]| {
-            let witness = Witness::new(&Nothing, 500, rays.len() as u64);
-            witness.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
-            witness.rays(500, &Model::default(), 0.1)
+            let sampler = RaySampler::new(&Nothing, 500, rays.len() as u64);
+            sampler.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
+            sampler.rays(500, &Model::default(), 0.1)
         };
         let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
         assert_eq!(forward.len(), 500);

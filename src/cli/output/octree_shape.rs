@@ -1,6 +1,6 @@
 //! What an octree looks like, for people: its statistics as text and in the report, its boxes as files to turn around.
 
-use crate::cli::Failure;
+use crate::cli::failure::Failure;
 use crate::formats::{Facets, Group, Polylines, write_atomic, write_facets};
 use crate::intersect::octree::{Octree, Statistics};
 use crate::intersect::{Cost, Intersector};
@@ -15,8 +15,8 @@ const MOST_BOXES: usize = 50_000;
 /// Most boxes drawn in the page: 16 corners each are half a megabyte.
 const MOST_DRAWN: usize = 2_000;
 
-/// An octree after its race.
-pub(crate) struct Shape {
+/// An octree after a benchmark.
+pub(crate) struct OctreeShape {
     facets: usize,
     bytes: usize,
     statistics: Statistics,
@@ -25,8 +25,8 @@ pub(crate) struct Shape {
     pub(crate) costs: Vec<(String, Cost)>,
 }
 
-impl Shape {
-    pub(crate) fn of(octree: &Octree) -> Self {
+impl OctreeShape {
+    pub(crate) fn new(octree: &Octree) -> Self {
         let footprint = octree.footprint();
         Self {
             facets: footprint.primitives,
@@ -37,16 +37,16 @@ impl Shape {
         }
     }
 
-    fn duplicates(&self) -> f64 {
+    fn listings_per_facet(&self) -> f64 {
         self.statistics.references as f64 / self.facets.max(1) as f64
     }
 
     /// Everything in words and bars.
-    fn described(&self) -> String {
+    fn summary(&self) -> String {
         let mut text = format!(
             "{} facets, each listed {} times, {} bytes a facet\n",
             grouped(self.facets as u64),
-            figures(self.duplicates(), 3),
+            figures(self.listings_per_facet(), 3),
             figures(self.bytes as f64 / self.facets.max(1) as f64, 3)
         );
         text += &self.statistics.to_string();
@@ -60,17 +60,20 @@ impl Shape {
 }
 
 /// Writes `octree.txt` for all trees, `octree.vtu` and `octree.glb` for the first.
-pub(crate) fn write(folder: &Path, shapes: &[Shape]) -> Result<(), Failure> {
-    let text: Vec<String> = shapes.iter().map(Shape::described).collect();
+pub(crate) fn write_octree_files(folder: &Path, shapes: &[OctreeShape]) -> Result<(), Failure> {
+    let text: Vec<String> = shapes.iter().map(OctreeShape::summary).collect();
     write_atomic(&folder.join("octree.txt"), |w| w.write_all(text.join("\n").as_bytes()))?;
     let Some(first) = shapes.first() else { return Ok(()) };
     let mut boxes = first.boxes.clone();
     boxes.sort_by_key(|(depth, _)| *depth);
     boxes.truncate(MOST_BOXES);
-    let mesh = walls(&boxes);
+    let mesh = box_facets(&boxes);
     let depths = boxes.last().map_or(0, |(depth, _)| *depth);
     let groups = (0..=depths)
-        .map(|depth| Group { opacity: 0.15, ..Group::solid(&format!("depth {depth}"), shade(depth, depths)) })
+        .map(|depth| Group {
+            opacity: 0.15,
+            ..Group::solid(&format!("depth {depth}"), depth_colour(depth, depths))
+        })
         .collect();
     let facets = Facets { groups, group_of_face: (0..=depths as u32).collect(), ..Facets::plain(&mesh, "octree") };
     write_facets(&folder.join("octree.vtu"), &facets)?;
@@ -79,13 +82,13 @@ pub(crate) fn write(folder: &Path, shapes: &[Shape]) -> Result<(), Failure> {
 }
 
 /// From blue at the root to orange at the leaves.
-fn shade(depth: usize, deepest: usize) -> [f64; 3] {
+fn depth_colour(depth: usize, deepest: usize) -> [f64; 3] {
     let s = depth as f64 / deepest.max(1) as f64;
     [0.20 + 0.70 * s, 0.45 + 0.10 * s, 0.85 - 0.65 * s]
 }
 
 /// Six quads a box, outward; the face of a quad is the depth of its box.
-fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
+fn box_facets(boxes: &[(usize, Aabb)]) -> FacetMesh {
     let mut mesh = FacetMesh::default();
     for (depth, b) in boxes {
         let first = mesh.positions.len() as u32;
@@ -112,7 +115,7 @@ fn walls(boxes: &[(usize, Aabb)]) -> FacetMesh {
 }
 
 /// Cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly.
-pub(crate) fn drawn(shape: &Shape) -> View {
+pub(crate) fn octree_view(shape: &OctreeShape) -> View {
     let mut boxes = shape.boxes.clone();
     boxes.sort_by_key(|(depth, _)| *depth);
     let total = boxes.len();
@@ -131,10 +134,10 @@ pub(crate) fn drawn(shape: &Shape) -> View {
         }
         let mut lines = Polylines::default();
         for b in level.iter().step_by(level.len().div_ceil(left)) {
-            lines.push(frame(b));
+            lines.push(box_edges(b));
             (left, shown) = (left - 1, shown + 1);
         }
-        view = view.lines(&format!("depth {depth}"), &lines, shade(depth, deepest));
+        view = view.lines(&format!("depth {depth}"), &lines, depth_colour(depth, deepest));
     }
     view.caption(&format!(
         "{} of the {} boxes into which the octree sorts the {} facets, from blue at the root to orange at the leaves: small where facets \
@@ -146,16 +149,16 @@ pub(crate) fn drawn(shape: &Shape) -> View {
 }
 
 /// The edges of a box in one stroke; three are passed twice.
-fn frame(b: &Aabb) -> [Point; 16] {
+fn box_edges(b: &Aabb) -> [Point; 16] {
     let ends = [b.min, b.max];
     [0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4]
         .map(|k: usize| Point::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z))
 }
 
 /// The section of the report.
-pub(crate) fn section(shapes: &[Shape]) -> Section {
+pub(crate) fn octree_section(shapes: &[OctreeShape]) -> Section {
     let deepest = shapes.iter().map(|s| s.statistics.depths.len()).max().unwrap_or(0);
-    let layer = |s: &Shape| {
+    let layer = |s: &OctreeShape| {
         let share = |depth: usize| {
             let blocks = s.statistics.depths.get(depth).copied().unwrap_or(0);
             100.0 * blocks as f64 / s.statistics.blocks.max(1) as f64
@@ -190,7 +193,7 @@ pub(crate) fn section(shapes: &[Shape]) -> Section {
                 (s.facets as u64).into(),
                 (s.statistics.nodes as u64).into(),
                 (s.statistics.blocks as u64).into(),
-                s.duplicates().into(),
+                s.listings_per_facet().into(),
                 (s.statistics.references as f64 / s.statistics.blocks.max(1) as f64).into(),
                 (s.bytes as f64 / s.facets.max(1) as f64).into(),
                 kind.as_str().into(),
@@ -202,7 +205,7 @@ pub(crate) fn section(shapes: &[Shape]) -> Section {
     let section = Section::new("The octree").with(chart);
     let files = "octree.vtu and octree.glb hold up to 50 000 of them.";
     let view = |shape| {
-        let view = drawn(shape);
+        let view = octree_view(shape);
         View { caption: format!("{} {files}", view.caption), ..view }
     };
     let section = shapes.first().into_iter().fold(section, |s, shape| s.with(view(shape)));

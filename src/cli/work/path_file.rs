@@ -1,6 +1,6 @@
 //! `--paths FILE.npz`: every vertex of every path of a run.
 
-use crate::cli::Failure;
+use crate::cli::failure::Failure;
 use crate::formats::{Column, Error, NpzStream};
 use crate::simulate::PathVertex;
 use std::path::Path;
@@ -16,15 +16,15 @@ const COLUMNS: [Column; 6] = [
 ];
 
 /// The file in the making, and what went wrong with it.
-pub(crate) struct Paths {
+pub(crate) struct PathFile {
     state: Mutex<(NpzStream, Option<Error>)>,
 }
 
-impl Paths {
+impl PathFile {
     pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
-            return Err(Failure::arguments(message).help("write --paths paths.npz"));
+            return Err(Failure::arguments(message).with_help("write --paths paths.npz"));
         }
         Ok(Self { state: Mutex::new((NpzStream::create(path, &COLUMNS)?, None)) })
     }
@@ -48,7 +48,7 @@ impl Paths {
     }
 
     /// Whether writing has failed, so that tracing on is of no use.
-    pub(crate) fn failed(&self) -> bool {
+    pub(crate) fn has_failed(&self) -> bool {
         self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
     }
 

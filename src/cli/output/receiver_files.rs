@@ -1,6 +1,6 @@
 //! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, Data_3 for planes, IES LM-63 for whole far fields in candela.
 
-use crate::cli::Failure;
+use crate::cli::failure::Failure;
 use crate::formats::{
     Data3, Grid, LightRay, PhotometricType, Photometry, write_data3, write_grid_csv, write_grid_npz,
     write_grid_png, write_ies, write_vti,

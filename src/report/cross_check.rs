@@ -1,4 +1,4 @@
-//! What the court found, for people: octree against BVH against spline, every cause in words, the disagreeing rays in 3-D.
+//! The cross-check, for people: octree against BVH against spline, every cause in words, the disagreeing rays in 3-D.
 
 use super::{AxisStyle, Cell, Chart, Content, Provenance, Report, Section, Table, View};
 use super::{figures, grouped};
@@ -7,7 +7,7 @@ use crate::math::{Point, Vector};
 use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
 
 /// Everything that the report of a check speaks of.
-pub struct Trial<'a> {
+pub struct CheckReport<'a> {
     /// Name of what was checked.
     pub title: String,
     /// What was found.
@@ -187,7 +187,7 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
     )))
 }
 
-impl Trial<'_> {
+impl CheckReport<'_> {
     /// The answer in a paragraph.
     pub fn answer(&self) -> String {
         let (c, f) = (self.check, &self.check.facets_vs_exact);
@@ -217,7 +217,7 @@ impl Trial<'_> {
     /// The whole report.
     pub fn report(&self) -> Report {
         let sections = vec![self.rays(), self.distance(), self.speed()];
-        let title = format!("CrossCheck of {}", self.title);
+        let title = format!("Check of {}", self.title);
         Report { title, answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 

@@ -1,6 +1,6 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
-use super::court::{self, verdict};
+use super::cross_check::{self, verdict};
 use super::faceting::{changes, limits};
 use super::maps::{cuts, photometric_grid, reading, receiver_grid, spoken};
 use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View};
@@ -12,7 +12,7 @@ use crate::study::cross_check::CrossCheck;
 use crate::study::faceting::Faceting;
 
 /// Everything that the report of a traced scene speaks of.
-pub struct Light<'a> {
+pub struct SimulationReport<'a> {
     /// Title of the scene.
     pub title: String,
     /// What the simulation found.
@@ -59,7 +59,7 @@ fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, mos
     kept
 }
 
-impl Light<'_> {
+impl SimulationReport<'_> {
     fn share(&self, power: f64) -> String {
         format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
     }
@@ -284,9 +284,11 @@ impl Light<'_> {
         let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";
-        let section =
-            Section::new("Cross-check").with(text).with(court::counts(check)).with(court::errors(check, "facets"));
-        match court::odd_rays(check, self.facets) {
+        let section = Section::new("Cross-check")
+            .with(text)
+            .with(cross_check::counts(check))
+            .with(cross_check::errors(check, "facets"));
+        match cross_check::odd_rays(check, self.facets) {
             Some(view) => section.with(view),
             None => section,
         }

@@ -1,0 +1,146 @@
+//! `trace --replay`: single rays of a run once more, with every vertex of their paths.
+
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::closing::LEDGER;
+use crate::cli::output::json::json_text;
+use crate::cli::work::lost_rays::{self, COLUMNS};
+use crate::cli::work::scene_run::PreparedScene;
+use crate::formats::write_vtp;
+use crate::report::path_lines;
+use crate::simulate::{PathVertex, Results, RunSettings, replay};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What `--replay` asks for: rays by number, and the seed and number of rays of a ledger.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct ReplayRequest {
+    pub(crate) rays: Vec<u64>,
+    run: Option<[u64; 2]>,
+}
+
+impl ReplayRequest {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rays.is_empty()
+    }
+}
+
+/// Rays given by number, or all those of a ledger.
+pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> {
+    let mut request = ReplayRequest::default();
+    for word in words {
+        if let Ok(ray) = word.parse() {
+            request.rays.push(ray);
+            continue;
+        }
+        let text = std::fs::read_to_string(word).map_err(|e| {
+            Failure::input(format!("--replay {word}: {e}"))
+                .with_help(format!("give the number of a ray, or a {LEDGER} of an earlier run"))
+        })?;
+        read_ledger(&text, &mut request).map_err(|m| Failure::input(format!("--replay {word}: {m}")))?;
+    }
+    request.rays.sort_unstable();
+    request.rays.dedup();
+    Ok(request)
+}
+
+fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
+    let mut lines = text.lines();
+    if lines.next() != Some(COLUMNS) {
+        return Err(format!("not a ledger of lost rays: its first line is not \"{COLUMNS}\""));
+    }
+    for (k, line) in lines.enumerate().filter(|(_, l)| !l.is_empty()) {
+        let number = |s: Option<&str>| {
+            s.and_then(|s| s.parse::<u64>().ok()).ok_or(format!("line {}: a number is missing", k + 2))
+        };
+        request.rays.push(number(line.split(',').next())?);
+        let mut last = line.rsplit(',');
+        let (rays, seed) = (number(last.next())?, number(last.next())?);
+        if request.run.replace([seed, rays]).is_some_and(|r| r != [seed, rays]) {
+            return Err(format!("line {}: another seed or number of rays than the lines before", k + 2));
+        }
+    }
+    Ok(())
+}
+
+/// Traces the rays again and shows every vertex of their paths; they are written as `replay.vtp` too.
+pub(crate) fn run(
+    prepared: &PreparedScene,
+    request: &ReplayRequest,
+    folder: &Path,
+    console: &Console,
+) -> Result<(), Failure> {
+    let settings = prepared.run_settings();
+    let [seed, rays] = request.run.unwrap_or([settings.seed, settings.rays]);
+    let settings = RunSettings { seed, rays, ..settings };
+    let found = prepared
+        .with_intersector(console, |intersector, _| replay(&prepared.bound, intersector, &settings, &request.rays));
+    if found.rays < request.rays.len() as u64 {
+        let message = format!("--replay: the run has {rays} rays, counted from 0");
+        return Err(Failure::arguments(message).with_help("give the number of rays that the run had with --rays"));
+    }
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+    let (lines, _) = path_lines(&found.paths);
+    write_vtp(&folder.join("replay.vtp"), &lines)?;
+    if console.json {
+        let rays: Vec<Value> =
+            found.paths.chunk_by(|a, b| a.ray == b.ray).map(|p| document_of(p, &found)).collect();
+        return Ok(print(&json_text(&json!({"seed": seed, "rays": rays}))?)?);
+    }
+    print_paths(prepared, &found)?;
+    console.say(format_args!("wrote {}", folder.join("replay.vtp").display()));
+    Ok(())
+}
+
+/// Every vertex of every path, and where a ray was lost.
+fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure> {
+    for path in found.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
+        print(&format!("ray {}, branch {}\n", path[0].ray, path[0].branch))?;
+        for v in path {
+            let p = v.point;
+            let event = format!("{:?}", v.event);
+            print(&format!(
+                "  {:>5}  {event:<12} {:>22} {:>22} {:>22}  power {}\n",
+                v.bounce, p.x, p.y, p.z, v.power
+            ))?;
+        }
+        for l in found.ledger.iter().filter(|l| (l.ray, l.branch) == (path[0].ray, path[0].branch)) {
+            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]);
+            print(&format!("  lost: {}, in {medium} of {instance}\n", lost_rays::cause_name(l).replace('_', " ")))?;
+        }
+    }
+    Ok(())
+}
+
+/// One path with what was lost of it.
+fn document_of(path: &[PathVertex], found: &Results) -> Value {
+    let lost: Vec<Value> = (found.ledger.iter())
+        .filter(|l| l.ray == path[0].ray)
+        .map(|l| {
+            json!({"branch": l.branch, "bounce": l.bounce, "cause": lost_rays::cause_name(l), "face": l.face,
+            "origin": l.origin.to_array(), "direction": l.direction.to_array()})
+        })
+        .collect();
+    let vertices: Vec<Value> = (path.iter())
+        .map(|v| json!({"branch": v.branch, "bounce": v.bounce, "event": v.event, "point": v.point.to_array(), "power": v.power}))
+        .collect();
+    json!({"ray": path[0].ray, "vertices": vertices, "lost": lost})
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ledger_gives_its_rays_and_its_run() {
+        let line =
+            |ray: u64, seed: u64| format!("{ray},0,1,no_exit,1,0,0,0,0,0,1,\"a,b\",\"g\",,\"\",{seed},100\n");
+        let text = format!("{COLUMNS}\n{}{}", line(7, 3), line(9, 3));
+        let mut request = ReplayRequest::default();
+        read_ledger(&text, &mut request).unwrap();
+        assert_eq!(request, ReplayRequest { rays: vec![7, 9], run: Some([3, 100]) });
+        assert!(read_ledger(&format!("{text}{}", line(1, 4)), &mut request).unwrap_err().contains("line 4"));
+        assert!(read_ledger("ray\n1\n", &mut request).unwrap_err().contains("not a ledger"));
+    }
+}

@@ -1,0 +1,82 @@
+//! The last lines of a traced scene, or its document on stdout.
+
+use super::json::json_text;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::report::file_stem;
+use crate::simulate::Results;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Longest line of the closing paragraph, characters.
+const LINE_LENGTH: usize = 96;
+
+/// Name of the list of lost rays in a folder of results.
+pub(crate) const LEDGER: &str = "lost_rays.csv";
+
+/// Prints the results as JSON on stdout, or the closing lines.
+pub(crate) fn print_results(
+    document: &Value,
+    answer: &str,
+    folder: &Path,
+    results: &Results,
+    console: &Console,
+) -> Result<(), Failure> {
+    if console.json {
+        return Ok(print(&json_text(document)?)?);
+    }
+    say_closing_lines(answer, folder, results, console);
+    Ok(())
+}
+
+/// The last lines of a traced scene: what was found, which file to open.
+pub(crate) fn say_closing_lines(answer: &str, folder: &Path, results: &Results, console: &Console) {
+    console.say("");
+    for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH)) {
+        console.say(format_args!("  {line}"));
+    }
+    console.say("");
+    let files = notable_files(folder, results);
+    let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).max().unwrap_or(0);
+    for (k, (path, what)) in files.iter().enumerate() {
+        let name = format!("{:<widest$}", path.display().to_string());
+        let name = if k == 0 { console.bold(&name) } else { name };
+        console.say(format_args!("  {name}  {}", console.dim(what)));
+    }
+}
+
+/// The files of a result folder that a person wants to know of.
+fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
+    let mut files = vec![
+        (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),
+        (folder.join("results.json"), "every number of the run".into()),
+    ];
+    for r in results.receivers.iter().filter(|r| !r.files.is_empty()) {
+        files.push((
+            folder.join(format!("{}.csv", file_stem(&r.name))),
+            format!("{} cell by cell (also .npz .png .vti and more)", r.name),
+        ));
+    }
+    if !results.ledger.is_empty() {
+        files.push((folder.join(LEDGER), "the lost rays; `lampyris trace` shows their paths with --replay".into()));
+    }
+    files.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));
+    files
+}
+
+/// Words in lines of at most `width` characters.
+fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().map(|l| (l.chars().count(), l));
+        match line {
+            Some((0, line)) => line.push_str(word),
+            Some((n, line)) if n + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}

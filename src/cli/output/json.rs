@@ -1,0 +1,16 @@
+//! JSON documents of commands: every one is made, written and printed the same way.
+
+use crate::cli::failure::Failure;
+use serde::Serialize;
+use serde_json::Value;
+
+/// A piece of a document.
+pub(crate) fn json_value(piece: &impl Serialize) -> Result<Value, Failure> {
+    serde_json::to_value(piece).map_err(|e| Failure::running(e.to_string()))
+}
+
+/// A document as text, its last line ended.
+pub(crate) fn json_text(document: &impl Serialize) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(document).map_err(|e| Failure::running(e.to_string()))?;
+    Ok(text + "\n")
+}

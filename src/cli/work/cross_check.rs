@@ -1,0 +1,137 @@
+//! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
+//! change of its light.
+
+use super::ray_sampler::RaySampler;
+use super::scene_run::{PreparedScene, TraceRequest};
+use crate::cli::arguments::options::IntersectorKind;
+use crate::cli::console::Console;
+use crate::intersect::bvh::Bvh;
+use crate::intersect::exact::{self, Exact};
+use crate::intersect::octree::Octree;
+use crate::intersect::{Intersector, NormalMode};
+use crate::math::Ray;
+use crate::simulate::{Results, RunSettings, Verification, replay, verify_pruning};
+use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
+use crate::study::faceting::{Faceting, faceting};
+
+/// Segments of a run that are asked again of BVH and spline.
+const RECHECKED: usize = 10_000;
+/// Tolerances above a surface that a ray which left it starts at, so that facets and spline are asked the same question.
+pub(crate) const LIFT_IN_TOLERANCES: f64 = 4.0;
+
+/// Rays traced on facets and on the spline: some 16,000 tell widths within a few per cent.
+const FACETING_RAYS: f64 = 16_384.0;
+/// The fewest of these, however long they are.
+const FEWEST_FACETING_RAYS: f64 = 1000.0;
+/// Segments of these: as many as take a tenth of a second on the spline.
+const FACETING_SEGMENTS: f64 = 100_000.0;
+/// Replicates of these rays: enough for the error of a difference.
+const FACETING_REPLICATES: u32 = 64;
+
+/// The results of a run with what else was found out about it.
+pub(crate) struct SceneResults {
+    pub(crate) results: Results,
+    pub(crate) check: Option<CrossCheck>,
+    /// What the facets change of the light, where the run was on facets.
+    pub(crate) faceting: Option<Faceting>,
+    /// The pruned kernel against the full one, when asked for.
+    pub(crate) verification: Option<Verification>,
+}
+
+/// Traces the scene, and asks some of its rays again of BVH and spline.
+pub(crate) fn trace_and_check(prepared: &PreparedScene, request: TraceRequest, console: &Console) -> SceneResults {
+    prepared.with_intersector(console, |intersector, build_seconds| {
+        let settings = prepared.run_settings();
+        let (mut results, verification) = if request.verify_pruning {
+            let (results, verification) = verify_pruning(&prepared.bound, intersector, &settings, &|_| true);
+            (results, Some(verification))
+        } else {
+            let traced = prepared.run(intersector, &settings, request, console);
+            (Results::of(&prepared.bound, &settings, traced), None)
+        };
+        // What was done before tracing.
+        results.seconds.read = prepared.job.loaded.seconds;
+        results.seconds.tessellate = prepared.tessellation_seconds;
+        results.seconds.build = build_seconds;
+        let (check, faceting) = recheck(prepared, &results, intersector, console);
+        SceneResults { results, check, faceting, verification }
+    })
+}
+
+/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline.
+///
+/// The rays depend on the run alone, not on how it was divided: a merged or resumed run has the figures of an undivided one.
+fn recheck(
+    prepared: &PreparedScene,
+    results: &Results,
+    intersector: &dyn Intersector,
+    console: &Console,
+) -> (Option<CrossCheck>, Option<Faceting>) {
+    let rays = sample(prepared, intersector);
+    if rays.is_empty() {
+        return (None, None);
+    }
+    let spinner = console.spinner("building the spline for the cross-check");
+    let exact = Exact::build(&prepared.job.loaded.model, &exact::Settings::for_few_rays());
+    spinner.finish_and_clear();
+    let check = check_rays(prepared, intersector, &exact, &rays, console);
+    (Some(check), facet_effects(prepared, results, [intersector, &exact]))
+}
+
+/// Segments of some rays of the run, which are spread evenly over it and traced once more.
+fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
+    let settings = prepared.run_settings();
+    let count = settings.rays.min(RECHECKED as u64);
+    let step = (settings.rays / count.max(1)).max(1);
+    // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
+    let sampler = RaySampler::new(intersector, RECHECKED as u64, 4 * count);
+    replay(&prepared.bound, &sampler, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
+    let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
+    sampler.rays(RECHECKED, &prepared.job.loaded.model, lift)
+}
+
+/// Octree against BVH against spline on these rays.
+fn check_rays(
+    prepared: &PreparedScene,
+    intersector: &dyn Intersector,
+    exact: &Exact,
+    rays: &[Ray],
+    console: &Console,
+) -> CrossCheck {
+    let (model, mesh) = (&prepared.job.loaded.model, &prepared.tessellation.mesh);
+    let spinner = console.spinner("building BVH for the cross-check");
+    let bvh = Bvh::build(mesh, &Default::default());
+    // The check is about facets: a run on the spline, or polished to it, says nothing about the octree.
+    let on_octree =
+        prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
+    let built = (!on_octree).then(|| Octree::build(mesh, &Default::default()));
+    let octree = built.as_ref().map_or(intersector, |octree| octree as &dyn Intersector);
+    spinner.finish_and_clear();
+    let bar = console.progress_bar("checking", "rays", rays.len() as u64);
+    let intersectors = Intersectors { model, mesh, octree, bvh: &bvh, exact };
+    let settings =
+        cross_check::Settings { fallback_band_mm: prepared.mesh_settings.loosest(), ..Default::default() };
+    let total = rays.len() as f64;
+    let found = cross_check(&intersectors, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
+    bar.finish_and_clear();
+    found
+}
+
+/// Some rays of the run once more, on facets and on the spline; `None` where the run was not on facets.
+fn facet_effects(
+    prepared: &PreparedScene,
+    results: &Results,
+    facets_and_spline: [&dyn Intersector; 2],
+) -> Option<Faceting> {
+    let on_facets =
+        prepared.choice.intersector != IntersectorKind::Exact && prepared.choice.normals != NormalMode::Exact;
+    if !on_facets || prepared.tessellation.mesh.facets.is_empty() {
+        return None;
+    }
+    let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
+    let rays = (FACETING_SEGMENTS / segments_a_ray.max(1.0)).clamp(FEWEST_FACETING_RAYS, FACETING_RAYS) as u64;
+    let run = prepared.run_settings();
+    let settings =
+        RunSettings { rays: rays.min(run.rays), replicates: FACETING_REPLICATES, path_samples: 0, ..run };
+    Some(faceting(&prepared.bound, facets_and_spline, &settings))
+}

@@ -1,0 +1,94 @@
+//! The lost-ray ledger: one line a lost ray, with all that is needed to trace it again.
+
+use super::scene_run::PreparedScene;
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::cli::output::closing::LEDGER;
+use crate::formats::write_atomic;
+use crate::simulate::{Cause, LostRay, Results};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Reasons that a message names.
+const NAMED_REASONS: usize = 3;
+
+/// The first line of a ledger.
+pub(crate) const COLUMNS: &str =
+    "ray,branch,bounce,cause,power,x_mm,y_mm,z_mm,dx,dy,dz,instance,medium,face,hit_instance,seed,rays";
+
+/// Writes the ledger, when a ray was lost. Text in quotes, as instance names may hold commas.
+pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) -> Result<bool, Failure> {
+    if results.ledger.is_empty() {
+        return Ok(false);
+    }
+    let settings = prepared.run_settings();
+    write_atomic(&folder.join(LEDGER), |w| {
+        writeln!(w, "{COLUMNS}")?;
+        for l in &results.ledger {
+            let power = l.quanta as f64 * results.quantum;
+            let (o, d) = (l.origin, l.direction);
+            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(quoted);
+            let face = l.face.map(|f| f.to_string()).unwrap_or_default();
+            let hit = quoted(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
+            writeln!(
+                w,
+                "{},{},{},{},{power},{},{},{},{},{},{},{instance},{medium},{face},{hit},{},{}",
+                l.ray,
+                l.branch,
+                l.bounce,
+                cause_name(l),
+                o.x,
+                o.y,
+                o.z,
+                d.x,
+                d.y,
+                d.z,
+                settings.seed,
+                settings.rays
+            )?;
+        }
+        Ok(())
+    })?;
+    Ok(true)
+}
+
+/// Says what is open in the scene, or beyond its tables.
+pub(crate) fn warn(prepared: &PreparedScene, console: &Console) {
+    prepared.bound.notes().iter().for_each(|note| console.say(note));
+}
+
+/// Why rays were lost and where, the most frequent first.
+pub(crate) fn reasons(results: &Results, prepared: &PreparedScene) -> String {
+    let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
+    for l in &results.ledger {
+        let hit = l.face.and_then(|f| prepared.bound.instance(f));
+        let inside = || prepared.bound.body(l.body).map(|[instance, _]| instance);
+        *count.entry((meaning(l.cause), hit.or_else(inside).unwrap_or(""))).or_default() += 1;
+    }
+    let mut all: Vec<_> = count.into_iter().collect();
+    all.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    let reasons: Vec<String> =
+        all.iter().take(NAMED_REASONS).map(|((why, place), n)| format!("{n} {why} at '{place}'")).collect();
+    let counted = if results.lost_rays as usize > results.ledger.len() { "of the first 1000: " } else { "" };
+    format!("{counted}{}", reasons.join("; "))
+}
+
+fn meaning(cause: Cause) -> &'static str {
+    match cause {
+        Cause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
+        Cause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
+        Cause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
+        Cause::TooDeep => "were in more than 7 bodies at once, as after entering an open shell again and again,",
+        _ => "had a distance or direction that is no number",
+    }
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// Name of the cause, as in the ledger.
+pub(crate) fn cause_name(l: &LostRay) -> String {
+    let name = serde_json::to_value(l.cause).ok();
+    name.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}

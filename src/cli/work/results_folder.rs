@@ -1,0 +1,160 @@
+//! The folder that a traced scene leaves: receiver files, ray paths, facets, `results.json` and the page.
+
+use super::cross_check::SceneResults;
+use super::lost_rays;
+use super::scene_run::PreparedScene;
+use crate::cli::arguments::options::IntersectorKind;
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::cli::output::closing::LEDGER;
+use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::{appearance, octree_shape, receiver_files};
+use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
+use crate::intersect::octree::Octree;
+use crate::report::{Cell, Provenance, Report, SimulationReport, Table, View, path_lines};
+use crate::simulate::arrivals;
+use serde_json::Value;
+use std::path::Path;
+
+/// Paths are shown as far as this share of the model's diagonal around it.
+const PATH_MARGIN: f64 = 0.35;
+
+/// Writes everything into a folder; the report comes last, so that a folder with a report is complete. Gives the document of
+/// `results.json`.
+pub(crate) fn write(
+    prepared: &PreparedScene,
+    folder: &Path,
+    run: &mut SceneResults,
+    sentences: Vec<String>,
+    console: &Console,
+) -> Result<(Value, Report), Failure> {
+    let spinner = console.spinner("writing");
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+    for k in 0..run.results.receivers.len() {
+        let rays = arrivals(&prepared.bound, k, &run.results);
+        run.results.receivers[k].files = receiver_files::write(folder, &run.results.receivers[k], rays)?;
+    }
+    let (paths, _) = path_lines(&run.results.paths);
+    write_vtp(&folder.join("paths.vtp"), &paths)?;
+    let mesh = &prepared.tessellation.mesh;
+    let bounds = mesh.bounds();
+    let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
+    let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(prepared.job.scene));
+    facets.paths = Some(&near);
+    write_facets(&folder.join("facets.glb"), &facets)?;
+    facets.paths = None;
+    let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
+    let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
+    let mut document = document(prepared, run, &provenance)?;
+    if has_lost_rays {
+        document["ledger"] = LEDGER.into();
+    }
+    let text = json_text(&document)?;
+    write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
+    let report = page(prepared, run, &facets, sentences, provenance);
+    report.write(folder)?;
+    spinner.finish_and_clear();
+    Ok((document, report))
+}
+
+/// The document of `results.json`, without the name of the ledger.
+fn document(prepared: &PreparedScene, run: &SceneResults, provenance: &Provenance) -> Result<Value, Failure> {
+    let mut document = json_value(&run.results)?;
+    if let Some(verification) = &run.verification {
+        document["pruning"] = json_value(verification)?;
+    }
+    if let Some(check) = &run.check {
+        document["check"] = json_value(check)?;
+    }
+    if let Some(faceting) = &run.faceting {
+        document["faceting"] = json_value(faceting)?;
+    }
+    if let Some(accuracy) = prepared.job.accuracy {
+        document["accuracy"] = json_value(accuracy)?;
+    }
+    document["provenance"] = json_value(provenance)?;
+    Ok(document)
+}
+
+/// The page of a traced scene.
+fn page(
+    prepared: &PreparedScene,
+    run: &SceneResults,
+    facets: &Facets,
+    sentences: Vec<String>,
+    provenance: Provenance,
+) -> Report {
+    let scene = prepared.job.scene;
+    let title = if scene.title.is_empty() { prepared.job.loaded.model.name.clone() } else { scene.title.clone() };
+    let unit = match scene.run.unit {
+        crate::simulate::scene::PowerUnit::Lumen => "lm",
+        _ => "W",
+    };
+    SimulationReport {
+        title,
+        results: &run.results,
+        facets,
+        unit,
+        check: run.check.as_ref(),
+        faceting: run.faceting.as_ref(),
+        views: views(prepared, facets),
+        tables: vec![model_table(prepared), facet_table(prepared)],
+        comparison: sentences,
+        provenance,
+    }
+    .report()
+}
+
+/// How finely the facets follow the surface, and how the octree sorts them.
+fn views(prepared: &PreparedScene, facets: &Facets) -> Vec<View> {
+    let mesh = facets.mesh;
+    let title = "Distance of the facets from the surface";
+    let sag = View::of_values("sag", title, facets, "proved distance (mm)", &mesh.sag, ColourMap::Viridis);
+    let sag = sag
+        .caption("No point of a facet is farther from the true surface than its colour says; grey is not proved.");
+    let octree = (prepared.choice.intersector == IntersectorKind::Octree).then(|| {
+        octree_shape::octree_view(&octree_shape::OctreeShape::new(&Octree::build(mesh, &Default::default())))
+    });
+    std::iter::once(sag).chain(octree).collect()
+}
+
+/// What was read.
+fn model_table(prepared: &PreparedScene) -> Table {
+    let columns =
+        [("file", ""), ("parts", ""), ("instances", ""), ("faces", ""), ("repaired", ""), ("refused", "")];
+    let mut table = Table::new("model", "Model", &columns);
+    for r in &prepared.job.loaded.reports {
+        table.row([
+            r.file.as_str().into(),
+            r.parts.into(),
+            r.instances.into(),
+            r.faces.found.into(),
+            r.faces.repaired.into(),
+            r.faces.refused.into(),
+        ]);
+    }
+    table
+}
+
+/// What the facets are.
+fn facet_table(prepared: &PreparedScene) -> Table {
+    let mesh = &prepared.tessellation.mesh;
+    let mut table = Table::new("facets", "Facets", &[("", ""), ("value", ""), ("unit", "")]);
+    let [finest, loosest] = prepared.mesh_settings.tolerance;
+    let proved: Vec<f64> = mesh.sag.iter().copied().filter(|s| s.is_finite()).collect();
+    let megabytes = mesh.bytes() as f64 / 1_000_000.0;
+    let rows: [(&str, Cell, &str); 7] = [
+        ("facets", mesh.facets.len().into(), ""),
+        ("of these quads", mesh.quad_count().into(), ""),
+        ("tolerance where sharply curved", finest.into(), "mm"),
+        ("tolerance where nearly flat", loosest.into(), "mm"),
+        ("largest proved distance to the spline", proved.iter().copied().fold(0.0, f64::max).into(), "mm"),
+        ("facets without a proof", (mesh.sag.len() - proved.len()).into(), ""),
+        ("memory of the mesh", Cell::Number(megabytes, 3), "MB"),
+    ];
+    for (name, value, unit) in rows {
+        table.row([name.into(), value, unit.into()]);
+    }
+    table
+}

@@ -1,0 +1,114 @@
+//! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
+
+use super::scene_run::PreparedScene;
+use crate::cli::arguments::options::{IntersectorKind, MeshingOptions, TracingOptions};
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::intersect::NormalMode;
+use crate::simulate::{Fingerprint, RunSettings};
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What stands at the head of a tally file: enough to write the results of the whole run. Lengths and angles as bits of `f64`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct TallyHeader {
+    pub(crate) fingerprint: String,
+    pub(crate) scene: PathBuf,
+    tolerance: Option<[u64; 2]>,
+    angle: Option<u64>,
+    part: Vec<(String, [u64; 2])>,
+    #[serde(default)]
+    face: Vec<(String, [u64; 2])>,
+    #[serde(default)]
+    role: Vec<(String, [u64; 2])>,
+    rays: Option<u64>,
+    seed: Option<u64>,
+    intersector: Option<String>,
+    normals: Option<String>,
+    pub(crate) shard: Option<[u32; 2]>,
+    pub(crate) command: String,
+}
+
+impl TallyHeader {
+    /// Of a run that is about to be traced.
+    pub(crate) fn new(
+        prepared: &PreparedScene,
+        scene: &Path,
+        shard: Option<[u32; 2]>,
+        console: &Console,
+    ) -> Result<Self, Failure> {
+        let (m, t) = (prepared.job.meshing, prepared.job.tracing);
+        let bits = |x: [f64; 2]| x.map(f64::to_bits);
+        Ok(Self {
+            fingerprint: fingerprint(prepared)?.0,
+            scene: std::path::absolute(scene).unwrap_or_else(|_| scene.to_path_buf()),
+            tolerance: m.tolerance.map(bits),
+            angle: m.angle.map(f64::to_bits),
+            part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            rays: t.rays,
+            seed: t.seed,
+            intersector: t.intersector.map(|i| i.to_string()),
+            normals: t.normals.map(|n| n.to_string()),
+            shard,
+            command: console.command.clone(),
+        })
+    }
+
+    /// The options that decided the facets.
+    pub(crate) fn meshing(&self) -> MeshingOptions {
+        let back = |x: [u64; 2]| x.map(f64::from_bits);
+        MeshingOptions {
+            tolerance: self.tolerance.map(back),
+            angle: self.angle.map(f64::from_bits),
+            part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            face: self.face.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            role: self.role.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
+            // Parts are not traced with an accuracy asked for.
+            plan: None,
+        }
+    }
+
+    /// The options that decided the rays.
+    pub(crate) fn tracing(&self) -> TracingOptions {
+        TracingOptions {
+            rays: self.rays,
+            seed: self.seed,
+            threads: None,
+            intersector: self.intersector.as_ref().and_then(|n| IntersectorKind::from_str(n, true).ok()),
+            normals: self.normals.as_ref().and_then(|n| NormalMode::from_str(n, true).ok()),
+        }
+    }
+}
+
+/// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
+pub(crate) fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Failure> {
+    let scene = prepared.job.scene;
+    let defaults = RunSettings::default();
+    let settings = RunSettings {
+        threads: 0,
+        batch: 0,
+        kernel: defaults.kernel,
+        shard: [0, 1],
+        path_samples: 0,
+        ..prepared.run_settings()
+    };
+    let words = format!(
+        "{} {} {:?} {:?} {settings:?}",
+        env!("CARGO_PKG_VERSION"),
+        env!("LAMPYRIS_COMMIT"),
+        prepared.mesh_settings,
+        prepared.choice
+    );
+    let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
+    let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
+    for file in files {
+        let path = scene.resolve(file);
+        let read = std::fs::read(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        pieces.push(read);
+    }
+    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
+    Ok(Fingerprint::of(&pieces))
+}

@@ -1,0 +1,36 @@
+//! Facets to files: the extension decides the format.
+
+use super::facets::Facets;
+use super::{Error, ErrorKind, data2, glb, obj, ply, stl, vtk};
+use std::path::Path;
+
+/// Extensions [`write_facets`] knows, for people.
+pub const FACET_EXTENSIONS: &str = ".obj .ply .stl .vtu .glb .data2";
+
+/// Writes facets in the format that the extension names: one of [`FACET_EXTENSIONS`].
+///
+/// # Errors
+/// For an unknown extension, and when the file cannot be written.
+pub fn write_facets(path: &Path, facets: &Facets) -> Result<(), Error> {
+    let extension = lower_extension(path);
+    match extension.as_str() {
+        "obj" => obj::write(path, facets),
+        "ply" => ply::write(path, facets),
+        "stl" => stl::write(path, facets),
+        "vtu" => vtk::write_vtu(path, facets),
+        "glb" => glb::write(path, facets),
+        "data2" => data2::write(path, facets),
+        _ => Err(Error::new(path, ErrorKind::Extension { given: extension, known: FACET_EXTENSIONS })),
+    }
+}
+
+/// Whether [`write_facets`] knows the extension of this name.
+pub fn is_facet_file(path: &Path) -> bool {
+    let extension = lower_extension(path);
+    FACET_EXTENSIONS.split(' ').any(|known| known[1..] == extension)
+}
+
+/// The extension in lower case; empty where a name has none.
+fn lower_extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
