@@ -44,9 +44,9 @@ mod tests {
     fn the_nearest_name_comes_first() {
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(
-            names("parts:", "huosing", &["cover", "housing", "cover"]),
+            closest_name("parts:", "huosing", &["cover", "housing", "cover"]),
             "did you mean \"housing\"? parts: cover, housing"
         );
-        assert_eq!(names("parts:", "xyz", &["cover"]), "parts: cover");
+        assert_eq!(closest_name("parts:", "xyz", &["cover"]), "parts: cover");
     }
 }
