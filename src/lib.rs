@@ -1,6 +1,6 @@
 //! CAD surfaces straight to optical simulation, with an account of what the accuracy cost.
 //!
-//! A STEP file ([`step`]) or a shape built with the truck kernel ([`kernel`]) becomes a [`model::Model`]: trimmed
+//! A STEP file ([`step`]) or a shape built with the truck kernel ([`truck`]) becomes a [`model::Model`]: trimmed
 //! rational B-splines, placed, in millimetres. [`tessellate`] covers it with quad facets that carry the spline's normals and
 //! a proved distance to it. Rays meet the facets in an adaptive octree ([`intersect::octree`]) or a BVH
 //! ([`intersect::bvh`]), or the spline itself with a certificate ([`intersect::exact`]); all three answer through one
@@ -67,7 +67,6 @@
 pub mod cli;
 pub mod formats;
 pub mod intersect;
-pub mod kernel;
 pub mod math;
 pub mod mesh;
 pub mod model;
@@ -78,6 +77,7 @@ pub mod simulate;
 pub mod step;
 pub mod study;
 pub mod tessellate;
+pub mod truck;
 
 pub use intersect::{Hit, Intersector};
 pub use math::{FaceId, Ray};

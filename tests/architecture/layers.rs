@@ -8,7 +8,7 @@ pub(crate) const LAYERS: &[(&str, u32)] = &[
     ("formats", 2),
     ("model", 2),
     ("step", 3),
-    ("kernel", 3),
+    ("truck", 3),
     ("tessellate", 3),
     ("intersect", 3),
     ("optics", 3),
@@ -130,7 +130,7 @@ pub(crate) const UNORDERED: &[&str] = &[
     "intersect",
     "intersect/exact",
     "intersect/octree",
-    "kernel",
+    "truck",
     "optics",
     "simulate",
     "simulate/kernel",
@@ -143,9 +143,9 @@ pub(crate) const UNORDERED: &[&str] = &[
 
 /// Crates that only these modules may name.
 pub(crate) const DOORS: &[(&str, &[&str])] = &[
-    ("truck_modeling", &["kernel"]),
-    ("truck_meshalgo", &["kernel"]),
-    ("truck_polymesh", &["kernel", "formats"]),
+    ("truck_modeling", &["truck"]),
+    ("truck_meshalgo", &["truck"]),
+    ("truck_polymesh", &["truck", "formats"]),
     ("obvhs", &["intersect"]),
     ("spade", &["tessellate"]),
     ("clap", &["cli"]),

@@ -1,8 +1,8 @@
 //! Our surfaces evaluated by truck, our faces meshed by truck: an independent program on the same geometry.
 
 use crate::files::{fixture, read_model};
-use lampyris::kernel::truck::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3, Vector4};
-use lampyris::kernel::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
+use lampyris::truck::modeling::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3, Vector4};
+use lampyris::truck::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
 use lampyris::math::{Frame, Point, Uv, Vector};
 use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::{Surface, sweep};

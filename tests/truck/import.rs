@@ -1,12 +1,12 @@
 //! Truck shapes become models that keep what `model` promises: closed loops in the domain with material on the left, edges on their
 //! surfaces, normals outward, areas and volumes as the closed forms say.
 
-use lampyris::kernel::{self, Conic, Conversion, Lens, Reflector, truck};
+use lampyris::truck::{self, Conic, Conversion, Lens, Reflector, modeling};
 use lampyris::math::{Uv, Vector};
 use lampyris::model::{EdgeUse, Face, Model, TrimLoop};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use truck::{Point3, Rad, Vector3, Wire, builder};
+use modeling::{Point3, Rad, Vector3, Wire, builder};
 
 const FULL: Rad<f64> = Rad(7.0);
 
@@ -130,7 +130,7 @@ fn a_block_and_the_same_block_inside_out() {
     let face = builder::tsweep(&edge, Vector3::new(0.0, 20.0, 0.0));
     let mut solid = builder::tsweep(&face, Vector3::new(0.0, 0.0, 30.0));
     for _ in 0..2 {
-        let made = kernel::solid("block", &solid);
+        let made = truck::solid("block", &solid);
         let (_, volume) = check(&made, 6);
         assert!(near(volume, 6000.0), "{volume}");
         check_closed(&made.model);
@@ -212,7 +212,7 @@ fn partial_turns_both_ways() {
     let disk = builder::try_attach_plane(&[wire]).unwrap();
     for angle in [2.0f64, 5.0, -2.0, -5.0, 7.0] {
         let torus = builder::rsweep(&disk, Point3::new(0.0, 0.0, 0.0), Vector3::unit_z(), Rad(angle));
-        let made = kernel::solid("torus", &torus);
+        let made = truck::solid("torus", &torus);
         assert!(made.refused.is_empty(), "{angle}: {:?}", made.refused);
         made.model.placed_faces().filter_map(|f| f.face).for_each(|f| check_face(&made.model, f));
         check_closed(&made.model);
@@ -235,7 +235,7 @@ fn a_void_has_normals_into_itself() {
     };
     let (outer, inner) = (cube(0.0, 10.0), cube(3.0, 2.0));
     let shells = vec![inner.boundaries()[0].clone(), outer.boundaries()[0].clone()];
-    let (_, volume) = check(&kernel::solid("hollow", &truck::Solid::new(shells)), 12);
+    let (_, volume) = check(&truck::solid("hollow", &modeling::Solid::new(shells)), 12);
     assert!(near(volume, 1000.0 - 8.0), "{volume}");
 }
 
@@ -247,7 +247,7 @@ fn a_lune_from_pole_to_pole_covers_the_right_side() {
     let wire = Wire::from(vec![builder::circle_arc(&south, &north, Point3::new(2.0, 0.0, 0.0))]);
     let angle = 300f64.to_radians();
     let shell = builder::rsweep(&wire, Point3::new(0.0, 0.0, 0.0), Vector3::unit_z(), Rad(angle));
-    let made = kernel::shell("lune", &shell);
+    let made = truck::shell("lune", &shell);
     let (area, volume) = check(&made, 3);
     assert!(near(area, angle * 2.0 * 4.0), "{area}");
     assert!(near(volume.abs(), angle * 8.0 * 2.0 / 3.0), "{volume}");
@@ -259,7 +259,7 @@ fn a_placed_and_stretched_lens_stays_exact() {
     let straight = measures(&lens.model("lens").unwrap().model).1;
     let turned = builder::rotated(&lens.solid().unwrap(), Point3::new(3.0, 1.0, 0.0), Vector3::unit_x(), Rad(0.7));
     let scaled = builder::scaled(&turned, Point3::new(0.0, 0.0, 0.0), Vector3::new(2.0, 1.0, -3.0));
-    let (_, volume) = check(&kernel::solid("lens", &scaled), 9);
+    let (_, volume) = check(&truck::solid("lens", &scaled), 9);
     assert!(near(volume, 6.0 * straight), "{volume}");
 }
 

@@ -8,11 +8,11 @@ use crate::cli::output::json::json_text;
 use crate::cli::work::{accuracy_target, facets, input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
-use crate::kernel::baseline;
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::tessellate::{Report, sampled_sag};
+use crate::truck::baseline;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use super::export::{TruckFace, faces_to_truck};
 use super::geometry::{point, vector};
-use super::truck::{Shell as TruckShell, Surface};
+use super::modeling::{Shell as TruckShell, Surface};
 use crate::math::{FaceId, Point, Uv};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::Model;

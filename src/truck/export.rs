@@ -2,7 +2,7 @@
 
 use super::geometry::{curve_to_truck, surface_to_truck, to_truck};
 use super::import::Refusal;
-use super::truck::{self, Curve as TruckCurve, Surface as TruckSurface};
+use super::modeling::{self, Curve as TruckCurve, Surface as TruckSurface};
 use crate::math::{Frame, Homogeneous};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve};
@@ -15,7 +15,7 @@ pub struct TruckFace {
     /// Index into the shell's faces.
     pub face: usize,
     /// The face, sharing edges and vertices with its neighbours.
-    pub truck: truck::Face,
+    pub truck: modeling::Face,
 }
 
 /// The faces of a part where it is placed, as truck faces that share their edges, and those truck cannot hold.
@@ -40,24 +40,24 @@ pub fn faces_to_truck(part: &Part, placement: &Frame) -> (Vec<TruckFace>, Vec<Re
 struct Exporter<'a> {
     part: &'a Part,
     placement: &'a Frame,
-    vertices: Vec<truck::Vertex>,
+    vertices: Vec<modeling::Vertex>,
     /// The pieces of each edge in its own direction, made when first used.
-    edges: Vec<Option<Vec<truck::Edge>>>,
+    edges: Vec<Option<Vec<modeling::Edge>>>,
 }
 
 impl<'a> Exporter<'a> {
     fn new(part: &'a Part, placement: &'a Frame) -> Self {
-        let vertices = part.vertices.iter().map(|p| truck::Vertex::new(to_truck(placement.point(*p)))).collect();
+        let vertices = part.vertices.iter().map(|p| modeling::Vertex::new(to_truck(placement.point(*p)))).collect();
         Self { part, placement, vertices, edges: vec![None; part.edges.len()] }
     }
 
-    fn face(&mut self, f: &Face) -> Result<truck::Face, String> {
+    fn face(&mut self, f: &Face) -> Result<modeling::Face, String> {
         let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)))?;
         if f.loops.is_empty() {
             return Err("a face without edges: truck has no closed surfaces without a boundary".into());
         }
-        let build = |wires: Vec<truck::Wire>| {
-            truck::Face::try_new(wires, TruckSurface::NurbsSurface(surface.clone()))
+        let build = |wires: Vec<modeling::Wire>| {
+            modeling::Face::try_new(wires, TruckSurface::NurbsSurface(surface.clone()))
                 .map_err(|e| format!("truck refuses its wires: {e}"))
         };
         let shared = f.loops.iter().map(|l| self.wire(l)).collect::<Result<Vec<_>, _>>().and_then(build);
@@ -68,8 +68,8 @@ impl<'a> Exporter<'a> {
     }
 
     /// A loop of shared edges.
-    fn wire(&mut self, l: &TrimLoop) -> Result<truck::Wire, String> {
-        let mut sides: Vec<truck::Edge> = Vec::new();
+    fn wire(&mut self, l: &TrimLoop) -> Result<modeling::Wire, String> {
+        let mut sides: Vec<modeling::Edge> = Vec::new();
         for u in &l.uses {
             let Some(id) = u.edge else { continue };
             let mut pieces = self.edge(id)?;
@@ -85,7 +85,7 @@ impl<'a> Exporter<'a> {
     }
 
     /// A loop of edges of its own, with a vertex of its own wherever two of them meet.
-    fn cut_open(&self, f: &Face, l: &TrimLoop) -> Result<truck::Wire, String> {
+    fn cut_open(&self, f: &Face, l: &TrimLoop) -> Result<modeling::Wire, String> {
         let mut curves: Vec<Curve> = Vec::new();
         for u in &l.uses {
             let curve = match u.edge {
@@ -101,13 +101,13 @@ impl<'a> Exporter<'a> {
             let t = 0.5 * (t0 + t1);
             curves = vec![curves[0].restricted(t0, t), curves[0].restricted(t, t1)];
         }
-        let joints: Vec<truck::Vertex> =
-            curves.iter().map(|c| truck::Vertex::new(to_truck(c.evaluate(c.domain()[0])))).collect();
+        let joints: Vec<modeling::Vertex> =
+            curves.iter().map(|c| modeling::Vertex::new(to_truck(c.evaluate(c.domain()[0])))).collect();
         let next = joints.iter().cycle().skip(1);
         curves.iter().zip(joints.iter().zip(next)).map(|(c, (a, b))| truck_edge(a, b, c)).collect()
     }
 
-    fn edge(&mut self, id: EdgeId) -> Result<Vec<truck::Edge>, String> {
+    fn edge(&mut self, id: EdgeId) -> Result<Vec<modeling::Edge>, String> {
         let index = id.0 as usize;
         if let Some(made) = &self.edges[index] {
             return Ok(made.clone());
@@ -118,7 +118,7 @@ impl<'a> Exporter<'a> {
         let made = if front == back {
             let [t0, t1] = curve.domain();
             let t = 0.5 * (t0 + t1);
-            let middle = truck::Vertex::new(to_truck(curve.evaluate(t)));
+            let middle = modeling::Vertex::new(to_truck(curve.evaluate(t)));
             vec![
                 truck_edge(&front, &middle, &curve.restricted(t0, t))?,
                 truck_edge(&middle, &back, &curve.restricted(t, t1))?,
@@ -138,8 +138,8 @@ impl<'a> Exporter<'a> {
     }
 }
 
-fn truck_edge(a: &truck::Vertex, b: &truck::Vertex, c: &Curve) -> Result<truck::Edge, String> {
-    truck::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c)?)).map_err(|e| format!("an edge: {e}"))
+fn truck_edge(a: &modeling::Vertex, b: &modeling::Vertex, c: &Curve) -> Result<modeling::Edge, String> {
+    modeling::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c)?)).map_err(|e| format!("an edge: {e}"))
 }
 
 /// The curve in space of a use without an edge: a line of constant u or v.

@@ -23,4 +23,4 @@ pub use export::{TruckFace, faces_to_truck};
 pub use geometry::{curve_to_truck, surface_to_truck};
 pub use import::{Conversion, Refusal, shell, solid};
 pub use parts::{Lens, Reflector};
-pub use truck_modeling as truck;
+pub use truck_modeling as modeling;

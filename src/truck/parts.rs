@@ -2,7 +2,7 @@
 
 use super::conic::{Conic, ShapeError, checked};
 use super::import::{Conversion, shell, solid};
-use super::truck::{Curve, Edge, Line, Point3, Rad, Shell, Solid, Vector3, Wire, builder};
+use super::modeling::{Curve, Edge, Line, Point3, Rad, Shell, Solid, Vector3, Wire, builder};
 
 /// A full turn for truck, which wants more than one.
 const TURN: Rad<f64> = Rad(7.0);
@@ -10,7 +10,7 @@ const TURN: Rad<f64> = Rad(7.0);
 /// A lens about the z axis: front vertex at the origin, light along +z meets the front first.
 ///
 /// ```
-/// use lampyris::kernel::{Conic, Lens};
+/// use lampyris::truck::{Conic, Lens};
 /// // Plano-convex: flat front, a hyperboloid behind that focuses n = 1.5 without aberration.
 /// let lens = Lens { front: Conic::FLAT, back: Conic { radius: -25.0, conic: -2.25 }, thickness: 8.0, half_aperture: 12.0 };
 /// let made = lens.model("condenser").unwrap();
@@ -73,7 +73,7 @@ impl Lens {
 /// A reflector about the z axis: a conic shell that opens towards +z, its vertex at the origin.
 ///
 /// ```
-/// use lampyris::kernel::{Conic, Reflector};
+/// use lampyris::truck::{Conic, Reflector};
 /// let dish = Reflector { shape: Conic::paraboloid(25.0), half_aperture: 60.0, hole: 0.0 };
 /// assert_eq!(dish.focus(), Some(25.0));
 /// assert_eq!(dish.model("dish").unwrap().model.placed_face_count(), 3);
@@ -133,7 +133,7 @@ impl Reflector {
 
     /// The profile from the hole outward.
     fn cut(&self, mut profile: Curve) -> Result<Curve, ShapeError> {
-        use super::truck::{BoundedCurve, Cut, ParametricCurve};
+        use super::modeling::{BoundedCurve, Cut, ParametricCurve};
         let (t0, t1) = profile.range_tuple();
         let off = |t: f64| profile.subs(t).x - self.hole;
         let t = crate::math::safe_newton(|t| (off(t), profile.der(t).x), t0, t1, 0.0);

@@ -1,9 +1,9 @@
 //! One truck face → one [`Face`]: its surface over the parameters it uses, its wires as closed uv loops.
 
 use super::geometry::{bspline_surface, nurbs_surface, point, vector};
+use super::modeling::{Plane, Surface as TruckSurface};
 use super::revolve::{Revolved, Side};
 use super::trace::{ACCEPTED, Tracer};
-use super::truck::{Plane, Surface as TruckSurface};
 use crate::math::{Frame, Point, Uv};
 use crate::model::{Analytic, EdgeId, EdgeUse, Face, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve, Surface, UvCurve, sweep};

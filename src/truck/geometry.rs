@@ -1,6 +1,6 @@
 //! Curves and surfaces in both directions: truck's homogeneous control points and ours are the same numbers.
 
-use super::truck::{
+use super::modeling::{
     BSplineCurve, BSplineSurface, BoundedCurve, Curve as TruckCurve, KnotVec, NurbsCurve, NurbsSurface, Point3,
     Vector3, Vector4,
 };

@@ -1,4 +1,4 @@
-use super::truck::{BSplineCurve, Curve, KnotVec, Line, NurbsCurve, Point3, Vector4};
+use super::modeling::{BSplineCurve, Curve, KnotVec, Line, NurbsCurve, Point3, Vector4};
 use thiserror::Error;
 
 /// A parameter of an optical part that makes no shape.
@@ -94,7 +94,7 @@ impl Conic {
 
 #[cfg(test)]
 mod tests {
-    use super::super::truck::{BoundedCurve, ParametricCurve};
+    use super::super::modeling::{BoundedCurve, ParametricCurve};
     use super::*;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Which angles a face on a surface of revolution covers: truck's surfaces always turn all the way round, ours only as far as the face.
 
 use super::geometry::{curve, point, vector};
-use super::truck::{Curve as TruckCurve, Matrix4, Processor, RevolutedCurve};
+use super::modeling::{Curve as TruckCurve, Matrix4, Processor, RevolutedCurve};
 use crate::math::{Frame, Homogeneous, Point};
 use crate::nurbs::{ControlPoint, Curve, Surface, conic, sweep};
 use std::f64::consts::PI;
@@ -37,7 +37,7 @@ pub(super) struct Cut {
 
 impl Revolved {
     pub(super) fn new(s: &Processor<RevolutedCurve<TruckCurve>, Matrix4>) -> Result<Self, String> {
-        use super::truck::SquareMatrix;
+        use super::modeling::SquareMatrix;
         let entity = s.entity();
         let meridian = curve(entity.entity_curve())?;
         let axis = Frame::from_axis(point(entity.origin()), vector(entity.axis()), None);

@@ -2,7 +2,7 @@
 
 use super::face::{WireEdge, along, convert};
 use super::geometry::{curve, point};
-use super::truck;
+use super::modeling;
 use crate::math::{Aabb, Uv, Vector};
 use crate::model::{Edge, EdgeId, Face, Model, Part, Shell, VertexId};
 use std::collections::HashMap;
@@ -31,16 +31,16 @@ pub struct Refusal {
 /// truck's faces were wound.
 ///
 /// ```
-/// use lampyris::kernel::{self, truck::{builder, Point3, Vector3}};
+/// use lampyris::truck::{self, modeling::{builder, Point3, Vector3}};
 /// let corner = builder::vertex(Point3::new(0.0, 0.0, 0.0));
 /// let edge = builder::tsweep(&corner, Vector3::new(10.0, 0.0, 0.0));
 /// let face = builder::tsweep(&edge, Vector3::new(0.0, 20.0, 0.0));
 /// let cuboid = builder::tsweep(&face, Vector3::new(0.0, 0.0, 30.0));
-/// let made = kernel::solid("block", &cuboid);
+/// let made = truck::solid("block", &cuboid);
 /// assert!(made.refused.is_empty());
 /// assert_eq!(made.model.placed_face_count(), 6);
 /// ```
-pub fn solid(name: &str, solid: &truck::Solid) -> Conversion {
+pub fn solid(name: &str, solid: &modeling::Solid) -> Conversion {
     let mut made = Maker::default();
     for shell in solid.boundaries() {
         made.shell(shell, true);
@@ -49,9 +49,9 @@ pub fn solid(name: &str, solid: &truck::Solid) -> Conversion {
 }
 
 /// The model of a shell; normals are those of truck's faces, turned outward when the shell is closed.
-pub fn shell(name: &str, shell: &truck::Shell) -> Conversion {
+pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     let mut made = Maker::default();
-    let closed = shell.shell_condition() == truck::ShellCondition::Closed;
+    let closed = shell.shell_condition() == modeling::ShellCondition::Closed;
     made.shell(shell, closed);
     made.finish(name)
 }
@@ -60,12 +60,12 @@ pub fn shell(name: &str, shell: &truck::Shell) -> Conversion {
 struct Maker {
     part: Part,
     refused: Vec<Refusal>,
-    vertices: HashMap<truck::VertexID, VertexId>,
-    edges: HashMap<truck::EdgeID, Result<EdgeId, String>>,
+    vertices: HashMap<modeling::VertexID, VertexId>,
+    edges: HashMap<modeling::EdgeID, Result<EdgeId, String>>,
 }
 
 impl Maker {
-    fn shell(&mut self, shell: &truck::Shell, closed: bool) {
+    fn shell(&mut self, shell: &modeling::Shell, closed: bool) {
         let at = self.part.shells.len();
         let mut faces = Vec::new();
         for (i, face) in shell.face_iter().enumerate() {
@@ -77,7 +77,7 @@ impl Maker {
         self.part.shells.push(Shell { faces, closed, ..Shell::default() });
     }
 
-    fn face(&mut self, face: &truck::Face) -> Result<Face, String> {
+    fn face(&mut self, face: &modeling::Face) -> Result<Face, String> {
         let mut wires: Vec<Vec<(EdgeId, bool)>> = Vec::new();
         for wire in face.absolute_boundaries() {
             let edges = wire.edge_iter().map(|e| Ok((self.edge(e)?, !e.orientation())));
@@ -95,7 +95,7 @@ impl Maker {
         convert(&face.surface(), face.orientation(), &wires)
     }
 
-    fn edge(&mut self, e: &truck::Edge) -> Result<EdgeId, String> {
+    fn edge(&mut self, e: &modeling::Edge) -> Result<EdgeId, String> {
         if let Some(known) = self.edges.get(&e.id()) {
             return known.clone();
         }
@@ -108,7 +108,7 @@ impl Maker {
         made
     }
 
-    fn vertex(&mut self, v: &truck::Vertex) -> VertexId {
+    fn vertex(&mut self, v: &modeling::Vertex) -> VertexId {
         *self.vertices.entry(v.id()).or_insert_with(|| {
             self.part.vertices.push(point(v.point()));
             VertexId(self.part.vertices.len() as u32 - 1)
