@@ -1,9 +1,12 @@
 //! Which facets turn farther from the surface normals than was asked.
 
-use super::Settings;
+use super::settings::Settings;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use serde::Serialize;
+
+/// Share of the angle by which a facet may be above it: rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Facets of a face that break [`Settings::angle_deg`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -19,7 +22,7 @@ pub struct SteepFace {
 }
 
 /// Names the faces; `None` when no angle was asked for.
-pub(super) fn broken(mesh: &FacetMesh, model: &Model, settings: &Settings) -> Option<Vec<SteepFace>> {
+pub(super) fn steep_faces(mesh: &FacetMesh, model: &Model, settings: &Settings) -> Option<Vec<SteepFace>> {
     let most = settings.angle_deg?;
     let faces: Vec<_> = model.placed_faces().collect();
     let mut out: Vec<SteepFace> = Vec::new();
@@ -31,12 +34,12 @@ pub(super) fn broken(mesh: &FacetMesh, model: &Model, settings: &Settings) -> Op
         }
         let (p, normal) = (mesh.corners(f), facet.vertices.map(|v| mesh.vertices[v as usize].normal));
         let cuts: &[[usize; 3]] = if facet.is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
-        let of = |t: &[usize; 3]| {
+        let steepest = |t: &[usize; 3]| {
             let flat = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).try_normalize()?;
             Some(t.iter().map(|&k| flat.angle_between(normal[k]).to_degrees()).fold(0.0, f64::max))
         };
-        let angle = cuts.iter().filter_map(of).fold(0.0, f64::max);
-        if angle <= most * (1.0 + 1e-9) {
+        let angle = cuts.iter().filter_map(steepest).fold(0.0, f64::max);
+        if angle <= most * (1.0 + ROUNDING) {
             continue;
         }
         match out.last_mut().filter(|s| s.face == facet.face.0) {

@@ -1,12 +1,15 @@
 //! Parts are meshed once, in parallel over their faces, and copied to where they stand.
 
-use super::border::edges::{self, Division, Side};
-use super::face::{self, FaceMesh};
+use super::border::edge_chords::EdgeSide;
+use super::border::edges::{self, Division, OwnDivision};
+use super::face;
+use super::face_mesh::FaceMesh;
+use super::face_surface::FaceSurface;
 use super::fallback;
-use super::repairs::Repair;
-use super::settings::{Field, Place, Settings};
-use super::sheet::Sheet;
-use super::{FacetQuality, Tessellation};
+use super::nodes::Position;
+use super::report::Repair;
+use super::settings::{FaceSelector, Settings, ToleranceField};
+use super::tessellation::{FacetQuality, Tessellation};
 use crate::math::{FaceId, Frame, Point};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::{EdgeId, Face, Instance, Model, Part, TessellatedFace};
@@ -19,128 +22,140 @@ pub(super) struct PartMesh {
 }
 
 /// Times that borders are sampled more densely where they cross or facets beside them are not proved.
-const TRIES: usize = 3;
+const MAX_ROUNDS: u32 = 3;
 
 /// Meshes every part that is placed.
-pub(super) fn parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
-    (0..model.parts.len())
-        .into_par_iter()
-        .map(|p| {
-            let uses: Vec<usize> =
-                (0..model.instances.len()).filter(|&i| model.instances[i].part.0 as usize == p).collect();
-            let scale = uses.iter().map(|&i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
-            (!uses.is_empty()).then(|| mesh_part(model, &model.parts[p], &uses, scale, settings))
-        })
-        .collect()
+pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
+    let mut uses: Vec<Vec<usize>> = vec![Vec::new(); model.parts.len()];
+    for (i, instance) in model.instances.iter().enumerate() {
+        uses[instance.part.0 as usize].push(i);
+    }
+    let mesh = |(part, uses): (&Part, &Vec<usize>)| {
+        let scale = uses.iter().map(|&i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
+        (!uses.is_empty()).then(|| mesh_part(model, part, uses, scale, settings))
+    };
+    model.parts.par_iter().zip(&uses).map(mesh).collect()
+}
+
+/// The part's faces with their surfaces, tolerances filled in; `None` for faces with numbers that are none.
+fn face_surfaces<'p>(
+    model: &Model,
+    part: &'p Part,
+    uses: &[usize],
+    scale: f64,
+    settings: &Settings,
+) -> Vec<(&'p Face, Option<FaceSurface<'p>>)> {
+    let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
+    let firsts: Vec<u32> = uses.iter().map(|&i| model.first_face(i).0).collect();
+    let with_surface = |(k, face): (usize, &'p Face)| {
+        let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
+        let (tolerance, radii) = tolerance(settings, part, face, &placed);
+        let surface = is_finite(face).then(|| {
+            let field = ToleranceField::new(tolerance, radii, settings.law, scale).with_angle(settings.angle_deg);
+            // Faces that were not read from a file have a gap of zero whether it was measured or not.
+            let mut surface = FaceSurface::new(&face.surface, face.reversed, field);
+            surface.gap = Some(face.gap).filter(|&g| g > 0.0);
+            surface
+        });
+        (face, surface)
+    };
+    faces.into_par_iter().enumerate().map(with_surface).collect()
 }
 
 fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &Settings) -> PartMesh {
-    let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-    let firsts: Vec<u32> = uses.iter().map(|&i| model.first_face(i).0).collect();
-    let sheets: Vec<Option<Sheet<'_>>> = faces
-        .par_iter()
-        .enumerate()
-        .map(|(k, f)| {
-            let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
-            let (tolerance, radii) = tolerance(settings, part, f, &placed);
-            usable(f).then(|| {
-                let field = Field::new(tolerance, radii, settings.law, scale).with_angle(settings.angle_deg);
-                // Faces that were not read from a file have a gap of zero whether it was measured or not.
-                let mut sheet = Sheet::new(&f.surface, f.reversed, field);
-                sheet.gap = Some(f.gap).filter(|&g| g > 0.0);
-                sheet
-            })
-        })
-        .collect();
-    let mut denser = vec![0u32; part.edges.len()];
-    let mut tries = 0;
-    let mut before: Option<Before> = None;
-    let mut alone = Vec::new();
-    loop {
-        let mut sides: Vec<Vec<Side<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
-        for (face, sheet) in faces.iter().zip(&sheets) {
-            let Some(sheet) = sheet else { continue };
-            for side in face.loops.iter().flat_map(|l| &l.uses) {
-                if let Some(list) = side.edge.and_then(|e| sides.get_mut(e.0 as usize)) {
-                    list.push(Side { sheet, side });
-                }
+    let faces = face_surfaces(model, part, uses, scale, settings);
+    let known: Vec<(&Face, &FaceSurface<'_>)> =
+        faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
+    // The sides of each edge on its faces.
+    let mut sides: Vec<Vec<EdgeSide<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
+    for &(face, surface) in &known {
+        for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
+            if let Some(list) = edge_use.edge.and_then(|e| sides.get_mut(e.0 as usize)) {
+                list.push(EdgeSide { surface, edge_use });
             }
         }
-        let known: Vec<(&Face, &Sheet<'_>)> =
-            faces.iter().zip(&sheets).filter_map(|(f, s)| Some((*f, s.as_ref()?))).collect();
-        let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut alone);
-        let mesh = |(face, sheet): (&&Face, &Option<Sheet<'_>>)| {
-            one(part, face, sheet.as_ref()?, &divisions, &shared, settings)
+    }
+    let mut denser = vec![0u32; part.edges.len()];
+    let mut own: Vec<OwnDivision> = Vec::new();
+    let mut before: Option<PreviousRound> = None;
+    let mut round = 0;
+    loop {
+        let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut own);
+        let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
+            mesh_face(part, face, surface.as_ref()?, &divisions, &shared, settings)
         };
         let meshes: Vec<Option<FaceMesh>> = match before.take() {
-            None => faces.par_iter().zip(&sheets).map(mesh).collect(),
+            None => faces.par_iter().map(mesh).collect(),
             Some(before) => {
                 // Few edges change: faces whose own did not are as they were, but for the numbers of their corners.
-                let moved = before.moved(part, &divisions);
-                let again = |(face, mesh): (&&Face, &Option<FaceMesh>)| {
-                    mesh.is_none() || face.loops.iter().flat_map(|l| &l.uses).any(|u| moved.has_changed(u.edge))
+                let renumbering = before.renumbering(part, &divisions);
+                let again = |((face, _), old): (&(&Face, Option<FaceSurface<'_>>), &Option<FaceMesh>)| {
+                    old.is_none()
+                        || face.loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge))
                 };
                 let dirty: Vec<bool> = faces.iter().zip(&before.meshes).map(again).collect();
-                let all = faces.par_iter().zip(&sheets).zip(before.meshes).zip(dirty);
-                all.map(
-                    |((x, old), dirty)| if dirty { mesh(x) } else { old.map(|m| moved.renamed(m, shared.len())) },
-                )
-                .collect()
+                let all = faces.par_iter().zip(before.meshes).zip(dirty);
+                let renew = |((face, old), dirty)| {
+                    if dirty { mesh(face) } else { Option::map(old, |m| renumbering.renumbered(m)) }
+                };
+                all.map(renew).collect()
             }
         };
         let coarse: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.coarse).map(|e| e.0 as usize).collect();
-        if coarse.is_empty() || tries == TRIES {
-            return joined(PartMesh { shared, faces: meshes });
+        if coarse.is_empty() || round == MAX_ROUNDS {
+            return with_coincident_vertices_joined(PartMesh { shared, faces: meshes });
         }
-        tries += 1;
+        round += 1;
         for e in coarse {
-            denser[e] = tries as u32;
+            denser[e] = round;
         }
-        before = Some(Before { divisions, shared: shared.len(), meshes });
+        before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     }
 }
 
 /// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there, the
 /// faces beyond must have the same.
-fn joined(mut mesh: PartMesh) -> PartMesh {
-    let all: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.same.iter().copied()).collect();
-    if all.is_empty() {
+fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
+    let pairs: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.coincident.iter().copied()).collect();
+    if pairs.is_empty() {
         return mesh;
     }
-    let mut first: Vec<u32> = (0..mesh.shared.len() as u32).collect();
-    let find = |first: &[u32], mut p: u32| {
-        while first[p as usize] != p {
-            p = first[p as usize];
+    // Union of sets, each named by its least member.
+    let mut parent: Vec<u32> = (0..mesh.shared.len() as u32).collect();
+    let root = |parent: &[u32], mut p: u32| {
+        while parent[p as usize] != p {
+            p = parent[p as usize];
         }
         p
     };
-    for [a, b] in all {
-        let (a, b) = (find(&first, a), find(&first, b));
-        first[a.max(b) as usize] = a.min(b);
+    for [a, b] in pairs {
+        let (a, b) = (root(&parent, a), root(&parent, b));
+        parent[a.max(b) as usize] = a.min(b);
     }
-    for (p, _, _) in mesh.faces.iter_mut().flatten().flat_map(|f| &mut f.corners) {
-        if (*p as usize) < first.len() {
-            *p = find(&first, *p);
+    for corner in mesh.faces.iter_mut().flatten().flat_map(|f| &mut f.corners) {
+        if let Position::Shared(p) = &mut corner.position {
+            *p = root(&parent, *p);
         }
     }
     mesh
 }
 
 /// What a part looked like before some of its edges were sampled more densely.
-struct Before {
+struct PreviousRound {
     divisions: Vec<Division>,
+    /// How many shared positions there were.
     shared: usize,
     meshes: Vec<Option<FaceMesh>>,
 }
 
 /// Where shared positions are now, and which edges have others.
-struct Moved {
+struct Renumbering {
     changed: Vec<bool>,
     to: Vec<u32>,
 }
 
-impl Before {
-    fn moved(&self, part: &Part, now: &[Division]) -> Moved {
+impl PreviousRound {
+    fn renumbering(&self, part: &Part, now: &[Division]) -> Renumbering {
         let mut to: Vec<u32> = (0..self.shared as u32).collect();
         let mut changed = Vec::with_capacity(part.edges.len());
         for (old, new) in self.divisions.iter().zip(now) {
@@ -149,46 +164,52 @@ impl Before {
                 (0..old.t.len() as u32 - 2).for_each(|k| to[(old.first + k) as usize] = new.first + k);
             }
         }
-        Moved { changed, to }
+        Renumbering { changed, to }
     }
 }
 
-impl Moved {
+impl Renumbering {
     fn has_changed(&self, edge: Option<EdgeId>) -> bool {
         edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
     }
 
-    /// The mesh with the numbers that its corners have now.
-    fn renamed(&self, mut mesh: FaceMesh, shared: usize) -> FaceMesh {
-        for (p, _, _) in &mut mesh.corners {
-            let own = (*p as usize).checked_sub(self.to.len());
-            *p = own.map_or_else(|| self.to[*p as usize], |own| (shared + own) as u32);
+    /// The mesh with the numbers that its shared positions have now.
+    fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
+        for corner in &mut mesh.corners {
+            if let Position::Shared(p) = &mut corner.position {
+                *p = self.to[*p as usize];
+            }
         }
-        mesh.same.iter_mut().flatten().for_each(|p| *p = self.to[*p as usize]);
+        mesh.coincident.iter_mut().flatten().for_each(|p| *p = self.to[*p as usize]);
         mesh
     }
 }
 
-fn one(
+/// A face by its cells and transition, or by its border alone; `None` where neither gives facets.
+fn mesh_face(
     part: &Part,
     face: &Face,
-    sheet: &Sheet<'_>,
+    surface: &FaceSurface<'_>,
     divisions: &[Division],
     shared: &[Point],
     settings: &Settings,
 ) -> Option<FaceMesh> {
-    let known = |e: Option<crate::model::EdgeId>| e.is_none_or(|e| (e.0 as usize) < part.edges.len());
-    let complete = face.loops.iter().flat_map(|l| &l.uses).all(|u| known(u.edge));
-    if !complete {
+    let uses = || face.loops.iter().flat_map(|l| &l.uses);
+    // Edges and vertices that the part does not have cannot be met.
+    let exists = |e: EdgeId| {
+        let edge = part.edges.get(e.0 as usize);
+        edge.is_some_and(|edge| edge.vertices.iter().all(|v| (v.0 as usize) < part.vertices.len()))
+    };
+    if !uses().filter_map(|u| u.edge).all(exists) {
         return None;
     }
-    let numbers = face.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.points.iter().all(|p| p.is_finite()));
-    let whole = if numbers { face::mesh(part, face, sheet, divisions, shared, settings) } else { None };
-    whole.or_else(|| fallback::boundary(part, face, sheet, divisions, shared))
+    let finite = uses().all(|u| u.uv.points.iter().all(|p| p.is_finite()));
+    let whole = if finite { face::mesh(part, face, surface, divisions, shared, settings) } else { None };
+    whole.or_else(|| fallback::border_alone(part, face, surface, divisions, shared))
 }
 
 /// Whether all numbers of a face are numbers.
-fn usable(face: &Face) -> bool {
+fn is_finite(face: &Face) -> bool {
     let s = &face.surface;
     let [[u0, u1], [v0, v1]] = s.domain();
     let points = s.points.iter().all(|p| p.is_finite() && p.w > 0.0);
@@ -196,71 +217,74 @@ fn usable(face: &Face) -> bool {
 }
 
 fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> ([f64; 2], [f64; 2]) {
-    let matches = |place: &Place| match place {
-        Place::Part(name) => *name == part.name,
-        Place::Face(name) => *name == face.name,
-        Place::Entity(id) => face.entity == Some(*id),
-        Place::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
+    let matches = |place: &FaceSelector| match place {
+        FaceSelector::Part(name) => *name == part.name,
+        FaceSelector::Face(name) => *name == face.name,
+        FaceSelector::Entity(id) => face.entity == Some(*id),
+        FaceSelector::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
     };
-    let found = settings.overrides.iter().rev().find(|o| matches(&o.place));
-    found.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
+    let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
+    last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
+}
+
+/// What placing gives.
+pub(super) struct Placed {
+    pub(super) made: Tessellation,
+    /// Faces without facets.
+    pub(super) failed: Vec<FaceId>,
+    /// Faces of which something was given up.
+    pub(super) repairs: Vec<(FaceId, Repair)>,
 }
 
 /// Puts every instance's facets where they belong.
-pub(super) fn place(
-    model: &Model,
-    parts: &[Option<PartMesh>],
-) -> (Tessellation, Vec<FaceId>, Vec<(FaceId, Repair)>) {
-    let mut out = Tessellation::default();
-    let (mut failed, mut repairs) = (Vec::new(), Vec::new());
+pub(super) fn place_instances(model: &Model, parts: &[Option<PartMesh>]) -> Placed {
+    let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new() };
     for (i, instance) in model.instances.iter().enumerate() {
         let first = model.first_face(i);
         let part = model.part(instance.part);
         let Some(mesh) = &parts[instance.part.0 as usize] else { continue };
-        let shared = out.mesh.positions.len() as u32;
-        out.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
+        let shared = out.made.mesh.positions.len() as u32;
+        out.made.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
         for (k, face) in mesh.faces.iter().enumerate() {
             let id = FaceId(first.0 + k as u32);
             match face {
                 Some(face) => {
-                    repairs.extend(face.repaired.map(|how| (id, how)));
-                    place_face(&mut out, instance, mesh, shared, face, id);
+                    out.repairs.extend(face.repaired.map(|how| (id, how)));
+                    place_face(&mut out.made, instance, shared, face, id);
                 }
-                None => failed.push(id),
+                None => out.failed.push(id),
             }
         }
         for (k, ready) in part.tessellated.iter().enumerate() {
-            place_ready(&mut out, &instance.placement, ready, FaceId(first.0 + (mesh.faces.len() + k) as u32));
+            let id = FaceId(first.0 + (mesh.faces.len() + k) as u32);
+            place_ready(&mut out.made, &instance.placement, ready, id);
         }
     }
-    drop_unused(&mut out.mesh);
-    (out, failed, repairs)
+    drop_unused(&mut out.made.mesh);
+    out
 }
 
-fn place_face(
-    out: &mut Tessellation,
-    instance: &Instance,
-    mesh: &PartMesh,
-    shared: u32,
-    face: &FaceMesh,
-    id: FaceId,
-) {
-    let (frame, limit) = (&instance.placement, mesh.shared.len() as u32);
+/// Adds the facets of a face whose part's shared positions start at `shared`.
+fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &FaceMesh, id: FaceId) {
+    let frame = &instance.placement;
     let own = out.mesh.positions.len() as u32;
     out.mesh.positions.extend(face.own.iter().map(|&p| frame.point(p)));
-    let corner = out.mesh.vertices.len() as u32;
-    out.mesh.vertices.extend(face.corners.iter().map(|&(p, n, uv)| MeshVertex {
-        position: if p < limit { shared + p } else { own + p - limit },
-        normal: frame.normal(n),
-        uv,
+    let first = out.mesh.vertices.len() as u32;
+    out.mesh.vertices.extend(face.corners.iter().map(|corner| MeshVertex {
+        position: match corner.position {
+            Position::Shared(p) => shared + p,
+            Position::Own(p) => own + p,
+        },
+        normal: frame.normal(corner.normal),
+        uv: corner.uv,
     }));
-    for ((f, &bound), &tolerance) in face.facets.iter().zip(&face.bounds).zip(&face.tolerances) {
-        let vertices = turned(f.map(|c| c + corner), frame);
+    for facet in &face.facets {
+        let vertices = turned(facet.corners.map(|c| c + first), frame);
         out.mesh.facets.push(Facet { vertices, face: id });
-        let (bound, tolerance) = (bound * frame.scale, tolerance * frame.scale);
-        let proved = bound <= tolerance;
-        out.mesh.sag.push(if proved { bound } else { f64::INFINITY });
-        out.quality.push(FacetQuality { tolerance, bound, certified: proved });
+        let (bound, tolerance) = (facet.bound * frame.scale, facet.tolerance * frame.scale);
+        let certified = bound <= tolerance;
+        out.mesh.sag.push(if certified { bound } else { f64::INFINITY });
+        out.quality.push(FacetQuality { tolerance, bound, certified });
     }
 }
 

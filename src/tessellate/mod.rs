@@ -7,7 +7,7 @@
 //! is sharply curved, loose where it is nearly flat.
 //!
 //! Guarantee: a facet with [`FacetQuality::certified`] and its piece of the spline lie within its tolerance of each other,
-//! measured both ways; the argument stands in `bound.rs`. Facets that cannot be proved are counted, never hidden. The
+//! measured both ways; the argument stands in `prover.rs`. Facets that cannot be proved are counted, never hidden. The
 //! result is the same bits for any number of threads.
 //!
 //! Known weakness: the angle condition ([`Settings::angle_deg`]) is checked at corners, not proved, and broken in acute corners between
@@ -17,45 +17,31 @@
 mod angles;
 mod assemble;
 mod border;
+mod border_nodes;
 mod cells;
+mod emission;
+mod evaluation;
 mod face;
+mod face_mesh;
+mod face_surface;
 mod fallback;
+mod nodes;
 mod proof;
 mod repairs;
 mod report;
 mod sample;
 mod settings;
-mod sheet;
-mod strip;
+mod tessellation;
+mod transition;
 
-use crate::mesh::FacetMesh;
 use crate::model::Model;
 pub use angles::SteepFace;
-pub use repairs::{Repair, RepairedFace};
-pub use report::{FaceCounts, Percentiles, Report, Sag, ShellCounts, ToleranceRange, sampled_sag};
-pub use settings::{Judge, Law, Override, Place, Settings};
-
-/// What [`tessellate`] makes.
-#[derive(Clone, Debug, Default)]
-pub struct Tessellation {
-    /// The facets of all placed faces; the id of a facet's face is its index in [`Model::placed_faces`].
-    pub mesh: FacetMesh,
-    /// What came out, counted.
-    pub report: Report,
-    /// For each facet of the mesh: what it had to hold to, and whether it does.
-    pub quality: Vec<FacetQuality>,
-}
-
-/// How a facet stands to its tolerance.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FacetQuality {
-    /// Tolerance at the facet's place, mm; 0 for faces that are meshes in the file.
-    pub tolerance: f64,
-    /// Upper bound of the distance to its piece of the spline where certified; otherwise a value above the tolerance.
-    pub bound: f64,
-    /// Whether the bound is proved to be within the tolerance.
-    pub certified: bool,
-}
+pub use evaluation::sampled_sag;
+pub use report::{
+    FaceCounts, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag, ShellCounts, ToleranceRange,
+};
+pub use settings::{Acceptance, FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
+pub use tessellation::{FacetQuality, Tessellation};
 
 /// Tessellates every placed face of a model. Faces of which nothing can be made are counted in the report.
 ///
@@ -84,9 +70,9 @@ pub struct FacetQuality {
 /// ```
 pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
-    let parts = assemble::parts(model, settings);
-    let (mut made, failed, repairs) = assemble::place(model, &parts);
+    let parts = assemble::mesh_parts(model, settings);
+    let assemble::Placed { mut made, failed, repairs } = assemble::place_instances(model, &parts);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
-    report::fill(&mut made, model, settings, failed, &repairs);
+    evaluation::fill_report(&mut made, model, settings, &failed, &repairs);
     made
 }

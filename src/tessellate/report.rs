@@ -1,11 +1,6 @@
 //! What came out, in the words of `facet --json`.
 
-use super::angles::{self, SteepFace};
-use super::repairs::{self, Repair, RepairedFace};
-use super::{Settings, Tessellation, sample};
-use crate::math::FaceId;
-use crate::mesh::{FacetMesh, Topology};
-use crate::model::Model;
+use super::angles::SteepFace;
 use serde::Serialize;
 
 /// The geometry part of `facet --json`.
@@ -132,118 +127,28 @@ pub struct Seconds {
     pub tessellate: f64,
 }
 
-/// Fills in everything but the times.
-pub(super) fn fill(
-    made: &mut Tessellation,
-    model: &Model,
-    settings: &Settings,
-    failed: Vec<FaceId>,
-    repairs: &[(FaceId, Repair)],
-) {
-    let mut report = std::mem::take(&mut made.report);
-    let mesh = &made.mesh;
-    report.facets = mesh.facets.len();
-    report.quads = mesh.quad_count();
-    report.triangles = report.facets - report.quads;
-    report.vertices = mesh.positions.len();
-    let [a, b] = settings.tolerance;
-    report.tolerance_mm = ToleranceRange { min: a.min(b), max: a.max(b) };
-    report.certified = made.quality.iter().filter(|q| q.certified).count();
-    report.sag_mm.bound_max = made.quality.iter().filter(|q| q.certified).map(|q| q.bound).fold(0.0, f64::max);
-    let areas: Vec<f64> = (0..mesh.facets.len()).map(|f| mesh.facet_area(f)).collect();
-    report.area_mm2 = areas.iter().sum();
-    let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
-    report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
-    report.faces.failed = failed.len();
-    report.over_angle = angles::broken(mesh, model, settings);
-    report.faces.repaired = repairs.len();
-    report.repaired = repairs::named(made, model, repairs);
-    report.faces.meshed = model.placed_face_count() - failed.len();
-    name_uncertified(&mut report, made, model);
-    let all_closed = shells(&mut report, made, model);
-    report.volume_mm3 = (all_closed && report.facets > 0).then(|| made.mesh.volume());
-    if settings.measure {
-        measure(&mut report, made, model, &areas);
-    }
-    made.report = report;
+/// What was given up on a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Repair {
+    /// Its budget of facets ended: what was left has coarser cells.
+    CoarserCells,
+    /// Its border crosses itself in the parameter plane: parts of it are not kept.
+    CrossingBorder,
+    /// Its parameter plane gave nothing: only its border was triangulated.
+    BorderOnly,
 }
 
-fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
-    for (facet, _) in made.mesh.facets.iter().zip(&made.quality).filter(|(_, q)| !q.certified) {
-        match report.not_certified.last_mut() {
-            Some(last) if last.face == facet.face.0 => last.facets += 1,
-            _ => {
-                report.not_certified.push(NotCertified { face: facet.face.0, entity: None, facets: 1, gap_mm: 0.0 })
-            }
-        }
-    }
-    if !report.not_certified.is_empty() {
-        let faces: Vec<_> = model.placed_faces().collect();
-        for n in &mut report.not_certified {
-            let placed = &faces[n.face as usize];
-            n.entity = placed.entity();
-            n.gap_mm = placed.face.map_or(0.0, |f| f.gap * placed.placement.scale.abs());
-        }
-    }
-}
-
-/// Counts closed shells; whether every shell of the model is closed.
-fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
-    let facets = &made.mesh.facets;
-    let mut all = true;
-    for (i, instance) in model.instances.iter().enumerate() {
-        let mut face = model.first_face(i).0;
-        let part = model.part(instance.part);
-        for shell in &part.shells {
-            let next = face + shell.faces.len() as u32;
-            let start = facets.partition_point(|f| f.face.0 < face);
-            let end = facets.partition_point(|f| f.face.0 < next);
-            face = next;
-            if !shell.closed {
-                all = false;
-                continue;
-            }
-            let Topology { open_edges, nonmanifold_edges, turned_edges } = made.mesh.topology(start..end);
-            report.open_edges += open_edges;
-            report.nonmanifold_edges += nonmanifold_edges + turned_edges;
-            if start < end && open_edges + nonmanifold_edges + turned_edges == 0 {
-                report.shells.closed += 1;
-            } else {
-                report.shells.open += 1;
-                all = false;
-            }
-        }
-        all &= part.tessellated.is_empty();
-    }
-    all
-}
-
-fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
-    let sampled = sample::all(&made.mesh, model);
-    let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
-    let mean = sampled.iter().zip(areas).map(|(s, a)| s.mean * a).sum::<f64>() / report.area_mm2.max(1e-300);
-    report.sag_mm.sampled_max = Some(max);
-    report.sag_mm.sampled_mean = Some(mean);
-    // A sample on the very tolerance differs by rounding alone.
-    let over = |(s, q): (&sample::Sampled, &super::FacetQuality)| s.sag > q.tolerance * (1.0 + 1e-9) + 1e-10;
-    let found = sampled.iter().zip(&made.quality).enumerate().filter(|&(_, x)| over(x));
-    report.over = found.map(|(i, (s, _))| (i as u32, s.sag)).collect();
-    report.over_tolerance = Some(report.over.len());
-    let mut errors: Vec<f32> = sampled.into_iter().flat_map(|s| s.normal_errors).collect();
-    errors.sort_by(f32::total_cmp);
-    let at = |share: f64| {
-        let i = ((errors.len().saturating_sub(1)) as f64 * share) as usize;
-        errors.get(i).map_or(0.0, |&e| f64::from(e).to_degrees())
-    };
-    report.normal_error_deg = Some(Percentiles { p50: at(0.5), p99: at(0.99), max: at(1.0) });
-}
-
-/// Samples how far any mesh of a model lies from its splines: the largest distance and the mean weighted by area, mm.
-///
-/// Vertices need their `uv`. This is how [`Report::sag_mm`] is sampled, for meshes of others.
-pub fn sampled_sag(mesh: &FacetMesh, model: &Model) -> [f64; 2] {
-    let sampled = sample::all(mesh, model);
-    let areas = (0..mesh.facets.len()).map(|f| mesh.facet_area(f));
-    let (sum, area) = sampled.iter().zip(areas).fold((0.0, 0.0), |(s, t), (x, a)| (s + x.mean * a, t + a));
-    [sampled.iter().map(|s| s.sag).fold(0.0, f64::max), sum / area.max(1e-300)]
+/// A face of which something was given up.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RepairedFace {
+    /// Index of the placed face.
+    pub face: u32,
+    /// The `#id` in the file.
+    pub entity: Option<u64>,
+    /// What was given up.
+    pub how: Repair,
+    /// The largest distance to its spline: proved for certified facets, sampled for the others, mm.
+    pub reached_mm: f64,
 }

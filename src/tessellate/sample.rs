@@ -1,5 +1,5 @@
 //! Sag and normal error by dense sampling: evaluates splines by their definition and measures distances its own way, so
-//! that it can judge the bound.
+//! that it can acceptance the bound.
 
 use crate::math::{Point, Uv, Vector};
 use crate::mesh::FacetMesh;
@@ -41,15 +41,24 @@ const POINTS: [(f64, [f64; 3]); 9] = {
 
 /// Surface samples a side of a facet.
 const GRID: usize = 8;
+/// Share of the distance found so far below which a piece of the surface is small enough: a start for [`project`], no more.
+const SMALL_PIECE: f64 = 1e-3;
+/// Steps of one projection, and the share of the distance below which a step gains nothing.
+const MAX_STEPS: usize = 12;
+const STILL: f64 = 1e-9;
+/// Determinant of the first fundamental form, in shares of the product of its diagonal, at which it cannot be solved for a step.
+const SINGULAR: f64 = 1e-14;
+/// Height of a triangle, in shares of its longer side, at which it is a needle.
+const NEEDLE: f64 = 1e-8;
 
 /// Samples every facet; facets of ready meshes give zeros.
-pub(super) fn all(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
+pub(super) fn sample_mesh(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
     let facets: Vec<usize> = (0..mesh.facets.len()).collect();
-    some(mesh, model, &facets)
+    sample_facets(mesh, model, &facets)
 }
 
 /// Samples some facets.
-pub(super) fn some(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sampled> {
+pub(super) fn sample_facets(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sampled> {
     let faces: Vec<_> = model.placed_faces().collect();
     facets
         .par_iter()
@@ -62,7 +71,7 @@ pub(super) fn some(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sam
             let normals = mesh.facets[f]
                 .vertices
                 .map(|v| sign * placed.placement.local_direction(mesh.vertices[v as usize].normal));
-            let mut s = facet(&face.surface, mesh, f, corners, normals);
+            let mut s = sample_facet(&face.surface, mesh, f, corners, normals);
             s.sag *= scale;
             s.mean *= scale;
             s
@@ -70,13 +79,13 @@ pub(super) fn some(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sam
         .collect()
 }
 
-fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
+fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
     let uv = mesh.facets[f].vertices.map(|v| mesh.vertices[v as usize].uv);
     let triangles: &[[usize; 3]] =
         if mesh.facets[f].is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
     let mut out = Sampled::default();
     let to_facet = |x: Point| {
-        let each = triangles.iter().map(|t| (x - closest(x, t.map(|k| p[k]))).length());
+        let each = triangles.iter().map(|t| (x - closest_point(x, t.map(|k| p[k]))).length());
         each.fold(f64::INFINITY, f64::min)
     };
     for t in triangles {
@@ -96,7 +105,7 @@ fn facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vecto
     }
     let (mut sum, mut area) = (0.0, 0.0);
     for t in triangles {
-        let share = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).length().max(1e-300);
+        let share = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).length().max(f64::MIN_POSITIVE);
         area += share;
         for (weight, b) in POINTS {
             let x = p[t[0]] * b[0] + p[t[1]] * b[1] + p[t[2]] * b[2];
@@ -142,7 +151,7 @@ const LEVELS: usize = 40;
 /// is lost where weights crowd most of the parameters into one place and a step of any length leaps over the surface.
 fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     let at = |u: Uv| (u, surface.evaluate(u));
-    let off = |p: &[(Uv, Point); 3]| (x - closest(x, p.map(|q| q.1))).length();
+    let off = |p: &[(Uv, Point); 3]| (x - closest_point(x, p.map(|q| q.1))).length();
     let mut best = (f64::INFINITY, over[0][0]);
     let mut pieces: Vec<[(Uv, Point); 3]> = over.iter().map(|uv| uv.map(at)).collect();
     for _ in 0..LEVELS {
@@ -161,7 +170,7 @@ fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
         parts.sort_by(|p, q| p.0.total_cmp(&q.0));
         parts.truncate(FOLLOWED);
         let small = |[a, b, c]: &[(Uv, Point); 3]| {
-            (a.1 - b.1).length().max((b.1 - c.1).length()).max((c.1 - a.1).length()) <= 1e-3 * best.0
+            (a.1 - b.1).length().max((b.1 - c.1).length()).max((c.1 - a.1).length()) <= SMALL_PIECE * best.0
         };
         pieces = parts.into_iter().map(|p| p.1).filter(|p| !small(p)).collect();
         if pieces.is_empty() {
@@ -184,12 +193,12 @@ pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
 fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
     let mut best = surface.clamp(start);
     let mut away = (surface.evaluate(best) - x).length();
-    for _ in 0..12 {
+    for _ in 0..MAX_STEPS {
         let d = surface.derivatives(best);
         let e = x - d.point;
         let (a, b, c) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
         let det = a * c - b * b;
-        if det <= 1e-14 * a * c {
+        if det <= SINGULAR * a * c {
             break;
         }
         let (r, s) = (e.dot(d.du), e.dot(d.dv));
@@ -202,7 +211,7 @@ fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
         };
         let gain = away - nearer;
         (best, away) = (next, nearer);
-        if gain <= 1e-9 * away {
+        if gain <= STILL * away {
             break;
         }
     }
@@ -210,9 +219,9 @@ fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
 }
 
 /// Nearest point of a triangle: Ericson, *Real-Time Collision Detection*, 5.1.5.
-fn closest(p: Point, [a, b, c]: [Point; 3]) -> Point {
+fn closest_point(p: Point, [a, b, c]: [Point; 3]) -> Point {
     let (ab, ac, ap) = (b - a, c - a, p - a);
-    if ab.cross(ac).length() <= 1e-8 * ab.length().max(ac.length()).powi(2) {
+    if ab.cross(ac).length() <= NEEDLE * ab.length().max(ac.length()).powi(2) {
         // A needle: the nearest of its three sides; region tests by differences of products lose all their digits there.
         let on = |x: Point, y: Point| {
             let l = (y - x).length_squared();

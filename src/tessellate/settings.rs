@@ -1,4 +1,9 @@
+//! What the facets must hold to, and the tolerance as a function of curvature.
+
 use crate::math::FaceId;
+
+/// Tolerance or radius, mm, in place of one that is not positive: less than any machine makes.
+const LEAST_LENGTH: f64 = 1e-9;
 
 /// What the facets must hold to, and how hard to try.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,25 +16,25 @@ pub struct Settings {
     /// reflector has 0.096 mm.
     pub radii: [f64; 2],
     /// How the tolerance runs between the two radii.
-    pub law: Law,
+    pub law: ToleranceLaw,
     /// Largest angle between a facet and the surface normals at its corners, degrees; `None` for no such condition.
     pub angle_deg: Option<f64>,
     /// Other tolerances for some places; of several that match a face, the last counts.
-    pub overrides: Vec<Override>,
+    pub overrides: Vec<ToleranceOverride>,
     /// Most cells of one face that are held to its tolerance; beyond it, cells are coarser, a few times as many at most, counted as
     /// not certified, and the face as repaired.
     pub budget: usize,
     /// What decides whether a facet is good enough.
-    pub judge: Judge,
+    pub acceptance: Acceptance,
     /// Whether [`super::Report`] gets sampled sag and normal errors, which costs about twice the time of meshing.
     pub measure: bool,
 }
 
 /// Another tolerance for some faces.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Override {
+pub struct ToleranceOverride {
     /// Where it holds.
-    pub place: Place,
+    pub place: FaceSelector,
     /// As [`Settings::tolerance`].
     pub tolerance: [f64; 2],
     /// As [`Settings::radii`], where the place needs its own.
@@ -38,7 +43,7 @@ pub struct Override {
 
 /// How the tolerance runs between the radii of [`Settings::radii`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Law {
+pub enum ToleranceLaw {
     /// Smoothly with the logarithm of the radius.
     #[default]
     Smooth,
@@ -50,7 +55,7 @@ pub enum Law {
 /// Selects faces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Place {
+pub enum FaceSelector {
     /// All faces of the parts of this name.
     Part(String),
     /// All faces of this name.
@@ -64,10 +69,10 @@ pub enum Place {
 
 /// What decides whether a facet is good enough.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Judge {
+pub enum Acceptance {
     /// The proved bound.
     #[default]
-    Bound,
+    Proved,
     /// Dense sampling of the true distance: proves nothing; it shows what the proof costs in facets.
     Sampled,
 }
@@ -77,11 +82,11 @@ impl Default for Settings {
         Self {
             tolerance: [0.05, 0.2],
             radii: [5.0, 300.0],
-            law: Law::Smooth,
+            law: ToleranceLaw::Smooth,
             angle_deg: None,
             overrides: Vec::new(),
             budget: 400_000,
-            judge: Judge::Bound,
+            acceptance: Acceptance::Proved,
             measure: false,
         }
     }
@@ -102,25 +107,25 @@ impl Settings {
 
 /// The tolerance as a function of curvature, for one face in its part's own lengths.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
+pub(super) struct ToleranceField {
     range: [f64; 2],
     radii: [f64; 2],
-    law: Law,
+    law: ToleranceLaw,
     /// Largest angle between a facet and the normals at its corners, radians.
     pub(super) angle: Option<f64>,
 }
 
-impl Field {
+impl ToleranceField {
     /// `scale` is that of the placement: tolerances hold for the placed part.
-    pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: Law, scale: f64) -> Self {
-        let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { 1e-9 };
+    pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: ToleranceLaw, scale: f64) -> Self {
+        let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { LEAST_LENGTH };
         let [a, b] = tolerance.map(clean);
         let [r, s] = radii.map(clean);
         Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)], law, angle: None }
     }
 
     /// Tolerance where the sharpest normal curvature is `k`.
-    pub(super) fn at(&self, k: f64) -> f64 {
+    pub(super) fn tolerance_at(&self, k: f64) -> f64 {
         let ([tight, loose], [sharp, flat]) = (self.range, self.radii);
         if tight == loose || k * flat <= 1.0 {
             return loose;
@@ -130,8 +135,8 @@ impl Field {
         }
         let x = (1.0 / (k * sharp)).ln() / (flat / sharp).ln();
         match self.law {
-            Law::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
-            Law::Power => tight * (loose / tight).powf(x),
+            ToleranceLaw::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
+            ToleranceLaw::Power => tight * (loose / tight).powf(x),
         }
     }
 

@@ -130,7 +130,6 @@ pub(crate) const UNORDERED: &[&str] = &[
     "intersect",
     "intersect/exact",
     "intersect/octree",
-    "truck",
     "optics",
     "simulate",
     "simulate/kernel",
@@ -138,7 +137,6 @@ pub(crate) const UNORDERED: &[&str] = &[
     "step/product",
     "study",
     "tessellate/proof",
-    "truck",
 ];
 
 /// Crates that only these modules may name.

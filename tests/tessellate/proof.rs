@@ -4,7 +4,7 @@ use crate::support::{config, knots};
 use lampyris::math::{Frame, Homogeneous, Point, Uv, Vector};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
-use lampyris::tessellate::{Judge, Settings, Tessellation, tessellate};
+use lampyris::tessellate::{Acceptance, Settings, Tessellation, tessellate};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -40,7 +40,7 @@ fn freeform() -> Model {
 fn the_proof_costs_at_most_a_quarter_more_facets_than_sampling() {
     for (name, model) in [("sphere", sphere()), ("torus", torus()), ("freeform", freeform())] {
         let bound = tessellate(&model, &Settings::uniform(0.05));
-        let oracle = tessellate(&model, &Settings { judge: Judge::Sampled, ..Settings::uniform(0.05) });
+        let oracle = tessellate(&model, &Settings { acceptance: Acceptance::Sampled, ..Settings::uniform(0.05) });
         let (b, o) = (bound.report.facets, oracle.report.facets);
         println!("{name}: {b} facets by the bound, {o} by sampling");
         assert_eq!(bound.report.certified, b, "{name}");

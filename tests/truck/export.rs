@@ -1,12 +1,14 @@
 //! Our surfaces evaluated by truck, our faces meshed by truck: an independent program on the same geometry.
 
 use crate::files::{fixture, read_model};
-use lampyris::truck::modeling::{ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3, Vector4};
-use lampyris::truck::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
 use lampyris::math::{Frame, Point, Uv, Vector};
 use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::{Surface, sweep};
 use lampyris::tessellate::{Settings, tessellate};
+use lampyris::truck::modeling::{
+    ParametricCurve, ParametricSurface, ParametricSurface3D, Point3, Vector3, Vector4,
+};
+use lampyris::truck::{Conic, Lens, Reflector, baseline, curve_to_truck, faces_to_truck, surface_to_truck};
 use std::f64::consts::PI;
 
 fn p(q: Point3) -> Point {

@@ -1,12 +1,12 @@
 //! Truck shapes become models that keep what `model` promises: closed loops in the domain with material on the left, edges on their
 //! surfaces, normals outward, areas and volumes as the closed forms say.
 
-use lampyris::truck::{self, Conic, Conversion, Lens, Reflector, modeling};
 use lampyris::math::{Uv, Vector};
 use lampyris::model::{EdgeUse, Face, Model, TrimLoop};
+use lampyris::truck::{self, Conic, Conversion, Lens, Reflector, modeling};
+use modeling::{Point3, Rad, Vector3, Wire, builder};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use modeling::{Point3, Rad, Vector3, Wire, builder};
 
 const FULL: Rad<f64> = Rad(7.0);
 

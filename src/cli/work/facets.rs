@@ -6,7 +6,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::model::Model;
 use crate::simulate::{BoundScene, Scene};
-use crate::tessellate::{self, Override, Place, Tessellation, tessellate};
+use crate::tessellate::{self, FaceSelector, Tessellation, ToleranceOverride, tessellate};
 use std::time::Instant;
 
 /// The mesher's settings from options and scene.
@@ -27,21 +27,21 @@ pub(crate) fn mesh_settings(
     // Later overrides win: roles are the widest, then parts, then single faces.
     for (role, tolerance) in &meshing.role {
         let place = place_of_role(role, scene, model)?;
-        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
+        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
     }
     for (name, tolerance) in &meshing.part {
         let place = place_of_part(name, model)?;
-        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
+        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
     }
     for (name, tolerance) in &meshing.face {
         let place = place_of_face(name, model)?;
-        settings.overrides.push(Override { place, tolerance: *tolerance, radii: None });
+        settings.overrides.push(ToleranceOverride { place, tolerance: *tolerance, radii: None });
     }
     Ok(settings)
 }
 
 /// The faces of an optical role, which only a scene knows.
-fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Place, Failure> {
+fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Failure> {
     if !BoundScene::ROLES.contains(&role) {
         let failure = Failure::arguments(format!("--role {role}: there is no such optical role"));
         return Err(failure.with_help(format!("use one of {}", BoundScene::ROLES.join(", "))));
@@ -50,12 +50,12 @@ fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Pla
         let failure = Failure::arguments(format!("--role {role}: only a scene says what faces are for light"));
         return Err(failure.with_help("name the faces or the part: --face NAME=0.01 or --part NAME=0.01"));
     };
-    Ok(Place::Placed(scene.bind(model)?.faces_in_role(role)))
+    Ok(FaceSelector::Placed(scene.bind(model)?.faces_in_role(role)))
 }
 
-fn place_of_part(name: &str, model: &Model) -> Result<Place, Failure> {
+fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Failure> {
     if model.parts.iter().any(|p| p.name == name) {
-        return Ok(Place::Part(name.to_owned()));
+        return Ok(FaceSelector::Part(name.to_owned()));
     }
     let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
     Err(Failure::arguments(format!("--part {name}: the model has no part of this name"))
@@ -63,14 +63,14 @@ fn place_of_part(name: &str, model: &Model) -> Result<Place, Failure> {
 }
 
 /// A face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
-fn place_of_face(name: &str, model: &Model) -> Result<Place, Failure> {
+fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Failure> {
     let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
     let faces = || model.placed_faces().filter_map(|f| f.face);
     if faces().any(|f| f.name == name) {
-        return Ok(Place::Face(name.to_owned()));
+        return Ok(FaceSelector::Face(name.to_owned()));
     }
     if let Some(id) = entity.filter(|id| faces().any(|f| f.entity == Some(*id))) {
-        return Ok(Place::Entity(id));
+        return Ok(FaceSelector::Entity(id));
     }
     let known: Vec<&str> = faces().map(|f| f.name.as_str()).filter(|n| !n.is_empty()).collect();
     let failure = Failure::arguments(format!("--face {name}: the model has no face of this name or number"));

@@ -3,7 +3,7 @@
 use crate::intersect::Hit;
 use crate::math::{FaceId, Ray};
 use crate::model::{Face, Model};
-use crate::tessellate::{Law, Override, Place, Settings};
+use crate::tessellate::{FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 
@@ -228,10 +228,10 @@ impl TolerancePlan {
     /// Puts the plan into the mesher's settings, before overrides that are there already: those win.
     pub fn apply(&self, settings: &mut Settings) {
         (settings.tolerance, settings.radii) = self.range(&self.other);
-        settings.law = Law::Power;
+        settings.law = ToleranceLaw::Power;
         let own = self.places.iter().map(|share| {
             let (tolerance, radii) = self.range(share);
-            Override { place: Place::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
+            ToleranceOverride { place: FaceSelector::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
         });
         settings.overrides.splice(0..0, own);
     }

@@ -1,329 +1,355 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
-use super::lines::Lines;
-use super::tree::{Cell, Leaf, Leaves};
+use super::cell::{Cell, ProvedCell, Subdivision};
+use super::grid_lines::{FACING, GridLines};
 use crate::math::Uv;
-use crate::tessellate::border::trim::Trim;
-use crate::tessellate::proof::bound::Prover;
-use crate::tessellate::proof::flat::from_chord;
-use crate::tessellate::sheet::Sheet;
-use crate::tessellate::strip::delaunay::{Node, key, prove};
+use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
+use crate::tessellate::proof::border_chord::BorderChords;
+use crate::tessellate::proof::facet::prove_triangle;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+use crate::tessellate::proof::prover::Prover;
 use rustc_hash::FxHashMap;
+
+/// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
+const MAX_PIECES: usize = 16;
+/// Largest polygon that is resolved by trying all triangulations: their number grows with the cube.
+const MAX_CORNERS: usize = 24;
+/// Sine of the sharpest corner, in parameters, of a triangle that a cell is cut into.
+const SHARPEST: f64 = 1e-5;
+/// Share by which the second diagonal must be nearer to the surface to be taken: rounding does not decide.
+const NEARER: f64 = 1e-9;
+/// How far a border node may lie from the corner of a cell that takes its proof over: share of the parameter resolution, and of the
+/// tolerance in space.
+const SAME_CORNER: [f64; 2] = [1e-4, 1e-6];
+/// Share of the surface's size that covers those parameters' last digits: [`SAME_CORNER`] of the resolution is 1e-11 of the domain.
+const MOVED_PARAMETERS: f64 = 1e-10;
 
 /// The cells of a face that became facets.
 #[derive(Default)]
 pub(in crate::tessellate) struct Grid {
-    /// Corners in order of the traced diagonal, counter-clockwise in parameters, with bound and tolerance.
-    pub(in crate::tessellate) quads: Vec<([u32; 4], f64, f64)>,
+    /// Corners in order of the traced diagonal.
+    pub(in crate::tessellate) quads: Vec<ProvedFacet<4>>,
     /// Pieces of cells with hanging vertices, to be joined in pairs.
-    pub(in crate::tessellate) triangles: Vec<([u32; 3], f64, f64)>,
+    pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
     /// Segments between the cells and the rest of the face.
     pub(in crate::tessellate) outline: Vec<[u32; 2]>,
 }
 
 /// What cells are made on.
-pub(in crate::tessellate) struct Ground<'g> {
+pub(in crate::tessellate) struct GridInput<'g> {
     /// Those of the border at first; corners of cells are added.
-    pub(in crate::tessellate) nodes: &'g mut Vec<Node>,
+    pub(in crate::tessellate) nodes: &'g mut Nodes,
     /// What border segments follow.
-    pub(in crate::tessellate) trims: &'g FxHashMap<[u32; 2], Trim>,
+    pub(in crate::tessellate) chords: &'g BorderChords,
     /// Parameters nearer than this are one.
-    pub(in crate::tessellate) same: Uv,
-    /// First free position.
-    pub(in crate::tessellate) next: u32,
+    pub(in crate::tessellate) resolution: Uv,
 }
 
-/// Makes facets of the inside leaves; cells that cannot be resolved within their tolerance are left to the strip.
-pub(in crate::tessellate) fn build(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    leaves: &Leaves,
-    ground: &mut Ground<'_>,
-) -> Grid {
+/// Makes facets of the cells inside; those that cannot be resolved within their tolerance are left to the transition.
+pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivision, input: GridInput<'_>) -> Grid {
+    let border = input.nodes.len();
+    let mut lines = GridLines::new(cells, input.resolution);
+    let corners = corners_of_cells(cells, &mut lines, input.nodes);
+    lines.sort();
+    add_bridges(prover, cells, &corners, &mut lines, input.nodes);
+    let mut builder = CellFacets { prover, input };
     let mut grid = Grid::default();
-    let border = ground.nodes.len() as u32;
-    let mut lines = Lines::new(leaves, ground.same);
-    let mut ids: FxHashMap<[usize; 2], u32> = FxHashMap::default();
-    for (id, n) in (0..border).zip(ground.nodes.iter()) {
-        let found = [lines.find(0, n.uv.x), lines.find(1, n.uv.y)];
-        if let [Some(i), Some(j)] = found
-            && ids.contains_key(&[i, j])
-        {
-            continue;
-        }
-        for d in 0..2 {
-            if let Some(i) = found[d] {
-                lines.on[d][i].push((n.uv[1 - d], id));
-            }
-        }
-        if let [Some(i), Some(j)] = found {
-            ids.insert([i, j], id);
-        }
-    }
-    let mut cells: Vec<[u32; 4]> = Vec::with_capacity(leaves.inside.len());
-    for leaf in &leaves.inside {
-        let corners = leaf.cell.corners();
-        cells.push([0, 1, 2, 3].map(|k| {
-            let c = corners[k];
-            let (i, j) = (lines.find(0, c.x).unwrap_or(0), lines.find(1, c.y).unwrap_or(0));
-            *ids.entry([i, j]).or_insert_with(|| {
-                let id = ground.nodes.len() as u32;
-                ground.nodes.push(Node { uv: c, place: leaf.places[k], position: ground.next });
-                ground.next += 1;
-                lines.on[0][i].push((c.y, id));
-                lines.on[1][j].push((c.x, id));
-                id
-            })
-        }));
-    }
-    for line in lines.on.iter_mut().flatten() {
-        line.sort_by(|a, b| a.0.total_cmp(&b.0));
-    }
-    let named: Vec<(Cell, [u32; 4])> = leaves.inside.iter().map(|l| l.cell).zip(cells.iter().copied()).collect();
-    for (i, s, x) in lines.bridges(&named, ground.nodes) {
-        let (cell, _) = named[i];
-        let (d, e) = (s % 2, 1 - s % 2);
-        let level = if s == 0 || s == 3 { cell.lo[e] } else { cell.hi[e] };
-        let Some(line) = lines.find(e, level) else { continue };
-        let mut uv = Uv::splat(level);
-        uv[d] = x;
-        let on = &mut lines.on[e][line];
-        on.insert(on.partition_point(|n| n.0 < x), (x, ground.nodes.len() as u32));
-        ground.nodes.push(Node { uv, place: sheet.point(uv), position: ground.next });
-        ground.next += 1;
-    }
-    let mut segments: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+    // Sides of facets in the order in which they were met, so that the outline is the same bits every time.
+    let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let mut order: Vec<[u32; 2]> = Vec::new();
-    for (leaf, corners) in leaves.inside.iter().zip(&cells) {
-        let inner = lines.sides(&leaf.cell);
+    for (proved, corners) in cells.inside.iter().zip(&corners) {
+        let hanging = lines.hanging_nodes(&proved.cell);
         let polygon: Vec<u32> =
-            (0..4).flat_map(|k| std::iter::once(corners[k]).chain(inner[k].iter().copied())).collect();
+            (0..4).flat_map(|k| std::iter::once(corners[k]).chain(hanging[k].iter().copied())).collect();
         let at_border = polygon.iter().any(|&n| n < border);
         let made = if polygon.len() > 4 {
-            match lattice(sheet, prover, leaf.slack, corners, &inner, ground) {
-                Some(pieces) => {
-                    grid.quads.extend(pieces);
-                    Some(())
-                }
-                None => resolve(sheet, prover, leaf.slack, &polygon, ground).map(|t| grid.triangles.extend(t)),
-            }
+            builder.with_hanging_nodes(proved, corners, &hanging, &polygon, &mut grid)
         } else if at_border {
-            as_proved(sheet, prover, leaf, corners, ground)
-                .or_else(|| beside(sheet, prover, leaf.slack, *corners, ground))
-                .map(|q| grid.quads.push(q))
+            builder.at_border(proved, corners).map(|quad| grid.quads.push(quad))
         } else {
-            let q = std::array::from_fn(|k| corners[(k + leaf.first) % 4]);
-            grid.quads.push((q, leaf.bound, leaf.tolerance));
+            let nodes = std::array::from_fn(|k| corners[(k + proved.first) % 4]);
+            grid.quads.push(ProvedFacet { nodes, bound: proved.bound, tolerance: proved.tolerance });
             Some(())
         };
         if made.is_none() {
             continue;
         }
         for (i, &a) in polygon.iter().enumerate() {
-            let name = key(a, polygon[(i + 1) % polygon.len()]);
-            let count = segments.entry(name).or_insert(0);
+            let name = edge_key(a, polygon[(i + 1) % polygon.len()]);
+            let count = uses.entry(name).or_insert(0);
             if *count == 0 {
                 order.push(name);
             }
             *count += 1;
         }
     }
-    grid.outline = order.into_iter().filter(|name| segments[name] % 2 == 1).collect();
+    grid.outline = order.into_iter().filter(|name| uses[name] % 2 == 1).collect();
     grid
 }
 
-/// A facet with corners on the border: it must hold with the border's own points, and follow its curve.
-fn beside(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    slack: f64,
-    corners: [u32; 4],
-    ground: &Ground<'_>,
-) -> Option<([u32; 4], f64, f64)> {
-    let n = corners.map(|c| ground.nodes[c as usize]);
-    if (0..4).any(|i| (0..i).any(|j| n[i].position == n[j].position)) {
-        return None;
-    }
-    let middle = sheet.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
-    let off = |i: usize, j: usize| from_chord(middle, &[n[i].place, n[j].place]);
-    let better = if off(1, 3) < off(0, 2) * (1.0 - 1e-9) { 1 } else { 0 };
-    [better, better + 1].into_iter().find_map(|r| {
-        let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
-        let [x, y] = [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]
-            .map(|t| prove(sheet, prover, slack, ground.nodes, t, ground.trims));
-        let (bound, xi) = (x.0.max(y.0), x.1.min(y.1));
-        (bound <= xi * slack).then_some((q, bound, xi))
-    })
-}
-
-/// The facet of a cell whose corners are the border's points already: what is proved of the cell holds for it but for the curves
-/// that its border sides follow. `None` when the border's points lie elsewhere.
-fn as_proved(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    leaf: &Leaf,
-    corners: &[u32; 4],
-    ground: &Ground<'_>,
-) -> Option<([u32; 4], f64, f64)> {
-    let n = corners.map(|c| ground.nodes[c as usize]);
-    let (bound, xi, r) = (leaf.bound, leaf.tolerance, leaf.first);
-    let at = leaf.cell.corners();
-    let mut moved = 0f64;
-    for k in 0..4 {
-        let (uv, place) = (at[k], leaf.places[k]);
-        if (n[k].uv - uv).abs().cmpgt(1e-4 * ground.same).any() || (0..k).any(|j| n[j].position == n[k].position) {
-            return None;
-        }
-        moved = moved.max((n[k].place - place).length());
-    }
-    // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
-    let limit = xi * leaf.slack;
-    if moved > 1e-6 * xi {
-        return None;
-    }
-    let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
-    let mut worst = bound + 4.0 * moved + 1e-10 * sheet.size;
-    for t in [[q[0], q[1], q[2]], [q[0], q[2], q[3]]] {
-        let xyz = t.map(|i| ground.nodes[i as usize].place);
-        for k in 0..3 {
-            if let Some(trim) = ground.trims.get(&key(t[k], t[(k + 1) % 3])) {
-                worst = worst.max(trim.bound(prover, xyz, limit));
-            }
-        }
-    }
-    (worst <= limit).then_some((q, worst, xi))
-}
-
-/// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
-const MOST_PIECES: usize = 16;
-
-/// Cuts a cell whose hanging vertices face each other from side to side; `None` when they do not.
-fn lattice(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    slack: f64,
-    corners: &[u32; 4],
-    inner: &[Vec<u32>; 4],
-    ground: &mut Ground<'_>,
-) -> Option<Vec<([u32; 4], f64, f64)>> {
-    let (nx, ny) = (inner[0].len() + 1, inner[1].len() + 1);
-    if inner[2].len() + 1 != nx || inner[3].len() + 1 != ny || nx * ny > MOST_PIECES {
-        return None;
-    }
-    let row = |from: u32, between: Vec<u32>, to: u32| -> Vec<u32> {
-        std::iter::once(from).chain(between).chain(std::iter::once(to)).collect()
-    };
-    let turned = |x: &[u32]| x.iter().rev().copied().collect::<Vec<u32>>();
-    let bottom = row(corners[0], inner[0].clone(), corners[1]);
-    let top = row(corners[3], turned(&inner[2]), corners[2]);
-    let left = row(corners[0], turned(&inner[3]), corners[3]);
-    let right = row(corners[1], inner[1].clone(), corners[2]);
-    let uv = |n: u32| ground.nodes[n as usize].uv;
-    let size = uv(corners[2]) - uv(corners[0]);
-    let face = |a: &[u32], b: &[u32], d: usize| {
-        a.iter().zip(b).all(|(&x, &y)| (uv(x)[d] - uv(y)[d]).abs() <= 0.15 * size[d].abs())
-    };
-    if !face(&bottom, &top, 0) || !face(&left, &right, 1) {
-        return None;
-    }
-    let kept = (ground.nodes.len(), ground.next);
-    let mut at = vec![vec![0u32; ny + 1]; nx + 1];
-    for i in 0..=nx {
-        for j in 0..=ny {
-            at[i][j] = match (i, j) {
-                (_, 0) => bottom[i],
-                (_, j) if j == ny => top[i],
-                (0, _) => left[j],
-                (i, _) if i == nx => right[j],
-                _ => {
-                    let uv = |n: u32| ground.nodes[n as usize].uv;
-                    let c = Uv::new(0.5 * (uv(bottom[i]).x + uv(top[i]).x), 0.5 * (uv(left[j]).y + uv(right[j]).y));
-                    ground.nodes.push(Node { uv: c, place: sheet.point(c), position: ground.next });
-                    ground.next += 1;
-                    (ground.nodes.len() - 1) as u32
-                }
-            };
-        }
-    }
-    let pieces = (0..nx * ny).map(|k| {
-        let (i, j) = (k / ny, k % ny);
-        beside(sheet, prover, slack, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]], ground)
-    });
-    let made: Option<Vec<_>> = pieces.collect();
-    if made.is_none() {
-        ground.nodes.truncate(kept.0);
-        ground.next = kept.1;
-    }
-    made
-}
-
-/// Largest polygon that is resolved by trying all triangulations.
-const MOST_CORNERS: usize = 24;
-
-/// Cuts a cell with hanging vertices into the triangles whose diagonals lie nearest to the surface.
-fn resolve(
-    sheet: &Sheet<'_>,
-    prover: &mut Prover<'_, '_>,
-    slack: f64,
-    polygon: &[u32],
-    ground: &Ground<'_>,
-) -> Option<Vec<([u32; 3], f64, f64)>> {
-    let n = polygon.len();
-    if n > MOST_CORNERS {
-        return None;
-    }
-    let at = |i: usize| {
-        let node = ground.nodes[polygon[i] as usize];
-        (node.uv, node.place)
-    };
-    let off = |i: usize, j: usize| {
-        let (a, b) = (at(i), at(j));
-        from_chord(sheet.point(0.5 * (a.0 + b.0)), &[a.1, b.1])
-    };
-    // cost[i][j]: best triangulation of corners i..=j; a triangle of zero area in parameters is no triangle.
-    let mut cost = vec![vec![0f64; n]; n];
-    let mut choice = vec![vec![0usize; n]; n];
-    for gap in 2..n {
-        for i in 0..n - gap {
-            let j = i + gap;
-            let chord = if i == 0 && j == n - 1 { 0.0 } else { off(i, j).powi(2) };
-            cost[i][j] = f64::INFINITY;
-            for k in i + 1..j {
-                let (x, y) = ((at(k).0 - at(i).0) / ground.same, (at(j).0 - at(i).0) / ground.same);
-                if x.perp_dot(y) <= 1e-5 * x.length() * y.length() {
+/// The nodes at the corners of each cell inside: those of the border where it has one there, else new ones. All are put on the lines.
+fn corners_of_cells(cells: &Subdivision, lines: &mut GridLines, nodes: &mut Nodes) -> Vec<[u32; 4]> {
+    let mut at_crossing: FxHashMap<[usize; 2], u32> = FxHashMap::default();
+    for (id, n) in (0..).zip(nodes.iter()) {
+        let crossing = match [lines.find(0, n.uv.x), lines.find(1, n.uv.y)] {
+            [Some(i), Some(j)] => {
+                // The first one stands for all in its place.
+                if at_crossing.contains_key(&[i, j]) {
                     continue;
                 }
-                let c = cost[i][k] + cost[k][j] + chord;
-                if c < cost[i][j] {
-                    (cost[i][j], choice[i][j]) = (c, k);
-                }
+                at_crossing.insert([i, j], id);
+                [Some(i), Some(j)]
+            }
+            other => other,
+        };
+        for d in 0..2 {
+            if let Some(i) = crossing[d] {
+                lines.nodes[d][i].push((n.uv[1 - d], id));
             }
         }
     }
-    if !cost[0][n - 1].is_finite() {
-        return None;
+    let mut corner = |uv: Uv, place| {
+        let crossing = [lines.side_line(0, uv.x), lines.side_line(1, uv.y)];
+        *at_crossing.entry(crossing).or_insert_with(|| {
+            let id = nodes.push_own(uv, place);
+            lines.nodes[0][crossing[0]].push((uv.y, id));
+            lines.nodes[1][crossing[1]].push((uv.x, id));
+            id
+        })
+    };
+    cells
+        .inside
+        .iter()
+        .map(|proved| {
+            let uv = proved.cell.corners();
+            [0, 1, 2, 3].map(|k| corner(uv[k], proved.places[k]))
+        })
+        .collect()
+}
+
+/// Adds nodes that lead one hanging vertex to another.
+fn add_bridges(
+    prover: &Prover<'_, '_>,
+    cells: &Subdivision,
+    corners: &[[u32; 4]],
+    lines: &mut GridLines,
+    nodes: &mut Nodes,
+) {
+    let named: Vec<(Cell, [u32; 4])> = cells.inside.iter().map(|l| l.cell).zip(corners.iter().copied()).collect();
+    for bridge in lines.bridges(&named, nodes) {
+        let (cell, _) = named[bridge.cell];
+        let d = bridge.side % 2;
+        let e = 1 - d;
+        let level = if bridge.side == 0 || bridge.side == 3 { cell.lo[e] } else { cell.hi[e] };
+        let mut uv = Uv::splat(level);
+        uv[d] = bridge.at;
+        let id = nodes.push_own(uv, prover.surface.point(uv));
+        let line = lines.side_line(e, level);
+        let on = &mut lines.nodes[e][line];
+        on.insert(on.partition_point(|n| n.0 < bridge.at), (bridge.at, id));
     }
-    let mut triangles: Vec<[usize; 3]> = Vec::new();
-    let mut stack = vec![(0, n - 1)];
-    while let Some((i, j)) = stack.pop() {
-        if j - i >= 2 {
-            let k = choice[i][j];
-            triangles.push([i, k, j]);
-            stack.extend([(i, k), (k, j)]);
+}
+
+/// Makes facets of single cells.
+struct CellFacets<'b, 'g, 's, 'a> {
+    prover: &'b mut Prover<'s, 'a>,
+    input: GridInput<'g>,
+}
+
+impl CellFacets<'_, '_, '_, '_> {
+    fn prove(&mut self, t: [u32; 3], slack: f64) -> ProvedFacet<3> {
+        prove_triangle(self.prover, self.input.nodes, t, self.input.chords, slack)
+    }
+
+    /// Facets of a cell with hanging nodes.
+    fn with_hanging_nodes(
+        &mut self,
+        proved: &ProvedCell,
+        corners: &[u32; 4],
+        hanging: &[Vec<u32>; 4],
+        polygon: &[u32],
+        grid: &mut Grid,
+    ) -> Option<()> {
+        match self.cut_across(proved.slack, corners, hanging) {
+            Some(pieces) => grid.quads.extend(pieces),
+            None => grid.triangles.extend(self.triangulate(proved.slack, polygon)?),
         }
+        Some(())
     }
-    let mut made = Vec::with_capacity(triangles.len());
-    for t in triangles {
-        let t = t.map(|i| polygon[i]);
-        let p = t.map(|n| ground.nodes[n as usize].position);
-        if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
+
+    /// The facet of a cell with corners on the border.
+    fn at_border(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
+        self.with_proof_of_cell(proved, corners).or_else(|| self.quad(proved.slack, *corners))
+    }
+
+    /// A facet with corners on the border: it must hold with the border's own points, and follow its curve.
+    fn quad(&mut self, slack: f64, corners: [u32; 4]) -> Option<ProvedFacet<4>> {
+        let n = corners.map(|c| self.input.nodes[c]);
+        if (0..4).any(|i| (0..i).any(|j| n[i].position == n[j].position)) {
             return None;
         }
-        let (bound, xi) = prove(sheet, prover, slack, ground.nodes, t, ground.trims);
-        if bound > xi * slack {
+        let middle = self.prover.surface.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
+        let off = |i: usize, j: usize| distance_to_chord(middle, &[n[i].place, n[j].place]);
+        let better = if off(1, 3) < off(0, 2) * (1.0 - NEARER) { 1 } else { 0 };
+        [better, better + 1].into_iter().find_map(|r| {
+            let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);
+            let [x, y] = [[q[0], q[1], q[2]], [q[0], q[2], q[3]]].map(|t| self.prove(t, slack));
+            let (bound, tolerance) = (x.bound.max(y.bound), x.tolerance.min(y.tolerance));
+            (bound <= tolerance * slack).then_some(ProvedFacet { nodes: q, bound, tolerance })
+        })
+    }
+
+    /// The facet of a cell whose corners are the border's points already: what is proved of the cell holds for it but for the curves
+    /// that its border sides follow. `None` when the border's points lie elsewhere.
+    fn with_proof_of_cell(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
+        let nodes = &*self.input.nodes;
+        let n = corners.map(|c| nodes[c]);
+        let tolerance = proved.tolerance;
+        let at = proved.cell.corners();
+        let mut moved = 0f64;
+        for k in 0..4 {
+            let elsewhere = (n[k].uv - at[k]).abs().cmpgt(SAME_CORNER[0] * self.input.resolution).any();
+            if elsewhere || (0..k).any(|j| n[j].position == n[k].position) {
+                return None;
+            }
+            moved = moved.max((n[k].place - proved.places[k]).length());
+        }
+        // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
+        let limit = tolerance * proved.slack;
+        if moved > SAME_CORNER[1] * tolerance {
             return None;
         }
-        made.push((t, bound, xi));
+        let q: [u32; 4] = std::array::from_fn(|k| corners[(k + proved.first) % 4]);
+        let mut worst = proved.bound + 4.0 * moved + MOVED_PARAMETERS * self.prover.surface.size;
+        for t in [[q[0], q[1], q[2]], [q[0], q[2], q[3]]] {
+            let xyz = t.map(|i| nodes[i].place);
+            for k in 0..3 {
+                if let Some(chord) = self.input.chords.get(&edge_key(t[k], t[(k + 1) % 3])) {
+                    worst = worst.max(chord.bound(self.prover, xyz, limit));
+                }
+            }
+        }
+        (worst <= limit).then_some(ProvedFacet { nodes: q, bound: worst, tolerance })
     }
-    Some(made)
+
+    /// Cuts a cell whose hanging vertices face each other from side to side; `None` when they do not.
+    fn cut_across(
+        &mut self,
+        slack: f64,
+        corners: &[u32; 4],
+        hanging: &[Vec<u32>; 4],
+    ) -> Option<Vec<ProvedFacet<4>>> {
+        let (nx, ny) = (hanging[0].len() + 1, hanging[1].len() + 1);
+        if hanging[2].len() + 1 != nx || hanging[3].len() + 1 != ny || nx * ny > MAX_PIECES {
+            return None;
+        }
+        let row = |from: u32, between: &[u32], to: u32| [&[from], between, &[to]].concat();
+        let reversed = |x: &[u32]| x.iter().rev().copied().collect::<Vec<u32>>();
+        let bottom = row(corners[0], &hanging[0], corners[1]);
+        let top = row(corners[3], &reversed(&hanging[2]), corners[2]);
+        let left = row(corners[0], &reversed(&hanging[3]), corners[3]);
+        let right = row(corners[1], &hanging[1], corners[2]);
+        let nodes = &mut *self.input.nodes;
+        let size = nodes[corners[2]].uv - nodes[corners[0]].uv;
+        let face_each_other = |a: &[u32], b: &[u32], d: usize| {
+            a.iter().zip(b).all(|(&x, &y)| (nodes[x].uv[d] - nodes[y].uv[d]).abs() <= FACING * size[d].abs())
+        };
+        if !face_each_other(&bottom, &top, 0) || !face_each_other(&left, &right, 1) {
+            return None;
+        }
+        // The nodes of the pieces, row by row; inner ones are new.
+        let mark = nodes.mark();
+        let mut at = vec![vec![0u32; ny + 1]; nx + 1];
+        for i in 0..=nx {
+            for j in 0..=ny {
+                at[i][j] = match (i, j) {
+                    (_, 0) => bottom[i],
+                    (_, j) if j == ny => top[i],
+                    (0, _) => left[j],
+                    (i, _) if i == nx => right[j],
+                    _ => {
+                        let x = 0.5 * (nodes[bottom[i]].uv.x + nodes[top[i]].uv.x);
+                        let uv = Uv::new(x, 0.5 * (nodes[left[j]].uv.y + nodes[right[j]].uv.y));
+                        nodes.push_own(uv, self.prover.surface.point(uv))
+                    }
+                };
+            }
+        }
+        let pieces = (0..nx * ny).map(|k| {
+            let (i, j) = (k / ny, k % ny);
+            self.quad(slack, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]])
+        });
+        let made: Option<Vec<_>> = pieces.collect();
+        if made.is_none() {
+            self.input.nodes.rewind(mark);
+        }
+        made
+    }
+
+    /// Cuts a cell with hanging vertices into the triangles whose diagonals lie nearest to the surface; `None` when one does not hold.
+    fn triangulate(&mut self, slack: f64, polygon: &[u32]) -> Option<Vec<ProvedFacet<3>>> {
+        let triangles = self.best_triangulation(polygon)?;
+        let mut made = Vec::with_capacity(triangles.len());
+        for t in triangles {
+            let t = t.map(|i| polygon[i]);
+            let p = t.map(|n| self.input.nodes[n].position);
+            if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
+                return None;
+            }
+            let proved = self.prove(t, slack);
+            if proved.bound > proved.tolerance * slack {
+                return None;
+            }
+            made.push(proved);
+        }
+        Some(made)
+    }
+
+    /// The triangulation of a polygon with the least sum of squared distances of its diagonals from the surface, in places of the
+    /// polygon; by dynamic programming over its parts.
+    fn best_triangulation(&self, polygon: &[u32]) -> Option<Vec<[usize; 3]>> {
+        let n = polygon.len();
+        if n > MAX_CORNERS {
+            return None;
+        }
+        let node = |i: usize| self.input.nodes[polygon[i]];
+        let off = |i: usize, j: usize| {
+            let (a, b) = (node(i), node(j));
+            distance_to_chord(self.prover.surface.point(0.5 * (a.uv + b.uv)), &[a.place, b.place])
+        };
+        // cost[i][j]: best triangulation of corners i..=j; a triangle of zero area in parameters is no triangle.
+        let mut cost = vec![vec![0f64; n]; n];
+        let mut choice = vec![vec![0usize; n]; n];
+        for gap in 2..n {
+            for i in 0..n - gap {
+                let j = i + gap;
+                let chord = if i == 0 && j == n - 1 { 0.0 } else { off(i, j).powi(2) };
+                cost[i][j] = f64::INFINITY;
+                for k in i + 1..j {
+                    let x = (node(k).uv - node(i).uv) / self.input.resolution;
+                    let y = (node(j).uv - node(i).uv) / self.input.resolution;
+                    if x.perp_dot(y) <= SHARPEST * x.length() * y.length() {
+                        continue;
+                    }
+                    let c = cost[i][k] + cost[k][j] + chord;
+                    if c < cost[i][j] {
+                        (cost[i][j], choice[i][j]) = (c, k);
+                    }
+                }
+            }
+        }
+        if !cost[0][n - 1].is_finite() {
+            return None;
+        }
+        let mut triangles: Vec<[usize; 3]> = Vec::new();
+        let mut open = vec![(0, n - 1)];
+        while let Some((i, j)) = open.pop() {
+            if j - i >= 2 {
+                let k = choice[i][j];
+                triangles.push([i, k, j]);
+                open.extend([(i, k), (k, j)]);
+            }
+        }
+        Some(triangles)
+    }
 }

@@ -1,7 +1,8 @@
-//! The inside of a face: a tree of rectangles, each proved as a facet, and the rows and lines they meet on.
+//! The inside of a face: a tree of rectangles, each proved as a facet, and the grid of facets that they make.
 
+pub(in crate::tessellate) mod candidate_facet;
+pub(in crate::tessellate) mod cell;
 pub(in crate::tessellate) mod grid;
-pub(in crate::tessellate) mod ladder;
-pub(in crate::tessellate) mod lines;
-pub(in crate::tessellate) mod look;
+mod grid_lines;
+mod preferred_cuts;
 pub(in crate::tessellate) mod tree;

@@ -1,61 +1,17 @@
 //! The tree over the parameter rectangle: cells are halved across the direction that bends more until they fit.
 //!
-//! Cuts fall on a ladder of preferred parameters, so that neighbouring cells and the border line up; below the ladder they
-//! halve. A cell is kept whole when it is clear of the border, or when the border runs along its sides, corner on sample.
+//! Cuts fall on preferred parameters, so that neighbouring cells and the border line up; between these they halve. A cell is kept whole
+//! when it is clear of the border, or when the border runs along its sides, corner on sample.
 
-use super::ladder::ladder;
-use super::look::Look;
-use crate::math::{Point, Uv};
-use crate::tessellate::border::rings::{Follows, Rings};
-use crate::tessellate::proof::bound::Prover;
-use crate::tessellate::settings::Judge;
-use crate::tessellate::sheet::Sheet;
-use crate::tessellate::strip::sector;
-
-/// A rectangle `[lo, hi]` of the parameter plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::tessellate) struct Cell {
-    pub(in crate::tessellate) lo: Uv,
-    pub(in crate::tessellate) hi: Uv,
-}
-
-impl Cell {
-    pub(in crate::tessellate) fn corners(&self) -> [Uv; 4] {
-        [self.lo, Uv::new(self.hi.x, self.lo.y), self.hi, Uv::new(self.lo.x, self.hi.y)]
-    }
-
-    pub(in crate::tessellate) fn center(&self) -> Uv {
-        0.5 * (self.lo + self.hi)
-    }
-}
-
-/// A cell that is proved.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::tessellate) struct Leaf {
-    pub(in crate::tessellate) cell: Cell,
-    pub(in crate::tessellate) bound: f64,
-    /// The tolerance at its place.
-    pub(in crate::tessellate) tolerance: f64,
-    /// How many times that it was held to: 1, more once the budget has ended.
-    pub(in crate::tessellate) slack: f64,
-    /// The corner at which the traced diagonal starts: 0 or 1.
-    pub(in crate::tessellate) first: usize,
-    /// Where its corners lie.
-    pub(in crate::tessellate) places: [Point; 4],
-}
-
-/// The leaves.
-#[derive(Default)]
-pub(in crate::tessellate) struct Leaves {
-    /// Wholly inside, not cut by the border, and proved.
-    pub(in crate::tessellate) inside: Vec<Leaf>,
-    /// Those that the border cuts or comes near to.
-    pub(in crate::tessellate) border: Vec<Cell>,
-    /// Whether splitting ended before all cells fitted.
-    pub(in crate::tessellate) exhausted: bool,
-    /// Whether it did so because a branch had used up its share of the budget.
-    short: bool,
-}
+use super::candidate_facet::CandidateFacet;
+use super::cell::{Cell, ProvedCell, Subdivision, parameter_resolution};
+use super::preferred_cuts::preferred_cuts;
+use crate::math::Uv;
+use crate::tessellate::border::polygons::{BorderPolygons, BorderSide, crosses_ray_from};
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::proof::pole;
+use crate::tessellate::proof::prover::Prover;
+use crate::tessellate::settings::Acceptance;
 
 /// Part of a cell's size that it must keep from the border.
 const CLEARANCE: f64 = 0.3;
@@ -69,152 +25,182 @@ const COARSEST: f64 = 1e9;
 
 /// Depth down to which the halves are visited in parallel, each with half of the budget.
 const PARALLEL: u32 = 5;
+/// Depth at which splitting ends: parameters have no more digits.
+const MAX_DEPTH: u32 = 60;
+/// Share of a cell's size that a preferred cut keeps from its sides.
+const CUT_CLEARANCE: f64 = 1e-3;
 
 struct Tree<'s, 'a> {
-    sheet: &'s Sheet<'a>,
-    judge: Judge,
+    surface: &'s FaceSurface<'a>,
+    acceptance: Acceptance,
     segments: Vec<[Uv; 2]>,
     /// Segments that are one point in space.
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
-    same: Uv,
-    ladder: [Vec<f64>; 2],
+    resolution: Uv,
+    preferred: [Vec<f64>; 2],
     max_angle: Option<f64>,
 }
 
 /// What one branch of the tree works with.
 struct Branch<'s, 'a> {
     prover: Prover<'s, 'a>,
-    leaves: Leaves,
+    cells: Subdivision,
     budget: usize,
     /// What cells are held to, in tolerances.
     slack: f64,
 }
 
-/// Splits the box around the rings until every cell fits.
+impl<'s, 'a> Branch<'s, 'a> {
+    fn new(tree: &Tree<'s, 'a>, budget: usize) -> Self {
+        let prover = Prover::new(tree.surface, tree.acceptance);
+        Self { prover, cells: Subdivision::default(), budget, slack: 1.0 }
+    }
+
+    /// Whether splitting may go on: once the share of the budget is used up, with coarser cells.
+    fn may_split(&mut self, depth: u32) -> bool {
+        let used_up = self.cells.len() >= self.budget;
+        self.cells.exhausted |= used_up;
+        self.cells.out_of_share |= used_up;
+        if used_up && self.slack < COARSEST {
+            self.slack *= COARSER;
+            self.budget += self.budget / RESERVE + 4;
+            return true;
+        }
+        let may = !used_up && depth <= MAX_DEPTH;
+        self.cells.exhausted |= !may;
+        may
+    }
+}
+
+/// A cell on its way down the tree.
+struct Visit<'n> {
+    cell: Cell,
+    /// Segments of the border that it may meet.
+    near: &'n [u32],
+    /// Whether it is known to lie inside.
+    inside: bool,
+    depth: u32,
+}
+
+/// Splits the box around the border until every cell fits.
 pub(in crate::tessellate) fn split(
-    sheet: &Sheet<'_>,
-    judge: Judge,
-    rings: &Rings,
+    surface: &FaceSurface<'_>,
+    acceptance: Acceptance,
+    border: &BorderPolygons,
     budget: usize,
     max_angle: Option<f64>,
-) -> Leaves {
-    let segments: Vec<[Uv; 2]> =
-        rings.rings.iter().flat_map(|r| (0..r.len()).map(move |i| [r[i].uv, r[(i + 1) % r.len()].uv])).collect();
-    let (lo, hi) =
-        segments.iter().flatten().fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-    if !(lo.x < hi.x && lo.y < hi.y) || sheet.affine {
-        return Leaves::default();
+) -> Subdivision {
+    let segments: Vec<[Uv; 2]> = border
+        .polygons
+        .iter()
+        .flat_map(|p| (0..p.len()).map(move |i| [p[i].uv, p[(i + 1) % p.len()].uv]))
+        .collect();
+    let (lo, hi) = border.bounds();
+    if !(lo.x < hi.x && lo.y < hi.y) || surface.affine {
+        return Subdivision::default();
     }
     let root = Cell { lo, hi };
-    let ladder = [ladder(sheet, rings, root, 0), ladder(sheet, rings, root, 1)];
-    let all: Vec<u32> = (0..segments.len() as u32).collect();
-    let poles = rings.rings.iter().flatten().map(|v| v.follows == Follows::Pole).collect();
-    let tree = Tree { sheet, judge, segments, poles, same: same(lo, hi), ladder, max_angle };
+    let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
+    let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
+    let resolution = parameter_resolution(lo, hi);
+    let tree = Tree { surface, acceptance, segments, poles, resolution, preferred, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
+    let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
     let mut share = budget;
     loop {
-        let mut branch =
-            Branch { prover: Prover::new(sheet, judge), leaves: Leaves::default(), budget: share, slack: 1.0 };
-        tree.visit(&mut branch, root, &all, false, 0);
-        let leaves = branch.leaves;
-        if !leaves.short || leaves.inside.len() + leaves.border.len() >= budget || share >> PARALLEL >= budget {
-            return leaves;
+        let mut branch = Branch::new(&tree, share);
+        tree.visit(&mut branch, Visit { cell: root, near: &all, inside: false, depth: 0 });
+        let cells = branch.cells;
+        if !cells.out_of_share || cells.len() >= budget || share >> PARALLEL >= budget {
+            return cells;
         }
         share *= 2;
     }
 }
 
-/// Parameters nearer than this are one, in a face that spans the box.
-pub(in crate::tessellate) fn same(lo: Uv, hi: Uv) -> Uv {
-    1e-7 * (hi - lo)
-}
-
 impl Tree<'_, '_> {
-    fn visit(&self, out: &mut Branch<'_, '_>, cell: Cell, candidates: &[u32], known_inside: bool, depth: u32) {
-        let mut inside = known_inside;
-        let mut near: Vec<u32> = Vec::new();
-        if !inside {
-            let grow = CLEARANCE * (cell.hi - cell.lo);
-            let (lo, hi) = (cell.lo - grow, cell.hi + grow);
-            near = candidates.iter().copied().filter(|&s| touches(self.segments[s as usize], lo, hi)).collect();
-            if near.is_empty() {
-                if !self.contains(cell.center()) {
-                    return;
-                }
-                inside = true;
-            }
-        }
-        let short = out.leaves.inside.len() + out.leaves.border.len() >= out.budget;
-        out.leaves.exhausted |= short;
-        out.leaves.short |= short;
-        if short && out.slack < COARSEST {
-            out.slack *= COARSER;
-            out.budget += out.budget / RESERVE + 4;
-        } else if short || depth > 60 {
-            out.leaves.exhausted = true;
-            out.leaves.border.push(cell);
+    fn visit(&self, branch: &mut Branch<'_, '_>, visit: Visit<'_>) {
+        let Visit { cell, depth, .. } = visit;
+        let Some((near, inside)) = self.border_near(&visit) else { return };
+        if !branch.may_split(depth) {
+            branch.cells.border.push(cell);
             return;
         }
-        let look = Look::new(self.sheet, cell);
+        let candidate = CandidateFacet::new(self.surface, cell);
         let crease = self.crease(cell);
         if crease.is_none()
-            && let Some(xi) = self.looks_fit(cell, &look, out.slack)
+            && let Some((bound, tolerance)) = self.fit(branch, cell, &candidate)
         {
-            let limit = xi * out.slack;
-            // A cell at the border is only a measure of size, but a look alone leaves them larger: 6 % more facets on a lens.
-            let prover = &mut out.prover;
-            let bound = at_pole(prover, cell, limit).unwrap_or_else(|| look.bound(prover, cell, limit));
-            if bound <= limit {
-                if inside || self.aligned(cell, &near) && self.contains(cell.center()) {
-                    let (first, places) = (look.first(), look.places());
-                    out.leaves.inside.push(Leaf { cell, bound, tolerance: xi, slack: out.slack, first, places });
-                } else {
-                    out.leaves.border.push(cell);
-                }
-                return;
+            if inside || self.is_aligned(cell, &near) && self.contains(cell.center()) {
+                let (first, places) = (candidate.first_corner(), candidate.places());
+                let slack = branch.slack;
+                branch.cells.inside.push(ProvedCell { cell, bound, tolerance, slack, first, places });
+            } else {
+                branch.cells.border.push(cell);
             }
+            return;
         }
         let (direction, at) = crease.unwrap_or_else(|| {
-            let d = look.direction();
-            (d, self.cut(cell, d))
+            let d = candidate.cut_direction();
+            (d, self.cut_parameter(cell, d))
         });
         if !(at > cell.lo[direction] && at < cell.hi[direction]) {
-            out.leaves.border.push(cell);
+            branch.cells.border.push(cell);
             return;
         }
-        let (mut a, mut b) = (cell, cell);
-        a.hi[direction] = at;
-        b.lo[direction] = at;
+        let (mut low, mut high) = (cell, cell);
+        low.hi[direction] = at;
+        high.lo[direction] = at;
+        let half = |cell: Cell| Visit { cell, near: &near, inside, depth: depth + 1 };
         if depth >= PARALLEL {
-            self.visit(out, a, &near, inside, depth + 1);
-            self.visit(out, b, &near, inside, depth + 1);
+            self.visit(branch, half(low));
+            self.visit(branch, half(high));
             return;
         }
-        let budget = out.budget / 2;
-        let half = |cell: Cell| {
-            let prover = Prover::new(self.sheet, self.judge);
-            let mut branch = Branch { prover, leaves: Leaves::default(), budget, slack: 1.0 };
-            self.visit(&mut branch, cell, &near, inside, depth + 1);
-            branch.leaves
+        let budget = branch.budget / 2;
+        let apart = |cell: Cell| {
+            let mut branch = Branch::new(self, budget);
+            self.visit(&mut branch, half(cell));
+            branch.cells
         };
-        let (first, second) = rayon::join(|| half(a), || half(b));
-        for part in [first, second] {
-            out.leaves.inside.extend(part.inside);
-            out.leaves.border.extend(part.border);
-            out.leaves.exhausted |= part.exhausted;
-            out.leaves.short |= part.short;
+        let (first, second) = rayon::join(|| apart(low), || apart(high));
+        branch.cells.append(first);
+        branch.cells.append(second);
+    }
+
+    /// The segments that come near a cell and whether it lies inside; `None` where it lies outside.
+    fn border_near(&self, visit: &Visit<'_>) -> Option<(Vec<u32>, bool)> {
+        if visit.inside {
+            return Some((Vec::new(), true));
         }
+        let cell = visit.cell;
+        let grow = CLEARANCE * (cell.hi - cell.lo);
+        let (lo, hi) = (cell.lo - grow, cell.hi + grow);
+        let touching = |s: &u32| touches(self.segments[*s as usize], lo, hi);
+        let near: Vec<u32> = visit.near.iter().copied().filter(touching).collect();
+        let clear = near.is_empty();
+        (!clear || self.contains(cell.center())).then_some((near, clear))
+    }
+
+    /// Bound and tolerance of a cell that fits.
+    fn fit(&self, branch: &mut Branch<'_, '_>, cell: Cell, candidate: &CandidateFacet) -> Option<(f64, f64)> {
+        let tolerance = self.sampled_fit(cell, candidate, branch.slack)?;
+        let limit = tolerance * branch.slack;
+        // A cell at the border is only a measure of size, but samples alone leave them larger: 6 % more facets on a lens.
+        let prover = &mut branch.prover;
+        let bound = pole_bound(prover, cell, limit).unwrap_or_else(|| candidate.bound(prover, cell, limit));
+        (bound <= limit).then_some((bound, tolerance))
     }
 
     /// Whether the segments near a cell leave it whole: they run along its sides, or beyond and along them, and no
     /// corner stands between two samples.
-    fn aligned(&self, cell: Cell, near: &[u32]) -> bool {
+    fn is_aligned(&self, cell: Cell, near: &[u32]) -> bool {
         near.iter().all(|&s| {
             let [a, b] = self.segments[s as usize];
             (0..2).any(|d| {
-                let (e, eps) = (1 - d, self.same);
+                let (e, eps) = (1 - d, self.resolution);
                 if (a[d] - b[d]).abs() > eps[d] || self.poles[s as usize] {
                     return false;
                 }
@@ -230,30 +216,32 @@ impl Tree<'_, '_> {
     /// A crease of the surface across the cell.
     fn crease(&self, cell: Cell) -> Option<(usize, f64)> {
         (0..2).find_map(|d| {
-            let c = &self.sheet.creases[d];
+            let c = &self.surface.creases[d];
             let (i, j) = (c.partition_point(|&x| x <= cell.lo[d]), c.partition_point(|&x| x < cell.hi[d]));
             (i < j).then(|| (d, c[(i + j) / 2]))
         })
     }
 
-    /// The ladder's middle step inside the cell, or the cell's middle.
-    fn cut(&self, cell: Cell, d: usize) -> f64 {
+    /// The middle one of the preferred cuts inside the cell, or the cell's middle.
+    fn cut_parameter(&self, cell: Cell, d: usize) -> f64 {
         let (lo, hi) = (cell.lo[d], cell.hi[d]);
-        let l = &self.ladder[d];
-        let slack = 1e-3 * (hi - lo);
+        let l = &self.preferred[d];
+        let slack = CUT_CLEARANCE * (hi - lo);
         let (i, j) = (l.partition_point(|&x| x <= lo + slack), l.partition_point(|&x| x < hi - slack));
         if i < j { l[(i + j) / 2] } else { 0.5 * (lo + hi) }
     }
 
     /// The tolerance of a cell that seems to be within `slack` times as much.
-    fn looks_fit(&self, cell: Cell, look: &Look, slack: f64) -> Option<f64> {
-        let xi =
-            cell.corners().iter().fold(self.sheet.tolerance(cell.center()), |x, &c| x.min(self.sheet.tolerance(c)));
-        if look.sag[0].max(look.sag[1]) > xi * slack {
+    fn sampled_fit(&self, cell: Cell, candidate: &CandidateFacet, slack: f64) -> Option<f64> {
+        let xi = cell
+            .corners()
+            .iter()
+            .fold(self.surface.tolerance(cell.center()), |x, &c| x.min(self.surface.tolerance(c)));
+        if candidate.sag[0].max(candidate.sag[1]) > xi * slack {
             return None;
         }
         if let Some(max) = self.max_angle.filter(|_| slack == 1.0) {
-            let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.sheet.normal(c)).collect();
+            let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.surface.normal(c)).collect();
             let turned = n.iter().any(|a| n.iter().any(|b| a.angle_between(*b) > 2.0 * max));
             if turned {
                 return None;
@@ -262,26 +250,20 @@ impl Tree<'_, '_> {
         Some(xi)
     }
 
-    /// Whether a point lies inside the rings: parity of crossings along u.
+    /// Whether a point lies inside the border: parity of crossings along u.
     fn contains(&self, p: Uv) -> bool {
-        let mut odd = false;
-        for [a, b] in &self.segments {
-            if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-                odd = !odd;
-            }
-        }
-        odd
+        self.segments.iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
     }
 }
 
 /// Bound of a cell with a side on a pole, which becomes a triangle.
-fn at_pole(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64> {
+fn pole_bound(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64> {
     let c = cell.corners();
-    let polar = c.map(|x| prover.sheet.pole(x).is_some());
+    let polar = c.map(|x| prover.surface.pole(x).is_some());
     let k = (0..4).find(|&k| !polar[k] && !polar[(k + 1) % 4] && polar[(k + 2) % 4] && polar[(k + 3) % 4])?;
     let uv = [0, 1, 2].map(|i| c[(k + i) % 4]);
-    let xyz = uv.map(|x| prover.sheet.point(x));
-    sector::bound(prover, uv, xyz, [None; 3], limit)
+    let xyz = uv.map(|x| prover.surface.point(x));
+    pole::sector_bound(prover, uv, xyz, [None; 3], limit)
 }
 
 /// Whether a segment meets a rectangle.

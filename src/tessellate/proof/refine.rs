@@ -1,17 +1,19 @@
 //! The hull bound, sharpened: a Bézier simplex is cut into halves or quarters while that may bring it below the limit.
 
-use super::net::Nets;
-use super::scalar::Scalar;
+use super::scalar_bezier::ScalarBezier;
+use super::simplex_net::SimplexNets;
 use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
 
 /// How often a piece is cut into four before the bound is taken as it is.
 pub(super) const LEVELS: u32 = 3;
+/// Limits beyond which a bound is not tried further below the first level: half of what two levels can gain.
+const HOPELESS: f64 = 8.0;
 
 /// Halves a net of degrees `[p, q]` along one direction by de Casteljau's steps: `high` holds it and keeps its upper half, `low` takes
 /// the lower one.
 #[inline]
-pub(super) fn split<T>(low: &mut [T], high: &mut [T], [p, q]: [usize; 2], along: usize)
+pub(super) fn halve_net<T>(low: &mut [T], high: &mut [T], [p, q]: [usize; 2], along: usize)
 where
     T: Copy + std::ops::Add<Output = T>,
     f64: std::ops::Mul<T, Output = T>,
@@ -30,7 +32,7 @@ where
 
 /// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
 pub(super) fn refine<const N: usize>(
-    (nets, scalar): (&mut Nets, &mut Scalar),
+    (nets, scalar): (&mut SimplexNets, &mut ScalarBezier),
     patch: &BezierPatch,
     at: [Uv; N],
     limit: f64,
@@ -41,14 +43,14 @@ pub(super) fn refine<const N: usize>(
     let degree = patch.degree[0] + patch.degree[1];
     let bound = scalar.load(net.iter().map(|c| (f(c.project()), c.w)), degree);
     // Corners lie on the surface: there the distance is no bound but true.
-    if bound <= limit || scalar.at_corners::<N>() > limit {
+    if bound <= limit || scalar.largest_corner::<N>() > limit {
         return bound;
     }
     // Each level brings the bound at most four times closer to the truth; no hope is no work.
-    if bound > 8.0 * limit && levels < LEVELS {
+    if bound > HOPELESS * limit && levels < LEVELS {
         return bound;
     }
-    if let Some(bound) = scalar.within::<N>(limit) {
+    if let Some(bound) = scalar.bound_within::<N>(limit) {
         return bound;
     }
     if levels == 0 {

@@ -16,21 +16,21 @@ use std::sync::OnceLock;
 
 /// Buffers reused from piece to piece.
 #[derive(Default)]
-pub(in crate::tessellate) struct Nets {
-    /// Nets of one step and of the next, one after another.
+pub(in crate::tessellate) struct SimplexNets {
+    /// SimplexNets of one step and of the next, one after another.
     work: [Vec<Homogeneous>; 2],
-    /// What the first direction leaves.
+    /// What the first direction cells.
     columns: Vec<Homogeneous>,
     out: Vec<Homogeneous>,
     /// One over the multinomials of a degree, for segments or triangles.
     shares: Vec<f64>,
     /// Corners and degree that these belong to.
-    of: (usize, usize),
+    shares_for: (usize, usize),
 }
 
 /// Degree up to which halves of rectangles have tables.
-pub(in crate::tessellate) const MOST_HALVED: usize = 3;
-static HALVES: [OnceLock<Half>; MOST_HALVED * MOST_HALVED] = [const { OnceLock::new() }; MOST_HALVED * MOST_HALVED];
+pub(in crate::tessellate) const MAX_HALVED: usize = 3;
+static HALVES: [OnceLock<Half>; MAX_HALVED * MAX_HALVED] = [const { OnceLock::new() }; MAX_HALVED * MAX_HALVED];
 
 /// How the net of a rectangle makes that of a half of it, for one pair of degrees: along the sides at the right angle.
 struct Half {
@@ -42,7 +42,7 @@ struct Half {
 
 /// Which half of a rectangle a triangle with corners A, B, C and its right angle at B is.
 #[derive(Clone, Copy)]
-pub(in crate::tessellate) struct Corner {
+pub(in crate::tessellate) struct RightAngle {
     /// The parameter that changes from A to B.
     pub(in crate::tessellate) direction: usize,
     /// Whether A in that direction, and B in the other, lie at the rectangle's upper end.
@@ -54,7 +54,7 @@ const fn size(corners: usize, d: usize) -> usize {
     if corners == 2 { d + 1 } else { (d + 1) * (d + 2) / 2 }
 }
 
-impl Nets {
+impl SimplexNets {
     /// Control points over the simplex with 2 or 3 corners, given in local parameters.
     pub(in crate::tessellate) fn expand<const N: usize>(
         &mut self,
@@ -62,31 +62,31 @@ impl Nets {
         corners: [Uv; N],
     ) -> &[Homogeneous] {
         let degree = patch.degree[0] + patch.degree[1];
-        if self.of != (N, degree) {
-            self.of = (N, degree);
+        if self.shares_for != (N, degree) {
+            self.shares_for = (N, degree);
             multinomials::<N>(degree, &mut self.shares);
         }
         #[cfg(target_arch = "x86_64")]
         if std::is_x86_feature_detected!("avx") {
             // Sound: the processor has what the function was compiled for.
-            unsafe { self.expand_wide(patch, corners) };
+            unsafe { self.expand_avx(patch, corners) };
             return &self.out;
         }
         self.expand_plain(patch, corners);
         &self.out
     }
 
-    /// Control points over half of the rectangle that a net of these degrees, 1 to [`MOST_HALVED`], stands for. Of cells cut along a diagonal it takes a
+    /// Control points over half of the rectangle that a net of these degrees, 1 to [`MAX_HALVED`], stands for. Of cells cut along a diagonal it takes a
     /// seventh of the time: each coefficient is a mean of few control points, with weights that are the same for all.
-    pub(in crate::tessellate) fn half(
+    pub(in crate::tessellate) fn half_of_rectangle(
         &mut self,
         net: &[Homogeneous],
         degree: [usize; 2],
-        corner: Corner,
+        corner: RightAngle,
     ) -> &[Homogeneous] {
         let (d, e) = (corner.direction, 1 - corner.direction);
         let [p, q] = [degree[d], degree[e]];
-        let half = HALVES[(p - 1) * MOST_HALVED + q - 1].get_or_init(|| Half::new([p, q]));
+        let half = HALVES[(p - 1) * MAX_HALVED + q - 1].get_or_init(|| Half::new([p, q]));
         let width = degree[1] as isize + 1;
         let mut step = if d == 0 { [width, 1] } else { [1, width] };
         let mut first = 0;
@@ -107,7 +107,7 @@ impl Nets {
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx")]
-    fn expand_wide<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) {
+    fn expand_avx<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) {
         self.expand_plain(patch, corners);
     }
 
@@ -130,13 +130,13 @@ impl Nets {
             for i in 0..=p {
                 self.work[0][i * one] = patch.points[i * (q + 1) + j];
             }
-            let last = reduce::<N>(&mut self.work, p, 0, u, one);
+            let last = de_casteljau::<N>(&mut self.work, p, 0, u, one);
             self.columns.extend_from_slice(&self.work[last][..one]);
         }
         for (column, to) in self.columns.chunks_exact(one).zip(self.work[0].chunks_exact_mut(all)) {
             to[..one].copy_from_slice(column);
         }
-        let last = reduce::<N>(&mut self.work, q, p, v, all);
+        let last = de_casteljau::<N>(&mut self.work, q, p, v, all);
         self.out.clear();
         self.out.extend(self.work[last][..all].iter().zip(&self.shares).map(|(&c, &s)| c * s));
     }
@@ -145,7 +145,7 @@ impl Nets {
 /// All de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result
 /// is first in the returned one of the two.
 #[inline(always)]
-fn reduce<const N: usize>(
+fn de_casteljau<const N: usize>(
     work: &mut [Vec<Homogeneous>; 2],
     steps: usize,
     degree: usize,
@@ -211,7 +211,7 @@ impl Half {
                     for c in 0..=q - j {
                         let (m, k) = (q + i - c, a + j);
                         let at = m * (m + 1) / 2 + k;
-                        let times = choose(p, i) * choose(q, j) * choose(i, a) * choose(q - j, c);
+                        let times = binomial(p, i) * binomial(q, j) * binomial(i, a) * binomial(q - j, c);
                         of[at].push(([i as isize, j as isize], times * shares[at]));
                     }
                 }
@@ -227,7 +227,7 @@ impl Half {
 }
 
 /// A binomial coefficient.
-fn choose(n: usize, k: usize) -> f64 {
+fn binomial(n: usize, k: usize) -> f64 {
     (0..k).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64)
 }
 
@@ -236,9 +236,9 @@ fn multinomials<const N: usize>(degree: usize, out: &mut Vec<f64>) {
     out.clear();
     for m in 0..=degree {
         if N == 2 {
-            out.push(1.0 / choose(degree, m));
+            out.push(1.0 / binomial(degree, m));
         } else {
-            out.extend((0..=m).map(|k| 1.0 / (choose(degree, m) * choose(m, k))));
+            out.extend((0..=m).map(|k| 1.0 / (binomial(degree, m) * binomial(m, k))));
         }
     }
 }
@@ -254,7 +254,7 @@ mod tests {
         let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 1.2], [0.3, 1.5]);
         let patch = &s.bezier_patches()[0];
         let corners = [Uv::new(0.1, 0.2), Uv::new(0.9, 0.35), Uv::new(0.4, 1.0)];
-        let mut nets = Nets::default();
+        let mut nets = SimplexNets::default();
         let net = nets.expand(patch, corners).to_vec();
         let n = patch.degree[0] + patch.degree[1];
         let b = [0.2, 0.5, 0.3f64];
@@ -270,7 +270,7 @@ mod tests {
         }
         let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
         assert!((sum.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
-        let mut plain = Nets::default();
+        let mut plain = SimplexNets::default();
         multinomials::<3>(n, &mut plain.shares);
         plain.expand_plain(patch, corners);
         assert_eq!(plain.out, net);
@@ -289,7 +289,7 @@ mod tests {
             all.map(|k| Homogeneous::new(k.sin(), (1.7 * k).cos(), 0.1 * k, 1.0 + 0.3 * k.cos())).collect()
         };
         let rectangle = [Uv::new(0.0, 0.0), Uv::new(1.0, 0.0), Uv::new(1.0, 1.0), Uv::new(0.0, 1.0)];
-        let mut nets = Nets::default();
+        let mut nets = SimplexNets::default();
         for degree in [[2, 2], [3, 1], [2, 3]] {
             let patch = BezierPatch { degree, points: points(degree), domain: [[0.0, 1.0]; 2] };
             for k in 0..4 {
@@ -299,7 +299,7 @@ mod tests {
                     let direction = if a.x != b.x { 0 } else { 1 };
                     let upper = [a[direction] == 1.0, b[1 - direction] == 1.0];
                     let want = nets.expand(&patch, [a, b, c]).to_vec();
-                    let found = nets.half(&patch.points, degree, Corner { direction, upper });
+                    let found = nets.half_of_rectangle(&patch.points, degree, RightAngle { direction, upper });
                     assert!(want.iter().zip(found).all(|(x, y)| (*x - *y).length() < 1e-13), "{degree:?} {k}");
                 }
             }

@@ -1,5 +1,7 @@
-use super::proof::bend::Bends;
-use super::settings::Field;
+//! A face's surface laid out for quick evaluation, with what meshing asks of it: tolerance, normals, creases, poles.
+
+use super::proof::second_derivatives::SecondDerivativeBounds;
+use super::settings::ToleranceField;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};
 
@@ -14,18 +16,31 @@ const SHARP: f64 = 0.05;
 pub(super) const CREASE: f64 = 1e-7;
 
 /// Largest tolerance of a surface that closes on itself, in shares of its size; a ball is a third as large in radius as its box is across.
-const SMALLEST: f64 = 0.05;
+const CLOSED_TOLERANCE: f64 = 0.05;
+/// Ratio of the lengths of both derivatives below which the shorter is nothing but rounding.
+const NO_DERIVATIVE: f64 = 1e-10;
+/// Share of the domain by which a normal is looked for beside a crease that runs into a pole.
+const BESIDE_CREASE: f64 = 1e-9;
+/// Share of the way to the domain's centre at which the curvature of a pole is taken.
+const BESIDE_POLE: f64 = 1e-3;
+/// Share of the surface's size, and of a weight, within which control points lie on an affine image of their parameters.
+const AFFINE: [f64; 2] = [1e-12, 1e-14];
+/// Share of the shorter knot interval at which tangents on both sides of a knot are compared, and at how many places along it.
+const CREASE_STEP: f64 = 1e-6;
+const CREASE_PLACES: usize = 9;
+/// Where in its share of the knot such a place lies: not in the middle, where symmetric surfaces have no jump.
+const OFF_SYMMETRY: f64 = 0.37;
 
 /// A face's surface with its Bézier patches laid out for quick evaluation.
-pub(super) struct Sheet<'a> {
-    pub(super) surface: &'a Surface,
-    pub(super) field: Field,
+pub(super) struct FaceSurface<'a> {
+    pub(super) spline: &'a Surface,
+    pub(super) field: ToleranceField,
     /// Whether the outward normal is `-(Su × Sv)`.
     flip: bool,
     /// Whether the surface is an affine image of its parameters, so that any facet lies in it.
     pub(super) affine: bool,
     patches: Vec<BezierPatch>,
-    pub(super) bends: Bends,
+    pub(super) curving: SecondDerivativeBounds,
     /// Distinct knots in u and v.
     pub(super) breaks: [Vec<f64>; 2],
     /// Parameters with a crease or corner of the surface, in u and v.
@@ -42,8 +57,8 @@ pub(super) struct Sheet<'a> {
     pub(super) pole_size: f64,
 }
 
-impl<'a> Sheet<'a> {
-    pub(super) fn new(surface: &'a Surface, flip: bool, field: Field) -> Self {
+impl<'a> FaceSurface<'a> {
+    pub(super) fn new(surface: &'a Surface, flip: bool, field: ToleranceField) -> Self {
         let breaks = [0, 1].map(|d| {
             let n = surface.counts()[d];
             let mut b = surface.knots[d][surface.degree[d]..=n].to_vec();
@@ -54,23 +69,23 @@ impl<'a> Sheet<'a> {
         let creases = sharper(BENT);
         let sharp = if creases.iter().all(|c| c.is_empty()) { creases.clone() } else { sharper(SHARP) };
         let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
-        let bends = Bends::new(surface, &patches, &breaks);
+        let curving = SecondDerivativeBounds::new(surface, &patches, &breaks);
         let least = POLE * size;
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
         let affine = is_affine(surface, size);
         // A ball or ring within its tolerance would be a point: all its triangles had two corners in one place.
-        let most = SMALLEST * size;
+        let most = CLOSED_TOLERANCE * size;
         let closed = |d: usize| poles[d] == [true; 2] || is_closed(surface, d, least);
         let small = field.loosest() > most && (poles.contains(&[true; 2]) || closed(0) && closed(1));
         let field = if small { field.at_most(most) } else { field };
         Self {
-            surface,
+            spline: surface,
             field,
             flip,
             affine,
             patches,
-            bends,
+            curving,
             breaks,
             creases,
             sharp,
@@ -83,7 +98,7 @@ impl<'a> Sheet<'a> {
 
     /// Where `uv` lies on a pole: the parameter that is constant along it.
     pub(super) fn pole(&self, uv: Uv) -> Option<usize> {
-        let domain = self.surface.domain();
+        let domain = self.spline.domain();
         let near = |d: usize, end: usize| {
             let [a, b] = domain[d];
             (uv[d] - domain[d][end]).abs() <= POLE * (b - a)
@@ -93,7 +108,7 @@ impl<'a> Sheet<'a> {
 
     /// Size of the parameter rectangle.
     pub(super) fn extent(&self) -> Uv {
-        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let [[u0, u1], [v0, v1]] = self.spline.domain();
         Uv::new(u1 - u0, v1 - v0)
     }
 
@@ -121,7 +136,7 @@ impl<'a> Sheet<'a> {
         patch.homogeneous_point(local(patch, uv)).project()
     }
 
-    /// Points at three parameters of each direction; the same bits as [`Sheet::point`].
+    /// Points at three parameters of each direction; the same bits as [`FaceSurface::point`].
     pub(super) fn lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Point; 3]; 3] {
         let (a, b) = (self.interval(0, u[0]), self.interval(1, v[0]));
         let one = a == self.interval(0, u[2]) && b == self.interval(1, v[2]);
@@ -145,7 +160,7 @@ impl<'a> Sheet<'a> {
 
     /// Outward unit normal, where there is one.
     pub(super) fn normal(&self, uv: Uv) -> Option<Vector> {
-        self.surface.normal(uv).map(|n| if self.flip { -n } else { n })
+        self.spline.normal(uv).map(|n| if self.flip { -n } else { n })
     }
 
     /// Whether the surface has creases.
@@ -177,9 +192,10 @@ impl<'a> Sheet<'a> {
         let patch = self.patch(a, b);
         let d = patch.second_derivatives(local(patch, uv).clamp(Uv::ZERO, Uv::ONE));
         let (lu, lv) = (d.du.length(), d.dv.length());
-        if lu.min(lv) <= 1e-10 * lu.max(lv) {
+        if lu.min(lv) <= NO_DERIVATIVE * lu.max(lv) {
             // At a pole rounding is all that is left of one derivative: the limit there, a little beside the crease.
-            let beside = |d: usize| on[d].map_or(uv[d], |c| c + (1e-9 * self.extent()[d]).copysign(inside[d] - c));
+            let beside =
+                |d: usize| on[d].map_or(uv[d], |c| c + (BESIDE_CREASE * self.extent()[d]).copysign(inside[d] - c));
             return self.normal(Uv::new(beside(0), beside(1)));
         }
         let n = d.du.cross(d.dv).try_normalize();
@@ -187,7 +203,7 @@ impl<'a> Sheet<'a> {
     }
 
     /// Whether facets run clockwise in the parameter plane.
-    pub(super) fn flipped(&self) -> bool {
+    pub(super) fn is_flipped(&self) -> bool {
         self.flip
     }
 
@@ -196,13 +212,13 @@ impl<'a> Sheet<'a> {
         if self.affine || self.field.tightest() == self.field.loosest() {
             return self.field.loosest();
         }
-        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let [[u0, u1], [v0, v1]] = self.spline.domain();
         let forms = self.forms(uv).or_else(|| {
             // Curvature at a pole is that just beside it.
             let center = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
-            self.forms(uv.lerp(center, 1e-3))
+            self.forms(uv.lerp(center, BESIDE_POLE))
         });
-        self.field.at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
+        self.field.tolerance_at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
     }
 }
 
@@ -246,7 +262,7 @@ fn is_affine(s: &Surface, size: f64) -> bool {
             let a = (greville(0, i) - g0[0]) / (g1[0] - g0[0]);
             let b = (greville(1, j) - g0[1]) / (g1[1] - g0[1]);
             let off = (at(i, j) - (o + x * a + y * b)).length();
-            off <= 1e-12 * size && (s.points[i * nv + j].w - w).abs() <= 1e-14 * w
+            off <= AFFINE[0] * size && (s.points[i * nv + j].w - w).abs() <= AFFINE[1] * w
         })
     })
 }
@@ -259,11 +275,11 @@ fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64
     inner
         .filter(|(_, k)| knots.iter().filter(|x| x == k).count() >= s.degree[d])
         .filter(|&(i, &k)| {
-            let step = 1e-6 * (b[i + 2] - k).min(k - b[i]);
+            let step = CREASE_STEP * (b[i + 2] - k).min(k - b[i]);
             let across = &breaks[1 - d];
             let (lo, hi) = (across[0], across[across.len() - 1]);
-            (0..=8).any(|j| {
-                let w = lo + (hi - lo) * (j as f64 + 0.37) / 9.0;
+            (0..CREASE_PLACES).any(|j| {
+                let w = lo + (hi - lo) * (j as f64 + OFF_SYMMETRY) / CREASE_PLACES as f64;
                 let tangent = |x: f64| {
                     let der = s.derivatives(if d == 0 { Uv::new(x, w) } else { Uv::new(w, x) });
                     if d == 0 { der.du } else { der.dv }

@@ -1,20 +1,35 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
+use super::deviation::DeviationBounds;
+use super::flat_triangle::distance_to_chord;
+use super::prover::Prover;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
-use crate::tessellate::proof::bound::Prover;
-use crate::tessellate::proof::flat::from_chord;
-use crate::tessellate::proof::near::Near;
-use crate::tessellate::sheet::Sheet;
+use crate::tessellate::face_surface::FaceSurface;
+use rustc_hash::FxHashMap;
 use smallvec::{SmallVec, smallvec};
 
 /// Share of the tolerance below which the file's own gap is taken as it is known for the whole face.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Where along a chord the file's gap between edge and face is measured, besides the ends.
+const GAP_PROBES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+/// Share of the domain within which a uv curve is the straight line of its chord: rounding of its control points.
+const STRAIGHT: f64 = 1e-12;
+/// Share of the surface's size that covers the rounding of points on it; see `prover.rs`.
+const ROUNDING: f64 = 1e-12;
+/// Share of the tolerance that is small for a curve's deviation: beyond it finer hulls are looked at.
+const SMALL_SHARE: f64 = 0.5;
+/// Halvings of one knot span, and the parts that several are cut into: coarse first, finer where that is not clearly small.
+const MAX_HALVINGS: u32 = 3;
+const PARTS: [i32; 2] = [2, 8];
+
+/// The chords of a face's border by the edge between their nodes.
+pub(in crate::tessellate) type BorderChords = FxHashMap<[u32; 2], BorderChord>;
 
 /// One chord of a border edge.
 #[derive(Clone, Debug, Default)]
-pub(in crate::tessellate) struct Trim {
+pub(in crate::tessellate) struct BorderChord {
     /// Bound of the distance between the edge's curve and the line of the chord, mm, with the offset of the chord's ends
     /// from the surface.
     pub(in crate::tessellate) deviation: f64,
@@ -23,12 +38,12 @@ pub(in crate::tessellate) struct Trim {
     /// A convex polygon around what lies between the chord and the curve in the parameter plane.
     pub(in crate::tessellate) between: Vec<Uv>,
     /// Bound of the distance from the surface there to the chord, mm, once it is known.
-    beside: Option<f64>,
+    sliver: Option<f64>,
 }
 
-impl Trim {
+impl BorderChord {
     pub(in crate::tessellate) fn new(
-        sheet: &Sheet<'_>,
+        surface: &FaceSurface<'_>,
         curve: &Curve,
         side: &EdgeUse,
         t: [f64; 2],
@@ -39,50 +54,50 @@ impl Trim {
         // The file's own gap between edge and face, as measured at the ends and at places between; not where it is known to be small.
         let gap = |f: f64| {
             let at = a + (b - a) * f;
-            (sheet.point(sheet.surface.clamp(side.uv.evaluate(at))) - curve.evaluate(at)).length()
+            (surface.point(surface.spline.clamp(side.uv.evaluate(at))) - curve.evaluate(at)).length()
         };
-        let ends = [0, 1].map(|i| (sheet.point(uv[i]) - xyz[i]).length());
-        let known = sheet.gap.filter(|&g| g <= NEGLIGIBLE * sheet.field.tightest());
+        let ends = [0, 1].map(|i| (surface.point(uv[i]) - xyz[i]).length());
+        let known = surface.gap.filter(|&g| g <= NEGLIGIBLE * surface.field.tightest());
         let offset = match known {
             Some(gap) => ends[0].max(ends[1]).max(gap),
-            None => [0.2, 0.4, 0.6, 0.8].map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max),
+            None => GAP_PROBES.map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max),
         };
         if a >= b || a.is_nan() || b.is_nan() {
-            return Self { deviation: offset, gap: offset, between: Vec::new(), beside: None };
+            return Self { deviation: offset, gap: offset, between: Vec::new(), sliver: None };
         }
-        let deviation = stray(curve, [a, b], &xyz, 0.5 * sheet.field.tightest() - offset);
-        let mut trim = Self { deviation: deviation + offset, gap: offset, between: Vec::new(), beside: None };
-        if !sheet.affine {
-            trim.between = around(sheet, side, [a, b], uv);
+        let deviation = curve_deviation(curve, [a, b], &xyz, SMALL_SHARE * surface.field.tightest() - offset);
+        let mut chord = Self { deviation: deviation + offset, gap: offset, between: Vec::new(), sliver: None };
+        if !surface.affine {
+            chord.between = parameter_hull(surface, side, [a, b], uv);
         }
-        trim
+        chord
     }
 
     /// Bounds how far the surface between chord and curve lies from the chord, once for all facets that have the chord.
-    pub(in crate::tessellate) fn prove(
+    pub(in crate::tessellate) fn bound_sliver(
         &mut self,
-        sheet: &Sheet<'_>,
-        near: &mut Near,
+        surface: &FaceSurface<'_>,
+        deviation: &mut DeviationBounds,
         uv: [Uv; 2],
         xyz: [Point; 2],
     ) {
         if self.between.len() < 3 {
             return;
         }
-        let at = uv.map(|x| sheet.point(x));
-        let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + 1e-12 * sheet.size;
-        let limit = sheet.tolerance(0.5 * (uv[0] + uv[1]));
-        self.beside = near.beside(sheet, &self.between, uv, at, limit - off).map(|x| x + off);
+        let at = uv.map(|x| surface.point(x));
+        let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + ROUNDING * surface.size;
+        let limit = surface.tolerance(0.5 * (uv[0] + uv[1]));
+        self.sliver = deviation.sliver(surface, &self.between, uv, at, limit - off).map(|x| x + off);
     }
 
     /// The part of the bound that the border adds to a triangle of facets.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
-        if let Some(beside) = self.beside.filter(|&x| x <= limit) {
-            return worst.max(beside);
+        if let Some(sliver) = self.sliver.filter(|&x| x <= limit) {
+            return worst.max(sliver);
         }
         if worst <= limit && self.between.len() > 2 {
-            worst = worst.max(prover.polygon(&self.between, xyz, limit));
+            worst = worst.max(prover.polygon_bound(&self.between, xyz, limit));
         }
         worst
     }
@@ -90,9 +105,10 @@ impl Trim {
 
 /// Bound of the distance between a piece of a curve and a chord, by the hulls of its two halves, and of eighths where that is not
 /// clearly small.
-fn stray(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
+fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
     let mut piece = curve.restricted_points(a, b);
-    let away = |points: &[Homogeneous]| points.iter().map(|p| from_chord(p.project(), chord)).fold(0.0, f64::max);
+    let away =
+        |points: &[Homogeneous]| points.iter().map(|p| distance_to_chord(p.project(), chord)).fold(0.0, f64::max);
     let n = curve.degree;
     if n == 1 {
         return away(&piece);
@@ -104,8 +120,8 @@ fn stray(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64
             let parts = (0..parts).filter(|&k| cut(k) < cut(k + 1));
             parts.map(|k| away(&curve.restricted_points(cut(k), cut(k + 1)))).fold(0.0, f64::max)
         };
-        let coarse = over(2);
-        return if coarse > small { over(8) } else { coarse };
+        let coarse = over(PARTS[0]);
+        return if coarse > small { over(PARTS[1]) } else { coarse };
     }
     // Halves by de Casteljau, the last one first, each further halved while it is not small.
     let mut worst = 0f64;
@@ -113,7 +129,7 @@ fn stray(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64
     while let Some(depth) = depths.pop() {
         let start = piece.len() - n - 1;
         let off = away(&piece[start..]);
-        if depth == 3 || depth > 0 && off <= small || off <= worst {
+        if depth == MAX_HALVINGS || depth > 0 && off <= small || off <= worst {
             worst = worst.max(off);
             piece.truncate(start);
             continue;
@@ -134,8 +150,8 @@ fn stray(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64
 }
 
 /// The convex hull of the curve's control points in the parameter plane.
-fn around(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<Uv> {
-    let [[u0, u1], [v0, v1]] = sheet.surface.domain();
+fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<Uv> {
+    let [[u0, u1], [v0, v1]] = surface.spline.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);
     let [s0, s1] = side.uv.domain();
     let (a, b) = (a.clamp(s0, s1), b.clamp(s0, s1));
@@ -148,7 +164,7 @@ fn around(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -
         if d.length() > 0.0 { x.perp_dot(d).abs() / d.length() } else { x.length() }
     };
     let line = side.uv.degree == 1 && side.uv.points.len() == 2;
-    if line && [a, b].iter().all(|&t| off(sheet.surface.clamp(side.uv.evaluate(t))) < 1e-12) {
+    if line && [a, b].iter().all(|&t| off(surface.spline.clamp(side.uv.evaluate(t))) < STRAIGHT) {
         return Vec::new();
     }
     let m = 0.5 * (a + b);
@@ -157,17 +173,17 @@ fn around(sheet: &Sheet<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -
         .iter()
         .filter(|p| p[0] < p[1])
         .flat_map(|&[a, b]| side.uv.restricted_points(a, b))
-        .map(|p| sheet.surface.clamp(p.truncate() / p.z))
+        .map(|p| surface.spline.clamp(p.truncate() / p.z))
         .collect();
-    if points.iter().all(|&p| off(p) < 1e-12) {
+    if points.iter().all(|&p| off(p) < STRAIGHT) {
         return Vec::new();
     }
     points.extend(chord);
-    hull(points)
+    convex_hull(points)
 }
 
 /// Convex hull, counter-clockwise (Andrew's monotone chain).
-fn hull(mut p: Vec<Uv>) -> Vec<Uv> {
+fn convex_hull(mut p: Vec<Uv>) -> Vec<Uv> {
     p.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     p.dedup();
     let half = |points: &mut dyn Iterator<Item = Uv>| {

@@ -15,22 +15,23 @@
 //! The curve over the diagonal plays no part, where the proof of each triangle by itself must hold it to the traced diagonal: on a surface
 //! that is uneven or twisted in its own plane that alone cuts cells. And one net takes the place of the nets of two triangles.
 
-use super::bound::Prover;
-use super::flat::from_chord;
-use super::refine::split;
+use super::flat_triangle::distance_to_chord;
+use super::prover::Prover;
 use crate::math::{Point, Uv, Vector};
-use crate::tessellate::settings::Judge;
-use crate::tessellate::sheet::local;
+use crate::tessellate::face_surface::local;
+use crate::tessellate::settings::Acceptance;
 
 /// Knot rectangles up to which a cell is looked at as one quad.
-const MOST_PATCHES: usize = 16;
+const MAX_PATCHES: usize = 16;
 /// Halvings for one cell.
-const MOST_HALVINGS: u32 = 24;
+const MAX_HALVINGS: u32 = 24;
 /// Least cosine between the quad and its triangles, so that little is lost.
 const FLATTEST: f64 = 0.9;
+/// Least sine between sides that meet: a corner that is nearly straight or folded has no normal to speak of.
+const SHARPEST: f64 = 1e-6;
 
 /// A convex flat quad that measures distances, and what its corners have lost.
-struct Quad {
+struct FlatQuad {
     corners: [Point; 4],
     normal: Vector,
     /// Across each side into the quad.
@@ -41,7 +42,7 @@ struct Quad {
     cosine: f64,
 }
 
-impl Quad {
+impl FlatQuad {
     /// The quad under corners in their order, with the traced diagonal from corner `first`; `None` unless it is convex and nearly flat.
     fn new(c: &[Point; 4], first: usize) -> Option<Self> {
         let normal = (c[2] - c[0]).cross(c[3] - c[1]).try_normalize()?;
@@ -49,10 +50,9 @@ impl Quad {
         let corners = [0, 1, 2, 3].map(|k| c[k] + normal * if k % 2 == 0 { height } else { -height });
         let side = |k: usize| corners[(k + 1) % 4] - corners[k];
         let inward = [0, 1, 2, 3].map(|k| normal.cross(side(k)));
-        // A corner that is nearly straight or folded has no normal to speak of.
         let convex = (0..4).all(|k| {
             let next = side((k + 1) % 4);
-            inward[k].dot(next) > 1e-6 * inward[k].length() * next.length()
+            inward[k].dot(next) > SHARPEST * inward[k].length() * next.length()
         });
         let at = |k: usize| c[(k + first) % 4];
         let cosines = [[0, 1, 2], [0, 2, 3]].map(|[i, j, k]| {
@@ -69,101 +69,51 @@ impl Quad {
         if (0..4).all(|k| self.inward[k].dot(p - c[k]) >= 0.0) {
             return (p - c[0]).dot(self.normal).abs();
         }
-        (0..4).map(|k| from_chord(p, &[c[k], c[(k + 1) % 4]])).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Buffers reused from cell to cell.
-#[derive(Default)]
-pub(in crate::tessellate) struct Halving {
-    /// Nets of W·(d − limit) that wait for halving, one after another.
-    stack: Vec<f64>,
-}
-
-impl Halving {
-    /// Bound of Σ dᵢwᵢBᵢ / Σ wᵢBᵢ over the unit square for distances and weights of a net of these degrees, where it is within the limit.
-    fn bound(
-        &mut self,
-        net: impl Iterator<Item = (f64, f64)>,
-        [p, q]: [usize; 2],
-        limit: f64,
-        left: &mut u32,
-    ) -> Option<f64> {
-        let mut heaviest = 0f64;
-        self.stack.clear();
-        self.stack.extend(net.map(|(d, w)| {
-            heaviest = heaviest.max(w);
-            w * (d - limit)
-        }));
-        let size = self.stack.len();
-        let mut most = f64::NEG_INFINITY;
-        while !self.stack.is_empty() {
-            let start = self.stack.len() - size;
-            let net = &self.stack[start..];
-            let worst = net.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
-            if worst <= 0.0 {
-                most = most.max(worst);
-                self.stack.truncate(start);
-                continue;
-            }
-            // At corners the value itself is taken.
-            if [0, q, p * (q + 1), size - 1].iter().any(|&k| net[k] > 0.0) {
-                return None;
-            }
-            *left = left.checked_sub(1)?;
-            let bend = |i: usize, step: usize| (net[i + 2 * step] - 2.0 * net[i + step] + net[i]).abs();
-            let along_u = (0..size.saturating_sub(2 * (q + 1))).map(|i| bend(i, q + 1)).fold(0.0, f64::max);
-            let rows = (0..=p).flat_map(|i| (0..q.saturating_sub(1)).map(move |j| i * (q + 1) + j));
-            let along_v = rows.map(|i| bend(i, 1)).fold(0.0, f64::max);
-            self.stack.extend_from_within(start..);
-            let (low, high) = self.stack[start..].split_at_mut(size);
-            split(low, high, [p, q], if along_u >= along_v { 0 } else { 1 });
-        }
-        Some(limit + most / heaviest)
+        (0..4).map(|k| distance_to_chord(p, &[c[k], c[(k + 1) % 4]])).fold(f64::INFINITY, f64::min)
     }
 }
 
 impl Prover<'_, '_> {
     /// Bound of the distance between the surface over a cell and its two triangles, both ways, where it is within the limit. The corners
     /// lie on the surface, counter-clockwise from the lowest; the traced diagonal starts at corner `first`.
-    pub(in crate::tessellate) fn quad(
+    pub(in crate::tessellate) fn quad_bound(
         &mut self,
         [lo, hi]: [Uv; 2],
         corners: &[Point; 4],
         first: usize,
         limit: f64,
     ) -> Option<f64> {
-        let sheet = self.sheet;
-        let (a, b) = (sheet.range(0, lo.x, hi.x), sheet.range(1, lo.y, hi.y));
-        if sheet.affine || self.judge == Judge::Sampled {
+        let surface = self.surface;
+        let (a, b) = (surface.range(0, lo.x, hi.x), surface.range(1, lo.y, hi.y));
+        if surface.affine || self.acceptance == Acceptance::Sampled {
             return None;
         }
-        let bent = sheet.bends.bound(a, b, hi - lo).map(|x| x + self.margin);
+        let bent = surface.curving.linear_deviation(a, b, hi - lo).map(|x| x + self.margin);
         if let Some(bound) = bent.filter(|&x| x <= limit) {
             return Some(bound);
         }
-        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST_PATCHES {
+        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MAX_PATCHES {
             return None;
         }
         let origin = corners[first];
         let c = corners.map(|x| x - origin);
-        let quad = Quad::new(&c, first)?;
+        let quad = FlatQuad::new(&c, first)?;
         let sides = limit * quad.cosine - self.margin;
         let flat = sides - quad.height;
         if flat <= 0.0 {
             return None;
         }
-        let (mut away, mut aside, mut left) = (0f64, 0f64, MOST_HALVINGS);
+        let (mut away, mut aside, mut left) = (0f64, 0f64, MAX_HALVINGS);
         for i in a[0]..=a[1] {
             for j in b[0]..=b[1] {
-                let patch = sheet.patch(i, j);
+                let patch = surface.patch(i, j);
                 let [p, q] = patch.degree;
                 let [[u0, u1], [v0, v1]] = patch.domain;
                 let from = local(patch, lo.max(Uv::new(u0, v0)));
                 let to = local(patch, hi.min(Uv::new(u1, v1)));
-                let net = self.near.restrict(patch, from, to, origin);
+                let net = self.deviation.restrict(patch, from, to, origin);
                 let distances = net.iter().map(|c| (quad.distance(c.project()), c.w));
-                away = away.max(self.halving.bound(distances, [p, q], flat, &mut left)?);
+                away = away.max(self.patch_scalar.bound(distances, [p, q], flat, &mut left)?);
                 // The rows of the net over the cell's own sides.
                 let last = p * (q + 1);
                 let rows: [(bool, usize, usize, usize, [usize; 2]); 4] = [
@@ -176,7 +126,7 @@ impl Prover<'_, '_> {
                     if outer {
                         let chord = ends.map(|k| c[k]);
                         let row = (0..=n).map(|k| &net[start + k * step]);
-                        let row = row.map(|x| (from_chord(x.project(), &chord), x.w));
+                        let row = row.map(|x| (distance_to_chord(x.project(), &chord), x.w));
                         aside = aside.max(self.scalar.bound::<2>(row, n, sides)?);
                     }
                 }
@@ -191,8 +141,8 @@ mod tests {
     use super::*;
     use crate::math::{Frame, Homogeneous};
     use crate::nurbs::{Surface, conic, sweep};
-    use crate::tessellate::settings::Field;
-    use crate::tessellate::sheet::Sheet;
+    use crate::tessellate::face_surface::FaceSurface;
+    use crate::tessellate::settings::ToleranceField;
     use proptest::prelude::*;
 
     fn cell([lo, hi]: [Uv; 2]) -> [Uv; 4] {
@@ -200,9 +150,10 @@ mod tests {
     }
 
     fn bound(s: &Surface, box_: [Uv; 2], first: usize, limit: f64) -> Option<f64> {
-        let sheet = Sheet::new(s, false, Field::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
-        let mut prover = Prover::new(&sheet, Judge::Bound);
-        prover.quad(box_, &cell(box_).map(|x| s.evaluate(x)), first, limit)
+        let surface =
+            FaceSurface::new(s, false, ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
+        let mut prover = Prover::new(&surface, Acceptance::Proved);
+        prover.quad_bound(box_, &cell(box_).map(|x| s.evaluate(x)), first, limit)
     }
 
     #[test]

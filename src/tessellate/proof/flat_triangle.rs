@@ -1,4 +1,4 @@
-//! Flat shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
+//! FlatTriangle shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
 
 use crate::math::{Point, Uv, Vector};
 use smallvec::SmallVec;
@@ -36,13 +36,13 @@ pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygo
 }
 
 /// Whether a clipped triangle is the whole rectangle.
-pub(in crate::tessellate) fn whole(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
+pub(in crate::tessellate) fn is_rectangle(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
     polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
 }
 
 /// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
 /// last bit, and the line through them can lie anywhere.
-pub(in crate::tessellate) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
+pub(in crate::tessellate) fn distance_to_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (b - a, p - a);
     let l = d.length_squared();
     let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
@@ -50,13 +50,13 @@ pub(in crate::tessellate) fn from_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
 }
 
 /// A triangle, which may be degenerate, ready to measure distances.
-pub(in crate::tessellate) struct Flat {
+pub(in crate::tessellate) struct FlatTriangle {
     corners: [Point; 3],
     /// Unit normal, and across each side into the triangle; `None` without area.
     frame: Option<(Vector, [Vector; 3])>,
 }
 
-impl Flat {
+impl FlatTriangle {
     pub(in crate::tessellate) fn new(corners: &[Point; 3]) -> Self {
         let [a, b, c] = *corners;
         let n = (b - a).cross(c - a);
@@ -75,7 +75,7 @@ impl Flat {
         {
             return (p - a).dot(n).abs();
         }
-        from_chord(p, &[a, b]).min(from_chord(p, &[b, c])).min(from_chord(p, &[c, a]))
+        distance_to_chord(p, &[a, b]).min(distance_to_chord(p, &[b, c])).min(distance_to_chord(p, &[c, a]))
     }
 }
 

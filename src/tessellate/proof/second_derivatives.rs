@@ -11,25 +11,31 @@ use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::{BezierPatch, Surface};
 use rayon::prelude::*;
 
-/// Most patches that are looked at for one triangle.
-const MOST: usize = 64;
+/// Most patches that are looked at for one triangle: beyond, other bounds are cheaper.
+const MAX_PATCHES: usize = 64;
+/// Room for the rounding of the differences themselves: a few thousand roundings.
+const ROUNDING_ROOM: f64 = 1.0 + 1e-12;
 
 /// Bounds of the second derivatives of each patch.
-pub(in crate::tessellate) struct Bends {
+pub(in crate::tessellate) struct SecondDerivativeBounds {
     /// For uu, uv and vv in the surface's own parameters, patch by patch.
-    of: Vec<[f64; 3]>,
+    per_patch: Vec<[f64; 3]>,
     /// Whether the parametrisation is C1 across each distinct knot.
     smooth: [Vec<bool>; 2],
     columns: usize,
 }
 
-impl Bends {
+impl SecondDerivativeBounds {
     pub(in crate::tessellate) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
         let smooth = [0, 1].map(|d| {
             let times = |k: &f64| surface.knots[d].iter().filter(|x| *x == k).count();
             breaks[d].iter().map(|k| times(k) < surface.degree[d]).collect()
         });
-        Self { of: patches.par_iter().with_min_len(64).map(second).collect(), smooth, columns: breaks[1].len() - 1 }
+        Self {
+            per_patch: patches.par_iter().with_min_len(64).map(patch_bounds).collect(),
+            smooth,
+            columns: breaks[1].len() - 1,
+        }
     }
 
     /// Whether the surface and its weight are C1 through these knot intervals (first and last).
@@ -40,14 +46,14 @@ impl Bends {
 
     /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
     /// `b` (first and last); `None` where it does not hold or costs too much.
-    pub(in crate::tessellate) fn bound(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
-        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MOST || !self.is_smooth(a, b) {
+    pub(in crate::tessellate) fn linear_deviation(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
+        if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MAX_PATCHES || !self.is_smooth(a, b) {
             return None;
         }
         let mut m = [0f64; 3];
         for i in a[0]..=a[1] {
             for j in b[0]..=b[1] {
-                let p = self.of[i * self.columns + j];
+                let p = self.per_patch[i * self.columns + j];
                 m = [m[0].max(p[0]), m[1].max(p[1]), m[2].max(p[2])];
             }
         }
@@ -56,7 +62,7 @@ impl Bends {
 }
 
 /// Bounds of |Suu|, |Suv| and |Svv| over a patch.
-fn second(patch: &BezierPatch) -> [f64; 3] {
+fn patch_bounds(patch: &BezierPatch) -> [f64; 3] {
     let [p, q] = patch.degree;
     let middle = patch.points[patch.points.len() / 2].project();
     let at = |i: usize, j: usize| -> Homogeneous {
@@ -87,12 +93,10 @@ fn second(patch: &BezierPatch) -> [f64; 3] {
     let r = patch.points.iter().map(|x| (x.project() - middle).length()).fold(0.0, f64::max);
     let (su, sv) = ((u[0] + u[1] * r) / w, (v[0] + v[1] * r) / w);
     let [hu, hv] = patch.domain.map(|[a, b]| b - a);
-    // Room for the rounding of the differences themselves.
-    let room = 1.0 + 1e-12;
     [
-        room * (uu[0] + 2.0 * u[1] * su + uu[1] * r) / (w * hu * hu),
-        room * (uv[0] + u[1] * sv + v[1] * su + uv[1] * r) / (w * hu * hv),
-        room * (vv[0] + 2.0 * v[1] * sv + vv[1] * r) / (w * hv * hv),
+        ROUNDING_ROOM * (uu[0] + 2.0 * u[1] * su + uu[1] * r) / (w * hu * hu),
+        ROUNDING_ROOM * (uv[0] + u[1] * sv + v[1] * su + uv[1] * r) / (w * hu * hv),
+        ROUNDING_ROOM * (vv[0] + 2.0 * v[1] * sv + vv[1] * r) / (w * hv * hv),
     ]
 }
 
@@ -106,7 +110,7 @@ mod tests {
     fn second_derivatives_stay_below_their_bounds() {
         let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 1.3], [0.2, 1.7]);
         for patch in s.bezier_patches() {
-            let bound = second(&patch);
+            let bound = patch_bounds(&patch);
             let [[u0, u1], [v0, v1]] = patch.domain;
             for k in 0..100 {
                 let f = Uv::new((k % 10) as f64 / 9.0, (k / 10) as f64 / 9.0);

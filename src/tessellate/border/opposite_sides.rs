@@ -2,23 +2,34 @@
 //!
 //! Two edges are opposite when both run along parameter lines of one direction, from the same parameter to the same
 //! parameter. The one with more samples hands its own on, from face to face, as long as the next has at least half
-//! as many: a strip between unequal sides has as many facets as the longer one anyway.
+//! as many: a transition between unequal sides has as many facets as the longer one anyway.
 
-use super::edges::{Side, breaks, hold};
+use super::curve_chords::breaks;
+use super::edge_chords::{EdgeSide, divide_further};
 use crate::model::{EdgeUse, Face, Part};
-use crate::tessellate::sheet::Sheet;
+use crate::tessellate::face_surface::FaceSurface;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Uses of a face beyond which no opposite ones are looked for.
-const MOST_USES: usize = 400;
+/// Uses of a face beyond which no opposite ones are looked for: pairs grow with the square.
+const MAX_USES: usize = 400;
 /// Share by which a side may grow beyond the samples handed to it before it keeps its own.
 const GROWTH: f64 = 1.2;
+/// Share of the domain within which sides start and end at the same parameter: ten times what [`LEVEL`] lets one wander.
+const SAME_RANGE: f64 = 1e-6;
+/// Share of the domain within which a side keeps to a parameter line.
+const LEVEL: f64 = 1e-7;
+/// Share of the edge's domain by which samples must ascend, and within which they are the same.
+const SAME_SAMPLE: f64 = 1e-9;
+/// Halvings that invert a uv curve: down to the spacing of numbers.
+const INVERSION_HALVINGS: usize = 60;
+/// Steps in which a side's shape is looked at.
+const STEPS: u32 = 8;
 
 /// A use that runs along a parameter line.
-struct Along<'f> {
+struct ParameterRun<'f> {
     edge: usize,
-    side: &'f EdgeUse,
+    edge_use: &'f EdgeUse,
     /// The parameter that changes.
     direction: usize,
     /// From where to where, ascending, in shares of the domain.
@@ -30,42 +41,43 @@ struct Along<'f> {
 type Pair<'f> = [(usize, &'f EdgeUse); 2];
 
 /// Makes samples of opposite edges equal. `times` are the parameters at which each edge is divided.
-pub(in crate::tessellate) fn align<'f>(
+pub(in crate::tessellate) fn equalise<'f>(
     part: &Part,
-    faces: &[(&'f Face, &Sheet<'_>)],
-    sides: &[Vec<Side<'_, '_>>],
+    faces: &[(&'f Face, &FaceSurface<'_>)],
+    sides: &[Vec<EdgeSide<'_, '_>>],
     denser: &[u32],
     times: &mut [Vec<f64>],
 ) {
-    let bent: Vec<&(&Face, &Sheet<'_>)> = faces.iter().filter(|(_, s)| !s.affine).collect();
-    let of_face = |&&(face, sheet): &&(&'f Face, &Sheet<'_>)| pairs_of(face, sheet, times.len());
+    let bent: Vec<&(&Face, &FaceSurface<'_>)> = faces.iter().filter(|(_, s)| !s.affine).collect();
+    let of_face = |&&(face, surface): &&(&'f Face, &FaceSurface<'_>)| pairs_of(face, surface, times.len());
     let each: Vec<Vec<(Pair<'_>, usize)>> = bent.par_iter().with_min_len(8).map(of_face).collect();
     let pairs: Vec<(Pair<'_>, usize)> = each.into_iter().flatten().collect();
-    let mut of: FxHashMap<usize, Vec<usize>> = FxHashMap::default();
+    let mut of_edge: FxHashMap<usize, Vec<usize>> = FxHashMap::default();
     for (k, ([a, b], _)) in pairs.iter().enumerate() {
-        of.entry(a.0).or_default().push(k);
-        of.entry(b.0).or_default().push(k);
+        of_edge.entry(a.0).or_default().push(k);
+        of_edge.entry(b.0).or_default().push(k);
     }
-    let work = Work { part, sides, denser, pairs: &pairs, of: &of, times };
+    let equaliser = Equaliser { part, sides, denser, pairs: &pairs, of_edge: &of_edge, times };
     // Nothing is handed on from one group to another: done one after the other, they took a tenth of the time of four threads.
-    let groups = work.groups();
-    let found: Vec<Vec<(usize, Vec<f64>)>> = groups.par_iter().map(|group| work.hand_on(group)).collect();
+    let groups = equaliser.groups();
+    let found: Vec<Vec<(usize, Vec<f64>)>> =
+        groups.par_iter().map(|group| equaliser.equalise_group(group)).collect();
     for (edge, kept) in found.into_iter().flatten() {
         times[edge] = kept;
     }
 }
 
-struct Work<'w, 'f, 's, 'a> {
+struct Equaliser<'w, 'f, 's, 'a> {
     part: &'w Part,
-    sides: &'w [Vec<Side<'s, 'a>>],
+    sides: &'w [Vec<EdgeSide<'s, 'a>>],
     denser: &'w [u32],
     pairs: &'w [(Pair<'f>, usize)],
     /// The pairs of each edge that has one.
-    of: &'w FxHashMap<usize, Vec<usize>>,
+    of_edge: &'w FxHashMap<usize, Vec<usize>>,
     times: &'w [Vec<f64>],
 }
 
-impl Work<'_, '_, '_, '_> {
+impl Equaliser<'_, '_, '_, '_> {
     /// Edges that pairs lead to from each other.
     fn groups(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.times.len()];
@@ -77,7 +89,7 @@ impl Work<'_, '_, '_, '_> {
             seen[first] = true;
             let (mut group, mut next) = (vec![first], 0);
             while next < group.len() {
-                for &k in &self.of[&group[next]] {
+                for &k in &self.of_edge[&group[next]] {
                     for (e, _) in self.pairs[k].0 {
                         if !seen[e] {
                             seen[e] = true;
@@ -93,7 +105,8 @@ impl Work<'_, '_, '_, '_> {
     }
 
     /// What the edges of one group take over.
-    fn hand_on(&self, group: &[usize]) -> Vec<(usize, Vec<f64>)> {
+    fn equalise_group(&self, group: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        // The side with most samples starts.
         let mut order = group.to_vec();
         order.sort_by_key(|&e| (std::cmp::Reverse(self.times[e].len()), e));
         let mut now: FxHashMap<usize, Vec<f64>> = FxHashMap::default();
@@ -103,10 +116,11 @@ impl Work<'_, '_, '_, '_> {
             if !done.insert(first) {
                 continue;
             }
+            // From side to opposite side, as long as the next has at least half as many.
             let most = self.times[first].len();
             let mut queue = vec![first];
             while let Some(e) = queue.pop() {
-                for &k in &self.of[&e] {
+                for &k in &self.of_edge[&e] {
                     let ([a, b], direction) = &self.pairs[k];
                     let (from, to) = if a.0 == e { (a, b) } else { (b, a) };
                     let (curve, own) = (&self.part.edges[to.0].curve, &self.times[to.0]);
@@ -114,13 +128,14 @@ impl Work<'_, '_, '_, '_> {
                         continue;
                     }
                     let domain = curve.domain();
-                    let handed = hand(now.get(&e).unwrap_or(&self.times[e]), from.1, to.1, *direction, domain);
+                    let handed =
+                        transfer_samples(now.get(&e).unwrap_or(&self.times[e]), from.1, to.1, *direction, domain);
                     let Some(handed) = handed else { continue };
                     // What it has already holds already.
-                    let kept = if alike(&handed, own, domain) {
+                    let kept = if are_same(&handed, own, domain) {
                         handed
                     } else {
-                        let kept = hold(curve, &self.sides[to.0], self.denser[to.0], handed.clone());
+                        let kept = divide_further(curve, &self.sides[to.0], self.denser[to.0], handed.clone());
                         if kept.len() as f64 > GROWTH * handed.len() as f64 {
                             continue;
                         }
@@ -138,24 +153,25 @@ impl Work<'_, '_, '_, '_> {
 }
 
 /// Whether samples are the same but for rounding.
-fn alike(a: &[f64], b: &[f64], [t0, t1]: [f64; 2]) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() <= 1e-9 * (t1 - t0))
+fn are_same(a: &[f64], b: &[f64], [t0, t1]: [f64; 2]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() <= SAME_SAMPLE * (t1 - t0))
 }
 
 /// Opposite uses of a face whose edges are among the first `edges`, and the direction in which they run.
-fn pairs_of<'f>(face: &'f Face, sheet: &Sheet<'_>, edges: usize) -> Vec<(Pair<'f>, usize)> {
+fn pairs_of<'f>(face: &'f Face, surface: &FaceSurface<'_>, edges: usize) -> Vec<(Pair<'f>, usize)> {
     let mut pairs = Vec::new();
     let uses: Vec<&EdgeUse> = face.loops.iter().flat_map(|l| &l.uses).collect();
-    if uses.len() > MOST_USES {
+    if uses.len() > MAX_USES {
         return pairs;
     }
-    let along: Vec<Along<'_>> = uses.iter().filter_map(|u| follow(u, sheet)).filter(|a| a.edge < edges).collect();
-    for (i, a) in along.iter().enumerate() {
-        for b in &along[i + 1..] {
-            let near = |x: f64, y: f64| (x - y).abs() <= 1e-6;
+    let runs: Vec<ParameterRun<'_>> =
+        uses.iter().filter_map(|u| parameter_run(u, surface)).filter(|a| a.edge < edges).collect();
+    for (i, a) in runs.iter().enumerate() {
+        for b in &runs[i + 1..] {
+            let near = |x: f64, y: f64| (x - y).abs() <= SAME_RANGE;
             let same = a.direction == b.direction && near(a.range[0], b.range[0]) && near(a.range[1], b.range[1]);
             if same && a.edge != b.edge && !near(a.level, b.level) {
-                pairs.push(([(a.edge, a.side), (b.edge, b.side)], a.direction));
+                pairs.push(([(a.edge, a.edge_use), (b.edge, b.edge_use)], a.direction));
             }
         }
     }
@@ -163,37 +179,37 @@ fn pairs_of<'f>(face: &'f Face, sheet: &Sheet<'_>, edges: usize) -> Vec<(Pair<'f
 }
 
 /// A use as a run along a parameter line, if it is one.
-fn follow<'f>(side: &'f EdgeUse, sheet: &Sheet<'_>) -> Option<Along<'f>> {
-    let edge = side.edge?.0 as usize;
-    let [t0, t1] = side.uv.domain();
-    let domain = sheet.surface.domain();
+fn parameter_run<'f>(edge_use: &'f EdgeUse, surface: &FaceSurface<'_>) -> Option<ParameterRun<'f>> {
+    let edge = edge_use.edge?.0 as usize;
+    let [t0, t1] = edge_use.uv.domain();
+    let domain = surface.spline.domain();
     let at = |i: u32| {
-        let uv = side.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / 8.0);
+        let uv = edge_use.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(STEPS));
         [0, 1].map(|d| (uv[d] - domain[d][0]) / (domain[d][1] - domain[d][0]))
     };
     // Most that do not run along a line show it at both ends.
-    let (from, to) = (at(0), at(8));
-    if (0..2).all(|d| (from[d] - to[d]).abs() > 1e-7) {
+    let (from, to) = (at(0), at(STEPS));
+    if (0..2).all(|d| (from[d] - to[d]).abs() > LEVEL) {
         return None;
     }
-    let looks: Vec<[f64; 2]> = (0..=8).map(at).collect();
+    let shape: Vec<[f64; 2]> = (0..=STEPS).map(at).collect();
     (0..2).find_map(|d| {
-        let flat = looks.iter().all(|p| (p[1 - d] - looks[0][1 - d]).abs() <= 1e-7);
-        let up = looks[8][d] > looks[0][d];
-        let steady = looks.windows(2).all(|w| (w[1][d] > w[0][d]) == up && w[1][d] != w[0][d]);
-        let (a, b) = (looks[0][d], looks[8][d]);
-        (flat && steady).then(|| Along {
+        let flat = shape.iter().all(|p| (p[1 - d] - shape[0][1 - d]).abs() <= LEVEL);
+        let up = to[d] > from[d];
+        let steady = shape.windows(2).all(|w| (w[1][d] > w[0][d]) == up && w[1][d] != w[0][d]);
+        let (a, b) = (from[d], to[d]);
+        (flat && steady).then(|| ParameterRun {
             edge,
-            side,
+            edge_use,
             direction: d,
             range: [a.min(b), a.max(b)],
-            level: looks[0][1 - d],
+            level: shape[0][1 - d],
         })
     })
 }
 
 /// The samples of one use where the other has the same parameter; `None` when they do not ascend there.
-fn hand(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2]) -> Option<Vec<f64>> {
+fn transfer_samples(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2]) -> Option<Vec<f64>> {
     let x = |t: f64| to.uv.evaluate(t)[d];
     let up = x(t1) > x(t0);
     // Most sides are straight lines of the parameter plane, run evenly.
@@ -204,7 +220,7 @@ fn hand(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2
             return (s0 + (s1 - s0) * (goal - x(s0)) / (x(s1) - x(s0))).clamp(t0, t1);
         }
         let (mut lo, mut hi) = (t0, t1);
-        for _ in 0..60 {
+        for _ in 0..INVERSION_HALVINGS {
             let m = 0.5 * (lo + hi);
             if (x(m) < goal) == up { lo = m } else { hi = m }
         }
@@ -214,6 +230,6 @@ fn hand(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2
     out.sort_by(f64::total_cmp);
     out.insert(0, t0);
     out.push(t1);
-    let least = 1e-9 * (t1 - t0);
+    let least = SAME_SAMPLE * (t1 - t0);
     out.windows(2).all(|w| w[1] - w[0] > least).then_some(out)
 }

@@ -1,4 +1,4 @@
-//! The hull of distances: sharper than the largest distance of a control point.
+//! The hull of distances over a segment or a triangle: sharper than the largest distance of a control point.
 //!
 //! A convex distance of Σ cᵢwᵢBᵢ / Σ wᵢBᵢ is at most Σ dᵢwᵢBᵢ / Σ wᵢBᵢ with the distances dᵢ of the control points: a scalar
 //! rational Bézier function. Its largest value is found by halving its coefficients alone, at a small share of what halving
@@ -12,22 +12,22 @@ const DEPTH: [u32; 2] = [4, 8];
 
 /// Distances over one piece, and buffers for halving.
 #[derive(Default)]
-pub(in crate::tessellate) struct Scalar {
+pub(in crate::tessellate) struct ScalarBezier {
     degree: usize,
-    /// Distance and weight of each control point, in the order of `net.rs`.
-    of: Vec<(f64, f64)>,
-    /// Nets that wait for halving, one after another.
+    /// Distance and weight of each control point, in the order of `simplex_net.rs`.
+    control: Vec<(f64, f64)>,
+    /// SimplexNets that wait for halving, one after another.
     stack: Vec<f64>,
     line: Vec<f64>,
 }
 
-impl Scalar {
+impl ScalarBezier {
     /// Takes in distances and weights of the control points of a segment or triangle; the largest distance.
     pub(in crate::tessellate) fn load(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
         self.degree = degree;
-        self.of.clear();
-        self.of.extend(points);
-        self.of.iter().map(|x| x.0).fold(0.0, f64::max)
+        self.control.clear();
+        self.control.extend(points);
+        self.control.iter().map(|x| x.0).fold(0.0, f64::max)
     }
 
     /// The bound of these distances if it is within the limit.
@@ -38,27 +38,27 @@ impl Scalar {
         limit: f64,
     ) -> Option<f64> {
         let most = self.load(points, degree);
-        if most <= limit { Some(most) } else { self.within::<N>(limit) }
+        if most <= limit { Some(most) } else { self.bound_within::<N>(limit) }
     }
 
     /// Largest distance of the corners.
-    pub(in crate::tessellate) fn at_corners<const N: usize>(&self) -> f64 {
+    pub(in crate::tessellate) fn largest_corner<const N: usize>(&self) -> f64 {
         let n = self.degree;
         let second = if N == 2 { n } else { n * (n + 1) / 2 };
-        self.of[0].0.max(self.of[second].0).max(self.of[self.of.len() - 1].0)
+        self.control[0].0.max(self.control[second].0).max(self.control[self.control.len() - 1].0)
     }
 
     /// A bound that is within the limit, if halving finds one.
-    pub(in crate::tessellate) fn within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
+    pub(in crate::tessellate) fn bound_within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
         let n = self.degree;
-        let heaviest = self.of.iter().fold(0.0, |a: f64, x| a.max(x.1));
+        let heaviest = self.control.iter().fold(0.0, |a: f64, x| a.max(x.1));
         self.stack.clear();
         // Coefficients of W·(d − limit): a piece is within the limit where none is positive.
-        let e = |x: usize| self.of[x].1 * (self.of[x].0 - limit);
+        let e = |x: usize| self.control[x].1 * (self.control[x].0 - limit);
         if N == 2 {
             self.stack.extend((0..=n).map(e));
         } else {
-            // Lines along the side from the first corner to the last, which is halved first.
+            // GridLines along the side from the first corner to the last, which is halved first.
             for j in 0..=n {
                 self.stack.extend((0..=n - j).map(|k| (j + k) * (j + k + 1) / 2 + k).map(e));
             }
@@ -74,7 +74,7 @@ impl Scalar {
                 self.stack.truncate(start);
                 continue;
             }
-            if depth == 0 || self.certain::<N>(start) > 0.0 {
+            if depth == 0 || self.largest_value_taken::<N>(start) > 0.0 {
                 return None;
             }
             if N == 2 {
@@ -88,7 +88,7 @@ impl Scalar {
     }
 
     /// The largest corner of the last net: its value is taken, not only approached.
-    fn certain<const N: usize>(&self, start: usize) -> f64 {
+    fn largest_value_taken<const N: usize>(&self, start: usize) -> f64 {
         let n = self.degree;
         let net = &self.stack[start..];
         let last = net[net.len() - 1];
@@ -175,18 +175,18 @@ mod tests {
                     most = most.max(value(&d, n, [a, b, 1.0 - a - b]));
                 }
             }
-            let mut scalar = Scalar::default();
+            let mut scalar = ScalarBezier::default();
             scalar.load(d.iter().map(|&d| (d, 1.0)), n);
-            assert!(scalar.within::<3>(0.999 * most).is_none());
+            assert!(scalar.bound_within::<3>(0.999 * most).is_none());
             // Random coefficients are far rougher than distances; four halvings come within a fifth.
-            let bound = scalar.within::<3>(1.2 * most).unwrap();
+            let bound = scalar.bound_within::<3>(1.2 * most).unwrap();
             assert!(most <= bound && bound <= 1.2 * most, "{most} {bound}");
             let row: Vec<f64> = (0..=n).map(|j| d[j * (j + 1) / 2]).collect();
             let along = (0..=100).map(|i| value(&d, n, [1.0 - i as f64 / 100.0, i as f64 / 100.0, 0.0]));
             let most = along.fold(0.0, f64::max);
             scalar.load(row.iter().map(|&d| (d, 1.0)), n);
-            assert!(scalar.within::<2>(0.999 * most).is_none());
-            let bound = scalar.within::<2>(1.01 * most).unwrap();
+            assert!(scalar.bound_within::<2>(0.999 * most).is_none());
+            let bound = scalar.bound_within::<2>(1.01 * most).unwrap();
             assert!(most <= bound && bound <= 1.01 * most, "{most} {bound}");
         }
     }

@@ -1,15 +1,19 @@
-//! A cell looked at as a facet: nine points of it, the better diagonal, the bound.
+//! A cell as a facet that may do: nine points of it, the better diagonal, the bound.
 
-use super::tree::Cell;
+use super::cell::Cell;
 use crate::math::{Point, Uv};
-use crate::tessellate::proof::bound::Prover;
-use crate::tessellate::proof::flat::from_chord;
-use crate::tessellate::sheet::Sheet;
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+use crate::tessellate::proof::prover::Prover;
 use smallvec::SmallVec;
 
 /// Shares of the tolerance that the curve over the diagonal may stray from it in a cell that is proved as one quad. With hanging vertices
-/// the cell falls into triangles, which are held to such curves: without a limit 250 of 19,690 facets of a very rough sheet are not proved.
+/// the cell falls into triangles, which are held to such curves: without a limit 250 of 19,690 facets of a very rough surface are not proved.
 const FARTHEST: f64 = 2.0;
+/// Share by which the second diagonal must be nearer to the surface to be taken: rounding does not decide.
+const NEARER: f64 = 1e-9;
+/// Share by which the sags along u and v must differ to decide where a cell is cut; else its longer side is.
+const SAG_DIFFERENCE: f64 = 0.05;
 
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(in crate::tessellate) type Corners = [(Uv, Point); 4];
@@ -19,14 +23,14 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
     let mut worst = 0f64;
     let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
     for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
-        match prover.facet([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], true, limit) {
+        match prover.facet_bound([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], true, limit) {
             Some(bound) if bound > limit => return bound,
             Some(bound) => worst = worst.max(bound),
             None => open.push([i, j, k]),
         }
     }
     for &[i, j, k] in &open {
-        worst = worst.max(prover.piece([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit));
+        worst = worst.max(prover.triangle_bound([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], limit));
         if worst > limit {
             return worst;
         }
@@ -36,7 +40,7 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
         if (i, j) == (0, 2) && open.len() == 2 {
             continue;
         }
-        worst = worst.max(prover.side([c[i].0, c[j].0], [c[i].1, c[j].1], limit));
+        worst = worst.max(prover.side_bound([c[i].0, c[j].0], [c[i].1, c[j].1], limit));
         if worst > limit {
             return worst;
         }
@@ -44,27 +48,28 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
     worst
 }
 
-/// Nine points of a cell and what they show.
-pub(in crate::tessellate) struct Look {
+/// A cell seen at nine points.
+pub(in crate::tessellate) struct CandidateFacet {
     p: [[Point; 3]; 3],
     /// Largest distance of a middle from its chord, for lines along u and along v.
     pub(in crate::tessellate) sag: [f64; 2],
 }
 
-impl Look {
-    pub(in crate::tessellate) fn new(sheet: &Sheet<'_>, cell: Cell) -> Self {
+impl CandidateFacet {
+    pub(in crate::tessellate) fn new(surface: &FaceSurface<'_>, cell: Cell) -> Self {
         let middle = cell.center();
-        let p = sheet.lattice([cell.lo.x, middle.x, cell.hi.x], [cell.lo.y, middle.y, cell.hi.y]);
-        let u = (0..3).map(|j| from_chord(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
-        let v = (0..3).map(|i| from_chord(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
+        let p = surface.lattice([cell.lo.x, middle.x, cell.hi.x], [cell.lo.y, middle.y, cell.hi.y]);
+        let u = (0..3).map(|j| distance_to_chord(p[1][j], &[p[0][j], p[2][j]])).fold(0.0, f64::max);
+        let v = (0..3).map(|i| distance_to_chord(p[i][1], &[p[i][0], p[i][2]])).fold(0.0, f64::max);
         Self { p, sag: [u, v] }
     }
 
-    pub(in crate::tessellate) fn direction(&self) -> usize {
+    /// The parameter across which the cell is cut when it does not fit.
+    pub(in crate::tessellate) fn cut_direction(&self) -> usize {
         let [u, v] = self.sag;
         let p = &self.p;
         let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
-        if (u - v).abs() > 0.05 * u.max(v) {
+        if (u - v).abs() > SAG_DIFFERENCE * u.max(v) {
             return if u > v { 0 } else { 1 };
         }
         let along_u = length(0, 1, 2, 1).max(length(0, 1, 1, 1));
@@ -78,22 +83,22 @@ impl Look {
     }
 
     /// The corner at which the better diagonal starts, the one that lies nearer to the surface: 0 or 1.
-    pub(in crate::tessellate) fn first(&self) -> usize {
+    pub(in crate::tessellate) fn first_corner(&self) -> usize {
         self.diagonal().0
     }
 
     /// The corner at which the better diagonal starts, and how far the middle is from it.
     fn diagonal(&self) -> (usize, f64) {
         let (p, m) = (self.places(), self.p[1][1]);
-        let (a, b) = (from_chord(m, &[p[0], p[2]]), from_chord(m, &[p[1], p[3]]));
-        if b < a * (1.0 - 1e-9) { (1, b) } else { (0, a) }
+        let (a, b) = (distance_to_chord(m, &[p[0], p[2]]), distance_to_chord(m, &[p[1], p[3]]));
+        if b < a * (1.0 - NEARER) { (1, b) } else { (0, a) }
     }
 
     /// Bound of the cell as a facet, cut along the better diagonal.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> f64 {
         let (r, off) = self.diagonal();
         if off <= FARTHEST * limit
-            && let Some(bound) = prover.quad([cell.lo, cell.hi], &self.places(), r, limit)
+            && let Some(bound) = prover.quad_bound([cell.lo, cell.hi], &self.places(), r, limit)
         {
             return bound;
         }

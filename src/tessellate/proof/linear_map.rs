@@ -3,37 +3,39 @@
 //! Beside a chord, S = L + D with L in a plane through it and D = D⊥ + D∥: a point of the sliver is at most
 //! √(|D⊥|² + (reach + |D∥|)²) from the chord.
 
-use super::flat::from_chord;
+use super::flat_triangle::distance_to_chord;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::BezierPatch;
-use crate::tessellate::sheet::Sheet;
+use crate::tessellate::face_surface::FaceSurface;
 use smallvec::SmallVec;
 
 /// Triangles with a smaller share of the rectangle around them are left to others: their L is steep.
 const THINNEST: f64 = 0.05;
+/// Share of the rectangle by which a part may miss the region and still be taken to meet it: rounding.
+const TOUCHING: f64 = 1e-12;
 
 /// What is measured of the deviation from L.
 enum Measure {
     /// All of it.
     Whole,
     /// The distance to a chord in L's plane, from which L goes no farther than `reach` over the region.
-    Beside { normal: Vector, reach: f64 },
+    Sliver { normal: Vector, reach: f64 },
 }
 
 /// A linear map L from parameters into space, and a convex region of parameters within a rectangle.
-pub(in crate::tessellate) struct Linear {
+pub(in crate::tessellate) struct LinearMap {
     pub(in crate::tessellate) lo: Uv,
     pub(in crate::tessellate) hi: Uv,
     /// Corners of the region, as shares of the rectangle.
     region: SmallVec<[Uv; 8]>,
     /// L at the rectangle's first corner, and along it, seen from a place that L meets.
-    l: [Point; 3],
+    values: [Point; 3],
     /// Which way the corners run.
     sign: f64,
     measure: Measure,
 }
 
-impl Linear {
+impl LinearMap {
     /// The map of a parameter triangle onto one in space, seen from its first corner.
     pub(in crate::tessellate) fn new(corners: [Uv; 3], at: [Point; 3]) -> Option<Self> {
         let lo = corners[0].min(corners[1]).min(corners[2]);
@@ -49,13 +51,13 @@ impl Linear {
         let lt = (e2 * d1.x - e1 * d2.x) / det;
         let l00 = -(ls * x[0].x + lt * x[0].y);
         let region = SmallVec::from_slice(&x);
-        Some(Self { lo, hi, region, l: [l00, ls, lt], sign: det.signum(), measure: Measure::Whole })
+        Some(Self { lo, hi, region, values: [l00, ls, lt], sign: det.signum(), measure: Measure::Whole })
     }
 
     /// The map that takes a chord of parameters onto its chord in space, seen from there, and goes with the surface across it;
     /// over a polygon, counter-clockwise, that holds the chord.
-    pub(in crate::tessellate) fn beside(
-        sheet: &Sheet<'_>,
+    pub(in crate::tessellate) fn along_chord(
+        surface: &FaceSurface<'_>,
         polygon: &[Uv],
         chord: [Uv; 2],
         at: [Point; 2],
@@ -66,48 +68,48 @@ impl Linear {
         let a = share(chord[0]);
         let d = share(chord[1]) - a;
         let along = at[1] - at[0];
-        let der = sheet.second_derivatives(0.5 * (chord[0] + chord[1]));
+        let der = surface.second_derivatives(0.5 * (chord[0] + chord[1]));
         let across = der.dv * (d.x * size.y) - der.du * (d.y * size.x);
         let normal = along.cross(across).try_normalize()?;
         let (ls, lt) =
             ((along * d.x - across * d.y) / d.length_squared(), (along * d.y + across * d.x) / d.length_squared());
         let l00 = -(ls * a.x + lt * a.y);
         let region: SmallVec<[Uv; 8]> = polygon.iter().map(|&x| share(x)).collect();
-        let off = |x: &Uv| from_chord(l00 + ls * x.x + lt * x.y, &[Point::ZERO, along]);
+        let off = |x: &Uv| distance_to_chord(l00 + ls * x.x + lt * x.y, &[Point::ZERO, along]);
         let reach = region.iter().map(off).fold(0.0, f64::max);
-        let measure = Measure::Beside { normal, reach };
-        reach.is_finite().then_some(Self { lo, hi, region, l: [l00, ls, lt], sign: 1.0, measure })
+        let measure = Measure::Sliver { normal, reach };
+        reach.is_finite().then_some(Self { lo, hi, region, values: [l00, ls, lt], sign: 1.0, measure })
     }
 
     /// The part of the rectangle that a patch covers.
-    pub(in crate::tessellate) fn meets(&self, patch: &BezierPatch) -> [Uv; 2] {
+    pub(in crate::tessellate) fn overlap(&self, patch: &BezierPatch) -> [Uv; 2] {
         let [[u0, u1], [v0, v1]] = patch.domain;
         [self.lo.max(Uv::new(u0, v0)), self.hi.min(Uv::new(u1, v1))]
     }
 
     /// Where a part of the rectangle starts and how large it is, as shares.
-    pub(in crate::tessellate) fn shares(&self, [a, b]: [Uv; 2]) -> [Uv; 2] {
+    pub(in crate::tessellate) fn as_shares(&self, [a, b]: [Uv; 2]) -> [Uv; 2] {
         let size = self.hi - self.lo;
         [(a - self.lo) / size, (b - a) / size]
     }
 
     /// L at the corners (0,0), (1,0), (0,1), (1,1) of a part.
-    pub(in crate::tessellate) fn over(&self, from: Uv, share: Uv) -> [Point; 4] {
-        let [l00, ls, lt] = self.l;
+    pub(in crate::tessellate) fn corner_values(&self, from: Uv, share: Uv) -> [Point; 4] {
+        let [l00, ls, lt] = self.values;
         let l = l00 + ls * from.x + lt * from.y;
         let (s, t) = (ls * share.x, lt * share.y);
         [l, l + s, l + t, l + s + t]
     }
 
     /// Whether a part meets the region.
-    pub(in crate::tessellate) fn touches(&self, from: Uv, share: Uv) -> bool {
+    pub(in crate::tessellate) fn meets_region(&self, from: Uv, share: Uv) -> bool {
         let n = self.region.len();
         (0..n).all(|k| {
             let a = self.region[k];
             let d = (self.region[(k + 1) % n] - a) * self.sign;
             // The corner that lies farthest to the left of the side.
             let far = from + Uv::new(if d.y < 0.0 { share.x } else { 0.0 }, if d.x > 0.0 { share.y } else { 0.0 });
-            d.perp_dot(far - a) >= -1e-12
+            d.perp_dot(far - a) >= -TOUCHING
         })
     }
 
@@ -115,7 +117,7 @@ impl Linear {
     pub(in crate::tessellate) fn bound(&self, net: &[Point], lightest: f64) -> f64 {
         match self.measure {
             Measure::Whole => net.iter().map(|x| x.length_squared()).fold(0.0, f64::max).sqrt() / lightest,
-            Measure::Beside { normal, reach } => {
+            Measure::Sliver { normal, reach } => {
                 let (mut up, mut flat) = (0f64, 0f64);
                 for x in net {
                     let h = x.dot(normal);
@@ -132,15 +134,16 @@ impl Linear {
 mod tests {
     use crate::math::{Frame, Uv};
     use crate::nurbs::sweep;
-    use crate::tessellate::proof::flat::from_chord;
-    use crate::tessellate::proof::near::Near;
-    use crate::tessellate::settings::Field;
-    use crate::tessellate::sheet::Sheet;
+    use crate::tessellate::face_surface::FaceSurface;
+    use crate::tessellate::proof::deviation::DeviationBounds;
+    use crate::tessellate::proof::flat_triangle::distance_to_chord;
+    use crate::tessellate::settings::ToleranceField;
 
     #[test]
     fn slivers_beside_a_chord_stay_within_their_bound() {
         let s = sweep::torus(&Frame::IDENTITY, 40.0, 12.0, [0.0, 3.0], [0.2, 2.9]);
-        let sheet = Sheet::new(&s, false, Field::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
+        let surface =
+            FaceSurface::new(&s, false, ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
         // Across the knots at which the torus is divided, and within them.
         for from in [Uv::new(0.3, 0.4), Uv::new(1.4, 1.4)] {
             let chord = [from, from + Uv::new(0.2, 0.3)];
@@ -151,10 +154,10 @@ mod tests {
                 for j in 0..=60 - i {
                     let (a, b) = (i as f64 / 60.0, j as f64 / 60.0);
                     let x = polygon[0] * a + polygon[1] * b + polygon[2] * (1.0 - a - b);
-                    worst = worst.max(from_chord(s.evaluate(x), &at));
+                    worst = worst.max(distance_to_chord(s.evaluate(x), &at));
                 }
             }
-            let bound = |limit: f64| Near::default().beside(&sheet, &polygon, chord, at, limit);
+            let bound = |limit: f64| DeviationBounds::default().sliver(&surface, &polygon, chord, at, limit);
             assert!(bound(0.999 * worst).is_none());
             let bound = bound(1.2 * worst).unwrap();
             assert!(worst <= bound && bound <= 1.2 * worst, "{worst} {bound}");

@@ -1,73 +1,75 @@
 //! The proof that most facets pass: how far a Bézier patch strays from the flat triangle between three of its points.
 //!
 //! Over a parameter triangle let L be the linear map onto the triangle in space, and A and W the patch's homogeneous position and
-//! weight. N = A − W·L vanishes at the corners, so Taylor's theorem as in `bend.rs` gives |N| ≤ (Muu + 2 Muv + Mvv)/8, with bounds of
+//! weight. N = A − W·L vanishes at the corners, so Taylor's theorem as in `second_derivatives.rs` gives |N| ≤ (Muu + 2 Muv + Mvv)/8, with bounds of
 //! its second derivatives over the rectangle around the triangle, in that rectangle's own parameters. The distance
 //! |S − L| = |N|/W follows, for the inside and the three sides alike, as L lies on the triangle and on its sides. Subtracting
 //! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
-//! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `net.rs` decides.
+//! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `simplex_net.rs` decides.
 
-use super::linear::Linear;
-use super::refine::split;
+use super::linear_map::LinearMap;
+use super::refine::halve_net;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
-use crate::tessellate::sheet::{Sheet, local};
+use crate::tessellate::face_surface::{FaceSurface, local};
 use smallvec::{SmallVec, smallvec};
 
 /// Triangles that reach into a patch by less than this share are left to others.
 const NARROWEST: f64 = 1e-3;
+/// Share by which weights may differ and still be all the same: a thousand roundings, whose effect the margin of `prover.rs` covers.
+const EQUAL_WEIGHTS: f64 = 1e-13;
 /// Halvings that one facet may take.
-const MOST_HALVINGS: u32 = 24;
+const MAX_HALVINGS: u32 = 24;
 
 /// Buffers reused from facet to facet.
 #[derive(Default)]
-pub(in crate::tessellate) struct Near {
+pub(in crate::tessellate) struct DeviationBounds {
     net: Vec<Homogeneous>,
     deviation: Vec<Point>,
     line: Vec<Homogeneous>,
-    /// Nets that wait for halving, one after another.
+    /// SimplexNets that wait for halving, one after another.
     stack: Vec<Point>,
-    /// What `net` holds: which patch (by place), over which rectangle, seen from where.
-    held: Option<(usize, Uv, Uv, Point)>,
+    /// What `net` holds: which patch (by address), over which rectangle, seen from where.
+    cached: Option<(usize, Uv, Uv, Point)>,
     /// Bounds of its second derivatives where they are known.
     seconds: Option<[f64; 3]>,
 }
 
-impl Near {
+impl DeviationBounds {
     /// Bound of |S − L| over the triangle with these corners in the surface's parameters, which lie at `at` in space. The patches
     /// cover it, and where there are several, S and its weight are C1 from one to the next: Taylor's theorem needs no more.
-    pub(in crate::tessellate) fn bound<'p>(
+    pub(in crate::tessellate) fn taylor<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
         corners: [Uv; 3],
         at: [Point; 3],
     ) -> Option<f64> {
-        let linear = Linear::new(corners, at)?;
+        let linear = LinearMap::new(corners, at)?;
         let (mut most, mut lightest) = ([0f64; 3], f64::INFINITY);
         for patch in patches {
-            let [a, b] = linear.meets(patch);
-            let [from, share] = linear.shares([a, b]);
+            let [a, b] = linear.overlap(patch);
+            let [from, share] = linear.as_shares([a, b]);
             // Differences over a sliver are divided by its square: rounding would be all that is left.
             if share.min_element() < NARROWEST || share.is_nan() {
                 return None;
             }
             self.restrict(patch, local(patch, a), local(patch, b), at[0]);
-            let [w_min, w_max] = self.weights();
+            let [w_min, w_max] = self.weight_range();
             lightest = lightest.min(w_min);
             let [p, q] = patch.degree;
-            let second = if even([w_min, w_max]) {
+            let second = if are_equal([w_min, w_max]) {
                 // L has no second derivatives: both triangles of a cell have the same.
                 match self.seconds {
                     Some(known) => known,
                     None => {
                         self.deviation.clear();
                         self.deviation.extend(self.net.iter().map(|c| c.truncate()));
-                        *self.seconds.insert(seconds(&self.deviation, [p, q]))
+                        *self.seconds.insert(second_derivative_bounds(&self.deviation, [p, q]))
                     }
                 }
             } else {
-                self.subtract([p, q], linear.over(from, share));
-                seconds(&self.deviation, [p + 1, q + 1])
+                self.subtract_raising_degree([p, q], linear.corner_values(from, share));
+                second_derivative_bounds(&self.deviation, [p + 1, q + 1])
             };
             let scale = [share.x * share.x, share.x * share.y, share.y * share.y];
             most = std::array::from_fn(|k| most[k].max(second[k] / scale[k]));
@@ -85,58 +87,64 @@ impl Near {
         at: [Point; 3],
         limit: f64,
     ) -> Option<f64> {
-        self.strays(patches, &Linear::new(corners, at)?, at[0], limit)
+        self.max_over_patches(patches, &LinearMap::new(corners, at)?, at[0], limit)
     }
 
     /// Bound of the distance from the surface over a convex polygon to a chord that the polygon holds, where it is within the limit;
     /// the chord's parameters lie at `at` in space.
-    pub(in crate::tessellate) fn beside(
+    pub(in crate::tessellate) fn sliver(
         &mut self,
-        sheet: &Sheet<'_>,
+        surface: &FaceSurface<'_>,
         polygon: &[Uv],
         chord: [Uv; 2],
         at: [Point; 2],
         limit: f64,
     ) -> Option<f64> {
-        let linear = Linear::beside(sheet, polygon, chord, at)?;
-        let (a, b) = (sheet.range(0, linear.lo.x, linear.hi.x), sheet.range(1, linear.lo.y, linear.hi.y));
-        let patches = (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| sheet.patch(i, j)));
-        self.strays(patches, &linear, at[0], limit)
+        let linear = LinearMap::along_chord(surface, polygon, chord, at)?;
+        let (a, b) = (surface.range(0, linear.lo.x, linear.hi.x), surface.range(1, linear.lo.y, linear.hi.y));
+        let patches = (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| surface.patch(i, j)));
+        self.max_over_patches(patches, &linear, at[0], limit)
     }
 
     /// What `linear` measures, where it is within the limit over all patches, seen from `origin`.
-    fn strays<'p>(
+    fn max_over_patches<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
-        linear: &Linear,
+        linear: &LinearMap,
         origin: Point,
         limit: f64,
     ) -> Option<f64> {
-        let (mut worst, mut halvings) = (0f64, MOST_HALVINGS);
+        let (mut worst, mut halvings) = (0f64, MAX_HALVINGS);
         for patch in patches {
-            let [a, b] = linear.meets(patch);
-            let [from, share] = linear.shares([a, b]);
-            if !linear.touches(from, share) {
+            let [a, b] = linear.overlap(patch);
+            let [from, share] = linear.as_shares([a, b]);
+            if !linear.meets_region(from, share) {
                 continue;
             }
             self.restrict(patch, local(patch, a), local(patch, b), origin);
-            let weights = self.weights();
+            let weights = self.weight_range();
             let mut degree = patch.degree;
-            if even(weights) {
-                self.subtract_even(degree, linear.over(from, share));
+            if are_equal(weights) {
+                self.subtract_keeping_degree(degree, linear.corner_values(from, share));
             } else {
-                self.subtract(degree, linear.over(from, share));
+                self.subtract_raising_degree(degree, linear.corner_values(from, share));
                 degree = degree.map(|d| d + 1);
             }
-            worst = worst.max(self.halve(linear, degree, (from, share), [weights[0], limit], &mut halvings)?);
+            worst = worst.max(self.bound_by_halving(
+                linear,
+                degree,
+                (from, share),
+                [weights[0], limit],
+                &mut halvings,
+            )?);
         }
         Some(worst)
     }
 
     /// The bound over the parts of a rectangle that meet the region, halved until all are within the limit.
-    fn halve(
+    fn bound_by_halving(
         &mut self,
-        linear: &Linear,
+        linear: &LinearMap,
         [p, q]: [usize; 2],
         (from, share): (Uv, Uv),
         [lightest, limit]: [f64; 2],
@@ -151,17 +159,17 @@ impl Near {
             let start = self.stack.len() - size;
             let net = &self.stack[start..];
             let worst = linear.bound(net, lightest);
-            if worst <= limit || !linear.touches(from, share) {
+            if worst <= limit || !linear.meets_region(from, share) {
                 most = if worst <= limit { most.max(worst) } else { most };
                 self.stack.truncate(start);
                 continue;
             }
             *halvings = halvings.checked_sub(1)?;
-            let [along_u, _, along_v] = seconds(net, [p, q]);
+            let [along_u, _, along_v] = second_derivative_bounds(net, [p, q]);
             let d = if along_u >= along_v { 0 } else { 1 };
             self.stack.extend_from_within(start..);
             let (low, high) = self.stack[start..].split_at_mut(size);
-            split(low, high, [p, q], d);
+            halve_net(low, high, [p, q], d);
             let (mut half, mut second) = (share, from);
             half[d] *= 0.5;
             second[d] += half[d];
@@ -171,7 +179,7 @@ impl Near {
     }
 
     /// Smallest and largest weight of the net.
-    fn weights(&self) -> [f64; 2] {
+    fn weight_range(&self) -> [f64; 2] {
         self.net.iter().fold([f64::INFINITY, 0.0], |[a, b], c| [a.min(c.w), b.max(c.w)])
     }
 
@@ -187,20 +195,20 @@ impl Near {
     ) -> &[Homogeneous] {
         let [p, q] = patch.degree;
         let name = Some((std::ptr::from_ref(patch).addr(), lo, hi, origin));
-        if self.held == name {
+        if self.cached == name {
             return &self.net;
         }
-        self.held = name;
+        self.cached = name;
         self.seconds = None;
         self.net.clear();
         self.net.extend(patch.points.iter().map(|c| (c.truncate() - origin * c.w).extend(c.w)));
         for row in self.net.chunks_exact_mut(q + 1) {
-            cut(row, lo.y, hi.y);
+            restrict_line(row, lo.y, hi.y);
         }
         for j in 0..=q {
             self.line.clear();
             self.line.extend((0..=p).map(|i| self.net[i * (q + 1) + j]));
-            cut(&mut self.line, lo.x, hi.x);
+            restrict_line(&mut self.line, lo.x, hi.x);
             for (i, &c) in self.line.iter().enumerate() {
                 self.net[i * (q + 1) + j] = c;
             }
@@ -209,7 +217,7 @@ impl Near {
     }
 
     /// Bernstein coefficients of A − W·L of the same degree, where all weights are the same.
-    fn subtract_even(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
+    fn subtract_keeping_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         let (s, t) = ((l[1] - l[0]) / p as f64, (l[2] - l[0]) / q as f64);
         self.deviation.clear();
         let with_place = self.net.iter().enumerate();
@@ -220,7 +228,7 @@ impl Near {
     }
 
     /// Bernstein coefficients of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
-    fn subtract(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
+    fn subtract_raising_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
         let (pi, qi) = (1.0 / (p + 1) as f64, 1.0 / (q + 1) as f64);
@@ -241,12 +249,12 @@ impl Near {
 }
 
 /// Whether weights are all the same.
-fn even([least, most]: [f64; 2]) -> bool {
-    most - least <= 1e-13 * most
+fn are_equal([least, most]: [f64; 2]) -> bool {
+    most - least <= EQUAL_WEIGHTS * most
 }
 
 /// Control points over `[lo, hi]` in place of those over `[0, 1]`.
-fn cut(line: &mut [Homogeneous], lo: f64, hi: f64) {
+fn restrict_line(line: &mut [Homogeneous], lo: f64, hi: f64) {
     let n = line.len() - 1;
     if hi < 1.0 {
         // Left part of a cut at `hi`.
@@ -268,7 +276,7 @@ fn cut(line: &mut [Homogeneous], lo: f64, hi: f64) {
 }
 
 /// Bounds of the second derivatives (uu, uv, vv) over the unit square of a net of these degrees.
-fn seconds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
+fn second_derivative_bounds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
     let n = q + 1;
     let mut most = [0f64; 3];
     for i in 0..=p {
@@ -318,7 +326,7 @@ mod tests {
             let [[u0, u1], [v0, v1]] = p.domain;
             u0 < hi.x && lo.x < u1 && v0 < hi.y && lo.y < v1
         };
-        let bound = Near::default().bound(patches.iter().filter(meets), corners, at).unwrap();
+        let bound = DeviationBounds::default().taylor(patches.iter().filter(meets), corners, at).unwrap();
         (bound, sampled(s, corners, 20))
     }
 
@@ -372,8 +380,8 @@ mod tests {
         ] {
             let at = corners.map(|x| s.evaluate(x));
             let worst = sampled(&s, corners, 60);
-            assert!(Near::default().hull(patches.iter(), corners, at, 0.99 * worst).is_none());
-            let bound = Near::default().hull(patches.iter(), corners, at, 2.0 * worst).unwrap();
+            assert!(DeviationBounds::default().hull(patches.iter(), corners, at, 0.99 * worst).is_none());
+            let bound = DeviationBounds::default().hull(patches.iter(), corners, at, 2.0 * worst).unwrap();
             assert!(worst <= bound && bound <= 2.0 * worst, "{worst} {bound}");
         }
     }

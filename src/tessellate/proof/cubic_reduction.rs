@@ -7,33 +7,33 @@
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::BezierPatch;
 
-/// Degree that is kept.
-const KEPT: usize = 3;
+/// Degree of what stands for the patch.
+const REDUCED_DEGREE: usize = 3;
 
 /// Whether there is anything to gain.
 pub(in crate::tessellate) fn is_high(patch: &BezierPatch) -> bool {
-    patch.degree[0].max(patch.degree[1]) > KEPT
+    patch.degree[0].max(patch.degree[1]) > REDUCED_DEGREE
 }
 
 /// Makes and holds the cubics.
-pub(in crate::tessellate) struct Slight {
+pub(in crate::tessellate) struct CubicReduction {
     /// The last one, over the parameters from 0 to 1.
     pub(in crate::tessellate) patch: BezierPatch,
     line: Vec<Homogeneous>,
     cubic: Vec<Homogeneous>,
 }
 
-impl Default for Slight {
+impl Default for CubicReduction {
     fn default() -> Self {
         let patch = BezierPatch { degree: [0, 0], points: Vec::new(), domain: [[0.0, 1.0]; 2] };
         Self { patch, line: Vec::new(), cubic: Vec::new() }
     }
 }
 
-impl Slight {
+impl CubicReduction {
     /// Fills in `patch` from the net of a patch of this degree, seen from `origin`; a bound of the distance between the two, point by
     /// point, infinite where there is none.
-    pub(in crate::tessellate) fn make(&mut self, net: &[Homogeneous], degree: [usize; 2], origin: Point) -> f64 {
+    pub(in crate::tessellate) fn reduce(&mut self, net: &[Homogeneous], degree: [usize; 2], origin: Point) -> f64 {
         let [p, q] = degree;
         // Along u first, line by line; then along v. The differences of both add up.
         let (mut first, mut second) = ([0f64; 2], [0f64; 2]);
@@ -41,16 +41,16 @@ impl Slight {
         for j in 0..=q {
             self.line.clear();
             self.line.extend((0..=p).map(|i| net[i * (q + 1) + j]));
-            reduce(&self.line, &mut self.cubic, &mut first);
+            reduce_line(&self.line, &mut self.cubic, &mut first);
         }
-        let pk = p.min(KEPT);
+        let pk = p.min(REDUCED_DEGREE);
         self.patch.points.clear();
         for i in 0..=pk {
             self.line.clear();
             self.line.extend((0..=q).map(|j| self.cubic[j * (pk + 1) + i]));
-            reduce(&self.line, &mut self.patch.points, &mut second);
+            reduce_line(&self.line, &mut self.patch.points, &mut second);
         }
-        self.patch.degree = [pk, q.min(KEPT)];
+        self.patch.degree = [pk, q.min(REDUCED_DEGREE)];
         // S − S' = (A − A')/W' + S·(W' − W)/W'; seen from the facet, S is no longer than the facet is large.
         let lightest = net.iter().map(|c| c.w).fold(f64::INFINITY, f64::min);
         let far = net.iter().map(|c| c.truncate().length() / c.w).fold(0.0, f64::max);
@@ -64,13 +64,13 @@ impl Slight {
 }
 
 /// Appends the line's Hermite cubic, or the line itself where its degree is no higher; adds the difference of positions and weights.
-fn reduce(line: &[Homogeneous], out: &mut Vec<Homogeneous>, off: &mut [f64; 2]) {
+fn reduce_line(line: &[Homogeneous], out: &mut Vec<Homogeneous>, off: &mut [f64; 2]) {
     let n = line.len() - 1;
-    if n <= KEPT {
+    if n <= REDUCED_DEGREE {
         out.extend_from_slice(line);
         return;
     }
-    let third = n as f64 / KEPT as f64;
+    let third = n as f64 / REDUCED_DEGREE as f64;
     let c = [line[0], line[0] + (line[1] - line[0]) * third, line[n] - (line[n] - line[n - 1]) * third, line[n]];
     out.extend_from_slice(&c);
     // Raised again: coefficient k is the sum of C(3, i) C(n − 3, k − i) / C(n, k) cᵢ, a hypergeometric distribution.
@@ -108,12 +108,12 @@ mod tests {
             .collect();
         let whole = BezierPatch { degree, points: net.clone(), domain: [[0.0, 1.0]; 2] };
         let origin = Point::new(3.0, -2.0, 1.0);
-        let mut slight = Slight::default();
-        let off = slight.make(&net, degree, origin);
+        let mut reduction = CubicReduction::default();
+        let off = reduction.reduce(&net, degree, origin);
         assert!(off < 0.05, "{off}");
         for k in 0..=400 {
             let x = Uv::new((k % 21) as f64 / 20.0, (k / 21) as f64 / 20.0);
-            let [a, b] = [&whole, &slight.patch].map(|p| p.homogeneous_point(x).project());
+            let [a, b] = [&whole, &reduction.patch].map(|p| p.homogeneous_point(x).project());
             assert!((a + origin - b).length() <= off + 1e-14);
         }
     }

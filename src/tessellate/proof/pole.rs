@@ -7,22 +7,23 @@
 //! of 160 000. A triangle from pole to pole and to a corner `x` stands for what lies between its own line from pole to pole and the parameter
 //! line through `x`.
 //!
-//! Why the bound of `bound.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into curves
+//! Why the bound of `prover.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into curves
 //! between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole (or the
 //! poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P each
 //! boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its place onto
-//! its chord, and the side along the pole onto the one point that it is, which it leaves by no more than the size of the pole. A border that
+//! its chord, and the side along the pole onto the one point that it is, which it cells by no more than the size of the pole. A border that
 //! runs aslant into the pole ends the piece in place of the parameter line: its chord's deviation and the hull around what lies between chord and
 //! curve are in its own bound, and its foot is the pole's corner itself. Corners stay where they are while curves shrink, the file's gap between
 //! corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners lie in one direction from
 //! the pole the piece has no width and the sides decide alone.
 
-use super::delaunay::key;
+use super::border_chord::BorderChord;
+use super::prover::Prover;
 use crate::math::{Point, Uv};
-use crate::tessellate::border::trim::Trim;
-use crate::tessellate::proof::bound::Prover;
-use crate::tessellate::sheet::Sheet;
-use rustc_hash::FxHashMap;
+use crate::tessellate::face_surface::FaceSurface;
+
+/// Share of the domain by which a border that runs into a pole may leave its parameter line.
+const ASLANT: f64 = 1e-9;
 
 /// Where the parameter line of `x` meets the pole at `pole`, whose parameter `across` it keeps.
 fn foot(x: Uv, pole: Uv, across: usize) -> Uv {
@@ -32,10 +33,10 @@ fn foot(x: Uv, pole: Uv, across: usize) -> Uv {
 }
 
 /// The corner at a pole, and the parameter that is constant along the pole; `None` unless it is the only one.
-fn corner(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
+fn pole_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
     let mut found = None;
     for (k, &x) in uv.iter().enumerate() {
-        if let Some(across) = sheet.pole(x)
+        if let Some(across) = surface.pole(x)
             && found.replace((k, across)).is_some()
         {
             return None;
@@ -45,28 +46,28 @@ fn corner(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
 }
 
 /// Whether two corners at poles, at which this parameter is constant, are not at the same one.
-fn apart(sheet: &Sheet<'_>, a: Uv, b: Uv, across: usize) -> bool {
-    (a[across] - b[across]).abs() > 0.5 * sheet.extent()[across]
+fn at_opposite_poles(surface: &FaceSurface<'_>, a: Uv, b: Uv, across: usize) -> bool {
+    (a[across] - b[across]).abs() > 0.5 * surface.extent()[across]
 }
 
 /// The corner off the poles of a triangle from pole to pole, and the parameter that is constant along these.
-fn between(sheet: &Sheet<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
-    let at = uv.map(|x| sheet.pole(x));
+fn spindle_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
+    let at = uv.map(|x| surface.pole(x));
     let k = (0..3).find(|&k| at[k].is_none())?;
     let (a, b) = ((k + 1) % 3, (k + 2) % 3);
     let across = at[a]?;
-    (at[b] == Some(across) && apart(sheet, uv[a], uv[b], across)).then_some((k, across))
+    (at[b] == Some(across) && at_opposite_poles(surface, uv[a], uv[b], across)).then_some((k, across))
 }
 
 /// Middles of the sides of a triangle, those into a pole along parameter lines.
-pub(in crate::tessellate) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] {
+pub(in crate::tessellate) fn side_middles(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> [Uv; 3] {
     let mut at = [0, 1, 2].map(|i| 0.5 * (uv[i] + uv[(i + 1) % 3]));
-    if let Some((k, across)) = corner(sheet, &uv) {
+    if let Some((k, across)) = pole_corner(surface, &uv) {
         let (a, b) = (uv[(k + 1) % 3], uv[(k + 2) % 3]);
         at[k] = 0.5 * (a + foot(a, uv[k], across));
         at[(k + 2) % 3] = 0.5 * (b + foot(b, uv[k], across));
     }
-    if let Some((k, across)) = between(sheet, &uv) {
+    if let Some((k, across)) = spindle_corner(surface, &uv) {
         let x = uv[k];
         at[k] = 0.5 * (x + foot(x, uv[(k + 1) % 3], across));
         at[(k + 2) % 3] = 0.5 * (x + foot(x, uv[(k + 2) % 3], across));
@@ -76,35 +77,35 @@ pub(in crate::tessellate) fn middles(sheet: &Sheet<'_>, uv: [Uv; 3]) -> [Uv; 3] 
 
 /// The corner of a facet at a pole, with parameters there that keep each of its triangles within its sector: opposite the
 /// diagonal those of the diagonal's other end, else those between its neighbours.
-pub(in crate::tessellate) fn seen(sheet: &Sheet<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
+pub(in crate::tessellate) fn facet_parameters(surface: &FaceSurface<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
     let n = uv.len();
-    let (k, across) = uv.iter().enumerate().find_map(|(k, &x)| Some((k, sheet.pole(x)?)))?;
+    let (k, across) = uv.iter().enumerate().find_map(|(k, &x)| Some((k, surface.pole(x)?)))?;
     let from = if n == 4 && k % 2 == 0 { uv[(k + 2) % 4] } else { 0.5 * (uv[(k + 1) % n] + uv[(k + n - 1) % n]) };
     Some((k, foot(from, uv[k], across)))
 }
 
 /// Whether a triangle is proved with all that lies beside it up to parameter lines into a pole.
-pub(in crate::tessellate) fn covers(sheet: &Sheet<'_>, uv: [Uv; 3]) -> bool {
-    applies(sheet, uv) || between(sheet, &uv).is_some()
+pub(in crate::tessellate) fn covers_to_meridians(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> bool {
+    is_sector(surface, uv) || spindle_corner(surface, &uv).is_some()
 }
 
 /// Whether a triangle is proved by its sector.
-pub(in crate::tessellate) fn applies(sheet: &Sheet<'_>, uv: [Uv; 3]) -> bool {
-    corner(sheet, &uv).is_some()
+pub(in crate::tessellate) fn is_sector(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> bool {
+    pole_corner(surface, &uv).is_some()
 }
 
 /// Bound for a triangle at a pole; `None` for others. `sides` are what its sides follow, the one from corner 0 to 1 first.
-pub(in crate::tessellate) fn bound(
+pub(in crate::tessellate) fn sector_bound(
     prover: &mut Prover<'_, '_>,
     uv: [Uv; 3],
     xyz: [Point; 3],
-    sides: [Option<&Trim>; 3],
+    sides: [Option<&BorderChord>; 3],
     limit: f64,
 ) -> Option<f64> {
-    if let Some((k, across)) = between(prover.sheet, &uv) {
+    if let Some((k, across)) = spindle_corner(prover.surface, &uv) {
         return Some(spindle(prover, uv, xyz, sides, limit, (k, across)));
     }
-    let (k, across) = corner(prover.sheet, &uv)?;
+    let (k, across) = pole_corner(prover.surface, &uv)?;
     let [p, a, b] = [0, 1, 2].map(|i| uv[(k + i) % 3]);
     let [xp, xa, xb] = [0, 1, 2].map(|i| xyz[(k + i) % 3]);
     let [of_a, of_base, of_b] = [0, 1, 2].map(|i| sides[(k + i) % 3]);
@@ -117,7 +118,7 @@ pub(in crate::tessellate) fn bound(
         (of_b, [b, foot_b], [xb, xp]),
         (None, [foot_a, foot_b], [xp, xp]),
     ];
-    // Where the corners run back around the pole the piece is folded; the argument of `bound.rs` does not ask for more.
+    // Where the corners run back around the pole the piece is folded; the argument of `prover.rs` does not ask for more.
     Some(quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit))
 }
 
@@ -126,7 +127,7 @@ fn spindle(
     prover: &mut Prover<'_, '_>,
     uv: [Uv; 3],
     xyz: [Point; 3],
-    sides: [Option<&Trim>; 3],
+    sides: [Option<&BorderChord>; 3],
     limit: f64,
     (k, across): (usize, usize),
 ) -> f64 {
@@ -142,14 +143,18 @@ fn spindle(
         (None, [foot_a, a], [xa, xa]),
         (None, [foot_b, b], [xb, xb]),
     ];
-    let aslant = of_a.or(of_b).map(|_| prover.piece([x, foot_a, foot_b], xyz, limit));
-    quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit).max(aslant.unwrap_or(0.0))
+    let whole = quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit);
+    if of_a.is_none() && of_b.is_none() {
+        return whole;
+    }
+    // A border in place of a parameter line leaves a triangle between the feet.
+    whole.max(prover.triangle_bound([x, foot_a, foot_b], xyz, limit))
 }
 
 /// Bound for a triangle whose piece is a quadrilateral of parameters, each boundary curve measured from its own edge or trim.
 fn quadrilateral<const N: usize>(
     prover: &mut Prover<'_, '_>,
-    lines: [(Option<&Trim>, [Uv; 2], [Point; 2]); N],
+    lines: [(Option<&BorderChord>, [Uv; 2], [Point; 2]); N],
     [a, b, c, d]: [Uv; 4],
     xyz: [Point; 3],
     limit: f64,
@@ -158,7 +163,7 @@ fn quadrilateral<const N: usize>(
     for (trim, uv, ends) in lines {
         worst = worst.max(match trim {
             Some(trim) => trim.bound(prover, xyz, limit),
-            None => prover.side(uv, ends, limit),
+            None => prover.side_bound(uv, ends, limit),
         });
         if worst > limit {
             return worst;
@@ -166,28 +171,30 @@ fn quadrilateral<const N: usize>(
     }
     for piece in [[a, b, c], [a, c, d]] {
         if worst <= limit {
-            worst = worst.max(prover.piece(piece, xyz, limit));
+            worst = worst.max(prover.triangle_bound(piece, xyz, limit));
         }
     }
     worst
 }
 
-/// Bound for a triangle with two corners on one pole: nothing, but where a border runs aslant into it.
-pub(in crate::tessellate) fn line(
-    sheet: &Sheet<'_>,
+/// Bound for a triangle with two corners on one pole: nothing, but where a border runs aslant into it. `sides` as for
+/// [`sector_bound`].
+pub(in crate::tessellate) fn collapsed_bound(
+    surface: &FaceSurface<'_>,
     uv: [Uv; 3],
-    t: [u32; 3],
-    trims: &FxHashMap<[u32; 2], Trim>,
+    sides: [Option<&BorderChord>; 3],
 ) -> Option<f64> {
-    let k = (0..3).find(|&k| sheet.pole(uv[k]).is_none())?;
-    let across = sheet.pole(uv[(k + 1) % 3])?;
-    if sheet.pole(uv[(k + 2) % 3]) != Some(across) || apart(sheet, uv[(k + 1) % 3], uv[(k + 2) % 3], across) {
+    let k = (0..3).find(|&k| surface.pole(uv[k]).is_none())?;
+    let [a, b] = [(k + 1) % 3, (k + 2) % 3];
+    let across = surface.pole(uv[a])?;
+    if surface.pole(uv[b]) != Some(across) || at_opposite_poles(surface, uv[a], uv[b], across) {
         return None;
     }
-    let extent = sheet.extent()[1 - across];
-    let aslant = [(k + 1) % 3, (k + 2) % 3].into_iter().any(|j| {
+    let extent = surface.extent()[1 - across];
+    // The side from `k` to `a` is the one that starts at `k`; that from `b` to `k` starts at `b`.
+    let aslant = [(a, sides[k]), (b, sides[b])].into_iter().any(|(j, side)| {
         let off = (uv[j][1 - across] - uv[k][1 - across]).abs();
-        trims.contains_key(&key(t[j], t[k])) && off > 1e-9 * extent
+        side.is_some() && off > ASLANT * extent
     });
-    (!aslant).then_some(sheet.pole_size)
+    (!aslant).then_some(surface.pole_size)
 }

@@ -1,0 +1,202 @@
+//! Chords of a curve within a tolerance that changes along it.
+
+use crate::math::{Point, Vector};
+use crate::nurbs::Curve;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+
+/// Steps in which the shape of a piece is sampled before it is divided, and those of one among many pieces.
+const STEPS: usize = 64;
+const STEPS_OF_MANY: usize = 8;
+/// Pieces from which on each is one of many.
+const MANY_PIECES: usize = 10;
+/// Tolerances vary slowly: one in so many samples asks for its own.
+const TOLERANCE_EVERY: usize = 4;
+/// Most chords of one curve.
+const MAX_CHORDS: usize = 20_000;
+/// Halvings of one chord at most: 4096 parts, of which the last differ by the rounding of trims that were fitted.
+const MAX_HALVINGS: u32 = 12;
+/// Share of a piece's length within which it is straight: rounding of the samples.
+const STRAIGHT: f64 = 1e-12;
+/// Chords that would be missing by this little of one are not made.
+const CHORD_ROUNDING: f64 = 1e-3;
+/// Excess over its tolerance with which a chord of the even spread passes, and from which more chords are no use because curvature
+/// was misjudged: halving sees to it then.
+const SPREAD_EXCESS: [f64; 2] = [1.02, 2.0];
+/// Times that the even spread is made anew with more chords.
+const MAX_SPREADS: usize = 3;
+/// Share of the tolerance from which a chord is halved; above the excess with which the spread passes.
+const HALVED_FROM: f64 = 1.03;
+/// Where along a chord the curve is compared with it.
+const PROBES: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
+/// Sine of the angle between tangents from which a knot is a kink, and the share of the knot interval at which they are taken.
+const KINK: f64 = 0.05;
+const KINK_STEP: f64 = 1e-6;
+
+/// The ends of a curve and the kinks between them.
+pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
+    let b = curve.breakpoints();
+    let n = b.len();
+    let is_kink = |i: usize| {
+        let k = b[i];
+        if curve.knots.iter().filter(|&&x| x == k).count() < curve.degree {
+            return false;
+        }
+        let step = KINK_STEP * (b[i + 1] - k).min(k - b[i - 1]);
+        let tangent = |t: f64| curve.derivatives(t).first.try_normalize();
+        match (tangent(k - step), tangent(k + step)) {
+            (Some(x), Some(y)) => x.cross(y).length() > KINK || x.dot(y) < 0.0,
+            _ => false,
+        }
+    };
+    (0..n).filter(|&i| i == 0 || i + 1 == n || is_kink(i)).map(|i| b[i]).collect()
+}
+
+/// Parameters so that chords stay within the tolerance (of a parameter and the direction there), spread evenly in
+/// `√(curvature / tolerance)` between `breaks`.
+pub(in crate::tessellate) fn parameters(
+    breaks: &[f64],
+    at: impl Fn(f64) -> Point,
+    tolerance: impl Fn(f64, Vector) -> f64,
+) -> Vec<f64> {
+    let steps = if breaks.len() > MANY_PIECES { STEPS_OF_MANY } else { STEPS };
+    let mut t = vec![breaks[0]];
+    for pair in breaks.windows(2) {
+        if let Some(piece) = Piece::new([pair[0], pair[1]], steps, &at, &tolerance) {
+            t.extend(piece.spread_within_tolerance(&at));
+        }
+        t.push(pair[1]);
+    }
+    shorten(&mut t, at, tolerance);
+    t
+}
+
+/// One piece of a curve, sampled.
+struct Piece {
+    ends: [f64; 2],
+    samples: Vec<f64>,
+    /// Tolerances at one in [`TOLERANCE_EVERY`] samples.
+    tolerances: Vec<f64>,
+    /// Number of chords from the start up to each sample.
+    chords: Vec<f64>,
+}
+
+impl Piece {
+    /// `None` where the piece is straight.
+    fn new(
+        [a, b]: [f64; 2],
+        steps: usize,
+        at: &impl Fn(f64) -> Point,
+        tolerance: &impl Fn(f64, Vector) -> f64,
+    ) -> Option<Self> {
+        let samples: Vec<f64> = (0..=steps).map(|i| a + (b - a) * i as f64 / steps as f64).collect();
+        let p: Vec<Point> = samples.iter().map(|&t| at(t)).collect();
+        let chord = [p[0], p[steps]];
+        if p.iter().all(|&q| distance_to_chord(q, &chord) <= STRAIGHT * (p[steps] - p[0]).length()) {
+            return None;
+        }
+        let own = |i: usize| tolerance(samples[i], p[(i + 1).min(steps)] - p[i.saturating_sub(1)]);
+        let last = steps / TOLERANCE_EVERY;
+        let tolerances: Vec<f64> = (0..=last).map(|k| own(TOLERANCE_EVERY * k)).collect();
+        let density = |i: usize| {
+            let (k, f) = (i / TOLERANCE_EVERY, (i % TOLERANCE_EVERY) as f64 / TOLERANCE_EVERY as f64);
+            let xi = tolerances[k] + (tolerances[(k + 1).min(last)] - tolerances[k]) * f;
+            (curvature(&p, i) / (8.0 * xi)).sqrt()
+        };
+        let d: Vec<f64> = (0..=steps).map(density).collect();
+        let mut chords = vec![0.0];
+        for i in 0..steps {
+            chords.push(chords[i] + 0.5 * (d[i] + d[i + 1]) * (p[i + 1] - p[i]).length());
+        }
+        Some(Self { ends: [a, b], samples, tolerances, chords })
+    }
+
+    /// Inner parameters of as few chords as hold, spread evenly.
+    fn spread_within_tolerance(&self, at: &impl Fn(f64) -> Point) -> Vec<f64> {
+        let total = self.chords[self.chords.len() - 1];
+        let mut n =
+            if total.is_finite() { (total - CHORD_ROUNDING).ceil().clamp(1.0, MAX_CHORDS as f64) } else { 1.0 };
+        let mut inner = self.spread(n);
+        // The samples' own chords miss a little of the curve: ask for more while the worst chord is too long.
+        for _ in 0..MAX_SPREADS {
+            let worst = self.worst_excess(&inner, at);
+            if worst <= SPREAD_EXCESS[0] || worst > SPREAD_EXCESS[1] {
+                break;
+            }
+            n = (n * worst.sqrt()).ceil().max(n + 1.0);
+            inner = self.spread(n);
+        }
+        inner
+    }
+
+    /// Inner parameters of `n` chords.
+    fn spread(&self, n: f64) -> Vec<f64> {
+        let (ts, sum) = (&self.samples, &self.chords);
+        let steps = ts.len() - 1;
+        let parameter = |k: usize| {
+            let goal = sum[steps] * k as f64 / n;
+            let i = sum.partition_point(|&s| s <= goal).clamp(1, steps) - 1;
+            ts[i] + (ts[i + 1] - ts[i]) * (goal - sum[i]) / (sum[i + 1] - sum[i])
+        };
+        (1..n as usize).map(parameter).collect()
+    }
+
+    /// The largest sag of a chord in its middle, in tolerances.
+    fn worst_excess(&self, inner: &[f64], at: &impl Fn(f64) -> Point) -> f64 {
+        let [a, b] = self.ends;
+        let last = self.tolerances.len() - 1;
+        let end = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
+        let excess = |k: usize| {
+            let (x, y) = (end(k), end(k + 1));
+            let i = (4.0 * ((0.5 * (x + y) - a) / (b - a) * last as f64)) as usize / 4;
+            distance_to_chord(at(0.5 * (x + y)), &[at(x), at(y)]) / self.tolerances[i.min(last)]
+        };
+        (0..=inner.len()).map(excess).fold(0.0, f64::max)
+    }
+}
+
+/// Curvature at a sample from the circle through three points; ends take their neighbour's.
+fn curvature(p: &[Point], i: usize) -> f64 {
+    let i = i.clamp(1, p.len() - 2);
+    let (x, y) = (p[i] - p[i - 1], p[i + 1] - p[i]);
+    let scale = x.length() * y.length() * (p[i + 1] - p[i - 1]).length();
+    if scale > 0.0 { 2.0 * x.cross(y).length() / scale } else { 0.0 }
+}
+
+/// Halves chords that stray too far from the curve.
+pub(super) fn shorten(t: &mut Vec<f64>, at: impl Fn(f64) -> Point, tolerance: impl Fn(f64, Vector) -> f64) {
+    bisect(t, |a, b| {
+        let chord = [at(a), at(b)];
+        let along = chord[1] - chord[0];
+        let xi = tolerance(0.5 * (a + b), along) * HALVED_FROM;
+        PROBES.iter().any(|f| distance_to_chord(at(a + (b - a) * f), &chord) > xi)
+    });
+}
+
+/// Halves intervals until `coarse` holds for none.
+pub(super) fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
+    let mut out = Vec::with_capacity(t.len());
+    for pair in t.windows(2) {
+        let mut stack = vec![(pair[0], pair[1], 0)];
+        while let Some((a, b, depth)) = stack.pop() {
+            let m = 0.5 * (a + b);
+            if depth < MAX_HALVINGS && a < m && m < b && out.len() < MAX_CHORDS && coarse(a, b) {
+                stack.push((m, b, depth + 1));
+                stack.push((a, m, depth + 1));
+            } else {
+                out.push(a);
+            }
+        }
+    }
+    out.extend(t.last());
+    *t = out;
+}
+
+/// Halves all intervals.
+pub(super) fn bisect_all(t: &mut Vec<f64>) {
+    let mut out = Vec::with_capacity(2 * t.len());
+    for pair in t.windows(2) {
+        out.extend([pair[0], 0.5 * (pair[0] + pair[1])]);
+    }
+    out.extend(t.last());
+    *t = out;
+}

@@ -1,0 +1,222 @@
+//! The border of a face as polygons in its parameter plane, on the shared samples of its edges.
+
+use super::curve_chords;
+use super::edges::Division;
+use crate::math::{Point, Uv};
+use crate::model::{EdgeUse, Face, Part, TrimLoop};
+use crate::nurbs::UvCurve;
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::nodes::Position;
+
+/// Distance, mm, and share of the surface's size, within which corners that a face makes itself are one: ten times what the readers
+/// of files let the ends of neighbouring trims lie apart.
+const COINCIDENT_CORNERS: [f64; 2] = [1e-9, 1e-6];
+/// Share of the surface's size within which a side without an edge is one point, or two such sides are one seam: such sides come
+/// from analytic surfaces, whose poles and seams close to rounding, or from splines fitted to them.
+const CLOSED_SIDE: f64 = 1e-5;
+/// Steps in which the shape of a side without an edge is compared with others.
+const SHAPE_STEPS: u32 = 8;
+/// Kinks of a straight-sided uv curve up to which each becomes a corner.
+const MAX_KINKS: usize = 30;
+/// Share of the tolerance that the chords of a seam take: both its sides are cells' sides, and the cells take the other half.
+const SEAM_SHARE: f64 = 0.48;
+
+/// A vertex of a border polygon, and what the polygon's edge that starts there follows.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::tessellate) struct PolygonVertex {
+    pub(in crate::tessellate) uv: Uv,
+    pub(in crate::tessellate) position: Position,
+    pub(in crate::tessellate) side: BorderSide,
+}
+
+/// What one edge of a border polygon follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::tessellate) enum BorderSide {
+    /// The part's edge of this use (counted through all loops) over a parameter interval.
+    Edge { edge_use: u32, t: [f64; 2] },
+    /// A straight line of the parameter plane whose two sides are one in space, or a free border.
+    Seam,
+    /// A line of the parameter plane that is one point in space.
+    Pole,
+}
+
+/// All polygons of a face.
+#[derive(Default)]
+pub(in crate::tessellate) struct BorderPolygons {
+    pub(in crate::tessellate) polygons: Vec<Vec<PolygonVertex>>,
+    /// Places of the positions that are not shared with other faces.
+    pub(in crate::tessellate) own: Vec<Point>,
+}
+
+impl BorderPolygons {
+    /// The box around all polygons.
+    pub(in crate::tessellate) fn bounds(&self) -> (Uv, Uv) {
+        let all = self.polygons.iter().flatten();
+        all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
+    }
+}
+
+/// The loops of a face; of an untrimmed one, the rim of its domain.
+pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
+    if !face.loops.is_empty() {
+        return face.loops.clone();
+    }
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+    let uses = (0..4)
+        .map(|k| {
+            let (a, b) = (corners[k], corners[(k + 1) % 4]);
+            let t = if k % 2 == 0 { [u0, u1] } else { [v0, v1] };
+            // Opposite sides run over the same parameters, so that a seam's two sides have the same samples.
+            let uv = if k < 2 { UvCurve::line(a, b, t) } else { UvCurve::line(b, a, t) };
+            EdgeUse { edge: None, reversed: k >= 2, uv }
+        })
+        .collect();
+    vec![TrimLoop { uses }]
+}
+
+/// Builds the polygons on the part's shared points.
+pub(in crate::tessellate) fn build(
+    part: &Part,
+    loops: &[TrimLoop],
+    surface: &FaceSurface<'_>,
+    divisions: &[Division],
+) -> BorderPolygons {
+    let mut out = BorderPolygons::default();
+    let near = COINCIDENT_CORNERS[1] * surface.size + COINCIDENT_CORNERS[0];
+    let mut own = OwnPoints { points: Vec::new(), near };
+    let mut seams: Vec<SeamSide> = Vec::new();
+    let mut edge_use = 0;
+    for trim in loops {
+        let n = trim.uses.len();
+        // Where each use starts, in space: the vertex of an edge decides, of either neighbour.
+        let starts: Vec<Position> = (0..n)
+            .map(|k| {
+                let (before, here) = (&trim.uses[(k + n - 1) % n], &trim.uses[k]);
+                vertex(part, here, 0)
+                    .or(vertex(part, before, 1))
+                    .unwrap_or_else(|| own.find_or_add(surface.point(surface.spline.clamp(here.start()))))
+            })
+            .collect();
+        let mut polygon: Vec<PolygonVertex> = Vec::new();
+        for (k, u) in trim.uses.iter().enumerate() {
+            let first = polygon.len();
+            let (from, to) = (starts[k], starts[(k + 1) % n]);
+            match u.edge {
+                Some(edge) => polygon.extend(edge_side(u, &divisions[edge.0 as usize], edge_use, from)),
+                None => polygon.extend(free_side(u, surface, [from, to], &mut own, &mut seams)),
+            }
+            if let Some(v) = polygon.get_mut(first) {
+                v.uv = u.start();
+            }
+            edge_use += 1;
+        }
+        for v in &mut polygon {
+            v.uv = surface.spline.clamp(v.uv);
+        }
+        polygon.dedup_by(|b, a| a.uv == b.uv && a.position == b.position);
+        if polygon.len() > 1 && polygon[0].uv == polygon[polygon.len() - 1].uv {
+            polygon.pop();
+        }
+        out.polygons.push(polygon);
+    }
+    out.own = own.points;
+    out
+}
+
+/// The vertex at the start (0) or end (1) of a use of an edge.
+fn vertex(part: &Part, u: &EdgeUse, end: usize) -> Option<Position> {
+    let vertices = part.edges[u.edge?.0 as usize].vertices;
+    Some(Position::Shared(vertices[if u.reversed { 1 - end } else { end }].0))
+}
+
+/// A side along an edge: the edge's own samples, from the use's start on.
+fn edge_side<'d>(
+    u: &'d EdgeUse,
+    division: &'d Division,
+    edge_use: u32,
+    from: Position,
+) -> impl Iterator<Item = PolygonVertex> + 'd {
+    let n = division.t.len();
+    (0..n - 1).map(move |i| {
+        let (k, next) = if u.reversed { (n - 1 - i, n - 2 - i) } else { (i, i + 1) };
+        let position = if i == 0 { from } else { Position::Shared(division.first + k as u32 - 1) };
+        let t = [division.t[k], division.t[next]];
+        PolygonVertex { uv: u.uv.evaluate(t[0]), position, side: BorderSide::Edge { edge_use, t } }
+    })
+}
+
+/// One side of a seam that has been sampled, to be met again from the other side.
+struct SeamSide {
+    shape: Vec<Point>,
+    /// Its inner samples: shares of the way along it, and positions.
+    samples: Vec<(f64, Position)>,
+}
+
+/// A side without an edge: a pole, or one side of a seam; the second side of a seam takes the samples of the first.
+fn free_side(
+    u: &EdgeUse,
+    surface: &FaceSurface<'_>,
+    [from, to]: [Position; 2],
+    own: &mut OwnPoints,
+    seams: &mut Vec<SeamSide>,
+) -> Vec<PolygonVertex> {
+    let [t0, t1] = u.uv.domain();
+    let uv = |f: f64| {
+        let t = if u.reversed { t1 + (t0 - t1) * f } else { t0 + (t1 - t0) * f };
+        surface.spline.clamp(u.uv.evaluate(t))
+    };
+    let at = |f: f64| surface.point(uv(f));
+    let shape: Vec<Point> = (0..=SHAPE_STEPS).map(|i| at(f64::from(i) / f64::from(SHAPE_STEPS))).collect();
+    let near = CLOSED_SIDE * surface.size;
+    if shape.iter().all(|p| (*p - shape[0]).length() <= near) && from == to {
+        return vec![PolygonVertex { uv: uv(0.0), position: from, side: BorderSide::Pole }];
+    }
+    let runs_back = |s: &&SeamSide| s.shape.iter().rev().zip(&shape).all(|(a, b)| (*a - *b).length() <= near);
+    let samples: Vec<(f64, Position)> = match seams.iter().find(runs_back) {
+        Some(s) => s.samples.iter().rev().map(|&(f, position)| (1.0 - f, position)).collect(),
+        None => {
+            // Seen from its first use: ascending in the curve's own parameter on both sides.
+            let inner: Vec<f64> = u.uv.breakpoints()[1..].iter().map(|t| (t - t0) / (t1 - t0)).collect();
+            let kinks: Vec<f64> = if inner.len() < MAX_KINKS && u.uv.degree == 1 { inner } else { vec![1.0] };
+            let mut breaks = vec![0.0];
+            breaks.extend(
+                kinks.iter().map(|&f| if u.reversed { 1.0 - f } else { f }).filter(|f| *f > 0.0 && *f < 1.0),
+            );
+            breaks.push(1.0);
+            breaks.sort_by(f64::total_cmp);
+            let fs = curve_chords::parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
+            let samples: Vec<(f64, Position)> = fs[1..fs.len() - 1].iter().map(|&f| (f, own.add(at(f)))).collect();
+            seams.push(SeamSide { shape, samples: samples.clone() });
+            samples
+        }
+    };
+    let all = std::iter::once((0.0, from)).chain(samples);
+    all.map(|(f, position)| PolygonVertex { uv: uv(f), position, side: BorderSide::Seam }).collect()
+}
+
+/// Points that a face makes itself, found again by place.
+struct OwnPoints {
+    points: Vec<Point>,
+    /// Distance within which they are one, mm.
+    near: f64,
+}
+
+impl OwnPoints {
+    fn add(&mut self, p: Point) -> Position {
+        self.points.push(p);
+        Position::Own(self.points.len() as u32 - 1)
+    }
+
+    fn find_or_add(&mut self, p: Point) -> Position {
+        match self.points.iter().position(|q| (*q - p).length() <= self.near) {
+            Some(k) => Position::Own(k as u32),
+            None => self.add(p),
+        }
+    }
+}
+
+/// Whether the ray from `p` along u crosses a segment: an odd number of them means inside.
+pub(in crate::tessellate) fn crosses_ray_from(p: Uv, [a, b]: [Uv; 2]) -> bool {
+    (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
+}

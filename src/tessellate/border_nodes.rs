@@ -1,0 +1,157 @@
+//! The border polygons of a face as nodes and segments, and how far each segment's curve strays from its chord.
+
+use super::border::polygons::{BorderPolygons, BorderSide};
+use super::cells::cell::Subdivision;
+use super::face_surface::FaceSurface;
+use super::nodes::{Node, Nodes, Position, edge_key};
+use super::proof::border_chord::{BorderChord, BorderChords};
+use super::proof::deviation::DeviationBounds;
+use crate::math::{Point, Uv};
+use crate::model::{EdgeId, EdgeUse, Part, TrimLoop};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Share of the face's extent within which vertices in one place have the same parameters: the trims' own rounding.
+const SAME_PARAMETERS: f64 = 1e-9;
+/// Share of a cell's size within which it reaches a pole.
+const AT_POLE: f64 = 1e-6;
+/// Share of a pole's length within which two corners on it are one.
+const SAME_AT_POLE: f64 = 1e-9;
+
+/// The border of a face.
+pub(super) struct BorderNodes {
+    pub(super) nodes: Nodes,
+    pub(super) segments: Vec<[u32; 2]>,
+    pub(super) chords: BorderChords,
+    /// The edge that a segment follows.
+    pub(super) followed: FxHashMap<[u32; 2], EdgeId>,
+    /// Segments that are one point in space.
+    poles: Vec<[u32; 2]>,
+    /// Positions of vertices that the file has twice, where loops touch.
+    pub(super) coincident: Vec<[u32; 2]>,
+}
+
+/// A segment that follows an edge, over these parameters.
+struct EdgeSegment<'l> {
+    nodes: [u32; 2],
+    edge_use: &'l EdgeUse,
+    edge: EdgeId,
+    t: [f64; 2],
+}
+
+impl BorderNodes {
+    pub(super) fn new(
+        part: &Part,
+        loops: &[TrimLoop],
+        surface: &FaceSurface<'_>,
+        polygons: &BorderPolygons,
+        shared: &[Point],
+    ) -> Self {
+        let mut out = Self {
+            nodes: Nodes::with_own(polygons.own.clone()),
+            segments: Vec::new(),
+            chords: BorderChords::default(),
+            followed: FxHashMap::default(),
+            poles: Vec::new(),
+            coincident: Vec::new(),
+        };
+        let ids = out.add_nodes(part, polygons, shared);
+        let uses: Vec<&EdgeUse> = loops.iter().flat_map(|l| &l.uses).collect();
+        let mut along_edges: Vec<EdgeSegment<'_>> = Vec::new();
+        for (polygon, ids) in polygons.polygons.iter().zip(&ids) {
+            for (k, v) in polygon.iter().enumerate() {
+                let nodes = [ids[k], ids[(k + 1) % ids.len()]];
+                if nodes[0] == nodes[1] {
+                    continue;
+                }
+                match v.side {
+                    BorderSide::Pole => out.poles.push(nodes),
+                    BorderSide::Seam => out.segments.push(nodes),
+                    BorderSide::Edge { edge_use, t } => {
+                        out.segments.push(nodes);
+                        let edge_use = uses[edge_use as usize];
+                        let segment = edge_use.edge.map(|edge| EdgeSegment { nodes, edge_use, edge, t });
+                        along_edges.extend(segment);
+                    }
+                }
+            }
+        }
+        // In parallel: a face with a long border would hold up the others.
+        let nodes = &out.nodes;
+        let chord = |deviation: &mut DeviationBounds, s: &EdgeSegment<'_>| {
+            let ends = s.nodes.map(|n| nodes[n]);
+            let (uv, xyz) = (ends.map(|n| n.uv), ends.map(|n| n.place));
+            let curve = &part.edges[s.edge.0 as usize].curve;
+            let mut chord = BorderChord::new(surface, curve, s.edge_use, s.t, uv, xyz);
+            chord.bound_sliver(surface, deviation, uv, xyz);
+            chord
+        };
+        let chords: Vec<BorderChord> =
+            along_edges.par_iter().with_min_len(32).map_init(DeviationBounds::default, chord).collect();
+        let names = along_edges.iter().map(|s| edge_key(s.nodes[0], s.nodes[1]));
+        out.chords.extend(names.clone().zip(chords));
+        out.followed.extend(names.zip(along_edges.iter().map(|s| s.edge)));
+        out
+    }
+
+    /// Makes the nodes of all polygons. Loops that touch in a vertex have one node there, or what follows its chords would be known of one
+    /// of them alone.
+    fn add_nodes(&mut self, part: &Part, polygons: &BorderPolygons, shared: &[Point]) -> Vec<Vec<u32>> {
+        let (lo, hi) = polygons.bounds();
+        let near = SAME_PARAMETERS * (hi - lo);
+        let mut vertices: FxHashMap<[u64; 3], u32> = FxHashMap::default();
+        let mut node = |uv: Uv, position: Position| {
+            let place = match position {
+                Position::Shared(p) => shared[p as usize],
+                Position::Own(p) => polygons.own[p as usize],
+            };
+            let Position::Shared(here) = position else {
+                return self.nodes.push(Node { uv, place, position });
+            };
+            if (here as usize) < part.vertices.len() {
+                let next = self.nodes.len();
+                let first = *vertices.entry(place.to_array().map(f64::to_bits)).or_insert(next);
+                if first < next && (self.nodes[first].uv - uv).abs().cmple(near).all() {
+                    if let Position::Shared(there) = self.nodes[first].position
+                        && there != here
+                    {
+                        self.coincident.push([there, here]);
+                    }
+                    return first;
+                }
+            }
+            self.nodes.push(Node { uv, place, position })
+        };
+        let polygons = polygons.polygons.iter();
+        polygons.map(|p| p.iter().map(|v| node(v.uv, v.position)).collect()).collect()
+    }
+
+    /// Divides poles where the cells beside them are.
+    pub(super) fn divide_poles(&mut self, cells: &Subdivision) {
+        for [from, to] in std::mem::take(&mut self.poles) {
+            let (a, b) = (self.nodes[from].uv, self.nodes[to].uv);
+            let d = if (b - a).x.abs() > (b - a).y.abs() { 0 } else { 1 };
+            let (lo, hi) = (a[d].min(b[d]), a[d].max(b[d]));
+            let touching = cells.border.iter().filter(|c| {
+                let slack = AT_POLE * (c.hi[1 - d] - c.lo[1 - d]);
+                c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
+            });
+            let mut at: Vec<f64> =
+                touching.flat_map(|c| [c.lo[d], c.hi[d]]).filter(|&x| x > lo && x < hi).collect();
+            at.sort_by(f64::total_cmp);
+            at.dedup_by(|y, x| *y - *x < SAME_AT_POLE * (hi - lo));
+            if a[d] > b[d] {
+                at.reverse();
+            }
+            let mut last = from;
+            for x in at {
+                let mut uv = a.lerp(b, (x - a[d]) / (b[d] - a[d]));
+                uv[d] = x;
+                let id = self.nodes.push(Node { uv, ..self.nodes[from] });
+                self.segments.push([last, id]);
+                last = id;
+            }
+            self.segments.push([last, to]);
+        }
+    }
+}

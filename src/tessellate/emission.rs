@@ -1,0 +1,107 @@
+//! Facets of nodes become facets of corners: outward normals, and corners apart where a crease or a pole has several normals.
+
+use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
+use super::face_surface::FaceSurface;
+use super::nodes::{Nodes, ProvedFacet};
+use crate::math::{Uv, Vector};
+use rustc_hash::FxHashMap;
+
+/// Collects the facets of a face.
+pub(super) struct Emission<'e, 's, 'a> {
+    surface: &'s FaceSurface<'a>,
+    nodes: &'e Nodes,
+    /// Corners by node and the side of each crease on which their facet lies.
+    corners: FxHashMap<(u32, [CreaseSide; 2]), u32>,
+    made: FaceMesh,
+}
+
+/// Where a facet lies beside a crease that one of its corners is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum CreaseSide {
+    NoCrease,
+    Below,
+    Above,
+}
+
+impl<'e, 's, 'a> Emission<'e, 's, 'a> {
+    pub(super) fn new(surface: &'s FaceSurface<'a>, nodes: &'e Nodes) -> Self {
+        Self { surface, nodes, corners: FxHashMap::default(), made: FaceMesh::default() }
+    }
+
+    pub(super) fn finish(self) -> FaceMesh {
+        self.made
+    }
+
+    /// Adds a facet; `pole` is a corner with parameters of its own.
+    pub(super) fn facet(&mut self, facet: &ProvedFacet<4>, pole: Option<(usize, Uv)>) {
+        let nodes = facet.nodes;
+        let uv = nodes.map(|n| self.nodes[n].uv);
+        let inside = 0.25 * (uv[0] + uv[1] + uv[2] + uv[3]);
+        let mut corner = |k: usize| match pole {
+            Some((at, uv)) if k == at => self.new_corner(nodes[at], uv, inside),
+            _ => self.shared_corner(nodes[k], inside),
+        };
+        let [a, b, c] = [0, 1, 2].map(&mut corner);
+        let d = if nodes[3] == nodes[2] { c } else { corner(3) };
+        let corners = if !self.surface.is_flipped() {
+            [a, b, c, d]
+        } else if c == d {
+            [a, c, b, b]
+        } else {
+            [a, d, c, b]
+        };
+        self.fill_normals(corners);
+        self.made.facets.push(MeshedFacet { corners, bound: facet.bound, tolerance: facet.tolerance });
+    }
+
+    /// The corner at a node for facets on one side of its creases.
+    fn shared_corner(&mut self, node: u32, inside: Uv) -> u32 {
+        let uv = self.nodes[node].uv;
+        let sides = crease_sides(self.surface, uv, inside);
+        if let Some(&known) = self.corners.get(&(node, sides)) {
+            return known;
+        }
+        let corner = self.new_corner(node, uv, inside);
+        self.corners.insert((node, sides), corner);
+        corner
+    }
+
+    fn new_corner(&mut self, node: u32, uv: Uv, inside: Uv) -> u32 {
+        let normal = self.surface.normal_towards(uv, inside).unwrap_or(NO_NORMAL);
+        self.made.corners.push(Corner { position: self.nodes[node].position, normal, uv });
+        (self.made.corners.len() - 1) as u32
+    }
+
+    /// Where the surface has no normal, a corner takes that of its first facet.
+    fn fill_normals(&mut self, corners: [u32; 4]) {
+        if corners.iter().all(|&n| self.made.corners[n as usize].normal != NO_NORMAL) {
+            return;
+        }
+        let p = corners.map(|n| self.surface.point(self.made.corners[n as usize].uv));
+        let n = (p[1] - p[0]).cross(p[2] - p[0]) + (p[2] - p[0]).cross(p[3] - p[0]);
+        // A facet without area shades nothing: any normal will do.
+        let n = n.try_normalize().unwrap_or(Vector::Z);
+        for k in corners {
+            let normal = &mut self.made.corners[k as usize].normal;
+            if *normal == NO_NORMAL {
+                *normal = n;
+            }
+        }
+    }
+}
+
+/// Stands for a normal that the surface does not have, until the corner's first facet gives one.
+const NO_NORMAL: Vector = Vector::ZERO;
+
+/// The side of each crease through `uv` on which `inside` lies.
+fn crease_sides(surface: &FaceSurface<'_>, uv: Uv, inside: Uv) -> [CreaseSide; 2] {
+    if !surface.is_creased() {
+        return [CreaseSide::NoCrease; 2];
+    }
+    let on = surface.on_creases(uv);
+    [0, 1].map(|d| match on[d] {
+        None => CreaseSide::NoCrease,
+        Some(crease) if inside[d] < crease => CreaseSide::Below,
+        Some(_) => CreaseSide::Above,
+    })
+}

@@ -1,0 +1,38 @@
+//! The facets of one face in its part's coordinates.
+
+use super::nodes::Position;
+use super::report::Repair;
+use crate::math::{Point, Uv, Vector};
+use crate::model::EdgeId;
+
+/// A corner of facets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    pub(super) position: Position,
+    /// Outward; zero where the surface has none, until a facet gives its own.
+    pub(super) normal: Vector,
+    pub(super) uv: Uv,
+}
+
+/// A facet of corners, counter-clockwise seen from outside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MeshedFacet {
+    pub(super) corners: [u32; 4],
+    pub(super) bound: f64,
+    pub(super) tolerance: f64,
+}
+
+/// The facets of a face.
+#[derive(Default)]
+pub(super) struct FaceMesh {
+    pub(super) corners: Vec<Corner>,
+    /// Places of the face's own positions.
+    pub(super) own: Vec<Point>,
+    pub(super) facets: Vec<MeshedFacet>,
+    /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
+    pub(super) coarse: Vec<EdgeId>,
+    /// Shared positions that are one: vertices of the file in one place, where loops touch.
+    pub(super) coincident: Vec<[u32; 2]>,
+    /// What was given up.
+    pub(super) repaired: Option<Repair>,
+}

@@ -1,0 +1,326 @@
+//! Between the whole cells and the border: constrained Delaunay in parameters scaled by curvature, refined where a
+//! triangle cannot be proved.
+
+use crate::math::Uv;
+use crate::model::EdgeId;
+use crate::tessellate::border::polygons::crosses_ray_from;
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
+use crate::tessellate::proof::border_chord::BorderChords;
+use crate::tessellate::proof::facet::prove_triangle;
+use crate::tessellate::proof::prover::Prover;
+use crate::tessellate::settings::Acceptance;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use spade::handles::{FaceHandle, FixedVertexHandle, InnerTag};
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+/// What is to be triangulated.
+pub(in crate::tessellate) struct Outline<'t> {
+    pub(in crate::tessellate) nodes: Nodes,
+    /// Constraint segments, each turning outside into inside.
+    pub(in crate::tessellate) segments: Vec<[u32; 2]>,
+    /// Lines inside that no triangle crosses; refinement may divide them.
+    pub(in crate::tessellate) creases: Vec<[u32; 2]>,
+    /// What border segments follow.
+    pub(in crate::tessellate) chords: &'t BorderChords,
+    /// Multiplies parameters before triangulating.
+    pub(in crate::tessellate) scale: Uv,
+}
+
+/// Triangles on the outline's nodes; refinement appends some.
+pub(in crate::tessellate) struct Transition {
+    pub(in crate::tessellate) nodes: Nodes,
+    pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
+    /// Segments that could not be kept because they cross others.
+    pub(in crate::tessellate) conflicts: Vec<[u32; 2]>,
+    /// Those that are kept and crossed by them.
+    pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
+}
+
+impl Transition {
+    /// Chords of the border beside triangles that are not proved, where shorter ones may help: not on edges that the file has farther
+    /// from the face than the tolerance somewhere.
+    pub(in crate::tessellate) fn unproved_chords(
+        &self,
+        chords: &BorderChords,
+        followed: &FxHashMap<[u32; 2], EdgeId>,
+    ) -> Vec<[u32; 2]> {
+        let sides = |f: &ProvedFacet<3>| {
+            let (t, xi) = (f.nodes, f.tolerance);
+            [0, 1, 2].map(|k| (edge_key(t[k], t[(k + 1) % 3]), xi))
+        };
+        let unproved = self.triangles.iter().filter(|f| f.bound > f.tolerance).flat_map(sides);
+        let at_border: Vec<([u32; 2], f64)> = unproved.filter(|(s, _)| chords.contains_key(s)).collect();
+        if at_border.is_empty() {
+            return Vec::new();
+        }
+        let mut gaps: FxHashMap<EdgeId, f64> = FxHashMap::default();
+        for (side, edge) in followed {
+            if let Some(chord) = chords.get(side) {
+                let gap = gaps.entry(*edge).or_insert(0.0);
+                *gap = gap.max(chord.gap);
+            }
+        }
+        let gap = |side: &[u32; 2]| followed.get(side).and_then(|e| gaps.get(e)).copied().unwrap_or(f64::INFINITY);
+        at_border.into_iter().filter(|(side, xi)| gap(side) < WIDEST_GAP * xi).map(|(side, _)| side).collect()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Vertex {
+    at: Point2<f64>,
+    node: u32,
+}
+
+impl HasPosition for Vertex {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        self.at
+    }
+}
+
+type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
+
+/// Rounds of refinement.
+const MAX_ROUNDS: usize = 40;
+/// Share of a tolerance that the file's own gap may take for shorter chords to help.
+const WIDEST_GAP: f64 = 0.97;
+/// Share of the largest excess from which triangles are refined once the budget has ended.
+const WORST: f64 = 0.25;
+/// Triangles that all rounds together go through: each looks at all, which on a transition of 500,000 takes most of a second.
+const MAX_WORK: usize = 8_000_000;
+/// Segments from which on nodes inside whole cells stay in: they keep the region that a constraint clears small.
+const LONG_OUTLINE: usize = 4000;
+/// Coordinates below the first, which spade refuses, are zero; those above the second lose the exactness of its predicates.
+const COORDINATES: [f64; 2] = [1e-30, 1e30];
+/// Share of a coordinate within which two places are one: some fifty roundings.
+const SAME_COORDINATE: f64 = 1e-14;
+
+/// How many corners refinement may make.
+struct Limits {
+    /// Up to here all that do not hold are refined.
+    usual: usize,
+    /// Up to here as long as those that do not hold become fewer.
+    budget: usize,
+}
+
+impl Limits {
+    fn new(corners: usize, budget: usize) -> Self {
+        let budget = budget.max(corners);
+        Self { usual: (corners * 6 + 4000).min(budget), budget }
+    }
+
+    fn most(&self, falls: bool) -> usize {
+        if falls { self.budget } else { self.usual + self.usual / 4 }
+    }
+}
+
+/// Triangulates; `None` when not even a triangulation of the points exists.
+pub(in crate::tessellate) fn triangulate(
+    surface: &FaceSurface<'_>,
+    acceptance: Acceptance,
+    outline: Outline<'_>,
+    budget: usize,
+) -> Option<Transition> {
+    let Outline { nodes, segments, creases, chords, scale } = outline;
+    let mut mesh =
+        Refinement { surface, nodes, scale, cdt: Cdt::new(), border: FxHashMap::default(), handles: Vec::new() };
+    mesh.insert_nodes(&segments)?;
+    let [conflicts, crossed] = mesh.constrain_all(&segments);
+    for &[a, b] in &creases {
+        mesh.keep_crease(a, b);
+    }
+    let by_centre = if conflicts.is_empty() { None } else { Some(segments.as_slice()) };
+    let mut known: FxHashMap<[u32; 3], ProvedFacet<3>> = FxHashMap::default();
+    let limits = Limits::new(mesh.cdt.num_vertices(), budget);
+    let mut unproved_before = 0;
+    let mut round = 0;
+    loop {
+        // Prove what is new; what was there before stands as it did.
+        let triangles = mesh.inner_triangles(by_centre);
+        let new: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
+        let prove =
+            |prover: &mut Prover<'_, '_>, &t: &[u32; 3]| prove_triangle(prover, &mesh.nodes, t, chords, 1.0);
+        let proved: Vec<ProvedFacet<3>> =
+            new.par_iter().with_min_len(16).map_init(|| Prover::new(surface, acceptance), prove).collect();
+        known.extend(new.iter().map(|&t| sorted(t)).zip(proved));
+        let triangles: Vec<ProvedFacet<3>> =
+            triangles.iter().map(|&nodes| ProvedFacet { nodes, ..known[&sorted(nodes)] }).collect();
+        let fails = |f: &&ProvedFacet<3>| f.bound > f.tolerance || mesh.steep_side(f.nodes).is_some();
+        let mut failing: Vec<ProvedFacet<3>> = triangles.iter().filter(fails).copied().collect();
+        // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
+        // 12 times the corners of its border.
+        let corners = mesh.cdt.num_vertices();
+        let falls = 5 * failing.len() < 4 * unproved_before;
+        unproved_before = failing.len();
+        if corners >= limits.usual && !falls {
+            // Where all cannot hold, the worst come first.
+            let excess = |f: &ProvedFacet<3>| f.bound / f.tolerance;
+            let worst = failing.iter().map(excess).fold(0.0, f64::max);
+            failing.retain(|f| excess(f) >= WORST * worst);
+        }
+        let ended = failing.is_empty()
+            || round == MAX_ROUNDS
+            || (round + 1) * triangles.len() > MAX_WORK
+            || corners >= limits.most(falls);
+        if ended || !mesh.refine(&failing, chords) {
+            return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed });
+        }
+        round += 1;
+    }
+}
+
+fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+    t.sort_unstable();
+    t
+}
+
+/// A triangulation under refinement.
+pub(super) struct Refinement<'s, 'a> {
+    pub(super) surface: &'s FaceSurface<'a>,
+    pub(super) nodes: Nodes,
+    scale: Uv,
+    cdt: Cdt,
+    /// How often each edge of the triangulation that lies on the outline turns outside into inside.
+    pub(super) border: FxHashMap<[u32; 2], u32>,
+    /// Of those nodes that are in the triangulation.
+    pub(super) handles: Vec<Option<FixedVertexHandle>>,
+}
+
+impl Refinement<'_, '_> {
+    fn insert_nodes(&mut self, segments: &[[u32; 2]]) -> Option<()> {
+        let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
+        segments.iter().flatten().for_each(|&n| used[n as usize] = true);
+        for (n, used) in (0..).zip(used) {
+            let handle = if used { Some(self.insert(n)?) } else { None };
+            self.handles.push(handle);
+        }
+        Some(())
+    }
+
+    pub(super) fn insert(&mut self, n: u32) -> Option<FixedVertexHandle> {
+        let at = self.scaled(self.nodes[n].uv)?;
+        let before = self.cdt.num_vertices();
+        let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
+        if self.cdt.num_vertices() == before {
+            // The place was taken: its first owner keeps it.
+            let first = self.handles.iter().position(|&h| h == Some(handle)).map_or(n, |first| first as u32);
+            self.cdt.vertex_data_mut(handle).node = first;
+        }
+        Some(handle)
+    }
+
+    fn scaled(&self, uv: Uv) -> Option<Point2<f64>> {
+        let clean = |x: f64| if x.abs() < COORDINATES[0] { 0.0 } else { x };
+        let p = uv * self.scale;
+        (p.is_finite() && p.abs().max_element() < COORDINATES[1]).then(|| Point2::new(clean(p.x), clean(p.y)))
+    }
+
+    /// Whether a point can be added without splitting a constraint or meeting a vertex, be it but for rounding: between corners one
+    /// rounding apart on a crease stood facets without width.
+    pub(super) fn is_free(&self, uv: Uv) -> bool {
+        use spade::PositionInTriangulation as At;
+        let apart = |p: Point2<f64>, v: Point2<f64>| {
+            (p.x - v.x).abs() > SAME_COORDINATE * p.x.abs() || (p.y - v.y).abs() > SAME_COORDINATE * p.y.abs()
+        };
+        self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
+            At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),
+            At::OnEdge(e) => {
+                let e = self.cdt.directed_edge(e);
+                let at_border = || self.border.contains_key(&edge_key(e.from().data().node, e.to().data().node));
+                (!e.is_constraint_edge() || !at_border()) && e.vertices().iter().all(|v| apart(p, v.position()))
+            }
+            _ => false,
+        })
+    }
+
+    /// Makes all segments edges of the triangulation; those that could not be, and those that they cross.
+    fn constrain_all(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
+        let mut conflicts = Vec::new();
+        let mut crossed = Vec::new();
+        for &[a, b] in segments {
+            if !self.constrain(a, b) {
+                conflicts.push([a, b]);
+                crossed.extend(self.crossed_by(a, b));
+            }
+        }
+        [conflicts, crossed]
+    }
+
+    fn constrain(&mut self, a: u32, b: u32) -> bool {
+        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
+        if from == to {
+            return true;
+        }
+        let made = self.cdt.try_add_constraint(from, to);
+        for edge in &made {
+            let e = self.cdt.directed_edge(*edge);
+            *self.border.entry(edge_key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
+        }
+        !made.is_empty()
+    }
+
+    /// Keeps triangles from crossing a line that bounds nothing, where the border leaves it.
+    fn keep_crease(&mut self, a: u32, b: u32) {
+        if let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize])
+            && from != to
+        {
+            self.cdt.try_add_constraint(from, to);
+        }
+    }
+
+    /// The constraints that keep a segment out.
+    fn crossed_by(&self, a: u32, b: u32) -> Vec<[u32; 2]> {
+        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else {
+            return Vec::new();
+        };
+        let edges = self.cdt.get_conflicting_edges_between_vertices(from, to);
+        edges.map(|e| [e.from().data().node, e.to().data().node]).collect()
+    }
+
+    /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
+    fn inner_triangles(&self, by_centre: Option<&[[u32; 2]]>) -> Vec<[u32; 3]> {
+        type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
+        let nodes = |f: Face<'_>| f.vertices().map(|v| v.data().node);
+        if let Some(segments) = by_centre {
+            let uv = |n: u32| self.nodes[n].uv;
+            let is_inside = |t: &[u32; 3]| {
+                let p = (uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0;
+                segments.iter().filter(|s| crosses_ray_from(p, s.map(uv))).count() % 2 == 1
+            };
+            return self.cdt.inner_faces().map(nodes).filter(is_inside).collect();
+        }
+        let inside = self.sides_of_border();
+        self.cdt.inner_faces().filter(|f| inside[f.index()] == Some(true)).map(nodes).collect()
+    }
+
+    /// For each face of the triangulation whether it lies inside.
+    fn sides_of_border(&self) -> Vec<Option<bool>> {
+        let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];
+        let mut queue = std::collections::VecDeque::from([self.cdt.outer_face().fix()]);
+        state[self.cdt.outer_face().index()] = Some(false);
+        // Breadth first over directed edges; the outer face's are found through the hull.
+        while let Some(face) = queue.pop_front() {
+            let inside = state[face.index()] == Some(true);
+            let edges: Vec<_> = match self.cdt.face(face).as_inner() {
+                Some(inner) => inner.adjacent_edges().to_vec(),
+                None => self.cdt.convex_hull().collect(),
+            };
+            for e in edges {
+                // Hull edges run along the outer face or against it, by version; take the unknown side.
+                for side in [e, e.rev()] {
+                    let next = side.face();
+                    if state[next.index()].is_some() {
+                        continue;
+                    }
+                    let name = edge_key(e.from().data().node, e.to().data().node);
+                    let turns = e.is_constraint_edge() && self.border.get(&name).is_some_and(|n| n % 2 == 1);
+                    state[next.index()] = Some(inside != turns);
+                    queue.push_back(next.fix());
+                }
+            }
+        }
+        state
+    }
+}

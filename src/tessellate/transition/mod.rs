@@ -1,0 +1,8 @@
+//! The transition from whole cells to the border: constrained Delaunay, refined until it is proved, and pairs of triangles joined to
+//! quads.
+
+pub(in crate::tessellate) mod creases;
+pub(in crate::tessellate) mod delaunay;
+mod matching;
+pub(in crate::tessellate) mod pairing;
+mod refinement;

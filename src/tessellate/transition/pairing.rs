@@ -1,0 +1,329 @@
+//! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
+
+use super::creases::runs_along_crease;
+use super::delaunay::Transition;
+use super::matching::{Candidate, CandidatesOf, augment};
+use crate::math::Uv;
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::nodes::{Node, Nodes, ProvedFacet, edge_key};
+use crate::tessellate::proof::pole;
+use crate::tessellate::proof::prover::Prover;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A facet of the transition; a triangle repeats its third corner.
+#[derive(Clone, Copy)]
+pub(in crate::tessellate) struct TransitionFacet {
+    pub(in crate::tessellate) facet: ProvedFacet<4>,
+    /// Other parameters for a corner: a pole, seen in the middle of its facet.
+    pub(in crate::tessellate) pole: Option<(usize, Uv)>,
+}
+
+/// Cosine of the sharpest and bluntest corner that a quad may have: 1.8°.
+const SHARPEST: f64 = 0.9995;
+/// Cosine below which a quad is made before any triangle's lack of mates is looked at: corners from 60° to 120°.
+const GOOD: f64 = 0.5;
+/// Least cosine between the two triangles of a quad.
+const FLATTEST: f64 = 0.5;
+
+impl Candidate {
+    /// Rank in which candidates are taken: triangles without area first, then the squarest.
+    fn rank(&self) -> f64 {
+        self.cosine.map_or(-1.0, |cosine| cosine)
+    }
+}
+
+/// Pairs greedily, squarest first. `fixed` edges are not crossed; triangles without area go into their neighbours.
+pub(in crate::tessellate) fn pair_triangles(
+    transition: &Transition,
+    fixed: &FxHashSet<[u32; 2]>,
+    prover: &mut Prover<'_, '_>,
+) -> Vec<TransitionFacet> {
+    let (nodes, t) = (&transition.nodes, &transition.triangles);
+    let node = |n: u32| nodes[n];
+    let collapsed: Vec<bool> = t.iter().map(|t| is_collapsed(t.nodes.map(node))).collect();
+    let candidates = candidates(transition, fixed, &collapsed, prover.surface);
+    let mut taken = vec![false; t.len()];
+    let mut facets = Vec::new();
+    let chosen = choose_pairs(&candidates, &mut taken);
+    for c in augment(&candidates, t.len(), &chosen) {
+        let Candidate { cosine, triangles: [i, j], corners } = candidates[c];
+        (taken[i], taken[j]) = (true, true);
+        let bound = t[i].bound.max(t[j].bound);
+        let tolerance = t[i].tolerance.min(t[j].tolerance);
+        if cosine.is_some() {
+            let pole = pole::facet_parameters(prover.surface, &corners.map(|n| node(n).uv));
+            facets.push(TransitionFacet { facet: ProvedFacet { nodes: corners, bound, tolerance }, pole });
+            continue;
+        }
+        let (full, empty) = if collapsed[i] { (t[j].nodes, t[i].nodes) } else { (t[i].nodes, t[j].nodes) };
+        // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
+        let (uv, xyz) = (empty.map(|n| node(n).uv), full.map(|n| node(n).place));
+        let whole = pole::covers_to_meridians(prover.surface, full.map(|n| node(n).uv));
+        let bound = if whole { bound } else { bound.max(prover.triangle_bound(uv, xyz, tolerance)) };
+        facets.push(pole_triangle(nodes, prover, ProvedFacet { nodes: full, bound, tolerance }, corners));
+    }
+    for (i, tri) in t.iter().enumerate() {
+        if !taken[i] && !collapsed[i] {
+            facets.push(single_triangle(nodes, prover.surface, *tri));
+        }
+    }
+    join_sectors(nodes, prover, facets)
+}
+
+/// All pairs that may be made, best first.
+fn candidates(
+    transition: &Transition,
+    fixed: &FxHashSet<[u32; 2]>,
+    collapsed: &[bool],
+    surface: &FaceSurface<'_>,
+) -> Vec<Candidate> {
+    let t = &transition.triangles;
+    let node = |n: u32| transition.nodes[n];
+    // The first triangle that has an edge, and which of its sides that is.
+    let mut sides: FxHashMap<[u32; 2], (usize, usize)> = FxHashMap::default();
+    let mut out: Vec<Candidate> = Vec::new();
+    for (i, tri) in t.iter().enumerate() {
+        for k in 0..3 {
+            let (c, a) = (tri.nodes[k], tri.nodes[(k + 1) % 3]);
+            let name = edge_key(a, c);
+            if fixed.contains(&name) || runs_along_crease(surface, node(a).uv, node(c).uv) {
+                continue;
+            }
+            let Some(&(j, m)) = sides.get(&name) else {
+                sides.insert(name, (i, k));
+                continue;
+            };
+            // This triangle is (a, b, c) and the other holds the edge a–c.
+            let corners = [a, tri.nodes[(k + 2) % 3], c, t[j].nodes[(m + 2) % 3]];
+            if collapsed[i] || collapsed[j] {
+                if collapsed[i] != collapsed[j] && node(a).position != node(c).position {
+                    out.push(Candidate { cosine: None, triangles: [i, j], corners });
+                }
+            } else if both_hold(&t[i], &t[j])
+                && let Some(cosine) = sharpest_corner(corners.map(node))
+            {
+                out.push(Candidate { cosine: Some(cosine), triangles: [i, j], corners });
+            }
+        }
+    }
+    out.sort_by(|x, y| x.rank().total_cmp(&y.rank()).then(x.triangles.cmp(&y.triangles)));
+    out
+}
+
+/// Whether a facet is a triangle with a pole as its third corner.
+fn is_sector(f: &TransitionFacet) -> bool {
+    f.pole.is_some() && f.facet.nodes[2] == f.facet.nodes[3]
+}
+
+/// Two sectors that become one quad.
+#[derive(Clone, Copy)]
+struct Join {
+    second: usize,
+    pole: Uv,
+    /// What the other parameters of the pole add to the bound.
+    bound: f64,
+}
+
+/// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
+/// convex quad with the meridian between them as its diagonal.
+fn join_sectors(nodes: &Nodes, prover: &mut Prover<'_, '_>, facets: Vec<TransitionFacet>) -> Vec<TransitionFacet> {
+    // A sector is (a, b, pole): the next one around starts at b.
+    let sectors = facets.iter().enumerate().filter(|(_, f)| is_sector(f));
+    let starts: FxHashMap<u32, usize> = sectors.map(|(i, f)| (f.facet.nodes[0], i)).collect();
+    let next = |f: &TransitionFacet| {
+        let j = *starts.get(&f.facet.nodes[1])?;
+        (nodes[facets[j].facet.nodes[2]].position == nodes[f.facet.nodes[2]].position).then_some(j)
+    };
+    let follows: Vec<Option<usize>> = facets.iter().map(|f| if is_sector(f) { next(f) } else { None }).collect();
+    let mut has_previous = vec![false; facets.len()];
+    follows.iter().flatten().for_each(|&j| has_previous[j] = true);
+    // Rows of sectors that end are gone along from their start, those all around a pole from anywhere.
+    let heads =
+        (0..facets.len()).filter(|&i| !has_previous[i]).chain((0..facets.len()).filter(|&i| has_previous[i]));
+    let mut joins: Vec<Option<Join>> = vec![None; facets.len()];
+    let mut joined = vec![false; facets.len()];
+    // Sectors all around a pole follow each other for ever.
+    let mut seen = vec![false; facets.len()];
+    for head in heads {
+        let mut at = Some(head);
+        while let Some(i) = at {
+            if joined[i] || joins[i].is_some() || std::mem::replace(&mut seen[i], true) {
+                break;
+            }
+            at = follows[i];
+            let Some(j) = follows[i].filter(|&j| j != i && !joined[j] && joins[j].is_none()) else { continue };
+            if let Some((pole, bound)) = join_two(nodes, prover, &facets[i], &facets[j]) {
+                joins[i] = Some(Join { second: j, pole, bound });
+                joined[j] = true;
+                at = follows[j];
+            }
+        }
+    }
+    let kept = facets.iter().enumerate().filter(|(i, _)| !joined[*i]);
+    kept.map(|(i, f)| match joins[i] {
+        None => *f,
+        Some(Join { second, pole, bound }) => {
+            let (f, g) = (&f.facet, &facets[second].facet);
+            let facet = ProvedFacet {
+                nodes: kite(f, g),
+                bound: f.bound.max(g.bound).max(bound),
+                tolerance: f.tolerance.min(g.tolerance),
+            };
+            TransitionFacet { facet, pole: Some((2, pole)) }
+        }
+    })
+    .collect()
+}
+
+/// The quad of two sectors, with the pole as its third corner.
+fn kite(f: &ProvedFacet<4>, g: &ProvedFacet<4>) -> [u32; 4] {
+    [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]]
+}
+
+/// The pole's parameters in the quad of two sectors, and the bound that these add; `None` where they do not become one.
+fn join_two(
+    nodes: &Nodes,
+    prover: &mut Prover<'_, '_>,
+    f: &TransitionFacet,
+    g: &TransitionFacet,
+) -> Option<(Uv, f64)> {
+    let tolerance = f.facet.tolerance.min(g.facet.tolerance);
+    let ((_, x), (_, y)) = f.pole.zip(g.pole).filter(|_| f.facet.bound.max(g.facet.bound) <= tolerance)?;
+    let corners = kite(&f.facet, &g.facet).map(|n| nodes[n]);
+    sharpest_corner(corners)?;
+    // Both sectors hold the line between them; other poles have to be looked at anew.
+    if let Some((2, pole)) = pole::facet_parameters(prover.surface, &corners.map(|n| n.uv)) {
+        return Some((pole, 0.0));
+    }
+    let pole = 0.5 * (x + y);
+    let first = bound_with_pole(nodes, prover, f.facet.nodes, pole, tolerance);
+    let second = bound_with_pole(nodes, prover, g.facet.nodes, pole, tolerance);
+    Some((pole, first?.max(second?)))
+}
+
+/// Pairs to make: good quads in order of squareness, then those of triangles that have but one mate left, then the rest.
+fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let of = CandidatesOf::new(candidates, taken.len(), |_| true);
+    for (c, candidate) in candidates.iter().enumerate() {
+        let [i, j] = candidate.triangles;
+        if candidate.rank() < GOOD && !taken[i] && !taken[j] {
+            (taken[i], taken[j]) = (true, true);
+            chosen.push(c);
+        }
+    }
+    let is_open = |c: usize, taken: &[bool]| candidates[c].triangles.iter().all(|&t| !taken[t]);
+    let only_mate = |t: usize, taken: &[bool]| {
+        let mut open = of.of(t).filter(|&c| is_open(c, taken));
+        open.next().filter(|_| open.next().is_none())
+    };
+    let mut lonely: Vec<usize> = (0..taken.len()).rev().collect();
+    let mut rest = 0..candidates.len();
+    loop {
+        // Triangles that may have one mate left come first; where there is none, the next best pair.
+        let c = match lonely.pop() {
+            Some(t) if taken[t] => continue,
+            Some(t) => match only_mate(t, taken) {
+                Some(c) => c,
+                None => continue,
+            },
+            None => match rest.find(|&c| is_open(c, taken)) {
+                Some(c) => c,
+                None => return chosen,
+            },
+        };
+        let pair = candidates[c].triangles;
+        pair.iter().for_each(|&t| taken[t] = true);
+        chosen.push(c);
+        for c in pair.iter().flat_map(|&t| of.of(t)) {
+            lonely.extend(candidates[c].triangles.into_iter().filter(|&x| !taken[x]));
+        }
+    }
+}
+
+/// Whether a triangle has two corners in one place.
+fn is_collapsed(n: [Node; 3]) -> bool {
+    n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position
+}
+
+/// The triangle at a pole, turned so that the pole is its third corner and seen in its middle, where that is proved too. `quad` has the
+/// pole's other node.
+fn pole_triangle(
+    nodes: &Nodes,
+    prover: &mut Prover<'_, '_>,
+    full: ProvedFacet<3>,
+    quad: [u32; 4],
+) -> TransitionFacet {
+    let t = full.nodes;
+    let position = |n: u32| nodes[n].position;
+    let twin = quad.iter().copied().find_map(|n| {
+        let k = t.iter().position(|&f| f != n && position(f) == position(n) && !t.contains(&n))?;
+        Some((k, n))
+    });
+    let Some((k, n)) = twin.filter(|_| !pole::is_sector(prover.surface, t.map(|n| nodes[n].uv))) else {
+        return single_triangle(nodes, prover.surface, full);
+    };
+    let corners = [t[(k + 1) % 3], t[(k + 2) % 3], t[k], t[k]];
+    let middle = 0.5 * (nodes[t[k]].uv + nodes[n].uv);
+    match bound_with_pole(nodes, prover, corners, middle, full.tolerance) {
+        Some(bound) => TransitionFacet {
+            facet: ProvedFacet { nodes: corners, bound: full.bound.max(bound), tolerance: full.tolerance },
+            pole: Some((2, middle)),
+        },
+        None => single_triangle(nodes, prover.surface, full),
+    }
+}
+
+/// A triangle by itself, a pole as its third corner.
+fn single_triangle(nodes: &Nodes, surface: &FaceSurface<'_>, full: ProvedFacet<3>) -> TransitionFacet {
+    let t = full.nodes;
+    let uv = t.map(|n| nodes[n].uv);
+    let pole = pole::facet_parameters(surface, &uv).filter(|_| pole::is_sector(surface, uv));
+    let k = pole.map_or(2, |(k, _)| k);
+    let corners = [t[(k + 1) % 3], t[(k + 2) % 3], t[k], t[k]];
+    let facet = ProvedFacet { nodes: corners, bound: full.bound, tolerance: full.tolerance };
+    TransitionFacet { facet, pole: pole.map(|(_, uv)| (2, uv)) }
+}
+
+/// Bound of a triangle at a pole with other parameters of its third corner, where it holds: they are those of the facet that is
+/// handed on, whose piece of the surface may lie outside the one that was proved.
+fn bound_with_pole(
+    nodes: &Nodes,
+    prover: &mut Prover<'_, '_>,
+    [a, b, c, _]: [u32; 4],
+    pole: Uv,
+    tolerance: f64,
+) -> Option<f64> {
+    let n = [a, b, c].map(|n| nodes[n]);
+    let (uv, xyz) = ([n[0].uv, n[1].uv, pole], n.map(|n| n.place));
+    let mut worst = prover.triangle_bound(uv, xyz, tolerance);
+    for i in 0..2 {
+        worst = worst.max(prover.side_bound([uv[i], pole], [xyz[i], xyz[2]], tolerance));
+    }
+    (worst <= tolerance).then_some(worst)
+}
+
+/// Whether two triangles that hold their own tolerances hold that of both together, which is the tighter of the two.
+fn both_hold(a: &ProvedFacet<3>, b: &ProvedFacet<3>) -> bool {
+    a.bound.max(b.bound) <= a.tolerance.min(b.tolerance) || a.bound > a.tolerance || b.bound > b.tolerance
+}
+
+/// Largest cosine of a corner of a quad; `None` when it is not convex or folds along its diagonal.
+fn sharpest_corner(n: [Node; 4]) -> Option<f64> {
+    let p = n.map(|x| x.place);
+    let (n1, n2) = ((p[1] - p[0]).cross(p[2] - p[0]), (p[2] - p[0]).cross(p[3] - p[0]));
+    let (l1, l2) = (n1.length(), n2.length());
+    if !(l1 > 0.0 && l2 > 0.0) || n1.dot(n2) < FLATTEST * l1 * l2 {
+        return None;
+    }
+    let up = n1 + n2;
+    let mut worst = 0f64;
+    for i in 0..4 {
+        let (x, y) = (p[(i + 1) % 4] - p[i], p[(i + 3) % 4] - p[i]);
+        if x.cross(y).dot(up) <= 0.0 {
+            return None;
+        }
+        worst = worst.max((x.dot(y) / (x.length() * y.length())).abs());
+    }
+    (worst < SHARPEST).then_some(worst)
+}

@@ -1,0 +1,115 @@
+//! Where the transition's triangles are divided further.
+
+use super::delaunay::Refinement;
+use crate::math::Uv;
+use crate::tessellate::nodes::{ProvedFacet, edge_key};
+use crate::tessellate::proof::border_chord::BorderChords;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+use crate::tessellate::proof::pole;
+use rustc_hash::FxHashSet;
+
+/// Share of the tolerance within which places are one.
+const SAME_PLACE: f64 = 1e-6;
+/// Share of the tolerance from which the sag of a side is what a triangle fails for.
+const SAGGING: f64 = 0.2;
+
+/// A point that a triangle asks for.
+struct Wish {
+    triangle: ProvedFacet<3>,
+    /// Where it is wanted, and where it may be if that is taken.
+    places: [Uv; 2],
+}
+
+impl Refinement<'_, '_> {
+    /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
+    pub(super) fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
+        let most = self.surface.field.angle?;
+        let n = t.map(|i| self.nodes[i]);
+        let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
+        let normals = n.map(|x| self.surface.spline.normal(x.uv));
+        let steep = normals.iter().flatten().any(|x| flat.angle_between(*x).min((-flat).angle_between(*x)) > most);
+        let turn = |k: usize| match (normals[k], normals[(k + 1) % 3]) {
+            (Some(a), Some(b)) => a.angle_between(b),
+            _ => 0.0,
+        };
+        let free = (0..3).filter(|&k| self.is_inner(t[k], t[(k + 1) % 3]));
+        let side = free.max_by(|&a, &b| turn(a).total_cmp(&turn(b)))?;
+        (steep && turn(side) > most).then_some(side)
+    }
+
+    /// Whether an edge is none of the border.
+    fn is_inner(&self, a: u32, b: u32) -> bool {
+        !self.border.contains_key(&edge_key(a, b))
+    }
+
+    /// Puts a point on the worst free edge of each failing triangle; `false` when nothing can be done.
+    pub(super) fn refine(&mut self, failing: &[ProvedFacet<3>], chords: &BorderChords) -> bool {
+        let mut divided: FxHashSet<[u32; 2]> = FxHashSet::default();
+        let wishes: Vec<Wish> = failing
+            .iter()
+            .filter(|f| self.can_gain(f, chords))
+            .filter_map(|f| self.wish(f, &mut divided))
+            .collect();
+        let mut done = false;
+        for Wish { triangle, places } in wishes {
+            // The middle of a parameter line into a pole may be a corner already.
+            let Some(uv) = places.into_iter().find(|&uv| self.is_free(uv)) else { continue };
+            let place = self.surface.point(uv);
+            // What does not hold down to such a size does not for its size.
+            let near = SAME_PLACE * triangle.tolerance;
+            if triangle.nodes.iter().any(|&n| (self.nodes[n].place - place).length() <= near) {
+                continue;
+            }
+            let mark = self.nodes.mark();
+            let node = self.nodes.push_own(uv, place);
+            match self.insert(node) {
+                Some(handle) => {
+                    self.handles.push(Some(handle));
+                    done = true;
+                }
+                None => self.nodes.rewind(mark),
+            }
+        }
+        done
+    }
+
+    /// Whether more points can make a triangle hold.
+    fn can_gain(&self, f: &ProvedFacet<3>, chords: &BorderChords) -> bool {
+        let t = f.nodes;
+        // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which at
+        // a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
+        let strays = |k: usize| {
+            let chord = chords.get(&edge_key(t[k], t[(k + 1) % 3]));
+            chord.is_some_and(|chord| chord.deviation > f.tolerance)
+        };
+        // Nor does a corner move that the file puts beside the surface.
+        let off = |&n: &u32| (self.surface.point(self.nodes[n].uv) - self.nodes[n].place).length();
+        !(0..3).any(strays) && !t.iter().any(|n| off(n) > f.tolerance)
+    }
+
+    /// The point that a triangle asks for; `None` where one is asked for on that side already.
+    fn wish(&self, f: &ProvedFacet<3>, divided: &mut FxHashSet<[u32; 2]>) -> Option<Wish> {
+        let t = f.nodes;
+        let end = |k: usize| t[(k + 1) % 3];
+        let middles = pole::side_middles(self.surface, t.map(|n| self.nodes[n].uv));
+        if let Some(k) = self.steep_side(t).filter(|_| f.bound <= f.tolerance) {
+            return divided
+                .insert(edge_key(t[k], end(k)))
+                .then_some(Wish { triangle: *f, places: [middles[k]; 2] });
+        }
+        let sag = |k: usize| {
+            let ends = [self.nodes[t[k]].place, self.nodes[end(k)].place];
+            distance_to_chord(self.surface.point(middles[k]), &ends)
+        };
+        let free = (0..3).filter(|&k| self.is_inner(t[k], end(k)));
+        let worst = free.map(|k| (k, sag(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let uv = t.map(|n| self.nodes[n].uv);
+        let center = (uv[0] + uv[1] + uv[2]) / 3.0;
+        match worst {
+            Some((k, sag)) if sag > SAGGING * f.tolerance => divided
+                .insert(edge_key(t[k], end(k)))
+                .then_some(Wish { triangle: *f, places: [middles[k], center] }),
+            _ => Some(Wish { triangle: *f, places: [center; 2] }),
+        }
+    }
+}
