@@ -1,6 +1,6 @@
 //! A face's surface laid out for quick evaluation, with what meshing asks of it: tolerance, normals, creases, poles.
 
-use super::proof::second_derivatives::SecondDerivativeBounds;
+use super::second_derivatives::SecondDerivativeBounds;
 use super::settings::ToleranceField;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};

@@ -30,6 +30,7 @@ mod proof;
 mod repairs;
 mod report;
 mod sample;
+mod second_derivatives;
 mod settings;
 mod tessellation;
 mod transition;

@@ -14,5 +14,4 @@ pub(in crate::tessellate) mod prover;
 mod refine;
 mod scalar_bezier;
 mod scalar_patch;
-pub(in crate::tessellate) mod second_derivatives;
 mod simplex_net;

@@ -17,7 +17,7 @@ const MAX_PATCHES: usize = 64;
 const ROUNDING_ROOM: f64 = 1.0 + 1e-12;
 
 /// Bounds of the second derivatives of each patch.
-pub(in crate::tessellate) struct SecondDerivativeBounds {
+pub(super) struct SecondDerivativeBounds {
     /// For uu, uv and vv in the surface's own parameters, patch by patch.
     per_patch: Vec<[f64; 3]>,
     /// Whether the parametrisation is C1 across each distinct knot.
@@ -26,7 +26,7 @@ pub(in crate::tessellate) struct SecondDerivativeBounds {
 }
 
 impl SecondDerivativeBounds {
-    pub(in crate::tessellate) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
+    pub(super) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
         let smooth = [0, 1].map(|d| {
             let times = |k: &f64| surface.knots[d].iter().filter(|x| *x == k).count();
             breaks[d].iter().map(|k| times(k) < surface.degree[d]).collect()
@@ -39,14 +39,14 @@ impl SecondDerivativeBounds {
     }
 
     /// Whether the surface and its weight are C1 through these knot intervals (first and last).
-    pub(in crate::tessellate) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
+    pub(super) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
         let through = |d: usize, r: [usize; 2]| (r[0] + 1..=r[1]).all(|k| self.smooth[d][k]);
         through(0, a) && through(1, b)
     }
 
     /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
     /// `b` (first and last); `None` where it does not hold or costs too much.
-    pub(in crate::tessellate) fn linear_deviation(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
+    pub(super) fn linear_deviation(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
         if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MAX_PATCHES || !self.is_smooth(a, b) {
             return None;
         }
