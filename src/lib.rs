@@ -72,6 +72,7 @@ pub mod mesh;
 pub mod model;
 pub mod nurbs;
 pub mod optics;
+pub mod regulation;
 pub mod report;
 pub mod simulate;
 pub mod step;

@@ -12,6 +12,7 @@ pub(crate) const LAYERS: &[(&str, u32)] = &[
     ("tessellate", 3),
     ("intersect", 3),
     ("optics", 3),
+    ("regulation", 3),
     ("simulate", 4),
     ("study", 5),
     ("report", 6),

@@ -129,6 +129,27 @@ pub(crate) enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: PathBuf,
     },
+    /// Judge a far field by a lamp regulation: pass, fail or unsure, row by row
+    Assess {
+        /// Results of a run: its folder or results.json
+        #[arg(required_unless_present = "list")]
+        result: Option<PathBuf>,
+        /// The regulation and function, such as "UN R149-01 C passing"
+        #[arg(long, value_name = "ID", required_unless_present = "list")]
+        regulation: Option<String>,
+        /// Name of the far field, where the run has several
+        #[arg(long, value_name = "NAME")]
+        receiver: Option<String>,
+        /// Left-hand traffic: the tables mirrored
+        #[arg(long)]
+        left_hand: bool,
+        /// Measure the lamp as it was placed, without the regulation's aiming
+        #[arg(long)]
+        as_placed: bool,
+        /// List the regulations there are tables of
+        #[arg(long)]
+        list: bool,
+    },
     /// Print the JSON Schema of the scene file
     Schema,
     /// Print a completion script

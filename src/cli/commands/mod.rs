@@ -1,5 +1,6 @@
 //! The commands, a file each.
 
+mod assess;
 mod bvh_benchmark;
 mod check;
 mod demo;
@@ -61,6 +62,17 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             study::run(&study::StudyCommand { kind, file, output, meshing: &meshing, tracing: &tracing }, console)
         }
         Command::Merge { parts, output } => merge::run(&parts, &output, console),
+        Command::Assess { list: true, .. } => assess::list(console),
+        Command::Assess { result, regulation, receiver, left_hand, as_placed, list: _ } => {
+            let command = assess::AssessCommand {
+                result: result.as_deref(),
+                regulation: regulation.as_deref(),
+                receiver: receiver.as_deref(),
+                left_hand,
+                as_placed,
+            };
+            assess::run(&command, console)
+        }
         Command::Schema => meta::schema(),
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), console),

@@ -1,0 +1,213 @@
+//! A far field as a photometer reads it: intensities over azimuth and elevation with the errors of every cell.
+
+use std::collections::BTreeMap;
+
+/// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
+#[derive(Clone, Debug)]
+pub struct IntensityMap {
+    h_edges: Vec<f64>,
+    v_edges: Vec<f64>,
+    /// Row after row, V slow: candela, its statistical and its geometric standard error.
+    cells: Vec<[f64; 3]>,
+}
+
+/// A value with both its errors, candela.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// The value.
+    pub value: f64,
+    /// Standard error of the sampling.
+    pub statistical: f64,
+    /// Standard error of what facets change.
+    pub geometric: f64,
+}
+
+impl Reading {
+    /// Both errors together.
+    pub fn error(&self) -> f64 {
+        self.statistical.hypot(self.geometric)
+    }
+}
+
+/// What a photometer in one or several directions adds up: cells with weights.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Measurement {
+    weights: BTreeMap<usize, f64>,
+}
+
+impl Measurement {
+    /// This measurement plus `factor` times another; cells that both hold are then counted with their correlation.
+    pub(super) fn plus(mut self, factor: f64, other: &Self) -> Self {
+        for (cell, weight) in &other.weights {
+            *self.weights.entry(*cell).or_insert(0.0) += factor * weight;
+        }
+        self
+    }
+}
+
+/// Form of a photometer's opening.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sensor {
+    /// Half a side of a square, or the radius of a disc, degrees.
+    pub(super) half_deg: f64,
+    pub(super) round: bool,
+}
+
+/// Bands of elevation in which the cells below a round sensor are weighed; a band's error is its share of the disc's rim, below 1e-3.
+const DISC_BANDS: usize = 32;
+
+impl IntensityMap {
+    /// From the edges of the cells (rising, degrees) and one value with two errors a cell, V slow.
+    ///
+    /// # Errors
+    /// When the edges do not rise, the number of cells is another, or a value is no number.
+    pub fn new(h_edges: Vec<f64>, v_edges: Vec<f64>, cells: Vec<[f64; 3]>) -> Result<Self, String> {
+        for (name, edges) in [("H", &h_edges), ("V", &v_edges)] {
+            if edges.len() < 2 || !edges.windows(2).all(|e| e[0] < e[1]) {
+                return Err(format!("the edges of {name} do not rise"));
+            }
+        }
+        let expected = (h_edges.len() - 1) * (v_edges.len() - 1);
+        if cells.len() != expected {
+            return Err(format!("{} cells where the edges make {expected}", cells.len()));
+        }
+        if cells.iter().flatten().any(|x| !x.is_finite()) {
+            return Err("an intensity or an error is no finite number".into());
+        }
+        Ok(Self { h_edges, v_edges, cells })
+    }
+
+    /// The largest side of a cell, degrees.
+    pub(super) fn coarsest_deg(&self) -> f64 {
+        let sides = |edges: &[f64]| edges.windows(2).map(|e| e[1] - e[0]).fold(0.0, f64::max);
+        sides(&self.h_edges).max(sides(&self.v_edges))
+    }
+
+    /// Azimuths and elevations from and to, degrees.
+    pub(super) fn extent(&self) -> [[f64; 2]; 2] {
+        [&self.h_edges, &self.v_edges].map(|e| [e[0], e[e.len() - 1]])
+    }
+
+    /// The same light seen in a mirror, left for right.
+    pub(super) fn mirrored(&self) -> Self {
+        let columns = self.h_edges.len() - 1;
+        let cells = self.cells.chunks(columns).flat_map(|row| row.iter().rev().copied()).collect();
+        Self { h_edges: self.h_edges.iter().rev().map(|h| -h).collect(), v_edges: self.v_edges.clone(), cells }
+    }
+
+    /// A photometer aimed at `(h, v)`: the mean over its opening, weighed by solid angle. `None` where the opening leaves the map.
+    pub(super) fn measure(&self, sensor: Sensor, h: f64, v: f64) -> Option<Measurement> {
+        let bands = if sensor.round { DISC_BANDS } else { 1 };
+        let mut measurement = Measurement::default();
+        let mut total = 0.0;
+        for band in 0..bands {
+            let from = v + sensor.half_deg * (2.0 * band as f64 / bands as f64 - 1.0);
+            let to = v + sensor.half_deg * (2.0 * (band + 1) as f64 / bands as f64 - 1.0);
+            let offset = 0.5 * (from + to) - v;
+            // Degrees of azimuth are shorter towards the poles.
+            let half =
+                if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
+            let half = half / v.to_radians().cos().max(1e-3);
+            for (row, v_share) in overlaps(&self.v_edges, from, to, |v| v.to_radians().sin())? {
+                for (column, h_share) in overlaps(&self.h_edges, h - half, h + half, f64::to_radians)? {
+                    let weight = v_share * h_share;
+                    *measurement.weights.entry(row * (self.h_edges.len() - 1) + column).or_insert(0.0) += weight;
+                    total += weight;
+                }
+            }
+        }
+        for weight in measurement.weights.values_mut() {
+            *weight /= total;
+        }
+        Some(measurement)
+    }
+
+    /// The value of a measurement. Statistical errors of cells are independent; those of the geometry push neighbours the same way, so
+    /// that they add without sign.
+    pub(super) fn read(&self, measurement: &Measurement) -> Reading {
+        let mut value = 0.0;
+        let mut variance = 0.0;
+        let mut geometric = 0.0;
+        for (cell, weight) in &measurement.weights {
+            let [i, s, g] = self.cells[*cell];
+            value += weight * i;
+            variance += (weight * s).powi(2);
+            geometric += (weight * g).abs();
+        }
+        Reading { value, statistical: variance.sqrt(), geometric }
+    }
+}
+
+/// Cells that an interval touches with the measure of the common part; `None` where the interval leaves the edges.
+fn overlaps(edges: &[f64], from: f64, to: f64, measure: impl Fn(f64) -> f64) -> Option<Vec<(usize, f64)>> {
+    /// Degrees by which an interval may end outside, for edges are rounded in their files.
+    const EDGE_ROUNDING: f64 = 1e-9;
+    if from < edges[0] - EDGE_ROUNDING || to > edges[edges.len() - 1] + EDGE_ROUNDING {
+        return None;
+    }
+    let first = edges.partition_point(|e| *e <= from).saturating_sub(1);
+    let cells = edges[first..].windows(2).enumerate().take_while(|(_, e)| e[0] < to);
+    Some(
+        cells
+            .map(|(k, e)| (first + k, measure(to.min(e[1])) - measure(from.max(e[0]))))
+            .filter(|(_, share)| *share > 0.0)
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edges(from: f64, to: f64, cells: usize) -> Vec<f64> {
+        (0..=cells).map(|k| from + (to - from) * k as f64 / cells as f64).collect()
+    }
+
+    /// Cells of 0.1° whose intensity is linear in H and V.
+    fn linear() -> IntensityMap {
+        let (h, v) = (edges(-5.0, 5.0, 100), edges(-3.0, 3.0, 60));
+        let middle = |e: &[f64], k: usize| 0.5 * (e[k] + e[k + 1]);
+        let cells = (0..60).flat_map(|j| (0..100).map(move |i| (i, j)));
+        let cells = cells.map(|(i, j)| [100.0 + 10.0 * middle(&h, i) + middle(&v, j), 2.0, 0.5]).collect();
+        IntensityMap::new(h.clone(), v.clone(), cells).unwrap()
+    }
+
+    #[test]
+    fn a_sensor_reads_the_mean_of_its_opening() {
+        let map = linear();
+        for round in [false, true] {
+            let sensor = Sensor { half_deg: 0.0745, round };
+            for (h, v) in [(0.0, 0.0), (1.23, -0.57), (-3.43, 0.57)] {
+                let reading = map.read(&map.measure(sensor, h, v).unwrap());
+                // Steps of 0.1° in H are 1 cd high: the mean over an opening that is not centred on one differs by less than half of it.
+                assert!((reading.value - (100.0 + 10.0 * h + v)).abs() < 0.5, "{reading:?}");
+                assert!(reading.statistical < 2.0 && (reading.geometric - 0.5).abs() < 1e-12);
+            }
+        }
+        // Exactly one cell.
+        let one = map.read(&map.measure(Sensor { half_deg: 0.05, round: false }, 0.05, 0.05).unwrap());
+        assert!((one.value - 100.55).abs() < 1e-9 && (one.statistical - 2.0).abs() < 1e-6);
+        assert!(map.measure(Sensor { half_deg: 0.05, round: false }, 5.0, 0.0).is_none());
+    }
+
+    #[test]
+    fn a_difference_of_one_cell_with_itself_has_no_error() {
+        let map = linear();
+        let sensor = Sensor { half_deg: 0.05, round: false };
+        let here = map.measure(sensor, 0.05, 0.05).unwrap();
+        let none = map.read(&here.clone().plus(-1.0, &here));
+        assert!(none.value.abs() < 1e-12 && none.statistical < 1e-12);
+        let there = map.measure(sensor, 1.05, 0.05).unwrap();
+        let two = map.read(&here.plus(-1.0, &there));
+        // The opening is wider than its cell by 1/cos 0.05°, 4e-7 on either side.
+        assert!((two.statistical - 8f64.sqrt()).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_mirrored_map_has_left_for_right() {
+        let map = linear();
+        let sensor = Sensor { half_deg: 0.05, round: false };
+        let read = |m: &IntensityMap, h: f64| m.read(&m.measure(sensor, h, 0.05).unwrap()).value;
+        assert!((read(&map.mirrored(), 2.05) - read(&map, -2.05)).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,115 @@
+//! The far field of a run, read back from its files.
+
+use super::map::IntensityMap;
+use std::collections::BTreeMap;
+
+/// Names under which a column may hold an error.
+const STATISTICAL: [&str; 2] = ["statistical", "standard_error"];
+const GEOMETRIC: &str = "geometric";
+
+/// Digits to which coordinates of cells are one: centres of neighbours differ by far more.
+const SAME_CENTRE_DEG: f64 = 1e-7;
+
+impl IntensityMap {
+    /// From the CSV file of a far-field receiver: columns `H_deg`, `V_deg`, an intensity in cd and its errors, a cell a line.
+    ///
+    /// `ray_flux` is the flux of one ray in lm, where it is known: a cell that no ray met may hold as much, so that no error is smaller.
+    ///
+    /// # Errors
+    /// When a column is missing or the cells make no regular grid; the message names the line.
+    pub fn from_csv(text: &str, ray_flux: Option<f64>) -> Result<Self, String> {
+        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+        let (_, header) = lines.next().ok_or("the file is empty")?;
+        let names: Vec<&str> = header.split(',').map(str::trim).collect();
+        let place = |wanted: &dyn Fn(&str) -> bool| names.iter().position(|n| wanted(n));
+        let needed = |place: Option<usize>, name: &str| {
+            place.ok_or_else(|| format!("no column {name}; a far field over H and V (angles A) is needed"))
+        };
+        let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
+        let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
+        let intensity = needed(place(&|n| n.ends_with("_cd")), "in cd")?;
+        let statistical = needed(place(&|n| STATISTICAL.contains(&n)), "of standard errors")?;
+        let geometric = place(&|n| n == GEOMETRIC);
+
+        let mut cells: BTreeMap<(i64, i64), [f64; 3]> = BTreeMap::new();
+        let [mut columns, mut rows] = [BTreeMap::new(), BTreeMap::new()];
+        let key = |x: f64| (x / SAME_CENTRE_DEG).round() as i64;
+        for (number, line) in lines {
+            let values: Vec<&str> = line.split(',').map(str::trim).collect();
+            let value = |place: usize| -> Result<f64, String> {
+                let text = values.get(place).copied().unwrap_or_default();
+                text.parse().map_err(|_| format!("line {}: '{text}' is not a number", number + 1))
+            };
+            let (centre_h, centre_v) = (value(h)?, value(v)?);
+            columns.insert(key(centre_h), centre_h);
+            rows.insert(key(centre_v), centre_v);
+            let geometric = geometric.map_or(Ok(0.0), value)?;
+            cells.insert((key(centre_v), key(centre_h)), [value(intensity)?, value(statistical)?, geometric]);
+        }
+        if cells.len() != columns.len() * rows.len() {
+            return Err(format!("{} cells are no grid of {} × {}", cells.len(), columns.len(), rows.len()));
+        }
+        let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
+        let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
+        let mut cells: Vec<[f64; 3]> = cells.into_values().collect();
+        if let Some(flux) = ray_flux {
+            let width = (h_edges[1] - h_edges[0]).to_radians();
+            let height = |row: usize| v_edges[row + 1].to_radians().sin() - v_edges[row].to_radians().sin();
+            for (index, cell) in cells.iter_mut().enumerate() {
+                cell[1] = cell[1].max(flux / (width * height(index / (h_edges.len() - 1))));
+            }
+        }
+        Self::new(h_edges, v_edges, cells)
+    }
+}
+
+/// The edges of cells of equal width, from their centres.
+fn edges_between(centres: &[f64]) -> Result<Vec<f64>, String> {
+    let [first, .., last] = centres else { return Err("a far field of one cell is no map".into()) };
+    let step = (last - first) / (centres.len() - 1) as f64;
+    if centres.windows(2).any(|c| (c[1] - c[0] - step).abs() > 10.0 * SAME_CENTRE_DEG) {
+        return Err("its cells are not of equal width".into());
+    }
+    Ok((0..=centres.len()).map(|k| first + step * (k as f64 - 0.5)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::map::Sensor;
+    use super::*;
+
+    #[test]
+    fn the_file_of_a_receiver_is_read_in_any_order() {
+        let text = "H_deg,V_deg,luminous_intensity_cd,standard_error,geometric\n\
+                    0.05,0.05,4,0.4,0.04\n-0.05,0.05,3,0.3,0.03\n-0.05,-0.05,1,0.1,0.01\n0.05,-0.05,2,0.2,0.02\n";
+        let map = IntensityMap::from_csv(text, None).unwrap();
+        let cell = |h: f64, v: f64| map.read(&map.measure(Sensor { half_deg: 0.04, round: false }, h, v).unwrap());
+        assert_eq!(
+            (cell(0.05, -0.05).value, cell(-0.05, 0.05).statistical, cell(0.05, 0.05).geometric),
+            (2.0, 0.3, 0.04)
+        );
+        // A ray of 1e-6 lm is 0.33 cd in a cell of (0.1°)².
+        let floor = IntensityMap::from_csv(text, Some(1e-6)).unwrap();
+        let error =
+            floor.read(&floor.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap()).statistical;
+        assert!((error - 1e-6 / 0.1f64.to_radians().powi(2)).abs() < 1e-3, "{error}");
+    }
+
+    #[test]
+    fn what_is_no_far_field_is_refused() {
+        for (text, message) in [
+            ("", "empty"),
+            ("x_mm,y_mm,illuminance_lx,standard_error\n1,2,3,4\n", "H_deg"),
+            ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,x\n", "line 2"),
+            ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n", "no grid"),
+            (
+                "H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n3,0,1,1\n0,1,1,1\n1,1,1,1\n3,1,1,1\n",
+                "equal width",
+            ),
+            ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,NaN,1\n0,1,1,1\n1,1,1,1\n", "finite"),
+        ] {
+            let error = IntensityMap::from_csv(text, None).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Rows of a table as comparisons of photometer readings with limits.
+
+use super::aim::Aim;
+use super::map::{IntensityMap, Measurement, Sensor};
+use super::table::{Row, Rules};
+
+/// One reading compared with one limit.
+#[derive(Clone, Debug)]
+pub(super) struct Comparison {
+    pub(super) measurement: Measurement,
+    pub(super) limit: f64,
+    /// Whether the limit is a least value.
+    pub(super) at_least: bool,
+    /// Direction of the table, degrees.
+    pub(super) direction: [f64; 2],
+}
+
+/// Comparisons of which all, or any one, decide a row.
+#[derive(Clone, Debug)]
+pub(super) struct Requirement {
+    pub(super) comparisons: Vec<Comparison>,
+    pub(super) any: bool,
+    /// Directions of the row that the far field does not hold.
+    pub(super) unseen: usize,
+}
+
+/// A map, how it is turned and how it is read.
+pub(super) struct Photometer<'a> {
+    pub(super) map: &'a IntensityMap,
+    pub(super) aim: &'a Aim,
+    pub(super) sensor: Sensor,
+    pub(super) tolerance_deg: f64,
+}
+
+/// Zones end here, degrees from the middle: what the texts leave open to 90° is behind the lamp's own rim.
+const MOST_DEG: f64 = 88.0;
+
+/// Directions within which a row may be met: rings of this many.
+const TOLERANCE_RING: usize = 8;
+
+impl Photometer<'_> {
+    fn measure(&self, direction: [f64; 2]) -> Option<Measurement> {
+        self.map.measure(self.sensor, direction[0] + self.aim.h_deg, direction[1] + self.aim.v_deg)
+    }
+
+    /// The rows' own directions: of a point with the directions around it where the regulation lets it be met nearby.
+    fn near(&self, direction: [f64; 2]) -> Vec<[f64; 2]> {
+        let mut directions = vec![direction];
+        if self.tolerance_deg > 0.0 {
+            for ring in [0.5, 1.0] {
+                directions.extend((0..TOLERANCE_RING).map(|k| {
+                    let (sin, cos) = (std::f64::consts::TAU * k as f64 / TOLERANCE_RING as f64).sin_cos();
+                    let radius = ring * self.tolerance_deg;
+                    [direction[0] + radius * cos, direction[1] + radius * sin]
+                }));
+            }
+        }
+        directions
+    }
+
+    /// Directions along a line, one opening beside the other.
+    fn line(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        let steps = (length / self.sensor.half_deg).ceil().max(1.0);
+        let at = |k: f64| [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * k / steps);
+        (0..=steps as usize).map(|k| at(k as f64)).collect()
+    }
+
+    /// Directions in a polygon, rim included, one opening beside the other, that the far field holds; and whether it holds all of it.
+    fn zone(&self, polygon: &[[f64; 2]]) -> (Vec<[f64; 2]>, bool) {
+        let step = self.sensor.half_deg;
+        let shift = [self.aim.h_deg, self.aim.v_deg];
+        let mut bounds = [[0.0; 2]; 2];
+        let mut complete = true;
+        for (axis, extent) in self.map.extent().into_iter().enumerate() {
+            let values = || polygon.iter().map(|p| p[axis].clamp(-MOST_DEG, MOST_DEG));
+            let asked = [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)];
+            let held = [extent[0] + step - shift[axis], extent[1] - step - shift[axis]];
+            complete &= asked[0] >= held[0] - 2.0 * step && asked[1] <= held[1] + 2.0 * step;
+            bounds[axis] = [asked[0].max(held[0]), asked[1].min(held[1])];
+        }
+        let [h, v] = bounds;
+        let count = |[low, high]: [f64; 2]| if high < low { 0 } else { ((high - low) / step).ceil() as usize + 1 };
+        let place = |[low, high]: [f64; 2], k: usize| (low + step * k as f64).min(high);
+        let mut directions = Vec::new();
+        for j in 0..count(v) {
+            for i in 0..count(h) {
+                let direction = [place(h, i), place(v, j)];
+                if contains(polygon, direction) {
+                    directions.push(direction);
+                }
+            }
+        }
+        // Towards the poles an opening takes more degrees of azimuth and may end beside the map.
+        directions.retain(|d| self.measure(*d).is_some());
+        (directions, complete)
+    }
+
+    /// Directions over all of the far field.
+    fn everywhere(&self) -> Vec<[f64; 2]> {
+        let [h, v] = self.map.extent();
+        let (h, v) = (h.map(|x| x - self.aim.h_deg), v.map(|x| x - self.aim.v_deg));
+        self.zone(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
+    }
+
+    /// The direction in which the photometer reads most.
+    fn brightest(&self) -> Option<[f64; 2]> {
+        let read = |d: &[f64; 2]| self.measure(*d).map_or(0.0, |m| self.map.read(&m).value);
+        self.everywhere().into_iter().max_by(|a, b| read(a).total_cmp(&read(b)))
+    }
+}
+
+/// What a row asks, as requirements that must all be met; empty where it asks nothing that can be measured.
+pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
+    let point = row.h.zip(row.v).map(|(h, v)| [h, v]);
+    let ends = (row.h0.zip(row.v0)).zip(row.h1.zip(row.v1));
+    let lenient = rules.tolerance_deg > 0.0;
+    match (row.kind.as_str(), point) {
+        ("point" | "distribution_point", Some(p)) => bounds(photometer, row, &photometer.near(p), [lenient; 2]),
+        ("line", _) => {
+            let directions = ends.map(|((h0, v0), (h1, v1))| photometer.line([h0, v0], [h1, v1]));
+            bounds(photometer, row, &directions.unwrap_or_default(), [false; 2])
+        }
+        ("zone", _) => {
+            let (directions, complete) = row.polygon.as_deref().map(|p| photometer.zone(p)).unwrap_or_default();
+            let mut requirements = bounds(photometer, row, &directions, [false; 2]);
+            requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
+            requirements
+        }
+        // Some direction must reach the least maximum, and none may pass the greatest.
+        ("imax", _) => bounds(photometer, row, &photometer.everywhere(), [true, false]),
+        ("sum" | "group_sum", _) => sum(photometer, row).into_iter().collect(),
+        ("relative", _) => relative(photometer, row, rows).into_iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A row's least and greatest value at directions; `any` says for each whether one direction is enough.
+fn bounds(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [bool; 2]) -> Vec<Requirement> {
+    let limits = [(row.min, true, any[0]), (row.max, false, any[1])];
+    let requirement = |(limit, at_least, any): (Option<f64>, bool, bool)| {
+        let limit = limit?;
+        let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: 0 };
+        for direction in directions {
+            match photometer.measure(*direction) {
+                Some(measurement) => {
+                    requirement.comparisons.push(Comparison {
+                        measurement,
+                        limit,
+                        at_least,
+                        direction: *direction,
+                    });
+                }
+                None => requirement.unseen += 1,
+            }
+        }
+        Some(requirement)
+    };
+    limits.into_iter().filter_map(requirement).collect()
+}
+
+/// The sum of readings at several points.
+fn sum(photometer: &Photometer, row: &Row) -> Option<Requirement> {
+    let points = row.points.as_deref()?;
+    let limit = row.min?;
+    let mut total = Measurement::default();
+    for point in points {
+        match photometer.measure(*point) {
+            Some(measurement) => total = total.plus(1.0, &measurement),
+            None => return Some(Requirement { comparisons: Vec::new(), any: false, unseen: points.len() }),
+        }
+    }
+    let comparison = Comparison { measurement: total, limit, at_least: true, direction: points[0] };
+    Some(Requirement { comparisons: vec![comparison], any: false, unseen: 0 })
+}
+
+/// A reading compared with a multiple of another: the difference is one measurement, so that what both have in common cancels.
+fn relative(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
+    let factor = row.factor?;
+    let reference = match row.of.as_deref()? {
+        "imax" => photometer.brightest()?,
+        name => rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?,
+    };
+    let (directions, complete) = match (&row.polygon, row.h.zip(row.v)) {
+        (Some(polygon), _) => photometer.zone(polygon),
+        (None, Some((h, v))) => (photometer.near([h, v]), true),
+        (None, None) => return None,
+    };
+    let reference = photometer.measure(reference);
+    let any = row.polygon.is_none() && photometer.tolerance_deg > 0.0;
+    let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: usize::from(!complete) };
+    for direction in directions {
+        match (photometer.measure(direction), &reference) {
+            (Some(measurement), Some(reference)) => requirement.comparisons.push(Comparison {
+                measurement: measurement.plus(-factor, reference),
+                limit: 0.0,
+                at_least: row.bound.as_deref() == Some("min"),
+                direction,
+            }),
+            _ => requirement.unseen += 1,
+        }
+    }
+    Some(requirement)
+}
+
+/// Whether a point lies in a polygon or on its rim.
+fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
+    /// Degrees by which a direction may lie outside: a thousandth of the finest sensor.
+    const RIM_DEG: f64 = 1e-4;
+    let mut inside = false;
+    for (k, a) in polygon.iter().enumerate() {
+        let b = polygon[(k + 1) % polygon.len()];
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let t = (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+        if (p[0] - a[0] - t * dx).hypot(p[1] - a[1] - t * dy) <= RIM_DEG {
+            return true;
+        }
+        if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + dx * (p[1] - a[1]) / dy {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contains;
+
+    #[test]
+    fn a_polygon_holds_its_inside_and_its_rim() {
+        let zone =
+            [[-8.0, 1.0], [-8.0, 4.0], [8.0, 4.0], [8.0, 2.0], [6.0, 1.5], [1.5, 1.5], [0.0, 0.0], [-4.0, 0.0]];
+        for (p, inside) in [
+            ([0.0, 2.0], true),
+            ([0.0, 0.0], true),
+            ([-8.0, 1.0], true),
+            ([7.0, 1.75], true),
+            ([7.0, 1.5], false),
+            ([2.0, 1.0], false),
+            ([-7.0, 0.1], false),
+            ([0.75, 0.75], true),
+            ([9.0, 3.0], false),
+        ] {
+            assert_eq!(contains(&zone, p), inside, "{p:?}");
+        }
+    }
+}
