@@ -64,6 +64,7 @@
 //! Lengths are millimetres, angles radians unless a name says otherwise (`angle_deg`), and every result is the same
 //! bits for any number of threads.
 
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod formats;
 pub mod intersect;
@@ -73,11 +74,13 @@ pub mod model;
 pub mod nurbs;
 pub mod optics;
 pub mod regulation;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod simulate;
 pub mod step;
 pub mod study;
 pub mod tessellate;
+#[cfg(feature = "truck")]
 pub mod truck;
 
 pub use intersect::{Hit, Intersector};

@@ -1,7 +1,8 @@
 //! Why a command stops: the message, what to do, the line at fault, the exit code.
 
 use super::console::Console;
-use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
+use annotate_snippets::renderer::DecorStyle;
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::io::Write;
 use std::ops::Range;
 use std::process::ExitCode;
@@ -19,7 +20,8 @@ pub(crate) struct Failure {
 /// A stretch of a text file.
 #[derive(Debug)]
 struct Excerpt {
-    source: NamedSource<String>,
+    file: String,
+    text: String,
     span: Range<usize>,
     label: String,
 }
@@ -52,39 +54,56 @@ impl Failure {
 
     /// Shows this stretch of a text file.
     pub(crate) fn with_excerpt(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
-        let source = NamedSource::new(file, text.to_owned());
-        self.excerpt = Some(Box::new(Excerpt { source, span, label: label.to_owned() }));
+        // A span beyond the text, which only a message about another file could have, is cut to it.
+        let span = span.start.min(text.len())..span.end.min(text.len());
+        let [file, text, label] = [file, text, label].map(str::to_owned);
+        self.excerpt = Some(Box::new(Excerpt { file, text, span, label }));
         self
     }
 
     /// Prints the failure on stderr.
     pub(crate) fn print(&self, console: &Console) -> ExitCode {
-        let theme =
-            if console.has_colour() { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
-        let handler = GraphicalReportHandler::new_themed(theme).with_width(console.width()).with_context_lines(1);
-        let mut text = String::new();
-        if handler.render_report(&mut text, self).is_err() {
-            text = format!("{self}\n");
-        }
-        let _ = std::io::stderr().lock().write_all(text.trim_start_matches('\n').as_bytes());
+        let renderer = if console.has_colour() { Renderer::styled() } else { Renderer::plain() };
+        let renderer = renderer.decor_style(DecorStyle::Unicode).term_width(console.width());
+        let message = wrapped(&self.message, console.width());
+        let help = self.help.as_ref().map(|help| wrapped(help, console.width()));
+        let snippet = self.excerpt.as_ref().map(|excerpt| {
+            let label = AnnotationKind::Primary.span(excerpt.span.clone()).label(&excerpt.label);
+            Snippet::source(&excerpt.text).path(&excerpt.file).annotation(label)
+        });
+        let report = Level::ERROR.primary_title(&message).elements(snippet);
+        let report = report.elements(help.as_ref().map(|help| Level::HELP.message(help)));
+        let text = renderer.render(&[report]) + "\n";
+        let _ = std::io::stderr().lock().write_all(text.as_bytes());
         ExitCode::from(self.code)
     }
 }
 
-impl Diagnostic for Failure {
-    fn help<'a>(&'a self) -> Option<Box<dyn std::fmt::Display + 'a>> {
-        self.help.as_ref().map(|h| Box::new(h) as Box<dyn std::fmt::Display>)
+/// Lines of at most this many characters where spaces allow it, beside what stands before a message.
+fn wrapped(text: &str, width: usize) -> String {
+    const LABEL: usize = "error: ".len();
+    const NARROWEST: usize = 20;
+    let width = width.saturating_sub(LABEL).max(NARROWEST);
+    let mut out = String::new();
+    for (k, line) in text.lines().enumerate() {
+        if k > 0 {
+            out.push('\n');
+        }
+        let mut length = 0;
+        for word in line.split(' ') {
+            let letters = word.chars().count();
+            if length > 0 && length + 1 + letters > width {
+                out.push('\n');
+                length = 0;
+            } else if length > 0 {
+                out.push(' ');
+                length += 1;
+            }
+            out += word;
+            length += letters;
+        }
     }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.excerpt.as_ref().map(|p| &p.source as &dyn SourceCode)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let Excerpt { span, label, .. } = self.excerpt.as_deref()?;
-        let label = LabeledSpan::new(Some(label.clone()), span.start, span.len());
-        Some(Box::new(std::iter::once(label)))
-    }
+    out
 }
 
 impl From<crate::formats::Error> for Failure {
@@ -101,5 +120,17 @@ impl From<crate::formats::Error> for Failure {
 impl From<std::io::Error> for Failure {
     fn from(e: std::io::Error) -> Self {
         Self::running(e.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_messages_are_broken_at_spaces_and_keep_their_lines() {
+        assert_eq!(wrapped("one two three four five six", 27), "one two three four\nfive six");
+        assert_eq!(wrapped("one\n  two", 80), "one\n  two");
+        assert_eq!(wrapped(&"x".repeat(50), 30), "x".repeat(50));
     }
 }

@@ -1,5 +1,4 @@
 use super::{Error, ErrorKind, Grid, write_atomic};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::io;
 use std::path::Path;
 
@@ -68,9 +67,13 @@ impl Picture {
             return Err(io::Error::other("a picture without pixels"));
         }
         let mut bytes = Vec::new();
-        PngEncoder::new(&mut bytes)
-            .write_image(&self.rgb, self.width, self.height, ExtendedColorType::Rgb8)
-            .map_err(io::Error::other)?;
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_compression(png::Compression::Fast);
+        encoder.set_filter(png::Filter::Adaptive);
+        let mut writer = encoder.write_header().map_err(io::Error::other)?;
+        writer.write_image_data(&self.rgb).map_err(io::Error::other)?;
+        writer.finish().map_err(io::Error::other)?;
         Ok(bytes)
     }
 }

@@ -3,7 +3,7 @@
 use super::document::{Block, Report, Section};
 use super::provenance::Provenance;
 use super::table::Table;
-use super::{plotly, raster, svg};
+use super::{plotly, raster, static_chart};
 use crate::formats::base64;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -75,7 +75,7 @@ fn content(block: &Block) -> Markup {
         Block::Text(text) => html! { p { (emphasised(text)) } },
         Block::Table(table) => table_markup(table),
         Block::Chart(chart) => {
-            let drawing = PreEscaped(svg::render(chart));
+            let drawing = PreEscaped(static_chart::draw(chart).svg());
             figure(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
         }
         Block::View(view) => {

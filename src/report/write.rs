@@ -1,5 +1,5 @@
 use super::document::{Block, Report};
-use super::{chart_png, html, raster, svg};
+use super::{chart_png, html, raster, static_chart};
 use crate::formats::{Error, ErrorKind, write_atomic, write_png};
 use std::path::{Path, PathBuf};
 
@@ -29,11 +29,11 @@ impl Report {
                 Block::Text(_) => continue,
                 Block::Chart(chart) => {
                     let path = inside("figures", format!("{}.svg", chart.name))?;
-                    write_atomic(&path, |w| w.write_all(svg::render(chart).as_bytes()))?;
+                    write_atomic(&path, |w| w.write_all(static_chart::draw(chart).svg().as_bytes()))?;
                     written.push(path.clone());
-                    if let Some(png) = chart_png::png(chart) {
+                    if let Some(picture) = chart_png::picture(chart) {
                         let path = path.with_extension("png");
-                        write_atomic(&path, |w| w.write_all(&png))?;
+                        write_png(&path, &picture)?;
                         written.push(path);
                     }
                 }

@@ -3,4 +3,5 @@
 mod facets;
 mod grids;
 mod ray_sets;
+#[cfg(feature = "report")]
 mod report_page;

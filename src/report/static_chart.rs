@@ -1,9 +1,9 @@
-//! The static picture of a chart: SVG in the text colour of wherever it stands, maps as an embedded PNG.
+//! The static picture of a chart: its scales, axes, lines, bars, legend or map as elements.
 
 use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
+use super::drawing::{Anchor, Drawing, Element, Ink, Place};
 use super::number::figures;
-use crate::formats::{ColourMap, Grid, Picture, base64};
-use std::fmt::Write;
+use crate::formats::{ColourMap, Grid, Picture};
 
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 470.0;
@@ -46,6 +46,11 @@ impl Scale {
         self.from + part * (self.to - self.from)
     }
 
+    /// Whether a value has a place: on a logarithmic scale, positive ones alone.
+    fn shows(&self, value: f64) -> bool {
+        value.is_finite() && (!self.log || value > 0.0)
+    }
+
     fn ticks(&self) -> Vec<f64> {
         if self.log {
             let decades: Vec<f64> = (self.low.log10().ceil() as i32..=self.high.log10().floor() as i32)
@@ -66,115 +71,105 @@ impl Scale {
     }
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
+/// How strongly the lines of the grid and the numbers beside it stand against the data.
+const GRID_OPACITY: f64 = 0.13;
+const NUMBER_OPACITY: f64 = 0.75;
 
-/// The chart as an SVG document.
-pub(super) fn render(chart: &Chart) -> String {
-    let height = HEIGHT + more(chart);
-    let mut svg = format!(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" role="img" font-family="system-ui, sans-serif" font-size="13" fill="currentColor"><title>{}</title>"#,
-        escape(&chart.title)
-    );
+/// The chart as a drawing.
+pub(super) fn draw(chart: &Chart) -> Drawing {
+    let size = [WIDTH, HEIGHT + more(chart)];
+    let mut drawing = Drawing { title: chart.title.clone(), size, elements: Vec::new() };
+    let elements = &mut drawing.elements;
     match &chart.content {
-        Content::Series(series) => series_chart(&mut svg, chart, series),
-        Content::Bars { categories, layers, stacked } => bar_chart(&mut svg, chart, categories, layers, *stacked),
-        Content::Map { grid, map } => map_chart(&mut svg, chart, grid, *map),
+        Content::Series(series) => series_chart(elements, chart, series),
+        Content::Bars { categories, layers, stacked } => bar_chart(elements, chart, categories, layers, *stacked),
+        Content::Map { grid, map } => map_chart(elements, chart, grid, *map),
     }
-    svg.push_str("</svg>\n");
-    svg
+    drawing
 }
 
-fn axes(svg: &mut String, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
+fn grid_line(from: Place, to: Place) -> Element {
+    Element::Line { points: vec![from, to], ink: Ink::Text, width: 1.0, opacity: GRID_OPACITY, dashed: false }
+}
+
+/// A number at an axis or a name below a bar.
+fn tick_label(text: String, place: Place, anchor: Anchor) -> Element {
+    Element::Text { text, place, anchor, opacity: NUMBER_OPACITY, turned: false }
+}
+
+fn label(text: String, place: Place, anchor: Anchor) -> Element {
+    Element::Text { text, place, anchor, opacity: 1.0, turned: false }
+}
+
+fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
     let [left, top, _, bottom] = AREA;
     for t in y.ticks() {
         let at = y.at(t);
-        let _ = write!(
-            svg,
-            r#"<path d="M{left} {at:.1}H{right}" stroke="currentColor" stroke-opacity=".13"/><text x="{}" y="{:.1}" text-anchor="end" opacity=".75">{}</text>"#,
-            left - 7.0,
-            at + 4.0,
-            figures(t, 3)
-        );
+        elements.push(grid_line([left, at], [right, at]));
+        elements.push(tick_label(figures(t, 3), [left - 7.0, at + 4.0], Anchor::End));
     }
     for (t, at) in x.iter().flat_map(|x| x.ticks().into_iter().map(|t| (t, x.at(t)))) {
-        let _ = write!(
-            svg,
-            r#"<path d="M{at:.1} {top}V{bottom}" stroke="currentColor" stroke-opacity=".13"/><text x="{at:.1}" y="{}" text-anchor="middle" opacity=".75">{}</text>"#,
-            bottom + 19.0,
-            figures(t, 3)
-        );
+        elements.push(grid_line([at, top], [at, bottom]));
+        elements.push(tick_label(figures(t, 3), [at, bottom + 19.0], Anchor::Middle));
     }
-    let (cx, cy) = ((left + right) / 2.0, (top + bottom) / 2.0);
-    let _ = write!(
-        svg,
-        r#"<text x="{cx}" y="{}" text-anchor="middle">{}</text><text transform="translate(17 {cy}) rotate(-90)" text-anchor="middle">{}</text>"#,
-        HEIGHT - 16.0 + more(chart),
-        escape(&chart.x.title()),
-        escape(&chart.y.title())
-    );
+    let [middle_x, middle_y] = [0.5 * (left + right), 0.5 * (top + bottom)];
+    elements.push(label(chart.x.title(), [middle_x, HEIGHT - 16.0 + more(chart)], Anchor::Middle));
+    let place = [17.0, middle_y];
+    elements.push(Element::Text {
+        text: chart.y.title(),
+        place,
+        anchor: Anchor::Middle,
+        opacity: 1.0,
+        turned: true,
+    });
 }
 
-fn legend(svg: &mut String, names: &[(&str, &str)]) {
+fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     let [_, top, right, _] = AREA;
+    // A single series is named by the title.
     if names.len() < 2 {
         return;
     }
     for (k, (name, colour)) in names.iter().enumerate() {
         let y = top + 16.0 + 18.0 * k as f64;
-        let _ = write!(
-            svg,
-            r#"<rect x="{}" y="{}" width="10" height="10" rx="2" fill="{colour}"/><text x="{}" y="{y}" text-anchor="end">{}</text>"#,
-            right - 14.0,
-            y - 9.0,
-            right - 20.0,
-            escape(name)
-        );
+        let corner = [right - 14.0, y - 9.0];
+        elements.push(Element::Rectangle { corner, size: [10.0, 10.0], radius: 2.0, ink: Ink::hex(colour) });
+        elements.push(label((*name).to_owned(), [right - 20.0, y], Anchor::End));
     }
 }
 
-fn series_chart(svg: &mut String, chart: &Chart, series: &[Series]) {
+fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     let [left, top, right, bottom] = AREA;
     let all = || series.iter().flat_map(|s| &s.points);
     let x = Scale::new(all().map(|p| p[0]), &chart.x, [left, right], false);
     let y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
-    axes(svg, chart, Some(&x), &y, right);
+    axes(elements, chart, Some(&x), &y, right);
     let mut names = Vec::new();
     for (s, colour) in series.iter().zip(colours(series)) {
         if s.style != SeriesStyle::Faint && !s.name.is_empty() {
             names.push((s.name.as_str(), colour));
         }
-        let at = |p: &[f64; 2]| -> Option<[f64; 2]> {
-            let good = |v: f64, log: bool| v.is_finite() && (!log || v > 0.0);
-            (good(p[0], x.log) && good(p[1], y.log)).then(|| [x.at(p[0]), y.at(p[1])])
-        };
-        let points: Vec<[f64; 2]> = s.points.iter().filter_map(at).collect();
-        if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Line | SeriesStyle::Dashed) {
-            let path: Vec<String> = points.iter().map(|p| format!("{:.1} {:.1}", p[0], p[1])).collect();
-            let dash = if s.style == SeriesStyle::Dashed { r#" stroke-dasharray="5 5""# } else { "" };
-            let _ = write!(
-                svg,
-                r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>"#,
-                path.join(" ")
-            );
-        }
-        for (p, e) in s.points.iter().zip(&s.errors).filter(|(p, _)| at(p).is_some()) {
-            let (px, low, high) = (x.at(p[0]), y.at(p[1] - e), y.at(p[1] + e));
-            let _ = write!(svg, r#"<path d="M{px:.1} {low:.1}V{high:.1}" stroke="{colour}"/>"#);
-        }
-        if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Points | SeriesStyle::Faint) {
-            let opacity = if s.style == SeriesStyle::Faint { 0.3 } else { 1.0 };
-            for p in &points {
-                let _ = write!(
-                    svg,
-                    r#"<circle cx="{:.1}" cy="{:.1}" r="4" fill="{colour}" opacity="{opacity}"/>"#,
-                    p[0], p[1]
-                );
-            }
-        }
+        one_series(elements, s, Ink::hex(colour), [&x, &y]);
     }
-    legend(svg, &names);
+    legend(elements, &names);
+}
+
+/// The line of a series, then its error bars, then its points on top.
+fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale; 2]) {
+    let place = |p: &[f64; 2]| (x.shows(p[0]) && y.shows(p[1])).then(|| [x.at(p[0]), y.at(p[1])]);
+    let points: Vec<Place> = s.points.iter().filter_map(place).collect();
+    if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Line | SeriesStyle::Dashed) {
+        let dashed = s.style == SeriesStyle::Dashed;
+        elements.push(Element::Line { points: points.clone(), ink, width: 2.0, opacity: 1.0, dashed });
+    }
+    for (p, e) in s.points.iter().zip(&s.errors).filter(|(p, _)| place(p).is_some()) {
+        let points = [p[1] - e, p[1] + e].map(|end| [x.at(p[0]), y.at(end)]).to_vec();
+        elements.push(Element::Line { points, ink, width: 1.0, opacity: 1.0, dashed: false });
+    }
+    if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Points | SeriesStyle::Faint) {
+        let opacity = if s.style == SeriesStyle::Faint { 0.3 } else { 1.0 };
+        elements.extend(points.iter().map(|&centre| Element::Disc { centre, radius: 4.0, ink, opacity }));
+    }
 }
 
 /// Distance of lines of text.
@@ -201,7 +196,13 @@ fn more(chart: &Chart) -> f64 {
     LINE * lines.saturating_sub(1) as f64
 }
 
-fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(String, Vec<f64>)], stacked: bool) {
+fn bar_chart(
+    elements: &mut Vec<Element>,
+    chart: &Chart,
+    categories: &[String],
+    layers: &[(String, Vec<f64>)],
+    stacked: bool,
+) {
     let [left, top, right, bottom] = AREA;
     let heights = |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0));
     let tallest = |c: usize| if stacked { heights(c).sum::<f64>() } else { heights(c).fold(0.0, f64::max) };
@@ -213,7 +214,7 @@ fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(
     } else {
         Scale::new((0..categories.len()).map(tallest), &axis, [bottom, top], true)
     };
-    axes(svg, chart, None, &y, right);
+    axes(elements, chart, None, &y, right);
     let slot = (right - left) / categories.len().max(1) as f64;
     let width = slot * 0.7 / if stacked { 1.0 } else { layers.len().max(1) as f64 };
     for (c, category) in categories.iter().enumerate() {
@@ -225,75 +226,47 @@ fn bar_chart(svg: &mut String, chart: &Chart, categories: &[String], layers: &[(
                 (y.at(base), y.at(base + value))
             };
             let shift = if stacked { 0.0 } else { k as f64 * width };
-            let _ = write!(
-                svg,
-                r#"<rect x="{:.1}" y="{high:.1}" width="{:.1}" height="{:.1}" fill="{}"/>"#,
-                left + slot * (c as f64 + 0.15) + shift,
-                width * 0.96,
-                (low - high).max(0.0),
-                PALETTE[k % PALETTE.len()]
-            );
+            let corner = [left + slot * (c as f64 + 0.15) + shift, high];
+            let size = [width * 0.96, (low - high).max(0.0)];
+            elements.push(Element::Rectangle {
+                corner,
+                size,
+                radius: 0.0,
+                ink: Ink::hex(PALETTE[k % PALETTE.len()]),
+            });
             base += if stacked { value } else { 0.0 };
         }
-        for (k, line) in wrapped(category, slot).iter().enumerate() {
-            let _ = write!(
-                svg,
-                r#"<text x="{:.1}" y="{}" text-anchor="middle" opacity=".75">{}</text>"#,
-                left + slot * (c as f64 + 0.5),
-                bottom + 19.0 + LINE * k as f64,
-                escape(line)
-            );
+        for (k, line) in wrapped(category, slot).into_iter().enumerate() {
+            let place = [left + slot * (c as f64 + 0.5), bottom + 19.0 + LINE * k as f64];
+            elements.push(tick_label(line, place, Anchor::Middle));
         }
     }
     let names: Vec<(&str, &str)> =
         layers.iter().enumerate().map(|(k, (n, _))| (n.as_str(), PALETTE[k % PALETTE.len()])).collect();
-    legend(svg, &names);
+    legend(elements, &names);
 }
 
-fn map_chart(svg: &mut String, chart: &Chart, grid: &Grid, map: ColourMap) {
+fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) {
     let [left, top, right, bottom] = AREA;
     let right = right - 74.0;
     let plain =
         |range: [f64; 2], to: [f64; 2]| Scale { low: range[0], high: range[1], log: false, from: to[0], to: to[1] };
     let (x, y) = (plain(grid.axes[0].range, [left, right]), plain(grid.axes[1].range, [bottom, top]));
-    if let Ok(png) = Picture::of_grid(grid, map, 1, 1.0).to_png() {
-        let _ = write!(
-            svg,
-            r#"<image x="{left}" y="{top}" width="{}" height="{}" preserveAspectRatio="none" style="image-rendering:pixelated" href="data:image/png;base64,{}"/>"#,
-            right - left,
-            bottom - top,
-            base64(&png)
-        );
-    }
-    axes(svg, chart, Some(&x), &y, right);
+    let picture = Picture::of_grid(grid, map, 1, 1.0);
+    elements.push(Element::Pixels { corner: [left, top], size: [right - left, bottom - top], picture });
+    axes(elements, chart, Some(&x), &y, right);
     let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
     let steps = 64;
     for k in 0..steps {
-        let [r, g, b] = map.at((k as f64 + 0.5) / f64::from(steps));
+        let ink = Ink::Colour(map.at((f64::from(k) + 0.5) / f64::from(steps)));
         let h = (bottom - top) / f64::from(steps);
-        let _ = write!(
-            svg,
-            r#"<rect x="{}" y="{:.1}" width="14" height="{:.1}" fill="rgb({r},{g},{b})"/>"#,
-            right + 12.0,
-            bottom - (f64::from(k) + 1.0) * h,
-            h + 0.3
-        );
+        let corner = [right + 12.0, bottom - (f64::from(k) + 1.0) * h];
+        // A little taller than its step: no seam shows between two.
+        elements.push(Element::Rectangle { corner, size: [14.0, h + 0.3], radius: 0.0, ink });
     }
     let bar = plain([low, high], [bottom, top]);
     for t in bar.ticks() {
-        let _ = write!(
-            svg,
-            r#"<text x="{}" y="{:.1}" opacity=".75">{}</text>"#,
-            right + 30.0,
-            bar.at(t) + 4.0,
-            figures(t, 3)
-        );
+        elements.push(tick_label(figures(t, 3), [right + 30.0, bar.at(t) + 4.0], Anchor::Start));
     }
-    let _ = write!(
-        svg,
-        r#"<text x="{}" y="{}" text-anchor="middle">{}</text>"#,
-        right + 30.0,
-        bottom + 19.0,
-        escape(&grid.unit)
-    );
+    elements.push(label(grid.unit.clone(), [right + 30.0, bottom + 19.0], Anchor::Middle));
 }
