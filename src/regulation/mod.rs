@@ -9,9 +9,10 @@
 //! The tables (`tables/*.json`) hold one row a requirement with its source and whether a second source was compared. A verdict repeats
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
-//! Layers: `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `verdict`.
+//! Layers: `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `judgement` ← `verdict`.
 
 mod aim;
+mod judgement;
 mod map;
 mod read;
 mod requirement;
@@ -19,6 +20,7 @@ mod table;
 mod verdict;
 
 pub use aim::Aim;
+pub use judgement::{Settles, Verdict};
 pub use map::{IntensityMap, Reading};
 pub use table::{Function, Regulation, Row, Traffic};
-pub use verdict::{Assessment, Assumptions, RowVerdict, Settles, Verdict, assess};
+pub use verdict::{Assessment, Assumptions, RowVerdict, assess};

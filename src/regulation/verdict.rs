@@ -1,50 +1,10 @@
-//! From readings to verdicts.
+//! A lamp measured by a regulation: aimed, read row by row, realigned where the regulation allows it.
 
 use super::aim::Aim;
+use super::judgement::{Judgement, Settles, Verdict};
 use super::map::{IntensityMap, Reading, Sensor};
-use super::requirement::{Comparison, Photometer, Requirement, requirements};
+use super::requirement::{Photometer, requirements};
 use super::table::{Regulation, Row, Traffic};
-
-/// What a row, or a lamp, comes to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// Met, by more than three combined standard errors.
-    Pass,
-    /// Not met, by more than three combined standard errors.
-    Fail,
-    /// Nearer to the limit than the errors let one tell, or outside the far field.
-    Unsure,
-}
-
-impl Verdict {
-    /// Of requirements that must all be met.
-    fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
-        verdicts.into_iter().fold(Self::Pass, |sum, v| match (sum, v) {
-            (Self::Fail, _) | (_, Self::Fail) => Self::Fail,
-            (Self::Unsure, _) | (_, Self::Unsure) => Self::Unsure,
-            _ => Self::Pass,
-        })
-    }
-}
-
-impl std::fmt::Display for Verdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(match self {
-            Self::Pass => "pass",
-            Self::Fail => "fail",
-            Self::Unsure => "unsure",
-        })
-    }
-}
-
-/// What would settle a row that is unsure.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settles {
-    /// Rays in all that bring the statistical error down far enough.
-    pub rays: u64,
-    /// Tolerance of the facets, mm, where the geometric error must come down too.
-    pub tolerance_mm: Option<f64>,
-}
 
 /// A row with what was measured.
 #[derive(Clone, Debug)]
@@ -88,12 +48,6 @@ pub struct Assumptions {
     /// Tolerance of the run's facets, mm, where it had any.
     pub tolerance_mm: Option<f64>,
 }
-
-/// Combined standard errors between a value and its limit that make a verdict.
-const SIGMAS: f64 = 3.0;
-
-/// Probability beyond three standard errors on one side.
-const ONE_SIDED: f64 = 1.35e-3;
 
 /// Degrees left, right and up or down that a passing beam may be realigned by when a row fails (UN R149 00, Annex 5, §1.2.3), and the
 /// step in which it is tried.
@@ -227,84 +181,10 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
         verdict.reading = Some(decisive.reading);
         verdict.direction = Some(decisive.direction);
         if worst.verdict == Verdict::Unsure && worst.unseen == 0 {
-            verdict.settles = decisive.settles(assumptions);
+            verdict.settles = decisive.settles(assumptions.rays, assumptions.tolerance_mm);
         }
     }
     verdict
-}
-
-/// A requirement with its verdict and the reading that decided it.
-struct Judgement {
-    verdict: Verdict,
-    decisive: Option<Decisive>,
-    unseen: usize,
-}
-
-struct Decisive {
-    reading: Reading,
-    direction: [f64; 2],
-    /// How far the reading is on the good side of its limit.
-    margin: f64,
-    sigmas: f64,
-}
-
-impl Decisive {
-    /// Rays and tolerance with which the same margin would be enough.
-    fn settles(&self, assumptions: &Assumptions) -> Option<Settles> {
-        /// Runs beyond this are no advice.
-        const MOST_RAYS: f64 = 1e15;
-        let wanted = self.margin.abs() / self.sigmas;
-        let Reading { statistical, geometric, .. } = self.reading;
-        // Where the facets leave no room, both errors get half of the square.
-        let finer = geometric > 0.5f64.sqrt() * wanted;
-        let room = if finer { wanted * 0.5f64.sqrt() } else { (wanted * wanted - geometric * geometric).sqrt() };
-        let rays = (assumptions.rays as f64 * (statistical / room).powi(2)).max(assumptions.rays as f64).ceil();
-        let tolerance_mm = assumptions.tolerance_mm.filter(|_| finer).map(|t| t * room / geometric);
-        (rays.is_finite() && rays < MOST_RAYS).then_some(Settles { rays: rays as u64, tolerance_mm })
-    }
-}
-
-impl Judgement {
-    fn of_requirement(photometer: &Photometer, requirement: &Requirement) -> Self {
-        // Of many comparisons one may be lucky: what one alone may decide is asked for at a confidence divided by their number. For a
-        // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
-        let count = requirement.comparisons.len().max(1) as f64;
-        let many = if count > 1.0 { (2.0 * (count / (2.0 * ONE_SIDED)).ln()).sqrt().max(SIGMAS) } else { SIGMAS };
-        let (to_pass, to_fail) = if requirement.any { (many, SIGMAS) } else { (SIGMAS, many) };
-
-        let mut passing = 0;
-        let mut failing = 0;
-        let mut decisive: Option<Decisive> = None;
-        for comparison in &requirement.comparisons {
-            let (reading, margin) = read(photometer, comparison);
-            let error = reading.error();
-            passing += usize::from(margin >= to_pass * error && margin >= 0.0);
-            failing += usize::from(-margin >= to_fail * error && margin < 0.0);
-            // The best of those of which any is enough, the worst of those that must all hold.
-            let decides = |d: &Decisive| (margin > d.margin) == requirement.any && margin != d.margin;
-            if decisive.as_ref().is_none_or(decides) {
-                let sigmas = if margin >= 0.0 { to_pass } else { to_fail };
-                decisive = Some(Decisive { reading, direction: comparison.direction, margin, sigmas });
-            }
-        }
-        let all = requirement.comparisons.len();
-        // A direction outside the far field may hide anything: only what one reading alone decides is still known.
-        let complete = requirement.unseen == 0 && all > 0;
-        let (alone, together) = if requirement.any {
-            ((passing > 0).then_some(Verdict::Pass), (failing == all && complete).then_some(Verdict::Fail))
-        } else {
-            ((failing > 0).then_some(Verdict::Fail), (passing == all && complete).then_some(Verdict::Pass))
-        };
-        let verdict = alone.or(together).unwrap_or(Verdict::Unsure);
-        Self { verdict, decisive, unseen: requirement.unseen }
-    }
-}
-
-fn read(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
-    let reading = photometer.map.read(&comparison.measurement);
-    let margin =
-        if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };
-    (reading, margin)
 }
 
 #[cfg(test)]
