@@ -17,6 +17,8 @@ pub struct Grid {
     pub values: Vec<f64>,
     /// Standard error of each value, where it was estimated.
     pub error: Option<Vec<f64>>,
+    /// Error of each value from the facets it was traced on, one standard error, where it is known; 0 on the true surfaces.
+    pub geometric: Option<Vec<f64>>,
     /// Further quantities over the same cells: colours, bands of wavelengths.
     pub layers: Vec<Layer>,
 }
@@ -82,6 +84,13 @@ impl Grid {
         column(&self.quantity, &self.unit)
     }
 
+    /// Both errors of the values under the names that every format gives them.
+    pub(super) fn error_layers(&self) -> impl Iterator<Item = (&'static str, &Vec<f64>)> {
+        [("statistical", &self.error), ("geometric", &self.geometric)]
+            .into_iter()
+            .filter_map(|(name, values)| Some((name, values.as_ref()?)))
+    }
+
     /// Smallest and largest finite value; `None` without any.
     pub fn extremes(&self) -> Option<[f64; 2]> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
@@ -98,7 +107,8 @@ impl Grid {
     }
 }
 
-/// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error, and the same of each layer.
+/// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error, the same of each
+/// layer, then both errors of the value as `statistical` and `geometric`, where they are known.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -110,6 +120,9 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
         for layer in &grid.layers {
             write!(w, ",{0},{0}_standard_error", layer.column())?;
         }
+        for (name, _) in grid.error_layers() {
+            write!(w, ",{name}")?;
+        }
         writeln!(w)?;
         for (k, value) in grid.values.iter().enumerate() {
             let (i, j) = (k % a.cells.max(1), k / a.cells.max(1));
@@ -120,6 +133,9 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
             for layer in &grid.layers {
                 write!(w, ",{},{}", layer.values[k], layer.error[k])?;
             }
+            for (_, values) in grid.error_layers() {
+                write!(w, ",{}", values[k])?;
+            }
             writeln!(w)?;
         }
         Ok(())
@@ -127,7 +143,7 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
-/// of its errors.
+/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, where they are known.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -151,6 +167,9 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
     for (layer, [name, error]) in grid.layers.iter().zip(&names) {
         arrays.push(NpyArray { name, shape: shape(), data: &layer.values });
         arrays.push(NpyArray { name: error, shape: shape(), data: &layer.error });
+    }
+    for (name, values) in grid.error_layers() {
+        arrays.push(NpyArray { name, shape: shape(), data: values });
     }
     write_npz(path, &arrays)
 }

@@ -35,6 +35,7 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         axes: [axis(0), axis(1)],
         values: r.cells.clone(),
         error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
+        geometric: None,
         layers: r.channels.iter().map(layer).collect(),
     })
 }
@@ -57,7 +58,15 @@ fn layer(channel: &ChannelResult) -> Layer {
 pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     let (grid, Layer { unit, values, error, .. }) = (receiver_grid(r)?, layer(r.photometric()?));
     let quantity = if unit == "lx" { "illuminance" } else { "luminous intensity" };
-    Some(Grid { quantity: quantity.into(), unit, values, error: Some(error), layers: Vec::new(), ..grid })
+    Some(Grid {
+        quantity: quantity.into(),
+        unit,
+        values,
+        error: Some(error),
+        geometric: None,
+        layers: Vec::new(),
+        ..grid
+    })
 }
 
 /// The values along both axes through the peak, with their statistical errors.

@@ -12,7 +12,7 @@ mod chart_png;
 mod cross_check;
 mod document;
 mod drawing;
-mod faceting;
+mod errors;
 mod html;
 mod maps;
 mod number;

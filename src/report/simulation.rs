@@ -1,7 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::cross_check::{self, verdict};
-use super::faceting::{changes, limits};
+use super::errors;
 use super::maps::{cuts, photometric_grid, reading, receiver_grid, spoken};
 use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View};
 use super::{figures, grouped, seconds};
@@ -9,7 +9,9 @@ use crate::formats::file_stem;
 use crate::formats::{Facets, Grid, Polylines};
 use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
 use crate::study::cross_check::CrossCheck;
-use crate::study::faceting::Faceting;
+use crate::study::default_accuracy::Chosen;
+use crate::study::figures::ReceiverFigures;
+use crate::study::geometric_error::GeometricError;
 
 /// Everything that the report of a traced scene speaks of.
 pub struct SimulationReport<'a> {
@@ -23,8 +25,12 @@ pub struct SimulationReport<'a> {
     pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
     pub check: Option<&'a CrossCheck>,
-    /// Some of the rays on facets and on the spline.
-    pub faceting: Option<&'a Faceting>,
+    /// Every receiver's figures with both their errors.
+    pub figures: &'a [ReceiverFigures],
+    /// Some of the rays on facets and on the spline, where the run was on facets.
+    pub geometric: Option<&'a GeometricError>,
+    /// Why the run was traced as it was, where it was not asked for.
+    pub chosen: Option<&'a Chosen>,
     /// More 3-D views: of the facets, of the octree.
     pub views: Vec<View>,
     /// More tables: of the model, of the facets.
@@ -68,28 +74,24 @@ impl SimulationReport<'_> {
     pub fn answer(&self) -> String {
         let r = self.results;
         let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
-        let parts: Vec<String> = (r.receivers.iter())
-            .map(|x| {
-                let power = figures(x.power, 4);
-                format!("**{power} {}** ({}) reach {}", self.unit, self.share(x.power), spoken(&x.name))
+        let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
+            .map(|(x, f)| {
+                let power = errors::with_errors(&f.power, 4);
+                format!("**{power}** ({}) reach {}", self.share(x.power), spoken(&x.name))
             })
             .collect();
         text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };
         text += ". ";
-        for grid in r.receivers.iter().filter(|x| x.kind == "far_field").filter_map(receiver_grid) {
-            if let Some(([h, v], peak)) = grid.peak() {
-                // Small cells at a pole are the brightest by chance: their error says so.
-                let at = grid.values.iter().position(|x| *x == peak);
-                let error = at.and_then(|k| grid.error.as_ref()?.get(k).copied());
-                let error = error.map(|e| format!(" ± {}", figures(e, 2))).unwrap_or_default();
+        let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
+        for (grid, max) in directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?))) {
+            if let Some(([h, v], _)) = grid.peak() {
                 text += &format!(
-                    "The brightest direction is {} {}°, {} {}° with **{}{error} {}**. ",
+                    "The brightest direction is {} {}°, {} {}° with **{}**. ",
                     grid.axes[0].label,
                     figures(h, 2),
                     grid.axes[1].label,
                     figures(v, 2),
-                    figures(peak, 3),
-                    grid.unit
+                    errors::with_errors(max, 3)
                 );
             }
         }
@@ -107,7 +109,8 @@ impl SimulationReport<'_> {
             }
         );
         text += &self.cut_off();
-        text += &self.faceting.map(limits).unwrap_or_default();
+        text += &self.geometric.map(|g| errors::limits(g, self.figures)).unwrap_or_default();
+        text += &self.chosen.map(errors::choice).unwrap_or_default();
         if let Some(check) = self.check {
             text += &verdict(check);
         }
@@ -244,7 +247,11 @@ impl SimulationReport<'_> {
             ]);
         }
         let section = Section::new("Energy").with(table).with(receivers);
-        let section = self.faceting.map(changes).into_iter().fold(section, |s, table| s.with(table));
+        let section = section.with(errors::figure_table(self.results, self.figures));
+        let section = section.with(errors::halving(self.results, self.geometric).as_str());
+        let measured = self.geometric.filter(|g| g.rays > 0).map(errors::changes).into_iter();
+        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternatives);
+        let section = measured.chain(tried).fold(section, |s, table| s.with(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
             section.with(self.channels())
         } else {

@@ -5,15 +5,12 @@
 //! would be comes from the spread over the run's replicates.
 
 use super::Progress;
+use super::geometric_error::trace_replicates;
 use super::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use super::timing::Countdown;
 use crate::intersect::{Intersector, NormalMode};
-use crate::simulate::{
-    BoundScene, Hooks, Moments, Portion, ReceiverResult, Results, RunSettings, replicates, simulate, trace,
-};
+use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
 use serde::Serialize;
-use std::sync::Mutex;
-use std::time::Duration;
 use std::time::Instant;
 
 /// Times are never taken as shorter, s: the resolution of the clock, so that no pace is infinite.
@@ -76,10 +73,15 @@ pub fn compare_power(
     exact: &dyn Intersector,
     settings: &RunSettings,
 ) -> Vec<PowerComparison> {
-    let [(found, ours), (truth, theirs)] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
+    let [on_facets, on_spline] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
+    let (found, truth) = (&on_facets.results, &on_spline.results);
     (found.receivers.iter().zip(&truth.receivers).enumerate())
         .map(|(k, (f, e))| {
-            let differences = ours.iter().zip(&theirs).map(|(a, b)| a[k].power as f64 - b[k].power as f64);
+            let differences = on_facets
+                .replicates
+                .iter()
+                .zip(&on_spline.replicates)
+                .map(|(a, b)| a[k].power as f64 - b[k].power as f64);
             let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
             let n = differences.len().max(2) as f64;
             let mean = differences.iter().sum::<f64>() / n;
@@ -94,51 +96,6 @@ pub fn compare_power(
             }
         })
         .collect()
-}
-
-/// What one replicate brought to one receiver: quanta, and their moments in half sides.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ReplicateSums {
-    pub(super) power: u128,
-    pub(super) first: [f64; 2],
-    pub(super) second: [f64; 2],
-}
-
-/// Results of a run, and what each replicate brought to each receiver.
-pub(super) fn trace_replicates(
-    bound: &BoundScene,
-    intersector: &dyn Intersector,
-    settings: &RunSettings,
-) -> (Results, Vec<Vec<ReplicateSums>>) {
-    let count = replicates(bound, settings) as usize;
-    type Sums = Vec<(u128, Moments)>;
-    let parts = Mutex::new((Vec::<u32>::new(), Sums::new(), vec![Vec::new(); count]));
-    let finished = |p: &Portion| {
-        let mut parts = parts.lock().unwrap_or_else(|e| e.into_inner());
-        let (done, sums, by) = &mut *parts;
-        let now: Sums =
-            p.tallies.receivers.iter().map(|s| s.total).zip(p.tallies.moments.iter().copied()).collect();
-        sums.resize(now.len(), Default::default());
-        if let Some(&new) = p.done.iter().find(|r| done.binary_search(r).is_err()) {
-            by[new as usize] = now.iter().zip(sums.iter()).map(difference).collect();
-        }
-        done.clone_from(&p.done);
-        *sums = now;
-    };
-    let hooks = Hooks { progress: &|_| true, finished: Some(&finished), every: Duration::ZERO, paths: None };
-    let results = Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks));
-    let (_, _, by) = parts.into_inner().unwrap_or_else(|e| e.into_inner());
-    (results, by)
-}
-
-/// What came between two states of a receiver's sums; exact until the last step.
-fn difference(((now, m), (before, o)): (&(u128, Moments), &(u128, Moments))) -> ReplicateSums {
-    let unit = Moments::GRAIN;
-    ReplicateSums {
-        power: now - before,
-        first: [0, 1].map(|a| (m.first[a] - o.first[a]) as f64 / unit),
-        second: [0, 1].map(|a| (m.second[a] - o.second[a]) as f64 / unit),
-    }
 }
 
 /// What to trace on, and the seconds that this will take.

@@ -230,7 +230,7 @@ fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let effects = crate::simulate::Required::by(&prepared.bound);
     if console.json {
-        let document = json!({"dry_run": true, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
+        let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
             "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},

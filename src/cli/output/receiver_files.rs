@@ -10,9 +10,16 @@ use crate::simulate::ReceiverResult;
 use crate::simulate::scene::FarFieldType;
 use std::path::Path;
 
-/// Writes all files of a receiver and gives their names; `rays` are those of the sample that it counted.
-pub(crate) fn write(folder: &Path, receiver: &ReceiverResult, rays: Vec<LightRay>) -> Result<Vec<String>, Failure> {
+/// Writes all files of a receiver and gives their names; `geometric` are the errors of its cells from the facets, where they are known,
+/// `rays` those of the sample that it counted.
+pub(crate) fn write(
+    folder: &Path,
+    receiver: &ReceiverResult,
+    geometric: Option<Vec<f64>>,
+    rays: Vec<LightRay>,
+) -> Result<Vec<String>, Failure> {
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
+    let grid = Grid { geometric: geometric.filter(|g| g.len() == grid.values.len()), ..grid };
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
     let writers: [(&str, Writer); 4] =

@@ -12,7 +12,7 @@ use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::simulate::{Results, RunSettings, Verification, replay, verify_pruning};
 use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
-use crate::study::faceting::{Faceting, faceting};
+use crate::study::geometric_error::{GeometricError, geometric_error};
 
 /// Segments of a run that are asked again of BVH and spline.
 const RECHECKED: usize = 10_000;
@@ -33,7 +33,7 @@ pub(crate) struct SceneResults {
     pub(crate) results: Results,
     pub(crate) check: Option<CrossCheck>,
     /// What the facets change of the light, where the run was on facets.
-    pub(crate) faceting: Option<Faceting>,
+    pub(crate) geometric: Option<GeometricError>,
     /// The pruned kernel against the full one, when asked for.
     pub(crate) verification: Option<Verification>,
 }
@@ -53,8 +53,8 @@ pub(crate) fn trace_and_check(prepared: &PreparedScene, request: TraceRequest, c
         results.seconds.read = prepared.job.loaded.seconds;
         results.seconds.tessellate = prepared.tessellation_seconds;
         results.seconds.build = build_seconds;
-        let (check, faceting) = recheck(prepared, &results, intersector, console);
-        SceneResults { results, check, faceting, verification }
+        let (check, geometric) = recheck(prepared, &results, intersector, console);
+        SceneResults { results, check, geometric, verification }
     })
 }
 
@@ -66,16 +66,18 @@ fn recheck(
     results: &Results,
     intersector: &dyn Intersector,
     console: &Console,
-) -> (Option<CrossCheck>, Option<Faceting>) {
+) -> (Option<CrossCheck>, Option<GeometricError>) {
+    // What the pilot found need not be measured again.
+    let pilot = prepared.chosen.as_ref().and_then(|chosen| chosen.geometric.clone());
     let rays = sample(prepared, intersector);
     if rays.is_empty() {
-        return (None, None);
+        return (None, pilot);
     }
     let spinner = console.spinner("building the spline for the cross-check");
     let exact = Exact::build(&prepared.job.loaded.model, &exact::Settings::for_few_rays());
     spinner.finish_and_clear();
     let check = check_rays(prepared, intersector, &exact, &rays, console);
-    (Some(check), facet_effects(prepared, results, [intersector, &exact]))
+    (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &exact])))
 }
 
 /// Segments of some rays of the run, which are spread evenly over it and traced once more.
@@ -122,10 +124,8 @@ fn facet_effects(
     prepared: &PreparedScene,
     results: &Results,
     facets_and_spline: [&dyn Intersector; 2],
-) -> Option<Faceting> {
-    let on_facets =
-        prepared.choice.intersector != IntersectorKind::Exact && prepared.choice.normals != NormalMode::Exact;
-    if !on_facets || prepared.tessellation.mesh.facets.is_empty() {
+) -> Option<GeometricError> {
+    if prepared.choice.intersector == IntersectorKind::Exact || prepared.tessellation.mesh.facets.is_empty() {
         return None;
     }
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
@@ -133,5 +133,5 @@ fn facet_effects(
     let run = prepared.run_settings();
     let settings =
         RunSettings { rays: rays.min(run.rays), replicates: FACETING_REPLICATES, path_samples: 0, ..run };
-    Some(faceting(&prepared.bound, facets_and_spline, &settings))
+    Some(geometric_error(&prepared.bound, facets_and_spline, &settings))
 }

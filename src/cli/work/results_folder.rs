@@ -13,6 +13,9 @@ use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, w
 use crate::intersect::octree::Octree;
 use crate::report::{Cell, Provenance, Report, SimulationReport, Table, View, path_lines};
 use crate::simulate::arrivals;
+use crate::simulate::scene::PowerUnit;
+use crate::study;
+use crate::study::figures::{ReceiverFigures, Surface};
 use serde_json::Value;
 use std::path::Path;
 
@@ -33,8 +36,11 @@ pub(crate) fn write(
         .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
     for k in 0..run.results.receivers.len() {
         let rays = arrivals(&prepared.bound, k, &run.results);
-        run.results.receivers[k].files = receiver_files::write(folder, &run.results.receivers[k], rays)?;
+        let receiver = &run.results.receivers[k];
+        let geometric = geometric_layer(prepared, run, k);
+        run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
     }
+    let all_figures = figures(prepared, run);
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &prepared.tessellation.mesh;
@@ -46,20 +52,54 @@ pub(crate) fn write(
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
-    let mut document = document(prepared, run, &provenance)?;
+    let mut document = document(prepared, run, &all_figures, &provenance)?;
     if has_lost_rays {
         document["ledger"] = LEDGER.into();
     }
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
-    let report = page(prepared, run, &facets, sentences, provenance);
+    let report = page(prepared, run, &all_figures, &facets, sentences, provenance);
     report.write(folder)?;
     spinner.finish_and_clear();
     Ok((document, report))
 }
 
+/// Unit of powers.
+fn power_unit(prepared: &PreparedScene) -> &'static str {
+    match prepared.job.scene.run.unit {
+        PowerUnit::Lumen => "lm",
+        PowerUnit::Watt => "W",
+    }
+}
+
+/// The figures of every receiver with both their errors.
+fn figures(prepared: &PreparedScene, run: &SceneResults) -> Vec<ReceiverFigures> {
+    let surface = match (prepared.choice.intersector, &run.geometric) {
+        (IntersectorKind::Exact, _) => Surface::Spline,
+        (_, Some(error)) => Surface::Facets(error),
+        (_, None) => Surface::Unmeasured,
+    };
+    study::figures::figures(&run.results, surface, power_unit(prepared))
+}
+
+/// The errors of a receiver's cells from the facets, where they are known.
+fn geometric_layer(prepared: &PreparedScene, run: &SceneResults, receiver: usize) -> Option<Vec<f64>> {
+    let none = vec![0.0; run.results.receivers[receiver].cells.len()];
+    match (prepared.choice.intersector, &run.geometric) {
+        (IntersectorKind::Exact, _) => Some(none),
+        // Facets that are the surface itself were not compared cell by cell.
+        (_, Some(error)) if error.rays == 0 => Some(none),
+        (_, measured) => measured.as_ref().and_then(|error| Some(error.receivers.get(receiver)?.cells.clone())),
+    }
+}
+
 /// The document of `results.json`, without the name of the ledger.
-fn document(prepared: &PreparedScene, run: &SceneResults, provenance: &Provenance) -> Result<Value, Failure> {
+fn document(
+    prepared: &PreparedScene,
+    run: &SceneResults,
+    all_figures: &[ReceiverFigures],
+    provenance: &Provenance,
+) -> Result<Value, Failure> {
     let mut document = json_value(&run.results)?;
     if let Some(verification) = &run.verification {
         document["pruning"] = json_value(verification)?;
@@ -67,8 +107,14 @@ fn document(prepared: &PreparedScene, run: &SceneResults, provenance: &Provenanc
     if let Some(check) = &run.check {
         document["check"] = json_value(check)?;
     }
-    if let Some(faceting) = &run.faceting {
-        document["faceting"] = json_value(faceting)?;
+    for (k, figures) in all_figures.iter().enumerate() {
+        document["receivers"][k]["figures"] = json_value(figures)?;
+    }
+    if let Some(chosen) = &prepared.chosen {
+        document["chosen"] = json_value(chosen)?;
+    }
+    if let Some(geometric) = run.geometric.as_ref().filter(|g| g.rays > 0) {
+        document["faceting"] = json_value(geometric)?;
     }
     if let Some(accuracy) = prepared.job.accuracy {
         document["accuracy"] = json_value(accuracy)?;
@@ -81,23 +127,22 @@ fn document(prepared: &PreparedScene, run: &SceneResults, provenance: &Provenanc
 fn page(
     prepared: &PreparedScene,
     run: &SceneResults,
+    all_figures: &[ReceiverFigures],
     facets: &Facets,
     sentences: Vec<String>,
     provenance: Provenance,
 ) -> Report {
     let scene = prepared.job.scene;
     let title = if scene.title.is_empty() { prepared.job.loaded.model.name.clone() } else { scene.title.clone() };
-    let unit = match scene.run.unit {
-        crate::simulate::scene::PowerUnit::Lumen => "lm",
-        _ => "W",
-    };
     SimulationReport {
         title,
         results: &run.results,
         facets,
-        unit,
+        unit: power_unit(prepared),
         check: run.check.as_ref(),
-        faceting: run.faceting.as_ref(),
+        figures: all_figures,
+        geometric: run.geometric.as_ref(),
+        chosen: prepared.chosen.as_ref(),
         views: views(prepared, facets),
         tables: vec![model_table(prepared), facet_table(prepared)],
         comparison: sentences,

@@ -1,5 +1,6 @@
 //! The main job: a scene that is read, bound, faceted and traced. `trace`, `merge` and `demo` share it.
 
+use super::default_accuracy;
 use super::facets;
 use super::input_files::LoadedModel;
 use super::intersectors::{self, IntersectorChoice};
@@ -13,6 +14,7 @@ use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, RunSettings, Scene, Traced, trace,
 };
 use crate::study::accuracy_target::AccuracyPlan;
+use crate::study::default_accuracy::Chosen;
 use crate::tessellate::{self, Tessellation};
 use std::time::Duration;
 
@@ -41,6 +43,8 @@ pub(crate) struct PreparedScene<'a> {
     pub(crate) threads: usize,
     /// Rays to trace in place of what the options and the scene say.
     pub(crate) rays: Option<u64>,
+    /// Why it is traced as it is, where nobody asked for it.
+    pub(crate) chosen: Option<Chosen>,
 }
 
 /// How to trace beside the settings.
@@ -66,10 +70,38 @@ pub(crate) fn prepare<'a>(job: SceneJob<'a>, console: &Console) -> Result<Prepar
     let bound = job.scene.bind(&job.loaded.model)?;
     let mesh_settings = facets::mesh_settings(job.meshing, Some(job.scene), &job.loaded.model)?;
     let (tessellation, tessellation_seconds) = facets::facets(&job.loaded.model, &mesh_settings, console);
-    Ok(PreparedScene { job, bound, tessellation, mesh_settings, tessellation_seconds, choice, threads, rays: None })
+    let mut prepared = PreparedScene {
+        job,
+        bound,
+        tessellation,
+        mesh_settings,
+        tessellation_seconds,
+        choice,
+        threads,
+        rays: None,
+        chosen: None,
+    };
+    if !default_accuracy::is_asked(prepared.job.meshing, prepared.job.tracing, prepared.job.scene) {
+        prepared.choose_accuracy(console);
+    }
+    Ok(prepared)
 }
 
 impl PreparedScene<'_> {
+    /// Takes the facets or the spline that a pilot of the run's own rays finds sufficient.
+    fn choose_accuracy(&mut self, console: &Console) {
+        let run = self.run_settings();
+        let facets = (&self.tessellation.mesh, &self.mesh_settings);
+        let choice = default_accuracy::choose(&self.job.loaded.model, &self.bound, &run, facets, console);
+        if let Some(finer) = choice.finer {
+            self.tessellation.mesh = finer.mesh;
+            self.tessellation_seconds += finer.seconds;
+            self.mesh_settings.tolerance = choice.chosen.tolerance_mm;
+        }
+        self.choice = choice.intersector;
+        self.chosen = Some(choice.chosen);
+    }
+
     /// The run's settings: the scene's, with the options over them.
     pub(crate) fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);

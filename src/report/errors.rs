@@ -1,0 +1,210 @@
+//! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
+
+use super::maps::spoken;
+use super::{Cell, Table, figures, grouped, seconds};
+use crate::simulate::Results;
+use crate::study::default_accuracy::Chosen;
+use crate::study::figures::{Figure, Limit, ReceiverFigures};
+use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
+
+/// A figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
+pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
+    let Figure { value, unit, statistical, geometric, .. } = figure;
+    let value = figures(*value, digits);
+    match geometric {
+        None => format!(
+            "{value} {unit} (± {} from the rays alone; the facets were not judged)",
+            figures(*statistical, 2)
+        ),
+        Some(g) if *g > 0.1 * statistical => format!(
+            "{value} ± {} {unit} (± {} from the rays, ± {} from the facets)",
+            figures(figure.combined(), 2),
+            figures(*statistical, 2),
+            figures(*g, 2)
+        ),
+        Some(_) => format!("{value} ± {} {unit}", figures(figure.combined(), 2)),
+    }
+}
+
+/// Where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces.
+pub(super) fn limits(error: &GeometricError, all: &[ReceiverFigures]) -> String {
+    let said: Vec<String> =
+        error.receivers.iter().zip(all).map(|(r, f)| sentence(r, f)).filter(|s| !s.is_empty()).collect();
+    if said.is_empty() {
+        return String::new();
+    }
+    format!(
+        "**The facets limit this answer**: {} ({} rays traced on both). --intersector exact takes that away, a tighter --tolerance \
+         lessens it. ",
+        said.join("; "),
+        grouped(error.rays)
+    )
+}
+
+/// What facets change of one receiver, as far as it is both beyond doubt and beyond the noise of the run.
+fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
+    let is_limit = |paired: &Paired, figure: Option<&Figure>| {
+        paired.is_significant() && figure.is_some_and(|f| f.limited_by == Limit::Geometry)
+    };
+    let mut parts = Vec::new();
+    if is_limit(&r.power, Some(&f.power)) {
+        let share = 100.0 * (r.power.facets / r.power.spline - 1.0);
+        parts.push(if r.power.spline > 0.0 {
+            format!("its power changes by {} %", figures(share, 2))
+        } else {
+            "light falls where none would".into()
+        });
+    }
+    if is_limit(&r.peak, f.max.as_ref()) {
+        let share = 100.0 * (r.peak.facets / r.peak.spline - 1.0);
+        parts.push(format!("its brightest place changes by {} %", figures(share, 2)));
+    }
+    let widths = |pick: fn(&Paired) -> f64| {
+        format!("{} × {} {}", figures(pick(&r.width[0]), 3), figures(pick(&r.width[1]), 3), r.unit)
+    };
+    if is_limit(&r.rms[0], f.rms_1.as_ref()) || is_limit(&r.rms[1], f.rms_2.as_ref()) {
+        let [on_facets, on_spline] = [widths(|p| p.facets), widths(|p| p.spline)];
+        parts.push(format!("the light is {on_facets} wide (rms), {on_spline} on the true surfaces"));
+    }
+    let moved = is_limit(&r.centroid[0], f.centroid_1.as_ref()) || is_limit(&r.centroid[1], f.centroid_2.as_ref());
+    if moved && parts.is_empty() {
+        let by = [0, 1].map(|a| figures(r.centroid[a].facets - r.centroid[a].spline, 2));
+        parts.push(format!("the light is moved by {} and {} {}", by[0], by[1], r.unit));
+    }
+    if parts.is_empty() && r.map.geometric > 3.0 * r.map.noise && r.map.geometric > r.map.statistical {
+        parts.push(format!("{} % of the light (rms) falls into other cells", figures(100.0 * r.map.geometric, 2)));
+    }
+    if parts.is_empty() { String::new() } else { format!("on {} {}", spoken(&r.name), parts.join(", ")) }
+}
+
+/// What would be needed to halve either error.
+pub(super) fn halving(results: &Results, error: Option<&GeometricError>) -> String {
+    // Four times the rays; sums over a scrambled net need fewer.
+    let mut text =
+        format!("To halve the statistical errors takes at most {} more", seconds(3.0 * results.seconds.trace));
+    if let Some(e) = error.filter(|e| e.rays > 0 && e.seconds[1] > 0.0) {
+        let s = &results.seconds;
+        let twice = s.tessellate + s.build + 1.1 * s.trace + s.tessellate + s.build;
+        let spline = e.seconds[1] * results.rays as f64 / e.rays as f64;
+        text += &format!(
+            ", to halve those from the facets a run at half the tolerance of about {}, to take them away a run on the spline of about {}",
+            seconds(twice),
+            seconds(spline)
+        );
+    }
+    text + ". "
+}
+
+/// Why the run was traced as it was.
+pub(super) fn choice(chosen: &Chosen) -> String {
+    let how = if chosen.intersector == "exact" { "on the true surfaces" } else { "on facets" };
+    let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
+    let facets = if chosen.intersector == "exact" { String::new() } else { format!(" of {low} to {high} mm") };
+    format!("Traced **{how}**{facets}, because {}. ", chosen.because)
+}
+
+/// Every figure with both its errors.
+pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table {
+    let columns = [
+        ("receiver", ""),
+        ("figure", ""),
+        ("value", ""),
+        ("unit", ""),
+        ("± rays (1σ)", ""),
+        ("± facets (1σ)", ""),
+        ("limited by", ""),
+    ];
+    let caption = "Each figure with the standard error from the number of rays and that from the facets; a dash where the facets were \
+        not compared with the true surfaces.";
+    let mut table = Table::new("figures", "Figures with both errors", &columns).caption(caption);
+    for (r, f) in results.receivers.iter().zip(all) {
+        for (name, figure) in f.named() {
+            let limit = match figure.limited_by {
+                Limit::Statistics => "rays",
+                Limit::Geometry => "facets",
+            };
+            table.row([
+                r.name.as_str().into(),
+                name.into(),
+                Cell::Number(figure.value, 6),
+                figure.unit.as_str().into(),
+                Cell::Number(figure.statistical, 2),
+                figure.geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2)),
+                limit.into(),
+            ]);
+        }
+    }
+    table
+}
+
+/// What was measured before the run was chosen to be traced so.
+pub(super) fn alternatives(chosen: &Chosen) -> Table {
+    let columns = [
+        ("intersector", ""),
+        ("normals", ""),
+        ("tolerance from", "mm"),
+        ("to", "mm"),
+        ("trace", "s"),
+        ("worst figure", ""),
+        ("wrong by", "%"),
+        ("in its standard errors", ""),
+    ];
+    let caption = format!(
+        "{} rays of the scene, traced so before the run; a run is given the cheapest way whose geometric error stays below the \
+         statistical one on every figure.",
+        grouped(chosen.pilot_rays)
+    );
+    let mut table = Table::new("alternatives", "What was tried first", &columns).caption(caption);
+    for a in &chosen.alternatives {
+        table.row([
+            a.intersector.into(),
+            a.normals.name().into(),
+            Cell::Number(a.tolerance_mm[0], 2),
+            Cell::Number(a.tolerance_mm[1], 2),
+            Cell::Number(a.seconds, 3),
+            a.figure.as_str().into(),
+            Cell::Number(100.0 * a.geometric_share, 2),
+            Cell::Number(a.geometric_to_statistical, 2),
+        ]);
+    }
+    table
+}
+
+/// Every receiver on both.
+pub(super) fn changes(error: &GeometricError) -> Table {
+    let columns = [
+        ("receiver", ""),
+        ("power, facets", ""),
+        ("power, spline", ""),
+        ("power, ± of the difference", ""),
+        ("brightest, facets", ""),
+        ("brightest, spline", ""),
+        ("brightest, ± of the difference", ""),
+        ("over cells a side", ""),
+        ("width 1, facets", ""),
+        ("width 1, spline", ""),
+        ("width 1, ± of the difference", ""),
+        ("width 2, facets", ""),
+        ("width 2, spline", ""),
+        ("width 2, ± of the difference", ""),
+        ("unit of widths", ""),
+    ];
+    let caption = format!(
+        "{} rays of the run, traced on the facets and on the true surfaces with the same random numbers. A width is the root mean square \
+         distance from the mean position; cells that few rays reach are judged with their neighbours.",
+        grouped(error.rays)
+    );
+    let mut table = Table::new("faceting", "What the facets change", &columns).caption(caption);
+    for r in &error.receivers {
+        let three = |p: &Paired| [Cell::Number(p.facets, 5), Cell::Number(p.spline, 5), Cell::Number(p.error, 2)];
+        let cells = std::iter::once(r.name.as_str().into())
+            .chain(three(&r.power))
+            .chain(three(&r.peak))
+            .chain([r.peak_cells.into()])
+            .chain(three(&r.width[0]))
+            .chain(three(&r.width[1]))
+            .chain([r.unit.into()]);
+        table.row(cells);
+    }
+    table
+}

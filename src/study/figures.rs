@@ -1,0 +1,224 @@
+//! The figures that a run prints for each receiver, each with both its errors.
+
+use super::geometric_error::{GeometricError, Paired, ReceiverError};
+use crate::simulate::{ReceiverResult, Results};
+use serde::Serialize;
+
+/// What is more to blame for the error of a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Limit {
+    /// The number of rays.
+    Statistics,
+    /// The facets.
+    Geometry,
+}
+
+/// A figure with both its errors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figure {
+    /// What was found.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Standard error from the number of rays.
+    pub statistical: f64,
+    /// Error from the facets, one standard error; 0 on the spline, absent where it was not measured.
+    pub geometric: Option<f64>,
+    /// Which of the two is larger.
+    pub limited_by: Limit,
+}
+
+impl Figure {
+    fn new(value: f64, unit: &str, statistical: f64, geometric: Option<f64>) -> Self {
+        let limited_by =
+            if geometric.is_some_and(|g| g > statistical) { Limit::Geometry } else { Limit::Statistics };
+        Self { value, unit: unit.into(), statistical, geometric, limited_by }
+    }
+
+    /// Both errors together.
+    pub fn combined(&self) -> f64 {
+        self.statistical.hypot(self.geometric.unwrap_or(0.0))
+    }
+}
+
+/// The figures of one receiver.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReceiverFigures {
+    /// Power.
+    pub power: Figure,
+    /// The largest cell; absent, as all that follow, where only power is counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max: Option<Figure>,
+    /// Root mean square distance from the centre along the first axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_1: Option<Figure>,
+    /// And along the second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_2: Option<Figure>,
+    /// Mean position along the first axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centroid_1: Option<Figure>,
+    /// And along the second.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centroid_2: Option<Figure>,
+}
+
+impl ReceiverFigures {
+    /// All of them with their names, as in `results.json`.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Figure)> {
+        let places = [
+            ("max", &self.max),
+            ("rms_1", &self.rms_1),
+            ("rms_2", &self.rms_2),
+            ("centroid_1", &self.centroid_1),
+            ("centroid_2", &self.centroid_2),
+        ];
+        std::iter::once(("power", &self.power))
+            .chain(places.into_iter().filter_map(|(n, f)| Some((n, f.as_ref()?))))
+    }
+}
+
+/// Where a run found its hits, as far as its figures ask.
+#[derive(Clone, Copy, Debug)]
+pub enum Surface<'a> {
+    /// On the surfaces themselves.
+    Spline,
+    /// On facets, whose errors were measured.
+    Facets(&'a GeometricError),
+    /// On facets that nobody compared with the spline.
+    Unmeasured,
+}
+
+/// The figures of every receiver of a run; `unit` is that of powers, `W` or `lm`.
+pub fn figures(results: &Results, surface: Surface<'_>, unit: &str) -> Vec<ReceiverFigures> {
+    let receivers = results.receivers.iter().enumerate();
+    receivers.map(|(k, r)| Errors::new(results, surface, k).figures(r, unit)).collect()
+}
+
+/// What is known of the geometric errors of one receiver.
+struct Errors<'a> {
+    surface: Surface<'a>,
+    measured: Option<&'a ReceiverError>,
+    /// Light that was lost: it might have fallen on any receiver, so it is an error of every one, on the spline too.
+    lost_power: f64,
+    lost_share: f64,
+}
+
+impl<'a> Errors<'a> {
+    fn new(results: &Results, surface: Surface<'a>, receiver: usize) -> Self {
+        let measured = match surface {
+            Surface::Facets(error) => error.receivers.get(receiver),
+            _ => None,
+        };
+        let lost_power = results.power.lost;
+        Self {
+            surface,
+            measured,
+            lost_power,
+            lost_share: lost_power / results.power.emitted.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The geometric error of a figure, `lost` of which may be missing.
+    fn geometric(&self, lost: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
+        match self.surface {
+            Surface::Spline => Some(lost),
+            Surface::Facets(_) => self.measured.map(|m| of_facets(m).hypot(lost)),
+            Surface::Unmeasured => None,
+        }
+    }
+
+    fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
+        let power = self.geometric(self.lost_power, |m| m.power.geometric());
+        let power = Figure::new(r.power, unit, r.power_error, power);
+        if r.kind == "absorbed" {
+            return ReceiverFigures {
+                power,
+                max: None,
+                rms_1: None,
+                rms_2: None,
+                centroid_1: None,
+                centroid_2: None,
+            };
+        }
+        // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
+        let max = self.geometric(self.lost_share * r.max, |m| {
+            if m.peak.facets > 0.0 { r.max * m.peak.geometric() / m.peak.facets } else { m.peak.geometric() }
+        });
+        let length = if r.kind == "plane" { "mm" } else { "deg" };
+        let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
+            let geometric = self.geometric(0.0, |m| paired(m).geometric());
+            Some(Figure::new(value, length, statistical, geometric))
+        };
+        ReceiverFigures {
+            power,
+            max: Some(Figure::new(r.max, r.unit, error_of_maximum(&r.cells, &r.errors), max)),
+            rms_1: along(r.rms[0], r.rms_error[0], &|m| m.rms[0]),
+            rms_2: along(r.rms[1], r.rms_error[1], &|m| m.rms[1]),
+            centroid_1: along(r.centroid[0], r.centroid_error[0], &|m| m.centroid[0]),
+            centroid_2: along(r.centroid[1], r.centroid_error[1], &|m| m.centroid[1]),
+        }
+    }
+}
+
+/// Steps of the integral over possible maxima: its ends are 12 standard errors apart, and a tenth of one is near enough.
+const STEPS: usize = 128;
+/// Standard errors beyond which a cell is taken as never to be the largest.
+const REACH: f64 = 6.0;
+
+/// Standard error of the largest of many cells: its own, and what the largest of noisy cells exceeds the largest true one by.
+///
+/// The excess is that of the largest cell after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of
+/// the distribution of a maximum of independent normal values.
+fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
+    let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])) else { return 0.0 };
+    let Some(&own) = errors.get(largest) else { return 0.0 };
+    let low = cells[largest] - REACH * own;
+    let rivals: Vec<[f64; 2]> = (cells.iter().zip(errors))
+        .filter(|(v, e)| **e > 0.0 && **v + REACH * **e > cells[largest])
+        .map(|(v, e)| [*v, *e])
+        .collect();
+    let high = rivals.iter().map(|[v, e]| v + REACH * e).fold(cells[largest], f64::max);
+    if high <= low {
+        return own;
+    }
+    let step = (high - low) / STEPS as f64;
+    let exceeded = (0..STEPS).map(|k| {
+        let x = low + (k as f64 + 0.5) * step;
+        let below: f64 = rivals.iter().map(|[v, e]| normal((x - v) / e)).product();
+        (1.0 - below) * step
+    });
+    let expected = low + exceeded.sum::<f64>();
+    own.hypot((expected - cells[largest]).max(0.0))
+}
+
+/// Distribution function of the standard normal distribution within 1e-5 (Abramowitz and Stegun, *Handbook*, 26.2.16).
+fn normal(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.33267 * x.abs());
+    let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    let beyond = density * t * (0.436_183_6 + t * (-0.120_167_6 + t * 0.937_298_0));
+    if x > 0.0 { 1.0 - beyond } else { beyond }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_normal_distribution_is_that_of_the_tables() {
+        for (x, expected) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (2.0, 0.977_250), (3.0, 0.998_650)] {
+            assert!((normal(x) - expected).abs() < 2e-5, "{x}");
+        }
+    }
+
+    /// The mean of the largest of two equal normal values is 1/√π of their standard error above each.
+    #[test]
+    fn the_largest_of_two_equal_cells_is_too_large_by_known_noise() {
+        let error = error_of_maximum(&[10.0, 10.0], &[1.0, 1.0]);
+        let excess = 1.0 / std::f64::consts::PI.sqrt();
+        assert!((error - 1f64.hypot(excess)).abs() < 2e-3, "{error}");
+        let alone = error_of_maximum(&[10.0, 1.0], &[1.0, 1.0]);
+        assert!((alone - 1.0).abs() < 2e-3, "{alone}");
+    }
+}

@@ -1,0 +1,220 @@
+//! What facets change of the cells of a receiver: of each alone or with its neighbours, of the brightest, of all together.
+//!
+//! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells tell a
+//! geometric error that no single cell could.
+
+use super::replicates::{ReplicateSums, ReplicatedRun};
+use super::{Paired, standard_error};
+use crate::simulate::{BoundScene, QUANTA};
+use serde::Serialize;
+
+/// Rays that the brightest square of cells holds at least: one of this many is known within 7 % alone, and its change better.
+const PEAK_RAYS: f64 = 200.0;
+/// Rays of a square of cells above which it is divided into four, where they can be judged apart.
+const POOLED_RAYS: f64 = 256.0;
+
+/// What facets change of all cells together, as shares of the root of the sum of their squares.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MapError {
+    /// Root of the sum of the squares of the cells' differences, their noise taken away.
+    pub geometric: f64,
+    /// What that may be by chance alone.
+    pub noise: f64,
+    /// Root of the sum of the squares of the cells' standard errors, from these rays alone.
+    pub statistical: f64,
+}
+
+/// The brightest place of a receiver.
+pub(super) struct Peak {
+    /// In the receiver's unit.
+    pub(super) density: Paired,
+    /// Cells a side that it was taken over.
+    pub(super) cells: usize,
+    /// Standard error of one cell there, in the receiver's unit.
+    pub(super) statistical: f64,
+}
+
+/// One cell on facets and on the spline, in quanta.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell {
+    facets: f64,
+    spline: f64,
+    /// Sum over replicates of the squares of their differences, then the variance of the whole difference.
+    difference_variance: f64,
+    /// The same of the spline alone.
+    spline_variance: f64,
+}
+
+impl Cell {
+    fn difference(&self) -> f64 {
+        self.facets - self.spline
+    }
+
+    /// The square of the difference less what noise adds to it on average.
+    fn excess(&self) -> f64 {
+        self.difference().powi(2) - self.difference_variance
+    }
+}
+
+/// A square of cells, cut off at the sides of the grid.
+#[derive(Clone, Copy)]
+struct Block {
+    x: usize,
+    y: usize,
+    side: usize,
+}
+
+/// The cells of a receiver in two runs of the same rays.
+pub(super) struct CellPairs<'r> {
+    grid: [usize; 2],
+    cells: Vec<Cell>,
+    /// From quanta to the receiver's unit, cell by cell.
+    unit: Vec<f64>,
+    replicates: [Vec<&'r ReplicateSums>; 2],
+}
+
+impl<'r> CellPairs<'r> {
+    pub(super) fn new(bound: &BoundScene, runs: [&'r ReplicatedRun; 2], k: usize) -> Self {
+        let (receiver, result) = (&bound.receivers[k], &runs[1].results.receivers[k]);
+        let replicates = runs.map(|run| run.replicates.iter().filter_map(|r| r.get(k)).collect::<Vec<_>>());
+        let grid = result.grid;
+        let mut cells = vec![Cell::default(); grid[0] * grid[1]];
+        for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
+            add_replicate(&mut cells, facets, spline);
+        }
+        let n = replicates[1].len().max(2) as f64;
+        for c in &mut cells {
+            let variance = |squares: f64, sum: f64| (squares - sum * sum / n).max(0.0) * n / (n - 1.0);
+            c.difference_variance = variance(c.difference_variance, c.difference());
+            c.spline_variance = variance(c.spline_variance, c.spline);
+        }
+        // Lux and W/m² of cells in mm².
+        let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
+        let quantum = runs[1].results.quantum;
+        let unit = (0..cells.len()).map(|c| quantum * scale / receiver.measure(c % grid[0], c / grid[0])).collect();
+        Self { grid, cells, unit, replicates }
+    }
+
+    fn inside(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
+        let [nx, ny] = self.grid;
+        let rows = block.y..(block.y + block.side).min(ny);
+        rows.flat_map(move |y| (block.x..(block.x + block.side).min(nx)).map(move |x| y * nx + x))
+    }
+
+    /// The smallest power of two that covers the grid.
+    fn whole(&self) -> usize {
+        self.grid[0].max(self.grid[1]).next_power_of_two()
+    }
+
+    /// The square of this many cells a side that is brightest by `quanta`.
+    fn brightest(&self, side: usize, quanta: impl Fn(&Cell) -> f64) -> (Block, f64) {
+        let corners =
+            (0..self.grid[1]).step_by(side).flat_map(|y| (0..self.grid[0]).step_by(side).map(move |x| (x, y)));
+        let blocks = corners.map(|(x, y)| {
+            let block = Block { x, y, side };
+            (block, self.density(block, &quanta))
+        });
+        blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block { x: 0, y: 0, side }, 0.0))
+    }
+
+    /// Quanta over measure of a square, in the receiver's unit.
+    fn density(&self, block: Block, quanta: impl Fn(&Cell) -> f64) -> f64 {
+        let sum = |of: &dyn Fn(usize) -> f64| self.inside(block).map(of).sum::<f64>();
+        let measure = sum(&|c| 1.0 / self.unit[c]);
+        if measure > 0.0 { sum(&|c| quanta(&self.cells[c])) / measure } else { 0.0 }
+    }
+
+    /// The brightest place, over the smallest squares of cells that hold rays enough.
+    pub(super) fn peak(&self) -> Peak {
+        let rays = |block: Block| self.inside(block).map(|c| self.cells[c].spline).sum::<f64>() / QUANTA;
+        let mut side = 1;
+        let (mut block, mut spline) = self.brightest(side, |c| c.spline);
+        while rays(block) < PEAK_RAYS && side < self.whole() {
+            side *= 2;
+            (block, spline) = self.brightest(side, |c| c.spline);
+        }
+        let (on_facets, facets) = self.brightest(side, |c| c.facets);
+        let inverse = |block: Block| self.inside(block).map(|c| 1.0 / self.unit[c]).sum::<f64>();
+        let measures = [inverse(on_facets), inverse(block)];
+        let by_replicate = |run: usize, block: Block| {
+            let nx = self.grid[0];
+            let within = move |c: usize| {
+                let (x, y) = (c % nx, c / nx);
+                (block.x..block.x + block.side).contains(&x) && (block.y..block.y + block.side).contains(&y)
+            };
+            let sum = move |s: &&ReplicateSums| {
+                s.cells.iter().filter(|(c, _)| within(*c as usize)).map(|(_, q)| *q as f64).sum::<f64>()
+            };
+            self.replicates[run].iter().map(move |s| sum(s) / measures[run])
+        };
+        let noise = standard_error(by_replicate(0, on_facets).zip(by_replicate(1, block)).map(|(a, b)| a - b));
+        // Facets may blur what is finer than the square: counted where it is beyond what noise makes of it.
+        let unit = |c: usize| self.unit[c];
+        let count = self.inside(block).count().max(1) as f64;
+        let excess: f64 = self.inside(block).map(|c| self.cells[c].excess() * unit(c).powi(2)).sum();
+        let chance: f64 =
+            self.inside(block).map(|c| 2.0 * (self.cells[c].difference_variance * unit(c).powi(2)).powi(2)).sum();
+        let blurred = ((excess - 3.0 * chance.sqrt()).max(0.0) / count).sqrt();
+        let variance: f64 = self.inside(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
+        let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
+        Peak { density, cells: side, statistical: (variance / count).sqrt() }
+    }
+
+    /// All cells together.
+    pub(super) fn map(&self) -> MapError {
+        let sum = |of: &dyn Fn(&Cell) -> f64| self.cells.iter().map(of).sum::<f64>();
+        let norm = sum(&|c| c.spline * c.spline).sqrt().max(1.0);
+        MapError {
+            geometric: sum(&Cell::excess).max(0.0).sqrt() / norm,
+            noise: sum(&|c| 2.0 * c.difference_variance.powi(2)).powf(0.25) / norm,
+            statistical: sum(&|c| c.spline_variance).sqrt() / norm,
+        }
+    }
+
+    /// The geometric error of each cell, and how many cells a side were pooled at most.
+    pub(super) fn layer(&self) -> (Vec<f64>, usize) {
+        let mut layer = vec![0.0; self.cells.len()];
+        let mut pooled = 1;
+        let mut stack = vec![Block { x: 0, y: 0, side: self.whole() }];
+        while let Some(block) = stack.pop() {
+            let quanta = |of: fn(&Cell) -> f64| self.inside(block).map(|c| of(&self.cells[c])).sum::<f64>();
+            let rays = quanta(|c| c.facets).max(quanta(|c| c.spline)) / QUANTA;
+            if rays == 0.0 {
+                continue;
+            }
+            if rays > POOLED_RAYS && block.side > 1 {
+                let side = block.side / 2;
+                let quarters = [(0, 0), (side, 0), (0, side), (side, side)];
+                stack.extend(quarters.map(|(dx, dy)| Block { x: block.x + dx, y: block.y + dy, side }));
+                continue;
+            }
+            let count = self.inside(block).count().max(1) as f64;
+            pooled = pooled.max(block.side.min(self.grid[0].max(self.grid[1])));
+            let excess = quanta(Cell::excess) / count;
+            let mean = quanta(Cell::difference) / count;
+            let noise = quanta(|c| c.difference_variance) / (count * count);
+            let error = (excess.max(mean * mean) + noise).sqrt();
+            self.inside(block).for_each(|c| layer[c] = error * self.unit[c]);
+        }
+        (layer, pooled)
+    }
+}
+
+/// Adds one replicate of both runs to the sums of the cells.
+fn add_replicate(cells: &mut [Cell], facets: &ReplicateSums, spline: &ReplicateSums) {
+    let (mut a, mut b) = (facets.cells.iter().peekable(), spline.cells.iter().peekable());
+    loop {
+        let cell = match (a.peek(), b.peek()) {
+            (None, None) => break,
+            (Some((c, _)), None) | (None, Some((c, _))) => *c,
+            (Some((c, _)), Some((d, _))) => *c.min(d),
+        };
+        let f = a.next_if(|(c, _)| *c == cell).map_or(0.0, |(_, q)| *q as f64);
+        let s = b.next_if(|(c, _)| *c == cell).map_or(0.0, |(_, q)| *q as f64);
+        let sum = &mut cells[cell as usize];
+        sum.facets += f;
+        sum.spline += s;
+        sum.difference_variance += (f - s) * (f - s);
+        sum.spline_variance += s * s;
+    }
+}

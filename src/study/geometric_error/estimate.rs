@@ -1,0 +1,79 @@
+//! The difference that facets make to power, position and width of a receiver's light, with its standard error.
+//!
+//! Ratios of sums are taken to first order: the standard error of a mean position is that of what each replicate adds to it.
+
+use super::replicates::{ReplicateSums, ReplicatedRun};
+use super::{Paired, standard_error};
+
+/// A figure of one run, and what each replicate adds to it to first order.
+struct Influence {
+    value: f64,
+    by_replicate: Vec<f64>,
+}
+
+/// The sums of a receiver over all replicates of a run, along one axis.
+#[derive(Clone, Copy)]
+struct Means {
+    power: f64,
+    mean: f64,
+    square: f64,
+}
+
+fn sums<'r>(run: &'r ReplicatedRun, receiver: usize) -> impl Iterator<Item = &'r ReplicateSums> {
+    run.replicates.iter().filter_map(move |r| r.get(receiver))
+}
+
+impl Means {
+    fn new(run: &ReplicatedRun, receiver: usize, axis: usize) -> Self {
+        let power = sums(run, receiver).map(|s| s.power as f64).sum::<f64>().max(1.0);
+        let mean = sums(run, receiver).map(|s| s.first[axis]).sum::<f64>() / power;
+        let square = sums(run, receiver).map(|s| s.second[axis]).sum::<f64>() / power;
+        Self { power, mean, square }
+    }
+
+    /// Of the mean position, in half sides.
+    fn centroid(&self, run: &ReplicatedRun, receiver: usize, axis: usize) -> Influence {
+        let by_replicate = |s: &ReplicateSums| (s.first[axis] - self.mean * s.power as f64) / self.power;
+        Influence { value: self.mean, by_replicate: sums(run, receiver).map(by_replicate).collect() }
+    }
+
+    /// Of the root mean square distance from `about`, which is 0 for the receiver's centre, or the mean position.
+    fn spread(&self, run: &ReplicatedRun, receiver: usize, axis: usize, about: f64) -> Influence {
+        let value = (self.square - about * about).max(0.0).sqrt();
+        let by_replicate = |s: &ReplicateSums| {
+            let power = s.power as f64;
+            let change = (s.second[axis] - self.square * power) - 2.0 * about * (s.first[axis] - about * power);
+            if value > 0.0 { 0.5 * change / (self.power * value) } else { 0.0 }
+        };
+        Influence { value, by_replicate: sums(run, receiver).map(by_replicate).collect() }
+    }
+}
+
+fn paired(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
+    let difference = facets.by_replicate.iter().zip(&spline.by_replicate).map(|(a, b)| a - b);
+    Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * standard_error(difference) }
+}
+
+/// Power of a receiver.
+pub(super) fn power(runs: [&ReplicatedRun; 2], receiver: usize) -> Paired {
+    let [facets, spline] = runs.map(|run| &run.results.receivers[receiver]);
+    let quanta = |run: &ReplicatedRun| -> Vec<f64> { sums(run, receiver).map(|s| s.power as f64).collect() };
+    let [a, b] = runs.map(quanta);
+    let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum;
+    Paired { facets: facets.power, spline: spline.power, error }
+}
+
+/// Mean position, root mean square about the receiver's centre, and about the mean position, along an axis.
+pub(super) fn moments(runs: [&ReplicatedRun; 2], receiver: usize, axis: usize) -> [Paired; 3] {
+    let result = &runs[1].results.receivers[receiver];
+    let (half, middle) = (result.half[axis], result.middle[axis]);
+    let means = runs.map(|run| Means::new(run, receiver, axis));
+    let [facets, spline] = [0, 1].map(|i| means[i].centroid(runs[i], receiver, axis));
+    let centroid = paired(&facets, &spline, half);
+    let [facets, spline] = [0, 1].map(|i| means[i].spread(runs[i], receiver, axis, 0.0));
+    let rms = paired(&facets, &spline, half);
+    let [facets, spline] = [0, 1].map(|i| means[i].spread(runs[i], receiver, axis, means[i].mean));
+    let width = paired(&facets, &spline, half);
+    let shifted = Paired { facets: middle + centroid.facets, spline: middle + centroid.spline, ..centroid };
+    [shifted, rms, width]
+}

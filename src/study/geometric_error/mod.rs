@@ -1,0 +1,183 @@
+//! What facets change of every figure of a run: the same rays once more on facets and on the spline.
+//!
+//! Random numbers are keyed by ray and bounce, so both runs follow the same paths until the facets turn them away, and most of the
+//! noise cancels in the differences. Each difference comes with its own standard error, from replicate to replicate. Cells that
+//! too few rays reach are judged together with their neighbours, in squares of cells, and the size of the squares is told.
+//!
+//! Guarantee: the same scene, seed and rays give the same bits for any number of threads.
+//! Known weakness: what facets hide from every one of these rays is not seen; the standard error of a difference says how far
+//! rays of this number can tell.
+
+mod cells;
+mod estimate;
+mod replicates;
+
+pub use cells::MapError;
+
+pub(in crate::study) use replicates::{ReplicatedRun, trace_replicates};
+
+use crate::intersect::Intersector;
+use crate::simulate::{BoundScene, RunSettings};
+use serde::{Serialize, Serializer};
+
+/// A figure on facets and on the spline.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Paired {
+    /// On facets.
+    pub facets: f64,
+    /// On the spline.
+    pub spline: f64,
+    /// Standard error of the difference.
+    pub error: f64,
+}
+
+impl Paired {
+    /// What the facets change, with how well that is known: one standard error of the figure on facets.
+    pub fn geometric(&self) -> f64 {
+        (self.facets - self.spline).hypot(self.error)
+    }
+
+    /// Whether rays can tell the difference from none: it is beyond three of its standard errors.
+    pub fn is_significant(&self) -> bool {
+        (self.facets - self.spline).abs() > 3.0 * self.error
+    }
+}
+
+impl Serialize for Paired {
+    /// As `[facets, spline, error of the difference]`.
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        [self.facets, self.spline, self.error].serialize(s)
+    }
+}
+
+/// What facets change of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GeometricError {
+    /// Rays from the sources, traced on both.
+    pub rays: u64,
+    /// Share of the emitted power that was lost, on facets and on the spline.
+    pub lost: [f64; 2],
+    /// Nearest-hit queries a ray on the spline.
+    pub segments_per_ray: f64,
+    /// Seconds of tracing, on facets and on the spline.
+    pub seconds: [f64; 2],
+    /// Every receiver of the scene.
+    pub receivers: Vec<ReceiverError>,
+}
+
+/// What facets change of one receiver's light.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ReceiverError {
+    /// Its name.
+    pub name: String,
+    /// Unit of positions and widths: `mm`, or `deg` of far fields and spheres; empty where only power is counted.
+    pub unit: &'static str,
+    /// Power.
+    pub power: Paired,
+    /// Mean position along both axes.
+    pub centroid: [Paired; 2],
+    /// Root mean square distance from the receiver's centre along both axes.
+    pub rms: [Paired; 2],
+    /// The same from the mean position: the width of the light.
+    pub width: [Paired; 2],
+    /// The brightest place, in the receiver's unit, over [`Self::peak_cells`] × as many cells.
+    pub peak: Paired,
+    /// Cells a side that the brightest place was judged over.
+    pub peak_cells: usize,
+    /// All cells together.
+    pub map: MapError,
+    /// Most cells a side that one cell was judged with.
+    pub pooled_cells: usize,
+    /// Standard errors on the spline, from these rays alone.
+    pub statistical: Statistical,
+    /// Geometric error of each cell, in the receiver's unit.
+    #[serde(skip)]
+    pub cells: Vec<f64>,
+}
+
+/// Standard errors of the figures of one receiver.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Statistical {
+    /// Of power.
+    pub power: f64,
+    /// Of the mean positions.
+    pub centroid: [f64; 2],
+    /// Of the root mean squares.
+    pub rms: [f64; 2],
+    /// Of one cell at the brightest place.
+    pub peak: f64,
+    /// Of all cells: root of the sum of squares, as [`MapError::geometric`].
+    pub map: f64,
+}
+
+impl GeometricError {
+    /// Of facets that are the surface itself.
+    pub(in crate::study) fn none(bound: &BoundScene) -> Self {
+        let none = |name: &String| ReceiverError { name: name.clone(), ..ReceiverError::default() };
+        Self { receivers: bound.receivers.iter().map(|r| none(&r.name)).collect(), ..Self::default() }
+    }
+}
+
+/// Traces `settings.rays` rays on facets and on the spline.
+pub fn geometric_error(
+    bound: &BoundScene,
+    [facets, spline]: [&dyn Intersector; 2],
+    settings: &RunSettings,
+) -> GeometricError {
+    let facets = trace_replicates(bound, facets, settings);
+    let spline = trace_replicates(bound, spline, settings);
+    compare(bound, [&facets, &spline])
+}
+
+/// Compares two runs of the same rays.
+pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -> GeometricError {
+    let results = runs.map(|run| &run.results);
+    GeometricError {
+        rays: results[1].rays,
+        lost: results.map(|r| r.power.lost / r.power.emitted),
+        segments_per_ray: results[1].segments as f64 / results[1].rays.max(1) as f64,
+        seconds: results.map(|r| r.seconds.trace),
+        receivers: (0..results[1].receivers.len()).map(|k| receiver_error(bound, runs, k)).collect(),
+    }
+}
+
+fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> ReceiverError {
+    let result = &runs[1].results.receivers[k];
+    let power = estimate::power(runs, k);
+    let mut statistical = Statistical { power: result.power_error, ..Statistical::default() };
+    // Absorbed power is one number: it has neither places nor cells.
+    if result.kind == "absorbed" {
+        return ReceiverError { name: result.name.clone(), power, statistical, ..ReceiverError::default() };
+    }
+    let [first, second] = [0, 1].map(|axis| estimate::moments(runs, k, axis));
+    let cells = cells::CellPairs::new(bound, runs, k);
+    let peak = cells.peak();
+    let map = cells.map();
+    statistical.centroid = result.centroid_error;
+    statistical.rms = result.rms_error;
+    statistical.peak = peak.statistical;
+    statistical.map = map.statistical;
+    let (layer, pooled_cells) = cells.layer();
+    ReceiverError {
+        name: result.name.clone(),
+        unit: if result.kind == "plane" { "mm" } else { "deg" },
+        power,
+        centroid: [first[0], second[0]],
+        rms: [first[1], second[1]],
+        width: [first[2], second[2]],
+        peak: peak.density,
+        peak_cells: peak.cells,
+        map,
+        pooled_cells,
+        statistical,
+        cells: layer,
+    }
+}
+
+/// Standard error of a sum over replicates.
+fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
+    let parts: Vec<f64> = parts.collect();
+    let n = parts.len().max(2) as f64;
+    let mean = parts.iter().sum::<f64>() / n;
+    (parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>() * n / (n - 1.0)).sqrt()
+}
