@@ -84,11 +84,11 @@ impl Grid {
         column(&self.quantity, &self.unit)
     }
 
-    /// Both errors of the values under the names that every format gives them.
+    /// Both errors of the values under the names that every format gives them, where both are known.
     pub(super) fn error_layers(&self) -> impl Iterator<Item = (&'static str, &Vec<f64>)> {
-        [("statistical", &self.error), ("geometric", &self.geometric)]
-            .into_iter()
-            .filter_map(|(name, values)| Some((name, values.as_ref()?)))
+        let both = self.error.as_ref().zip(self.geometric.as_ref());
+        both.into_iter()
+            .flat_map(|(statistical, geometric)| [("statistical", statistical), ("geometric", geometric)])
     }
 
     /// Smallest and largest finite value; `None` without any.
@@ -108,7 +108,7 @@ impl Grid {
 }
 
 /// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error, the same of each
-/// layer, then both errors of the value as `statistical` and `geometric`, where they are known.
+/// layer, then both errors of the value as `statistical` and `geometric`, where both are known.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -143,7 +143,7 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
-/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, where they are known.
+/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, where both are known.
 ///
 /// # Errors
 /// When the file cannot be written.

@@ -188,7 +188,7 @@ fn an_ies_file_read_as_a_source_is_the_light_it_was_written_from() {
     }
 }
 
-/// A spot that the facets widen is said to be so where people look; with exact normals there is nothing to say.
+/// A spot that the facets widen is said to be so where people look; on the spline there is nothing to say.
 #[test]
 fn a_trace_says_where_its_facets_show() {
     let folder = tempfile::tempdir().unwrap();
@@ -198,16 +198,48 @@ fn a_trace_says_where_its_facets_show() {
         let (code, _, err) = lampyris_in(folder.path(), &arguments);
         assert_eq!(code, 0, "{err}");
         let text = std::fs::read_to_string(folder.path().join("out/results.json")).unwrap();
-        let said = err.split_whitespace().collect::<Vec<_>>().join(" ").contains("The facets show in the light");
+        let said = err.split_whitespace().collect::<Vec<_>>().join(" ").contains("The facets limit this answer");
         (said, serde_json::from_str::<Value>(&text).unwrap())
     };
     let (said, flat) = trace(&["--normals", "flat"]);
     let width = &flat["faceting"]["receivers"][0]["width"][1];
     assert!(said && width[0].as_f64() > width[1].as_f64(), "{width}");
-    let (said, fine) = trace(&["--tolerance", "0.001"]);
-    assert!(!said && fine["faceting"]["rays"] == 16_384, "{}", fine["faceting"]);
-    let (said, exact) = trace(&["--normals", "exact"]);
+    let rms = &flat["receivers"][0]["figures"]["rms_1"];
+    assert!(rms["limited_by"] == "geometry" && rms["geometric"].as_f64() > rms["statistical"].as_f64(), "{rms}");
+    assert!(flat.get("chosen").is_none(), "normals were asked for");
+    let (said, exact) = trace(&["--intersector", "exact"]);
     assert!(!said && exact.get("faceting").is_none());
+    assert_eq!(exact["receivers"][0]["figures"]["rms_1"]["geometric"], 0.0);
+    // Neither tolerance nor normals nor intersector: the spot of this lens is far too sharp for facets of 0.05 mm.
+    let (said, default) = trace(&[]);
+    assert!(!said && default["chosen"]["intersector"] == "exact", "{}", default["chosen"]);
+    assert_eq!(default["digest"], exact["digest"]);
+}
+
+/// The brightest direction comes with an error that holds the facets' part, and every map with both layers.
+#[test]
+fn figures_and_maps_carry_both_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = fixture("scenes/demo.toml").display().to_string();
+    let arguments = ["trace", &scene, "-o", "out", "--rays", "20000", "--tolerance", "0.05..0.2"];
+    let (code, _, err) = lampyris_in(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let err = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(err.contains("from the facets) cd") || err.contains("from the facets)"), "{err}");
+    let text = std::fs::read_to_string(folder.path().join("out/results.json")).unwrap();
+    let document: Value = serde_json::from_str(&text).unwrap();
+    for receiver in document["receivers"].as_array().unwrap() {
+        for name in ["power", "max", "rms_1", "rms_2", "centroid_1", "centroid_2"] {
+            let figure = &receiver["figures"][name];
+            for key in ["value", "statistical", "geometric"] {
+                assert!(figure[key].is_number(), "{name} {key}: {figure}");
+            }
+            assert!(figure["unit"].is_string() && figure["limited_by"].is_string(), "{figure}");
+        }
+        let file = receiver["files"][0].as_str().unwrap();
+        let csv = std::fs::read_to_string(folder.path().join("out").join(file)).unwrap();
+        assert!(csv.lines().next().unwrap().ends_with("statistical,geometric"), "{file}");
+    }
 }
 
 /// Without a model there are ray paths to look at all the same, and no empty arrays, which glTF forbids.

@@ -18,6 +18,7 @@ fn grid() -> Grid {
         axes: [axis("H", [-3.0, 3.0], 3), axis("V", [0.0, 1.0], 2)],
         values: vec![0.0, 1.0 / 3.0, 2.0, 3.0, 4.0, 5e-324],
         error: Some(vec![0.5; 6]),
+        geometric: None,
         layers: vec![],
     }
 }

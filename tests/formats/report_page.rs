@@ -49,6 +49,7 @@ fn sample(n: u32) -> Report {
         axes: [axis("H"), axis("V")],
         values: (0..900).map(|k| 1200.0 * bump(k)).collect(),
         error: None,
+        geometric: None,
         layers: Vec::new(),
     };
     let line = |name: &str, style, power: i32| Series {

@@ -158,7 +158,9 @@ fn views(prepared: &PreparedScene, facets: &Facets) -> Vec<View> {
     let sag = View::of_values("sag", title, facets, "proved distance (mm)", &mesh.sag, ColourMap::Viridis);
     let sag = sag
         .caption("No point of a facet is farther from the true surface than its colour says; grey is not proved.");
-    let octree = (prepared.choice.intersector == IntersectorKind::Octree).then(|| {
+    // A run on the spline is cross-checked on the octree.
+    let on_octree = matches!(prepared.choice.intersector, IntersectorKind::Octree | IntersectorKind::Exact);
+    let octree = on_octree.then(|| {
         octree_shape::octree_view(&octree_shape::OctreeShape::new(&Octree::build(mesh, &Default::default())))
     });
     std::iter::once(sag).chain(octree).collect()

@@ -19,7 +19,7 @@ struct Means {
     square: f64,
 }
 
-fn sums<'r>(run: &'r ReplicatedRun, receiver: usize) -> impl Iterator<Item = &'r ReplicateSums> {
+fn sums(run: &ReplicatedRun, receiver: usize) -> impl Iterator<Item = &ReplicateSums> {
     run.replicates.iter().filter_map(move |r| r.get(receiver))
 }
 
