@@ -2,9 +2,12 @@
 
 mod accuracy;
 mod asks;
+mod axial;
 mod check;
+mod default_figures;
 #[path = "../support/files.rs"]
 mod files;
+mod known_scenes;
 mod models;
 mod stability;
 mod support;

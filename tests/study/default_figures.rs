@@ -1,0 +1,204 @@
+//! The default answer: figures against closed forms and against the spline with other random numbers, within three times the error
+//! that is printed with them.
+//!
+//! The long comparison over random scenes: `cargo test --release --test study default_figures -- --ignored --nocapture`.
+
+use crate::known_scenes::{self, KnownScene};
+use lampyris::intersect::NormalMode;
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::kernel::{Conic, Lens};
+use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
+use lampyris::study::default_accuracy::{Chosen, Undecided, choose};
+use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
+use lampyris::study::geometric_error::geometric_error;
+use lampyris::study::{MeshSource, ModelMeshSource, Random};
+use lampyris::tessellate::{self, tessellate};
+use std::path::Path;
+
+/// What a run without any option answers.
+struct Answer {
+    chosen: Chosen,
+    results: Results,
+    figures: Vec<ReceiverFigures>,
+}
+
+fn bind(known: &KnownScene) -> (BoundScene, RunSettings) {
+    let scene =
+        Scene::parse(&known.text, "known.toml", Path::new(".")).unwrap_or_else(|e| panic!("{}: {e}", known.name));
+    let settings = RunSettings { threads: 2, ..RunSettings::from(&scene.run) };
+    (scene.bind(&known.model).unwrap_or_else(|e| panic!("{}: {e}", known.name)), settings)
+}
+
+fn default_answer(known: &KnownScene, rays: u64, threads: usize) -> Answer {
+    let (bound, settings) = bind(known);
+    let run = RunSettings { rays, threads, ..settings };
+    let mesher = tessellate::Settings::default();
+    let facets = tessellate(&known.model, &mesher).mesh;
+    let source = ModelMeshSource::new(&known.model);
+    let undecided = Undecided {
+        model: &known.model,
+        bound: &bound,
+        run: &run,
+        source: &source,
+        facets: &facets,
+        tolerance: mesher.tolerance,
+    };
+    let (chosen, finer) = choose(&undecided);
+    let results = if chosen.intersector == "exact" {
+        simulate(&bound, source.exact(), &run, &|_| true)
+    } else {
+        let mesh = finer.map_or(facets, |f| f.mesh);
+        let octree =
+            Octree::build(&mesh, &octree::Settings { normals: NormalMode::Bilinear, ..Default::default() });
+        simulate(&bound, &octree, &run, &|_| true)
+    };
+    let surface = chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
+    let figures = figures(&results, surface, "W");
+    Answer { chosen, results, figures }
+}
+
+fn named<'f>(figures: &'f ReceiverFigures, name: &str) -> &'f Figure {
+    figures.named().find(|(n, _)| *n == name).unwrap_or_else(|| panic!("no figure {name}")).1
+}
+
+/// The figures of a scene that lie farther from the truth than three times their error.
+fn misses(known: &KnownScene, answer: &Answer) -> Vec<String> {
+    let mut missed = Vec::new();
+    for &(name, truth) in &known.figures {
+        let figure = named(&answer.figures[0], name);
+        // Places are counted in steps: the finest width that is told from none is 1.6e-5 of the half side.
+        let steps = if matches!(name, "power" | "max") { 1e-9 * truth.abs() } else { 2e-5 * known.half };
+        if (figure.value - truth).abs() > 3.0 * figure.combined() + steps {
+            missed.push(format!("{}: {name} {} ± {}, truly {truth}", known.name, figure.value, figure.combined()));
+        }
+    }
+    missed
+}
+
+#[test]
+fn the_default_answer_is_right_on_scenes_known_in_closed_form() {
+    let scenes = known_scenes::all();
+    let count: usize = scenes.iter().map(|s| s.figures.len()).sum();
+    let mut missed = Vec::new();
+    for known in &scenes {
+        let answer = default_answer(known, 40_000, 2);
+        let of_scene = misses(known, &answer);
+        println!("{:<36} {:<7} {:?}", known.name, answer.chosen.intersector, of_scene);
+        missed.extend(of_scene);
+    }
+    assert!(count >= 60 && missed.len() as f64 <= 0.02 * count as f64, "{} of {count}: {missed:#?}", missed.len());
+}
+
+/// A paraboloid with an LED of 1 mm: facets of 0.05 to 0.2 mm blur what it throws by a fifth, and say so.
+#[test]
+fn facets_that_blur_a_lamp_say_by_how_much() {
+    let known = known_scenes::parabolic_lamp(25.0, 1.0);
+    let truth = known.figures[0].1;
+    let (bound, settings) = bind(&known);
+    let source = ModelMeshSource::new(&known.model);
+    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let run = RunSettings { rays: 100_000, ..settings };
+    let results = simulate(&bound, &octree, &run, &|_| true);
+    let few = RunSettings { rays: 16_384, replicates: 64, ..run };
+    let error = geometric_error(&bound, [&octree, source.exact()], &few);
+    let all = figures(&results, Surface::Facets(&error), "lm");
+    let max = named(&all[0], "max");
+    let off = (max.value - truth).abs();
+    assert!(off > 3.0 * max.statistical, "the facets of this test are too good: {max:?}");
+    assert!(off < 3.0 * max.combined() && max.limited_by == Limit::Geometry, "{max:?}, truly {truth}");
+    // A run that asks for nothing is not traced on them.
+    let answer = default_answer(&known, 100_000, 2);
+    let max = named(&answer.figures[0], "max");
+    assert!((max.value - truth).abs() < 3.0 * max.combined(), "{max:?}, truly {truth}");
+    assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
+}
+
+/// The choice and the light are the same for any number of threads and shards.
+#[test]
+fn the_choice_does_not_depend_on_threads() {
+    for known in [known_scenes::freeform(0.008, 0.004), known_scenes::plate()] {
+        let [one, three] = [1, 3].map(|threads| default_answer(&known, 40_000, threads));
+        let bare = |c: &Chosen| (c.intersector, c.tolerance_mm, c.because.clone(), c.pilot_rays);
+        assert_eq!(bare(&one.chosen), bare(&three.chosen));
+        assert_eq!(one.results.digest, three.results.digest);
+        assert_eq!(one.chosen.geometric.map(|g| g.receivers), three.chosen.geometric.map(|g| g.receivers));
+    }
+}
+
+/// Faces that are polygons are traced on facets, which cost less and are the faces themselves.
+#[test]
+fn flat_faces_need_no_spline() {
+    let answer = default_answer(&known_scenes::plate(), 40_000, 2);
+    assert_eq!((answer.chosen.intersector, answer.chosen.pilot_rays), ("octree", 0));
+    assert!(answer.figures[0].named().all(|(_, f)| f.geometric == Some(0.0)));
+}
+
+fn random_scene(index: u64) -> KnownScene {
+    let mut random = Random::new(17, index);
+    let scale = 0.5 * 10f64.powf(4.0 * random.unit());
+    let between = |random: &mut Random, a: f64, b: f64| a + (b - a) * random.unit();
+    match index % 6 {
+        0 => known_scenes::parabolic_lamp(scale, scale * between(&mut random, 0.01, 0.1)),
+        1 => {
+            let front =
+                Conic { radius: between(&mut random, 2.0, 6.0) * scale, conic: between(&mut random, -1.5, 0.0) };
+            let back = Conic::sphere(-between(&mut random, 4.0, 20.0) * scale);
+            let lens = Lens { front, back, thickness: 1.2 * scale, half_aperture: scale };
+            known_scenes::lens(
+                &format!("lens {index} of {scale:.3} mm"),
+                lens,
+                between(&mut random, 1.45, 1.7),
+                6.0 * scale,
+            )
+        }
+        2 => known_scenes::doublet(0.05 * scale),
+        3 => known_scenes::round_guide(
+            scale,
+            between(&mut random, 4.0, 20.0) * scale,
+            between(&mut random, 1.45, 1.7),
+        ),
+        4 => known_scenes::ball(scale, between(&mut random, 1.4, 1.9)),
+        _ => known_scenes::ellipsoid(0.02 * scale),
+    }
+}
+
+/// Every printed figure of sixty scenes of 0.5 mm to 5 m, by default and on facets of 0.05 to 0.2 mm that were asked for, against the
+/// spline with other random numbers.
+#[test]
+#[ignore = "minutes"]
+fn figures_of_random_scenes_are_those_of_the_spline_with_other_seeds() {
+    let (mut count, mut missed) = ([0, 0], [Vec::new(), Vec::new()]);
+    for index in 0..60 {
+        let known = random_scene(index);
+        let (bound, settings) = bind(&known);
+        let source = ModelMeshSource::new(&known.model);
+        let run = RunSettings { rays: 100_000, ..settings };
+        let other = simulate(&bound, source.exact(), &RunSettings { seed: 1000 + index, ..run.clone() }, &|_| true);
+        let truth = figures(&other, Surface::Spline, "W");
+        let answer = default_answer(&known, run.rays, 0);
+        let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+        let octree = Octree::build(&mesh, &octree::Settings::default());
+        let results = simulate(&bound, &octree, &run, &|_| true);
+        let few = RunSettings { rays: 16_384, replicates: 64, ..run.clone() };
+        let error = geometric_error(&bound, [&octree, source.exact()], &few);
+        let on_facets = figures(&results, Surface::Facets(&error), "W");
+        for (k, found) in [&answer.figures, &on_facets].into_iter().enumerate() {
+            for ((name, figure), (_, true_figure)) in found[0].named().zip(truth[0].named()) {
+                count[k] += 1;
+                let error = figure.combined().hypot(true_figure.combined());
+                let steps = if matches!(name, "power" | "max") { 1e-9 } else { 2e-5 * known.half };
+                if (figure.value - true_figure.value).abs() > 3.0 * error + steps {
+                    missed[k].push(format!(
+                        "{}: {name} {} for {} ± {error}",
+                        known.name, figure.value, true_figure.value
+                    ));
+                }
+            }
+        }
+    }
+    for (what, k) in [("default", 0), ("facets of 0.05..0.2 mm", 1)] {
+        println!("{what}: {} of {} figures beyond three errors: {:#?}", missed[k].len(), count[k], missed[k]);
+    }
+    assert!(missed[0].len() as f64 <= 0.01 * f64::from(count[0]), "{:#?}", missed[0]);
+}
