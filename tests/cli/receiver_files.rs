@@ -207,6 +207,7 @@ fn a_trace_says_where_its_facets_show() {
     let rms = &flat["receivers"][0]["figures"]["rms_1"];
     assert!(rms["limited_by"] == "geometry" && rms["geometric"].as_f64() > rms["statistical"].as_f64(), "{rms}");
     assert!(flat.get("chosen").is_none(), "normals were asked for");
+    assert_eq!(flat["check"]["octree_vs_bvh"]["disagree"], 0, "both carry the flat normals that were asked for");
     let (said, exact) = trace(&["--intersector", "exact"]);
     assert!(!said && exact.get("faceting").is_none());
     assert_eq!(exact["receivers"][0]["figures"]["rms_1"]["geometric"], 0.0);

@@ -6,13 +6,13 @@
 use crate::known_scenes::{self, KnownScene};
 use lampyris::intersect::NormalMode;
 use lampyris::intersect::octree::{self, Octree};
-use lampyris::kernel::{Conic, Lens};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::study::default_accuracy::{Chosen, Undecided, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
 use lampyris::study::geometric_error::geometric_error;
 use lampyris::study::{MeshSource, ModelMeshSource, Random};
 use lampyris::tessellate::{self, tessellate};
+use lampyris::truck::{Conic, Lens};
 use std::path::Path;
 
 /// What a run without any option answers.

@@ -1,11 +1,11 @@
 //! Scenes whose figures are known in closed form or by a computation that shares nothing with the program.
 
 use crate::axial::{Interface, Spot, spot, transmitted};
-use lampyris::kernel::{Conic, Lens, Reflector};
 use lampyris::math::{Frame, Homogeneous, Point, Vector};
 use lampyris::model::{Instance, Model, PartId};
 use lampyris::nurbs::{ControlPoint, Surface, sweep};
 use lampyris::study::sample_models;
+use lampyris::truck::{Conic, Lens, Reflector};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A scene with the figures of its one receiver, as far as they are known.
@@ -229,7 +229,7 @@ pub(crate) fn round_guide(radius: f64, length: f64, index: f64) -> KnownScene {
     let half = 20.0 * radius;
     let text = format!(
         "{}[[source]]\nkind = 'lambertian'\nat = [0, 0, {:?}]\nradius = {:?}\npower = 1\n\
-         [[receiver]]\nname = 'end'\nat = [0, 0, {:?}]\nsize = [{3:?}, {3:?}]\ncells = [20, 20]\n",
+         [[receiver]]\nname = 'end'\nat = [0, 0, {:?}]\nsize = [{4:?}, {4:?}]\ncells = [20, 20]\n",
         glass(index),
         -1e-3 * radius,
         0.2 * radius,

@@ -5,9 +5,9 @@ use super::ray_sampler::RaySampler;
 use super::scene_run::{PreparedScene, TraceRequest};
 use crate::cli::arguments::options::IntersectorKind;
 use crate::cli::console::Console;
-use crate::intersect::bvh::Bvh;
+use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
-use crate::intersect::octree::Octree;
+use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::simulate::{Results, RunSettings, Verification, replay, verify_pruning};
@@ -102,11 +102,13 @@ fn check_rays(
 ) -> CrossCheck {
     let (model, mesh) = (&prepared.job.loaded.model, &prepared.tessellation.mesh);
     let spinner = console.spinner("building BVH for the cross-check");
-    let bvh = Bvh::build(mesh, &Default::default());
+    // With the normals of the run: those of facets with others differ without a fault.
+    let normals = prepared.choice.normals.on_facets();
+    let bvh = Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() });
     // The check is about facets: a run on the spline, or polished to it, says nothing about the octree.
     let on_octree =
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
-    let built = (!on_octree).then(|| Octree::build(mesh, &Default::default()));
+    let built = (!on_octree).then(|| Octree::build(mesh, &octree::Settings { normals, ..Default::default() }));
     let octree = built.as_ref().map_or(intersector, |octree| octree as &dyn Intersector);
     spinner.finish_and_clear();
     let bar = console.progress_bar("checking", "rays", rays.len() as u64);
