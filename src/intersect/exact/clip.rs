@@ -5,27 +5,273 @@
 //! says so, solved by Newton when at most one root is left, and halved otherwise. Boxes that come down to rounding are
 //! reported as tangent or uncertified, never dropped.
 
-use super::geometry::project;
-use super::leaf::{Leaf, ROUND};
+use super::leaf::Leaf;
 use super::net::{self, Net, Slopes, V4, by_degree};
+use super::patch::project;
 use super::query::Query;
-use super::{Exact, wide};
+use super::structure::Exact;
+use super::tolerances::{CONTACT_LENGTH, INVERSE_ROUNDING, ROUND, SAME_PARAMETER, SINGULAR, TANGENT};
 use crate::intersect::Certainty;
+use crate::math::simd::{self, Instructions, Kernel};
 
-/// Contact closer than this is a matter of rounding, mm.
-pub(super) const TANGENT: f64 = 1e-9;
-/// Smallest box of parameters.
+/// Smallest box of parameters: below some hundred ulps halving says nothing.
 const FINEST: f64 = 1e-13;
+/// A leaf whose roots count no farther beyond its unit square than this is clipped over that alone: what lies beyond is within
+/// the margin of a root.
+const BEYOND_UNIT: f64 = 1e-9;
+/// Half ulps by which a coordinate across the ray is off, beside those of each de Casteljau step.
+const SHIFT_ROUNDING: f64 = 4.0;
+/// Rounding of the preconditioned hull, as a share of the box: about a thousand half ulps, for sums of four products of which
+/// the inverse magnifies each by no more than what [`SINGULAR`] lets pass and the margin takes into account.
+const HULL_ROUNDING: f64 = 1e-13;
+/// Row sums below this leave at most one root, and Newton's method a tenth of each error at worst; what lies above is halved.
+const UNIQUE: f64 = 0.9;
+/// How far beyond its box a root counts beside twice the margin: Newton's method ends within 1e-14.
+const ROOT_ROUNDING: f64 = 1e-12;
+/// Boxes of this size are a point to Newton's method; one that touches the ray over more than [`CONTACT_LENGTH`] contacts is
+/// a contact all the same.
+const POINT_BOX: f64 = 1e-7;
+/// A box of which the hull leaves less than this share is cut down, others are halved: Nishita, Sederberg and Kakimoto halve above
+/// 0.8, but a halving costs half of a cut.
+const WORTH_CUTTING: f64 = 0.6;
+/// The least part of a box that a cut leaves, so that it keeps an inside.
+const LEAST_CUT: f64 = 1e-15;
+/// A surface is regular where its normal is longer than this share of its longest derivative's square.
+const REGULAR: f64 = 1e-6;
+/// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
+const TANGENT_SINE: f64 = 1e-3;
+/// Newton steps in a box with one root at most.
+const STEPS: usize = 12;
+/// Newton's method ends at steps of this size, as a share of the box.
+const LAST_STEP: f64 = 1e-14;
+/// Steps below this that do not get shorter are rounding.
+const STALLED_STEP: f64 = 1e-8;
 
+/// A box of parameters with the net over it.
 struct Node {
     net: Net,
     rect: [[f64; 2]; 2],
     near: f64,
 }
 
+/// What is clipped.
+struct Clipping<'a> {
+    index: u32,
+    leaf: &'a Leaf,
+    /// Bound of the rounding of the two coordinates across the ray, in homogeneous units.
+    margin: [f64; 2],
+    /// The point that the ray leaves, in the leaf's parameters.
+    departure: Option<[f64; 2]>,
+}
+
+/// What a net's hull says of the ray.
+struct Hull {
+    near: f64,
+    far: f64,
+    /// Largest distance from the ray, mm.
+    across: f64,
+}
+
+/// The inverse of the middle Jacobian and what it bounds.
+struct Preconditioner {
+    inverse: [[f64; 2]; 2],
+    /// Largest row sum of its product with the radii of the derivative boxes.
+    deviation: f64,
+    /// Bound of what rounding moves a root, as a share of the box.
+    slack: [f64; 2],
+}
+
+/// A leaf to be clipped, for [`simd::dispatch`].
+struct LeafClipping<'a> {
+    exact: &'a Exact,
+    query: &'a mut Query,
+    leaf: u32,
+}
+
+impl Kernel for LeafClipping<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        self.exact.clip_leaf(self.query, self.leaf);
+    }
+}
+
+/// Looks for every root of the query on a leaf by clipping.
+#[cold]
+pub(super) fn clip(exact: &Exact, query: &mut Query, leaf: u32) {
+    simd::dispatch(LeafClipping { exact, query, leaf });
+}
+
+impl Exact {
+    /// Looks for every root of the query on a leaf.
+    #[inline(always)]
+    fn clip_leaf(&self, query: &mut Query, index: u32) {
+        query.clips += 1;
+        let leaf = &self.leaves[index as usize];
+        let degree = leaf.degree;
+        let oc = query.o - leaf.center;
+        let (mut net, size) = seen_along(query, leaf.net(&self.pool), oc);
+        let mut rect = [[0.0, 1.0]; 2];
+        for d in 0..2 {
+            let [lo, hi] = leaf.reach[d];
+            let (below, above) = (lo < -BEYOND_UNIT, hi > 1.0 + BEYOND_UNIT);
+            if below || above {
+                rect[d] = [if below { lo } else { 0.0 }, if above { hi } else { 1.0 }];
+                net::restrict(&mut net, degree, d, rect[d]);
+            }
+        }
+        // Halving errs by one rounding a degree and level relative to a net that shrinks with the level: twice the first.
+        let steps = SHIFT_ROUNDING + 2.0 * (degree[0] as f64 + degree[1] as f64);
+        let noise = self.noise(leaf, oc);
+        let margin = size.map(|s| noise + steps * ROUND * s);
+        let departure = query.departure.and_then(|own| own.local_to(leaf, &self.geometry));
+        let clipping = Clipping { index, leaf, margin, departure };
+        let near = range_along(&net).0;
+        let mut stack = vec![Node { net, rect, near }];
+        while let Some(node) = stack.pop() {
+            // Strict, so that a box that starts where the best root lies is not searched again.
+            if node.near >= query.t_max && query.best.is_some() {
+                continue;
+            }
+            if query.budget == 0 {
+                query.undecided_from = query.undecided_from.min(node.near);
+                continue;
+            }
+            query.budget -= 1;
+            self.clip_node(query, &clipping, node, &mut stack);
+        }
+    }
+
+    /// One step: drops a box, takes its root, or puts what is left of it on the stack.
+    #[inline(always)]
+    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: Node, stack: &mut Vec<Node>) {
+        let degree = clipping.leaf.degree;
+        let Some(hull) = hull(&node.net, clipping.margin) else { return };
+        if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
+            return;
+        }
+        // What the preconditioned hull leaves of the box, and its root where there is one at most.
+        let mut keep = [[0.0, 1.0]; 2];
+        let slopes = net::slopes(&node.net, degree);
+        if let Some(y) = precondition(&slopes, clipping.margin) {
+            keep = linear_hull(&node.net, degree, &y.inverse);
+            for k in 0..2 {
+                keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];
+                if keep[k][0] > 1.0 || keep[k][1] < 0.0 {
+                    return;
+                }
+                keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
+            }
+            if y.deviation < UNIQUE && self.take_single_root(query, clipping, &node, &y, keep) {
+                return;
+            }
+        }
+        let small = size(&node.rect).into_iter().fold(0.0, f64::max);
+        let touches =
+            hull.across < TANGENT && (hull.far - hull.near < CONTACT_LENGTH * TANGENT || small < POINT_BOX);
+        if touches || small < FINEST {
+            return self.take_contact(query, clipping, &node);
+        }
+        let kept = keep.map(|[a, b]| b - a);
+        if kept[0] < WORTH_CUTTING || kept[1] < WORTH_CUTTING {
+            stack.push(cut(node, degree, keep, hull.near));
+        } else {
+            halve(&node, degree, &slopes, stack);
+        }
+    }
+
+    /// Takes the root of a box with one at most, when Newton's method finds it there; whether it did.
+    #[inline(always)]
+    fn take_single_root(
+        &self,
+        query: &mut Query,
+        clipping: &Clipping<'_>,
+        node: &Node,
+        y: &Preconditioner,
+        keep: [[f64; 2]; 2],
+    ) -> bool {
+        let degree = clipping.leaf.degree;
+        let start = keep.map(|[a, b]| 0.5 * (a + b));
+        let Some([u, v]) = newton(&node.net, degree, start) else { return false };
+        let e = ROOT_ROUNDING + 2.0 * y.slack[0].max(y.slack[1]);
+        if [u, v].iter().any(|x| !(-e..=1.0 + e).contains(x)) {
+            return false;
+        }
+        let s = net::evaluate_inlined(&node.net, degree, u, v).s;
+        let t = s[2] / s[3];
+        let [[u0, u1], [v0, v1]] = node.rect;
+        let [size_u, size_v] = size(&node.rect);
+        let local = [u0 + size_u * u, v0 + size_v * v];
+        // An origin a little off its surface point moves the root by that much across the ray.
+        let moved =
+            query.departure.map_or(0.0, |own| own.off) * y.inverse.iter().flatten().map(|x| x.abs()).sum::<f64>();
+        let is_departure = |p: [f64; 2]| {
+            let close = (p[0] - local[0]).abs() <= size_u * (e + moved) + SAME_PARAMETER
+                && (p[1] - local[1]).abs() <= size_v * (e + moved) + SAME_PARAMETER;
+            close || p[0] >= u0 && p[0] <= u1 && p[1] >= v0 && p[1] <= v1
+        };
+        let leaving = clipping.departure.is_some_and(is_departure)
+            && query.departure.is_some_and(|own| own.is_unique_root(t));
+        if !leaving {
+            self.offer(query, clipping.index, local, t, Certainty::Certified);
+        }
+        true
+    }
+
+    /// Reports a box that touches the ray within rounding, unless it is the point that the ray leaves.
+    #[inline(always)]
+    fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) {
+        let s = net::evaluate_inlined(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
+        let [size_u, size_v] = size(&node.rect);
+        let local = [node.rect[0][0] + 0.5 * size_u, node.rect[1][0] + 0.5 * size_v];
+        let t = s[2] / s[3];
+        let reach = POINT_BOX + size_u.max(size_v);
+        let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
+            && query.departure.is_some_and(|own| own.is_unique_root(t.abs() - CONTACT_LENGTH * TANGENT));
+        if !leaving {
+            let certainty = self.contact(clipping.leaf, local, query);
+            self.offer(query, clipping.index, local, t, certainty);
+        }
+    }
+
+    /// Tangent where the surface is regular and the ray grazes it; uncertified at singular points.
+    fn contact(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
+        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
+        let (_, du, dv) = project(&jet);
+        let n = du.cross(dv);
+        let regular = n.length() > REGULAR * du.length().max(dv.length()).powi(2);
+        let sine = n.dot(query.d).abs() / n.length().max(f64::MIN_POSITIVE);
+        if regular && sine < TANGENT_SINE { Certainty::Tangent } else { Certainty::Uncertified }
+    }
+}
+
+/// A net in the ray's frame (across, across, along, weight), and the largest coordinates across.
+#[inline(always)]
+fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net, [f64; 2]) {
+    let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
+    let mut size = [0f64; 2];
+    let net = control
+        .iter()
+        .map(|p| {
+            let a = glam::DVec3::new(p[0], p[1], p[2]);
+            let x = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
+            size = [size[0].max(x[0].abs()), size[1].max(x[1].abs())];
+            x
+        })
+        .collect();
+    (net, size)
+}
+
+/// Lengths of a box's sides.
+#[inline(always)]
+fn size(rect: &[[f64; 2]; 2]) -> [f64; 2] {
+    rect.map(|[lo, hi]| hi - lo)
+}
+
 /// Range of t over a net; everything when a weight is not positive.
 #[inline(always)]
-fn along(net: &[V4]) -> (f64, f64) {
+fn range_along(net: &[V4]) -> (f64, f64) {
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
     for p in net {
         if p[3] <= 0.0 {
@@ -37,204 +283,86 @@ fn along(net: &[V4]) -> (f64, f64) {
     (lo, hi)
 }
 
-impl Exact {
-    /// Looks for every root of the query on a leaf.
-    #[inline(always)]
-    pub(super) fn clip_leaf(&self, q: &mut Query, index: u32) {
-        q.clips += 1;
-        let leaf = &self.leaves[index as usize];
-        let degree = leaf.degree;
-        let oc = q.o - leaf.center;
-        let (k1, k2, kd) = (q.n1.dot(oc), q.n2.dot(oc), q.d.dot(oc));
-        let mut size = [0f64; 2];
-        let mut root: Net = leaf
-            .net(&self.pool)
-            .iter()
-            .map(|p| {
-                let a = glam::DVec3::new(p[0], p[1], p[2]);
-                let x = [q.n1.dot(a) - k1 * p[3], q.n2.dot(a) - k2 * p[3], q.d.dot(a) - kd * p[3], p[3]];
-                size = [size[0].max(x[0].abs()), size[1].max(x[1].abs())];
-                x
-            })
-            .collect();
-        let mut rect = [[0.0, 1.0]; 2];
-        for d in 0..2 {
-            let [lo, hi] = leaf.reach[d];
-            if lo < -1e-9 || hi > 1.0 + 1e-9 {
-                rect[d] = [if lo < -1e-9 { lo } else { 0.0 }, if hi > 1.0 + 1e-9 { hi } else { 1.0 }];
-                net::restrict(&mut root, degree, d, rect[d]);
-            }
+/// What a net's hull says of the ray; `None` when it misses it.
+#[inline(always)]
+fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
+    let (mut lo, mut hi, mut least_weight) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], f64::INFINITY);
+    for p in net {
+        for k in 0..2 {
+            lo[k] = lo[k].min(p[k]);
+            hi[k] = hi[k].max(p[k]);
         }
-        // Halving errs by one rounding a degree and level relative to a net that shrinks with the level: twice the first.
-        let steps = 4.0 + 2.0 * (degree[0] as f64 + degree[1] as f64);
-        let noise = self.noise(leaf, oc);
-        let margin = size.map(|s| noise + steps * ROUND * s);
-        let own = q.own.and_then(|o| o.in_leaf(leaf, &self.geometry));
-        let near = along(&root).0;
-        let mut stack = vec![Node { net: root, rect, near }];
-        while let Some(node) = stack.pop() {
-            // Strict, so that a box that starts where the best root lies is not searched again.
-            if node.near >= q.t_max && q.best.is_some() {
-                continue;
-            }
-            if q.budget == 0 {
-                q.doubt = q.doubt.min(node.near);
-                continue;
-            }
-            q.budget -= 1;
-            self.clip_node(q, index, leaf, node, margin, own, &mut stack);
+        least_weight = least_weight.min(p[3]);
+    }
+    if (0..2).any(|k| lo[k] > margin[k] || hi[k] < -margin[k]) {
+        return None;
+    }
+    let (near, far) = range_along(net);
+    let largest = lo.iter().chain(&hi).fold(0f64, |a, x| a.max(x.abs()));
+    Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
+}
+
+/// The part of a node that the hull leaves.
+#[inline(always)]
+fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
+    let Node { mut net, mut rect, .. } = node;
+    for d in 0..2 {
+        let [low, high] = keep[d];
+        if high - low < 1.0 {
+            let range = [low, high.max(low + LEAST_CUT)];
+            net::restrict(&mut net, degree, d, range);
+            let [a, b] = rect[d];
+            rect[d] = [a + (b - a) * range[0], a + (b - a) * range[1]];
         }
     }
+    Node { net, rect, near }
+}
 
-    #[allow(clippy::too_many_arguments)]
-    #[inline(always)]
-    fn clip_node(
-        &self,
-        q: &mut Query,
-        index: u32,
-        leaf: &Leaf,
-        node: Node,
-        margin: [f64; 2],
-        own: Option<[f64; 2]>,
-        stack: &mut Vec<Node>,
-    ) {
-        let degree = leaf.degree;
-        let net = &node.net;
-        let (mut lo, mut hi, mut least) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], f64::INFINITY);
-        for p in net {
-            for k in 0..2 {
-                lo[k] = lo[k].min(p[k]);
-                hi[k] = hi[k].max(p[k]);
-            }
-            least = least.min(p[3]);
-        }
-        if (0..2).any(|k| lo[k] > margin[k] || hi[k] < -margin[k]) {
-            return;
-        }
-        let (near, far) = along(net);
-        if near > q.t_max || far < q.t_min - TANGENT {
-            return;
-        }
-        let [[u0, u1], [v0, v1]] = node.rect;
-        let (wide_u, wide_v) = (u1 - u0, v1 - v0);
-        let mut keep = [[0.0, 1.0]; 2];
-        let slopes = net::slopes(net, degree);
-        if let Some((y, rho)) = precondition(&slopes) {
-            let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + 1e-13);
-            keep = linear_hull(net, degree, &y);
-            for k in 0..2 {
-                keep[k] = [keep[k][0] - slack[k], keep[k][1] + slack[k]];
-                if keep[k][0] > 1.0 || keep[k][1] < 0.0 {
-                    return;
-                }
-                keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
-            }
-            if rho < 0.9 {
-                let start = [0, 1].map(|k: usize| 0.5 * (keep[k][0] + keep[k][1]));
-                if let Some([u, v]) = newton(net, degree, start) {
-                    let e = 1e-12 + 2.0 * slack[0].max(slack[1]);
-                    if [u, v].iter().all(|x| (-e..=1.0 + e).contains(x)) {
-                        let s = net::evaluate(net, degree, u, v).s;
-                        let t = s[2] / s[3];
-                        let local = [u0 + wide_u * u, v0 + wide_v * v];
-                        // An origin a little off its surface point moves the root by that much across the ray.
-                        let moved = q.own.map_or(0.0, |o| o.off) * y.iter().flatten().map(|x| x.abs()).sum::<f64>();
-                        let close = |p: [f64; 2]| {
-                            (p[0] - local[0]).abs() <= wide_u * (e + moved) + 1e-9
-                                && (p[1] - local[1]).abs() <= wide_v * (e + moved) + 1e-9
-                        };
-                        let inside = |p: [f64; 2]| p[0] >= u0 && p[0] <= u1 && p[1] >= v0 && p[1] <= v1;
-                        let leaving = own.is_some_and(|p| close(p) || inside(p))
-                            && q.own.is_some_and(|o| o.is_unique_root(t));
-                        if !leaving {
-                            self.offer(q, index, local, t, Certainty::Certified);
-                        }
-                        return;
-                    }
-                }
-            }
-        }
-        let across = lo.iter().chain(&hi).fold(0f64, |a, x| a.max(x.abs())) / least.max(f64::MIN_POSITIVE);
-        let small = wide_u.max(wide_v);
-        if (across < TANGENT && (far - near < 1e3 * TANGENT || small < 1e-7)) || small < FINEST {
-            let s = net::evaluate(net, degree, 0.5, 0.5).s;
-            let local = [u0 + 0.5 * wide_u, v0 + 0.5 * wide_v];
-            let reach = 1e-7 + small;
-            let leaving = own.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
-                && q.own.is_some_and(|o| o.is_unique_root((s[2] / s[3]).abs() - 1e3 * TANGENT));
-            if !leaving {
-                let certainty = self.contact(leaf, local, q);
-                self.offer(q, index, local, s[2] / s[3], certainty);
-            }
-            return;
-        }
-        let kept = keep.map(|[a, b]| b - a);
-        if kept[0] < 0.6 || kept[1] < 0.6 {
-            let mut net = node.net;
-            let mut rect = node.rect;
-            for d in 0..2 {
-                if kept[d] < 1.0 {
-                    let range = [keep[d][0], keep[d][1].max(keep[d][0] + 1e-15)];
-                    net::restrict(&mut net, degree, d, range);
-                    let [a, b] = rect[d];
-                    rect[d] = [a + (b - a) * range[0], a + (b - a) * range[1]];
-                }
-            }
-            stack.push(Node { net, rect, near });
-            return;
-        }
-        let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
-        let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
-        let direction = if (u_first && wide_u > FINEST) || wide_v <= FINEST { 0 } else { 1 };
-        let halves = net::halves(net, degree, direction);
-        let middle = 0.5 * (node.rect[direction][0] + node.rect[direction][1]);
-        let mut children = halves.map(|net| {
-            let near = along(&net).0;
-            Node { net, rect: node.rect, near }
-        });
-        children[0].rect[direction][1] = middle;
-        children[1].rect[direction][0] = middle;
-        let [a, b] = children;
-        if a.near <= b.near {
-            stack.extend([b, a]);
-        } else {
-            stack.extend([a, b]);
-        }
-    }
-
-    /// Tangent where the surface is regular and the ray grazes it; uncertified at singular points.
-    fn contact(&self, leaf: &Leaf, [u, v]: [f64; 2], q: &Query) -> Certainty {
-        let jet = wide::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
-        let (_, du, dv) = project(&jet);
-        let n = du.cross(dv);
-        let regular = n.length() > 1e-6 * du.length().max(dv.length()).powi(2);
-        let sine = n.dot(q.d).abs() / n.length().max(f64::MIN_POSITIVE);
-        if regular && sine < 1e-3 { Certainty::Tangent } else { Certainty::Uncertified }
+/// Puts the halves of a node on the stack, across its longer side, the nearer one on top.
+#[inline(always)]
+fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
+    let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
+    let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
+    let [size_u, size_v] = size(&node.rect);
+    let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };
+    let halves = net::halves(&node.net, degree, direction);
+    let middle = 0.5 * (node.rect[direction][0] + node.rect[direction][1]);
+    let mut children = halves.map(|net| {
+        let near = range_along(&net).0;
+        Node { net, rect: node.rect, near }
+    });
+    children[0].rect[direction][1] = middle;
+    children[1].rect[direction][0] = middle;
+    let [a, b] = children;
+    if a.near <= b.near {
+        stack.extend([b, a]);
+    } else {
+        stack.extend([a, b]);
     }
 }
 
-/// The inverse of the middle Jacobian, and the largest row sum of its product with the radii.
+/// The inverse of the middle Jacobian; `None` where its rounding is not bounded.
 #[inline(always)]
-fn precondition(s: &Slopes) -> Option<([[f64; 2]; 2], f64)> {
+fn precondition(s: &Slopes, margin: [f64; 2]) -> Option<Preconditioner> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
     let size = (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
-    // Below this the rounding of the inverse would reach 1e-6 in the test.
-    if !(det.abs() > 1e-8 * size) {
+    if !(det.abs() > SINGULAR * size) {
         return None;
     }
     let y = [[s.v[1] / det, -s.v[0] / det], [-s.u[1] / det, s.u[0] / det]];
     let row = |r: usize| y[r][0].abs() * (s.ru[0] + s.rv[0]) + y[r][1].abs() * (s.ru[1] + s.rv[1]);
-    Some((y, row(0).max(row(1)) + 1e-6))
+    let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + HULL_ROUNDING);
+    Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING, slack })
 }
 
 /// Ranges of u and v that can hold a root: where `u = u − g(u, v)` for the preconditioned net g.
 #[inline(always)]
 fn linear_hull(net: &[V4], degree: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    by_degree!(degree, linear_hull_in(net, y))
+    by_degree!(degree, linear_hull_of_degree(net, y))
 }
 
 #[inline(always)]
-fn linear_hull_in(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2]; 2] {
+fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2]; 2] {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     for i in 0..=p {
         for j in 0..=q {
@@ -249,18 +377,19 @@ fn linear_hull_in(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2
     range
 }
 
+/// The root near `start`, as a share of the box; `None` when it is not found near the box.
 #[inline(always)]
 fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
     let mut last = f64::INFINITY;
-    for _ in 0..12 {
-        let j = net::evaluate(net, degree, u, v);
+    for _ in 0..STEPS {
+        let j = net::evaluate_inlined(net, degree, u, v);
         let inv = 1.0 / (j.su[0] * j.sv[1] - j.sv[0] * j.su[1]);
         let du = (j.sv[1] * j.s[0] - j.sv[0] * j.s[1]) * inv;
         let dv = (j.su[0] * j.s[1] - j.su[1] * j.s[0]) * inv;
         u -= du;
         v -= dv;
         let step = du.abs().max(dv.abs());
-        if step < 1e-14 || (step < 1e-8 && step >= last) {
+        if step < LAST_STEP || (step < STALLED_STEP && step >= last) {
             return Some([u, v]);
         }
         last = step;

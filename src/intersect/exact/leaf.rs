@@ -4,17 +4,20 @@
 //! [`EXTENSION`], an axis-parallel and an oriented box. Patches are halved until the derivative boxes, preconditioned by the
 //! inverse of their middles, deviate from the identity by less than `Settings::flatness` when seen along the normal.
 
-use super::geometry::{Patch, PatchGrid};
 use super::net::{self, Net, Slopes, V4};
-use super::wide;
+use super::patch::{Patch, PatchGrid};
+use super::tolerances::{EXTENSION, NEWTON_STEP, PARALLEL, REACH, ROUND};
 use crate::math::{Aabb, Vector};
 
-/// How far beyond its domain a leaf's derivative boxes hold, in local parameters.
-pub(super) const EXTENSION: f64 = 0.1;
-/// Half an ulp of 1: the relative error of one rounded operation.
-pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
-/// Where roots count on a leaf without trims on its border.
-pub(super) const REACH: [[f64; 2]; 2] = [[-1e-12, 1.0 + 1e-12]; 2];
+/// Rounding operations of the extraction, and of the shift to the leaf's centre, that a control point has behind it beside its
+/// halvings.
+const EXTRACTIONS: f64 = 4.0;
+/// Half ulps of a leaf's place by which its rounded centre makes neighbours drift apart, far from the origin.
+const PLACED_ROUNDING: f64 = 8.0;
+/// Roots count beyond a trimmed border as far as this many bands: on grazed faces they stray by the inverse of the sine.
+const BANDS_BEYOND: f64 = 32.0;
+/// A Jacobian whose determinant is a smaller part of the product of its row sums says nothing of which halving helps.
+const UNTOLD: f64 = 1e-9;
 
 /// A piece of a patch.
 #[derive(Clone, Debug)]
@@ -55,7 +58,7 @@ impl Leaf {
 
     /// Local parameters of the patch at local parameters of the leaf.
     #[inline]
-    pub(super) fn in_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn to_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [u0 + (u1 - u0) * u, v0 + (v1 - v0) * v]
     }
@@ -65,7 +68,7 @@ impl Leaf {
     }
 
     /// Local parameters of the leaf at local parameters of the patch.
-    pub(super) fn of_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn from_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [(u - u0) / (u1 - u0), (v - v0) / (v1 - v0)]
     }
@@ -84,7 +87,7 @@ pub(super) struct Described {
 
 pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
-    let middle = wide::evaluate(piece, degree, 0.5, 0.5).s;
+    let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
     let center = patch.center + xyz(&middle) / middle[3];
     // The offset as the rounded centre has it, so that the net and the centre agree.
     let offset = center - patch.center;
@@ -108,9 +111,9 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
     let size = |net: &[V4]| net.iter().map(|p| at(p).abs().max_element()).fold(0.0, f64::max);
     let radius = size(&centred);
     // Each halving and the extraction before it err by at most one rounding a step and degree, relative to the patch.
-    let steps = (degree[0] as f64 + degree[1] as f64 + 4.0) * (depth as f64 + 4.0);
+    let steps = (degree[0] as f64 + degree[1] as f64 + EXTRACTIONS) * (depth as f64 + EXTRACTIONS);
     // The centre itself is rounded where it is placed: far from the origin neighbours drift apart by that much.
-    let placed = 8.0 * ROUND * center.abs().max_element();
+    let placed = PLACED_ROUNDING * ROUND * center.abs().max_element();
     let slop = steps * ROUND * (size(piece) + offset.abs().max_element() + radius) + placed;
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
     let (mut olo, mut ohi) = (lo, hi);
@@ -120,7 +123,7 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
         let along = Vector::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
         (olo, ohi) = (olo.min(along), ohi.max(along));
     }
-    let pad = slop + 8.0 * ROUND * (center.abs().max_element() + radius);
+    let pad = slop + PLACED_ROUNDING * ROUND * (center.abs().max_element() + radius);
     let leaf = Leaf {
         center,
         lo: center + lo - pad,
@@ -156,10 +159,9 @@ pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2])
 /// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
 /// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
 pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
-    // Roots on grazed faces stray beyond the band by the inverse of the sine.
-    let far = 32.0 * band;
+    let far = BANDS_BEYOND * band;
     for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
-        let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(1e-12, 0.5 * EXTENSION);
+        let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(NEWTON_STEP, 0.5 * EXTENSION);
         if border[d][0] {
             leaf.reach[d][0] = -beyond;
         }
@@ -179,7 +181,7 @@ fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
     let longer = if sv.length() > su.length() { sv } else { su };
     let x = longer.try_normalize().unwrap_or(Vector::X);
     let n = su.cross(sv);
-    let z = if n.length() > 1e-12 * su.length() * sv.length() { n.try_normalize() } else { None }
+    let z = if n.length() > PARALLEL * su.length() * sv.length() { n.try_normalize() } else { None }
         .unwrap_or_else(|| x.any_orthonormal_vector());
     [x, z.cross(x), z]
 }
@@ -203,7 +205,8 @@ pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
         return f64::INFINITY;
     }
     let r = |e: Vector| measure(&slopes.ru, e, leaf.radius) + measure(&slopes.rv, e, leaf.radius);
-    let (rx, ry) = (r(leaf.axes[0]), r(leaf.axes[1]));
+    let rx = r(leaf.axes[0]);
+    let ry = r(leaf.axes[1]);
     ((d.abs() * rx + b.abs() * ry) / det.abs()).max((c.abs() * rx + a.abs() * ry) / det.abs())
 }
 
@@ -212,7 +215,8 @@ pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> u
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;
     let (mut uu, mut uv, mut vv) = ([0f64; 4], [0f64; 4], [0f64; 4]);
-    let (fp, fq) = (p as f64, q as f64);
+    let fp = p as f64;
+    let fq = q as f64;
     for i in 0..=p {
         for j in 0..=q {
             let at = |a: usize, b: usize| &net[a * m + b];
@@ -235,9 +239,10 @@ pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> u
     let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
     let alternate = depth as usize % 2;
-    if !(det.abs() > 1e-9 * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
+    if !(det.abs() > UNTOLD * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
         let square = |x: &V4| x.iter().map(|c| c * c).sum::<f64>();
-        let (nu, nv) = (square(&uu), square(&vv));
+        let nu = square(&uu);
+        let nv = square(&vv);
         return if nu == nv { alternate } else { usize::from(nu < nv) };
     }
     let inverse = [[d / det, -b / det], [-c / det, a / det]];

@@ -3,6 +3,7 @@
 //! A net of degrees `[p, q]` is a slice of `(p + 1)(q + 1)` four-vectors, `net[i * (q + 1) + j]`, over `[0, 1]²`. The degrees that
 //! real files use most have kernels of fixed size; all others run through loops.
 
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::nurbs::MAX_DEGREE;
 use smallvec::SmallVec;
 
@@ -20,7 +21,7 @@ pub(super) struct Jet {
 }
 
 /// `a += k x`, each rounded once: the same bits with and without an instruction for it. Where there is none this is slow, so
-/// hot loops reach it through [`super::wide`].
+/// hot loops reach it through [`crate::math::simd`].
 #[inline(always)]
 pub(super) fn axpy(a: &mut V4, k: f64, x: &V4) {
     for c in 0..4 {
@@ -43,9 +44,32 @@ macro_rules! by_degree {
 }
 pub(super) use by_degree;
 
+/// A net to be evaluated at `(u, v)`.
+struct Evaluation<'a> {
+    net: &'a [V4],
+    degree: [u8; 2],
+    u: f64,
+    v: f64,
+}
+
+impl Kernel for Evaluation<'_> {
+    type Output = Jet;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> Jet {
+        evaluate_inlined(self.net, self.degree, self.u, self.v)
+    }
+}
+
 /// Value and derivatives of a net at `(u, v)`, which may lie outside `[0, 1]²`.
-#[inline(always)]
+#[inline]
 pub(super) fn evaluate(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
+    simd::dispatch(Evaluation { net, degree, u, v })
+}
+
+/// As [`evaluate`], for hot loops that are dispatched as a whole.
+#[inline(always)]
+pub(super) fn evaluate_inlined(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
     match degree {
         [1, 1] => fixed::<2, 2>(net, u, v),
         [2, 2] => fixed::<3, 3>(net, u, v),
@@ -85,34 +109,30 @@ fn bernstein_fixed<const N: usize>(t: f64) -> ([f64; N], [f64; N]) {
 
 #[inline(always)]
 fn fixed<const N: usize, const M: usize>(net: &[V4], u: f64, v: f64) -> Jet {
-    let net = &net[..N * M];
-    let (bu, du) = bernstein_fixed::<N>(u);
-    let (bv, dv) = bernstein_fixed::<M>(v);
-    let mut jet = Jet { s: [0.0; 4], su: [0.0; 4], sv: [0.0; 4] };
-    for i in 0..N {
-        let (mut row, mut row_v) = ([0.0; 4], [0.0; 4]);
-        for j in 0..M {
-            axpy(&mut row, bv[j], &net[i * M + j]);
-            axpy(&mut row_v, dv[j], &net[i * M + j]);
-        }
-        axpy(&mut jet.s, bu[i], &row);
-        axpy(&mut jet.su, du[i], &row);
-        axpy(&mut jet.sv, bu[i], &row_v);
-    }
-    jet
+    tensor_product(&net[..N * M], bernstein_fixed::<N>(u), bernstein_fixed::<M>(v), [N, M])
 }
 
 #[inline(always)]
 fn any_degree(net: &[V4], [p, q]: [u8; 2], u: f64, v: f64) -> Jet {
-    let (p, q) = (p as usize, q as usize);
-    let (bu, du) = bernstein(p, u);
-    let (bv, dv) = bernstein(q, v);
+    let [p, q] = [p, q].map(usize::from);
+    tensor_product(net, bernstein(p, u), bernstein(q, v), [p + 1, q + 1])
+}
+
+/// Value and derivatives from Bernstein values and derivatives in u and v, each with as many entries as `counts` says.
+#[inline(always)]
+fn tensor_product<const N: usize, const M: usize>(
+    net: &[V4],
+    (bu, du): ([f64; N], [f64; N]),
+    (bv, dv): ([f64; M], [f64; M]),
+    counts: [usize; 2],
+) -> Jet {
     let mut jet = Jet { s: [0.0; 4], su: [0.0; 4], sv: [0.0; 4] };
-    for i in 0..=p {
+    for i in 0..counts[0] {
         let (mut row, mut row_v) = ([0.0; 4], [0.0; 4]);
-        for j in 0..=q {
-            axpy(&mut row, bv[j], &net[i * (q + 1) + j]);
-            axpy(&mut row_v, dv[j], &net[i * (q + 1) + j]);
+        for j in 0..counts[1] {
+            let point = &net[i * counts[1] + j];
+            axpy(&mut row, bv[j], point);
+            axpy(&mut row_v, dv[j], point);
         }
         axpy(&mut jet.s, bu[i], &row);
         axpy(&mut jet.su, du[i], &row);
@@ -146,7 +166,7 @@ fn bernstein(n: usize, t: f64) -> ([f64; MAX_DEGREE + 1], [f64; MAX_DEGREE + 1])
 
 /// Index of control point `k` of the line `line` that runs in `direction`.
 #[inline(always)]
-fn at(direction: usize, q: usize, k: usize, line: usize) -> usize {
+fn point_index(direction: usize, q: usize, k: usize, line: usize) -> usize {
     if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k }
 }
 
@@ -179,9 +199,9 @@ fn halve(low: &mut [V4], high: &mut [V4], [n, lines, direction]: [usize; 3]) {
     for line in 0..=lines {
         // The high net is halved in place: after round r its first n − r points have moved.
         for r in 0..=n {
-            low[at(direction, q, r, line)] = high[at(direction, q, 0, line)];
+            low[point_index(direction, q, r, line)] = high[point_index(direction, q, 0, line)];
             for k in 0..n - r {
-                let (i, j) = (at(direction, q, k, line), at(direction, q, k + 1, line));
+                let (i, j) = (point_index(direction, q, k, line), point_index(direction, q, k + 1, line));
                 for c in 0..4 {
                     high[i][c] = 0.5 * (high[i][c] + high[j][c]);
                 }
@@ -218,16 +238,16 @@ fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f6
         if b != 1.0 {
             for r in 1..=n {
                 for k in (r..=n).rev() {
-                    let i = at(direction, q, k, line);
-                    net[i] = lerp(net[at(direction, q, k - 1, line)], net[i], b);
+                    let i = point_index(direction, q, k, line);
+                    net[i] = lerp(net[point_index(direction, q, k - 1, line)], net[i], b);
                 }
             }
         }
         if a != 0.0 {
             for r in 1..=n {
                 for k in 0..=n - r {
-                    let i = at(direction, q, k, line);
-                    net[i] = lerp(net[i], net[at(direction, q, k + 1, line)], a / b);
+                    let i = point_index(direction, q, k, line);
+                    net[i] = lerp(net[i], net[point_index(direction, q, k + 1, line)], a / b);
                 }
             }
         }
@@ -283,10 +303,10 @@ fn slopes_in(net: &[V4], p: usize, q: usize) -> Slopes {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
 
-    pub(in super::super) fn sample(p: usize, q: usize) -> Net {
+    fn sample(p: usize, q: usize) -> Net {
         (0..(p + 1) * (q + 1))
             .map(|k| {
                 let x = k as f64;
@@ -296,12 +316,27 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        for (p, q) in [(1, 1), (2, 2), (3, 3), (2, 3), (5, 4), (13, 6)] {
+            let control = sample(p, q);
+            for k in 0..50 {
+                let (u, v) = (k as f64 / 49.0, (k * 17 % 50) as f64 / 49.0);
+                let degree = [p as u8, q as u8];
+                let a = evaluate(&control, degree, u, v);
+                let b = evaluate_inlined(&control, degree, u, v);
+                assert_eq!((a.s, a.su, a.sv), (b.s, b.su, b.sv), "degree {p} {q}");
+            }
+        }
+    }
+
+    #[test]
     fn fixed_kernels_halves_and_restrictions_agree_with_loops() {
         for (p, q) in [(1, 1), (2, 1), (3, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 2), (3, 3), (5, 7), (13, 2)] {
             let (net, degree) = (sample(p, q), [p as u8, q as u8]);
             let close = |a: V4, b: V4| (0..4).all(|c| (a[c] - b[c]).abs() < 1e-11);
             let (u, v) = (0.37, 0.81);
-            let (f, g) = (evaluate(&net, degree, u, v), any_degree(&net, degree, u, v));
+            let f = evaluate(&net, degree, u, v);
+            let g = any_degree(&net, degree, u, v);
             assert!(close(f.s, g.s) && close(f.su, g.su) && close(f.sv, g.sv), "{p} {q}");
             for direction in 0..2 {
                 let [low, high] = halves(&net, degree, direction);

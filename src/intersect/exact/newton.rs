@@ -1,9 +1,16 @@
 //! Newton's method from a seed on one face: the last step of polishing, and by itself the plain iterative tracer.
 
-use super::Exact;
-use super::geometry::{self, project};
+use super::patch::{self, project};
+use super::structure::Exact;
+use super::tolerances::TANGENT;
 use super::trim::Region;
 use crate::math::{FaceId, Ray, Uv, Vector, orthonormal_pair};
+
+/// After a step this short, as a share of a patch, the next error is its square, below rounding. The normal stays that of the place
+/// before the step: with 1e-8 it was 2e-8 off on a ball.
+const LAST_STEP: f64 = 3e-10;
+/// Ulps of the largest coordinate that a point's place across the ray is off.
+const ROUNDING: f64 = 8.0;
 
 /// A point of a face on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,24 +54,23 @@ impl Exact {
             let off = p - oc;
             let (f1, f2) = (n1.dot(off), n2.dot(off));
             let across = f1.hypot(f2);
-            let rounding = 8.0 * f64::EPSILON * (oc.abs().max_element() + p.abs().max_element());
+            let rounding = ROUNDING * f64::EPSILON * (oc.abs().max_element() + p.abs().max_element());
             let (a, b, c, d) = (n1.dot(du), n1.dot(dv), n2.dot(du), n2.dot(dv));
             let inv = 1.0 / (a * d - b * c);
             let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
             let next = patch.uv([local[0] - xu, local[1] - xv]);
             let fits = |d: usize| next[d] >= bounds[d][0] && next[d] <= bounds[d][1];
-            // After a step of 3e-10 the next error is its square, below rounding: the point is moved along, and one evaluation
-            // of about four saved. The normal stays that of the place before the step: with 1e-8 it was 2e-8 off on a ball.
-            let moves = xu.abs().max(xv.abs()) < 3e-10 && fits(0) && fits(1);
+            // The point is moved along, and one evaluation of about four saved.
+            let moves = xu.abs().max(xv.abs()) < LAST_STEP && fits(0) && fits(1);
             // At borders and where steps mean little the distance decides: stop when steps no longer help.
-            let settled = across <= rounding || (across < 1e-9 && across >= 0.5 * last);
+            let settled = across <= rounding || (across < TANGENT && across >= 0.5 * last);
             if moves || settled || step == steps {
                 let (uv, off) = if moves { (next, off - du * xu - dv * xv) } else { (uv, off) };
                 let residual = n1.dot(off).hypot(n2.dot(off));
-                if residual > 1e-9 + rounding {
+                if residual > TANGENT + rounding {
                     return None;
                 }
-                let normal = record.sign * geometry::normal(&patch.net, patch.degree, local, &jet, patch.rounding);
+                let normal = record.sign * patch::normal(&patch.net, patch.degree, local, &jet, patch.rounding);
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
                 let inside = match trim.cell_at(uv) {
@@ -122,6 +128,6 @@ impl Exact {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
         let local = patch.local(uv);
-        Some(record.sign * geometry::normal(&patch.net, patch.degree, local, &patch.jet(local), patch.rounding))
+        Some(record.sign * patch::normal(&patch.net, patch.degree, local, &patch.jet(local), patch.rounding))
     }
 }

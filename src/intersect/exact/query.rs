@@ -1,11 +1,23 @@
 //! One ray under way: its frame, what it left, the roots it has met.
 
-use super::geometry::{Geometry, project};
+use super::geometry::Geometry;
 use super::leaf::Leaf;
-use super::slabs::Slabs;
+use super::patch::project;
+use super::slabs::RaySlabs;
+use super::tolerances::{SAME_PARAMETER, TANGENT};
 use super::tree::Tree;
 use crate::intersect::Certainty;
 use crate::math::{Ray, Uv, Vector, orthonormal_pair};
+
+/// Ulps of its largest coordinate by which a ray's origin may miss the point it leaves: it is a rounded `origin + t·direction`
+/// of a ray that may have come sixty times as far as the origin lies from zero.
+const ORIGIN_ROUNDING: f64 = 64.0;
+/// A ray whose origin is off its surface point meets its own root within this many times that distance, unless it leaves at a
+/// sine below a sixteenth.
+const NEAR_DEPARTURE: f64 = 16.0;
+/// Share of a surface's domain within which parameters lie on its border, where seams and poles make one point of several: a
+/// micrometre on a metre.
+const BORDER: f64 = 1e-6;
 
 /// A point of the spline on the ray.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +33,7 @@ pub(super) struct Root {
 
 /// The surface point that the ray leaves.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Own {
+pub(super) struct DeparturePoint {
     pub(super) face: u32,
     patch: u32,
     uv: Uv,
@@ -33,27 +45,33 @@ pub(super) struct Own {
 
 /// A ray with everything that each leaf needs of it.
 pub(super) struct Query {
+    /// Origin.
     pub(super) o: Vector,
+    /// Direction.
     pub(super) d: Vector,
+    /// Two directions across the ray, which complete a frame with `d`.
     pub(super) n1: Vector,
     pub(super) n2: Vector,
     /// What the hierarchy needs of it.
-    pub(super) slabs: Slabs,
+    pub(super) slabs: RaySlabs,
     pub(super) t_min: f64,
     /// Roots beyond are of no interest; shrinks with each root found in a search for the first.
     pub(super) t_max: f64,
     /// The ray's own largest t.
     pub(super) limit: f64,
-    pub(super) own: Option<Own>,
+    /// The point that the ray leaves.
+    pub(super) departure: Option<DeparturePoint>,
     pub(super) best: Option<Root>,
+    /// Whether every root is looked for, not the first alone.
+    pub(super) collects_all: bool,
     /// Every root, in a search for all.
-    pub(super) all: Option<Vec<Root>>,
+    pub(super) all: Vec<Root>,
     /// From here on a region of the ray stayed undecided.
-    pub(super) doubt: f64,
+    pub(super) undecided_from: f64,
     /// The nearest root that a trim within its band turned away.
-    pub(super) turned_away: f64,
+    pub(super) nearest_rejected: f64,
     /// Every such root, in a search for all.
-    pub(super) all_turned_away: Vec<f64>,
+    pub(super) all_rejected: Vec<f64>,
     /// Clipping steps left.
     pub(super) budget: u32,
     pub(super) leaves_tested: u32,
@@ -68,16 +86,17 @@ impl Query {
         d: Vector::X,
         n1: Vector::Y,
         n2: Vector::Z,
-        slabs: Slabs::IDLE,
+        slabs: RaySlabs::IDLE,
         t_min: 0.0,
         t_max: 0.0,
         limit: 0.0,
-        own: None,
+        departure: None,
         best: None,
-        all: None,
-        doubt: f64::INFINITY,
-        turned_away: f64::INFINITY,
-        all_turned_away: Vec::new(),
+        collects_all: false,
+        all: Vec::new(),
+        undecided_from: f64::INFINITY,
+        nearest_rejected: f64::INFINITY,
+        all_rejected: Vec::new(),
         budget: 0,
         leaves_tested: 0,
         nodes: 0,
@@ -87,46 +106,51 @@ impl Query {
     /// Takes up a ray; field by field, since building it elsewhere and moving it here cost 8 % of a ray.
     #[inline(always)]
     pub(super) fn restart(&mut self, ray: &Ray, geometry: &Geometry, tree: &Tree, budget: u32) {
-        (self.o, self.d) = (ray.origin, ray.direction);
+        self.o = ray.origin;
+        self.d = ray.direction;
         (self.n1, self.n2) = orthonormal_pair(ray.direction);
         self.slabs.restart(ray, tree);
-        (self.t_min, self.t_max, self.limit) = (ray.t_min, ray.t_max, ray.t_max);
-        self.own = None;
+        self.t_min = ray.t_min;
+        self.t_max = ray.t_max;
+        self.limit = ray.t_max;
+        self.departure = None;
         if let Some(from) = ray.from {
-            self.own = Own::new(ray, from.face, from.uv, geometry);
+            self.departure = DeparturePoint::new(ray, from.face, from.uv, geometry);
         }
         self.best = None;
-        (self.doubt, self.turned_away) = (f64::INFINITY, f64::INFINITY);
+        self.undecided_from = f64::INFINITY;
+        self.nearest_rejected = f64::INFINITY;
         self.budget = budget;
-        (self.leaves_tested, self.nodes, self.clips) = (0, 0, 0);
+        self.leaves_tested = 0;
+        self.nodes = 0;
+        self.clips = 0;
     }
 
     /// Whether a root at `t` would be of use.
     #[inline(always)]
-    pub(super) fn wants(&self, t: f64) -> bool {
+    pub(super) fn is_in_range(&self, t: f64) -> bool {
         t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
     }
 
-    pub(super) fn turn_away(&mut self, t: f64) {
-        self.turned_away = self.turned_away.min(t);
-        if self.all.is_some() {
-            self.all_turned_away.push(t);
+    pub(super) fn reject_at_trim(&mut self, t: f64) {
+        self.nearest_rejected = self.nearest_rejected.min(t);
+        if self.collects_all {
+            self.all_rejected.push(t);
         }
     }
 
     pub(super) fn accept(&mut self, root: Root) {
-        match &mut self.all {
-            Some(all) => all.push(root),
-            None => {
-                self.t_max = root.t;
-                self.slabs.end_at(root.t);
-                self.best = Some(root);
-            }
+        if self.collects_all {
+            self.all.push(root);
+            return;
         }
+        self.t_max = root.t;
+        self.slabs.end_at(root.t);
+        self.best = Some(root);
     }
 }
 
-impl Own {
+impl DeparturePoint {
     fn new(ray: &Ray, face: crate::math::FaceId, uv: Uv, geometry: &Geometry) -> Option<Self> {
         let face = *geometry.by_id.get(&face)?;
         if !uv.is_finite() {
@@ -134,47 +158,46 @@ impl Own {
         }
         let patch = geometry.patch_at(&geometry.faces[face as usize], uv);
         let p = &geometry.patches[patch as usize];
-        let (s, _, _) = project(&p.jet(p.local(uv)));
+        let (s, ..) = project(&p.jet(p.local(uv)));
         let off = (ray.origin - p.center - s).length();
-        let tolerance = 1e-9 + 64.0 * f64::EPSILON * ray.origin.abs().max_element();
+        let tolerance = TANGENT + ORIGIN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
         Some(Self { face, patch, uv, off, tolerance })
     }
 
     /// The departure in the leaf's parameters; on a neighbouring patch only when it lies on the common border.
-    pub(super) fn in_leaf(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
+    pub(super) fn local_to(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
         if leaf.face != self.face {
             return None;
         }
         let mut local = geometry.patches[leaf.patch as usize].local(self.uv);
         if leaf.patch != self.patch {
-            const JOINT: f64 = 1e-9;
-            if local.iter().any(|&x| !(-JOINT..=1.0 + JOINT).contains(&x)) {
+            if local.iter().any(|&x| !(-SAME_PARAMETER..=1.0 + SAME_PARAMETER).contains(&x)) {
                 return None;
             }
             local = local.map(|x| x.clamp(0.0, 1.0));
         }
-        Some(leaf.of_patch(local))
+        Some(leaf.from_patch(local))
     }
 
     /// Whether the only root near the departure, `distance` along the ray, is the departure itself.
     pub(super) fn is_unique_root(&self, t: f64) -> bool {
         // An origin that is not where the departure says can be a facet's; its own root is then as near as it is off.
-        self.off <= self.tolerance || t.abs() <= 16.0 * self.off
+        self.off <= self.tolerance || t.abs() <= NEAR_DEPARTURE * self.off
     }
 
     /// Whether a root elsewhere in the parameters is the same point: across a seam, or at a pole.
-    pub(super) fn is_twin(&self, leaf: &Leaf, local: [f64; 2], t: f64, geometry: &Geometry) -> bool {
-        if leaf.face != self.face || t.abs() > 16.0 * (self.tolerance + self.off) {
+    pub(super) fn is_same_point(&self, leaf: &Leaf, local: [f64; 2], t: f64, geometry: &Geometry) -> bool {
+        if leaf.face != self.face || t.abs() > NEAR_DEPARTURE * (self.tolerance + self.off) {
             return false;
         }
         let grid = &geometry.grids[geometry.faces[self.face as usize].grid as usize];
         let patch = &geometry.patches[leaf.patch as usize];
-        let uv = patch.uv(leaf.in_patch(local));
+        let uv = patch.uv(leaf.to_patch(local));
         let on_border = |p: Uv| {
             (0..2).any(|d| {
                 let b = &grid.breaks[d];
                 let (first, last) = (b[0], b[b.len() - 1]);
-                let reach = 1e-6 * (last - first);
+                let reach = BORDER * (last - first);
                 p[d] <= first + reach || p[d] >= last - reach
             })
         };

@@ -10,13 +10,22 @@
 
 use super::tree::{Node, Tree, WIDTH};
 use crate::math::Ray;
+use crate::math::simd::Instructions;
 
 /// More than three roundings of `f32` on either side.
 const SLACK: f32 = 1.0 + 16.0 * f32::EPSILON;
 
+/// A ray that runs along a plane is taken to cross it at this slope, so that no reciprocal is infinite; over 1e12 mm it moves
+/// nothing by more than the slack.
+const LEAST_SLOPE: f64 = 1e-30;
+/// Share of the scene by which the box around it is widened before rays are clipped to it: `f32` cannot tell less.
+const WIDENED: f64 = 1e-6;
+/// Ulps of the largest coordinate by which that box is widened at least: sixteen times what shifts and reciprocals round.
+const WIDENED_ULPS: f64 = 64.0;
+
 /// A ray as the hierarchy sees it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slabs {
+pub(super) struct RaySlabs {
     inverse: [f32; 3],
     /// 1 where the ray runs against the axis.
     back: [usize; 3],
@@ -32,7 +41,7 @@ pub(super) struct Slabs {
     pub(super) misses: bool,
 }
 
-impl Slabs {
+impl RaySlabs {
     /// Meets nothing.
     pub(super) const IDLE: Self = Self {
         inverse: [1.0; 3],
@@ -50,11 +59,11 @@ impl Slabs {
         let (o, d) = (ray.origin, ray.direction);
         let (lo, hi) = (tree.bounds.min, tree.bounds.max);
         let reach = o.abs().max_element() + tree.center.abs().max_element();
-        let beyond = 1e-6 * (hi - lo).max_element() + 64.0 * f64::EPSILON * reach;
+        let beyond = WIDENED * (hi - lo).max_element() + WIDENED_ULPS * f64::EPSILON * reach;
         let (mut near, mut far) = (ray.t_min, ray.t_max);
         for k in 0..3 {
-            // A finite reciprocal keeps 0 · ∞ out of the slab test; 1e-30 moves no plane by more than the slack below.
-            let inverse = 1.0 / if d[k].abs() < 1e-30 { 1e-30f64.copysign(d[k]) } else { d[k] };
+            // A finite reciprocal keeps 0 · ∞ out of the slab test.
+            let inverse = 1.0 / if d[k].abs() < LEAST_SLOPE { LEAST_SLOPE.copysign(d[k]) } else { d[k] };
             let (a, b) = ((lo[k] - beyond - o[k]) * inverse, (hi[k] + beyond - o[k]) * inverse);
             let (a, b) = if a < b { (a, b) } else { (b, a) };
             near = if a > near { a } else { near };
@@ -81,7 +90,7 @@ impl Slabs {
 
     /// Where each of a node's boxes is entered, counted from the start and not too far, and a bit for each that is met.
     #[inline(always)]
-    pub(super) fn meet(&self, node: &Node) -> ([f32; WIDTH], u32) {
+    fn intersect_boxes_portable(&self, node: &Node) -> ([f32; WIDTH], u32) {
         let (mut near, mut far) = ([0f32; WIDTH], [self.end; WIDTH]);
         for k in 0..3 {
             let (first, last) = (&node.planes[self.back[k]][k], &node.planes[1 - self.back[k]][k]);
@@ -99,11 +108,11 @@ impl Slabs {
         (near, met)
     }
 
-    /// The same bits as [`Slabs::meet`], all boxes side by side.
+    /// The same bits as [`RaySlabs::intersect_boxes_portable`], all boxes side by side.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[target_feature(enable = "avx2")]
-    pub(super) fn meet_wide(&self, node: &Node) -> ([f32; WIDTH], u32) {
+    fn intersect_boxes_avx2(&self, node: &Node) -> ([f32; WIDTH], u32) {
         use std::arch::x86_64::*;
         let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(self.end));
         for k in 0..3 {
@@ -121,6 +130,17 @@ impl Slabs {
         unsafe { _mm256_storeu_ps(entered.as_mut_ptr(), near) };
         (entered, _mm256_movemask_ps(met) as u32)
     }
+}
+
+/// Where a ray enters each of a node's boxes, counted from its start and not too far, and a bit for each that is met.
+#[inline(always)]
+pub(super) fn intersect_boxes<I: Instructions>(slabs: &RaySlabs, node: &Node) -> ([f32; WIDTH], u32) {
+    #[cfg(target_arch = "x86_64")]
+    if I::AVX2 {
+        // SAFETY: only kernels that run where the features were found are compiled for such instructions.
+        return unsafe { slabs.intersect_boxes_avx2(node) };
+    }
+    slabs.intersect_boxes_portable(node)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -153,11 +173,11 @@ mod tests {
                 .collect();
             let tree = Tree::build(&boxes);
             let d = Vector::new(next(), next(), if round % 7 == 0 { 0.0 } else { next() }).normalize();
-            let mut slabs = Slabs::IDLE;
+            let mut slabs = RaySlabs::IDLE;
             slabs.restart(&Ray::new(Point::new(next(), next(), next()) * 3.0, d), &tree);
-            let (near, met) = slabs.meet(&tree.nodes[0]);
+            let (near, met) = slabs.intersect_boxes_portable(&tree.nodes[0]);
             // SAFETY: the feature was found.
-            let wide = unsafe { slabs.meet_wide(&tree.nodes[0]) };
+            let wide = unsafe { slabs.intersect_boxes_avx2(&tree.nodes[0]) };
             assert_eq!((near.map(f32::to_bits), met), (wide.0.map(f32::to_bits), wide.1));
         }
     }

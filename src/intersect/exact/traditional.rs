@@ -8,10 +8,17 @@
 //! patches, as fast as the polishing of facet hits.
 
 use super::newton::SurfacePoint;
-use super::{Certainty, Cost, Exact, Footprint, Hit, Intersector};
+use super::structure::Exact;
+use super::tolerances::SAME_POINT;
+use crate::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, FaceId, Point, Ray, Uv};
 use crate::model::Model;
 use std::time::Instant;
+
+/// A point this near to the one that a ray leaves is that point, mm: a thousand times what a start is off.
+const OWN_POINT: f64 = 1e-6;
+/// Newton steps from a seed.
+const STEPS: u32 = 20;
 
 /// Where Newton's method starts on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,12 +33,12 @@ pub enum Seeds {
 #[derive(Debug)]
 pub struct Traditional<'a> {
     exact: &'a Exact,
-    surfaces: Vec<Seeded>,
+    surfaces: Vec<SampledSurface>,
     build_seconds: f64,
 }
 
 #[derive(Debug)]
-struct Seeded {
+struct SampledSurface {
     face: FaceId,
     bounds: Aabb,
     counts: [usize; 2],
@@ -44,59 +51,59 @@ impl<'a> Traditional<'a> {
         let start = Instant::now();
         let surfaces = model
             .placed_faces()
-            .filter(|placed| exact.geometry.by_id.contains_key(&placed.id))
-            .filter_map(|placed| placed.face.map(|f| (placed.id, f, placed.placement)))
-            .map(|(face, f, placement)| {
-                let points = f.surface.points.iter().map(|p| placement.point(p.project()));
+            .filter_map(|placed| {
+                let record = *exact.geometry.by_id.get(&placed.id)? as usize;
+                let surface = &placed.face?.surface;
+                let points = surface.points.iter().map(|p| placed.placement.point(p.project()));
                 let bounds = Aabb::around(points);
-                let lines = [0, 1].map(|d| match seeds {
+                let grid = &exact.geometry.grids[exact.geometry.faces[record].grid as usize];
+                let [us, vs] = [0, 1].map(|d| match seeds {
                     Seeds::Middle => {
-                        let [a, b] = f.surface.domain()[d];
+                        let [a, b] = surface.domain()[d];
                         vec![0.5 * (a + b)]
                     }
-                    Seeds::Sampled(n) => {
-                        let record = exact.geometry.by_id[&face] as usize;
-                        let grid = &exact.geometry.grids[exact.geometry.faces[record].grid as usize];
-                        let within = |pair: &[f64]| {
-                            let (a, b) = (pair[0], pair[1]);
-                            (0..n)
-                                .map(move |k| a + (b - a) * (f64::from(k) + 0.5) / f64::from(n))
-                                .collect::<Vec<_>>()
-                        };
-                        grid.breaks[d].windows(2).flat_map(within).collect()
-                    }
+                    Seeds::Sampled(n) => grid.breaks[d].windows(2).flat_map(|w| middles(w[0], w[1], n)).collect(),
                 });
-                let counts = [lines[0].len(), lines[1].len()];
-                let samples = lines[0]
+                let samples = us
                     .iter()
-                    .flat_map(|&u| lines[1].iter().map(move |&v| Uv::new(u, v)))
-                    .map(|uv| (uv, placement.point(f.surface.evaluate(uv))))
+                    .flat_map(|&u| vs.iter().map(move |&v| Uv::new(u, v)))
+                    .map(|uv| (uv, placed.placement.point(surface.evaluate(uv))))
                     .collect();
-                Seeded { face, bounds: bounds.grown(1e-9 * (1.0 + bounds.diagonal())), counts, samples }
+                Some(SampledSurface {
+                    face: placed.id,
+                    bounds: bounds.grown(SAME_POINT * (1.0 + bounds.diagonal())),
+                    counts: [us.len(), vs.len()],
+                    samples,
+                })
             })
             .collect();
         Self { exact, surfaces, build_seconds: start.elapsed().as_secs_f64() }
     }
 
-    fn candidates(&self, ray: &Ray, surface: &Seeded, found: &mut Vec<(FaceId, SurfacePoint)>) {
+    fn candidates(&self, ray: &Ray, surface: &SampledSurface, found: &mut Vec<(FaceId, SurfacePoint)>) {
         let distances: Vec<f64> =
             surface.samples.iter().map(|(_, p)| (*p - ray.origin).cross(ray.direction).length_squared()).collect();
         let [nu, nv] = surface.counts;
         for i in 0..nu {
             for j in 0..nv {
                 let here = distances[i * nv + j];
-                let (is, js) =
-                    (i.saturating_sub(1)..=(i + 1).min(nu - 1), j.saturating_sub(1)..=(j + 1).min(nv - 1));
+                let is = i.saturating_sub(1)..=(i + 1).min(nu - 1);
+                let js = j.saturating_sub(1)..=(j + 1).min(nv - 1);
                 if is.flat_map(|a| js.clone().map(move |b| a * nv + b)).any(|k| distances[k] < here) {
                     continue;
                 }
                 let seed = surface.samples[i * nv + j].0;
-                if let Some(point) = self.exact.converge(ray, surface.face, seed, 20).filter(|p| p.inside) {
+                if let Some(point) = self.exact.converge(ray, surface.face, seed, STEPS).filter(|p| p.inside) {
                     found.push((surface.face, point));
                 }
             }
         }
     }
+}
+
+/// The middles of `n` equal parts of an interval.
+fn middles(a: f64, b: f64, n: u32) -> impl Iterator<Item = f64> {
+    (0..n).map(move |k| a + (b - a) * (f64::from(k) + 0.5) / f64::from(n))
 }
 
 impl Intersector for Traditional<'_> {
@@ -114,8 +121,8 @@ impl Intersector for Traditional<'_> {
         let leaving = |face: FaceId, p: &SurfacePoint| {
             ray.from.is_some_and(|f| {
                 f.face == face
-                    && p.t.abs() < 1e-6
-                    && self.exact.distance_at(face, f.uv, ray.at(p.t)).is_some_and(|d| d < 1e-6)
+                    && p.t.abs() < OWN_POINT
+                    && self.exact.distance_at(face, f.uv, ray.at(p.t)).is_some_and(|d| d < OWN_POINT)
             })
         };
         let first = found.into_iter().find(|(face, p)| p.t >= ray.t_min && p.t <= ray.t_max && !leaving(*face, p));

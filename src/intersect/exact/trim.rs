@@ -3,11 +3,25 @@
 //! The test counts crossings of a half-line towards +u with pieces monotone in v whose joints are bit-equal, so it has one
 //! answer for every point, however close to a curve. Uses that pass within `band` mm are named.
 
-use super::piece::{Piece, pieces_of};
-use super::uses::{Use, uses_of};
+use super::edge_use::{EdgeUse, edge_uses};
+use super::trim_piece::{TrimPiece, trim_pieces};
 use crate::math::Uv;
 use crate::model::Face;
 use smallvec::SmallVec;
+
+/// Share of a cell by which a rectangle is kept wider than its cells, so that rounding takes no point into one beyond.
+const CELL_ROUNDING: f64 = 1e-6;
+/// Share of the loops' extent by which the grid is larger than they are.
+const GRID_MARGIN: f64 = 1e-3;
+/// Roots are flagged as far from a trim as this many gaps between the faces along it.
+const BAND_OF_GAP: f64 = 8.0;
+/// Cells keep so many bands off a trim: a ray that grazes a face at a sine down to 1/64 has its root within the band of the edge as
+/// it sees it.
+const REACH_OF_BAND: f64 = 64.0;
+/// The least share of the domain that cells keep off a trim: parameters in files have nine digits.
+const LEAST_REACH: f64 = 1e-9;
+/// The largest share of the domain that cells keep off a trim: with more, none would be decided.
+const LARGEST_REACH: f64 = 1e-2;
 
 /// What a cell or rectangle of the domain is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +53,8 @@ pub(super) struct Near {
 /// The trimming of one face.
 #[derive(Debug)]
 pub(super) struct Trim {
-    pieces: Vec<Piece>,
-    pub(super) uses: Vec<Use>,
+    pieces: Vec<TrimPiece>,
+    pub(super) uses: Vec<EdgeUse>,
     /// Low corner of the grid of cells.
     origin: Uv,
     /// Whether the grid ends before the domain does, at the low and the high end of u, and of v: beyond is outside.
@@ -64,19 +78,20 @@ impl Trim {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
         let segments: usize = face.loops.iter().flat_map(|l| &l.uses).map(|u| u.uv.points.len()).sum();
+        // Fine enough that most cells are decided, coarse enough to stay in a cache.
         let n = match segments {
             0 => 1,
             1..=24 => 24,
             25..=200 => 48,
             _ => 96,
         };
-        let uses = uses_of(face, closed, gaps);
+        let uses = edge_uses(face, closed, gaps);
         let widest = uses.iter().map(|u| u.gap).fold(0.0, f64::max);
-        let reach = reach(face, extent, band.max(8.0 * widest));
-        let ([lo, hi], ends) = gridded(face, reach);
+        let reach = cell_margin(face, extent, band.max(BAND_OF_GAP * widest));
+        let ([lo, hi], ends) = grid_bounds(face, reach);
         let cell = (hi - lo) / n as f64;
         let mut trim = Self {
-            pieces: pieces_of(face, cell),
+            pieces: trim_pieces(face, cell),
             uses,
             origin: lo,
             ends,
@@ -96,7 +111,7 @@ impl Trim {
         if trim.outside_is_inside {
             // Holes alone: what lies around them counts too.
             let cell = extent / n as f64;
-            trim.pieces = pieces_of(face, cell);
+            trim.pieces = trim_pieces(face, cell);
             (trim.origin, trim.density, trim.ends) = (Uv::new(u0, v0), Uv::ONE / cell, Default::default());
         }
         trim.fill_cells(reach);
@@ -109,16 +124,13 @@ impl Trim {
     }
 
     fn signed_area(&self) -> f64 {
-        let ends = |p: &Piece| {
-            let at = |q: &glam::DVec3| q.truncate() / q.z;
-            (at(&p.points[0]), at(&p.points[p.points.len() - 1]))
-        };
+        let from_origin = |q: &glam::DVec3| q.truncate() / q.z - self.origin;
         self.pieces
             .iter()
             .map(|p| {
-                let (a, b) = ends(p);
-                let (a, b) = (a - self.origin, b - self.origin);
-                0.5 * a.perp_dot(b) * if p.reversed { -1.0 } else { 1.0 }
+                let start = from_origin(&p.points[0]);
+                let end = from_origin(&p.points[p.points.len() - 1]);
+                0.5 * start.perp_dot(end) * if p.reversed { -1.0 } else { 1.0 }
             })
             .sum()
     }
@@ -174,7 +186,7 @@ impl Trim {
     }
 
     /// The part of a rectangle of the domain that holds all of it that is not outside; `None` when all is.
-    pub(super) fn kept(&self, rect: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+    pub(super) fn bounds_within(&self, rect: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
         if self.whole {
             return Some(rect);
         }
@@ -197,9 +209,10 @@ impl Trim {
         let place = |d: usize, cell: f64| self.origin[d] + cell / self.density[d];
         let kept = [0, 1].map(|d: usize| {
             let [a, b] = rect[d];
-            let low = if lo[d] == 0 && !self.ends[d][0] { a } else { place(d, lo[d] as f64 - 1e-6) };
+            let low = if lo[d] == 0 && !self.ends[d][0] { a } else { place(d, lo[d] as f64 - CELL_ROUNDING) };
             let last = self.count[d] - 1;
-            let high = if hi[d] == last && !self.ends[d][1] { b } else { place(d, hi[d] as f64 + 1.0 + 1e-6) };
+            let high =
+                if hi[d] == last && !self.ends[d][1] { b } else { place(d, hi[d] as f64 + 1.0 + CELL_ROUNDING) };
             [a.max(low), b.min(high)]
         });
         kept.iter().all(|[a, b]| a < b).then_some(kept)
@@ -235,7 +248,7 @@ impl Trim {
     }
 
     /// Whether `q`, which lies in a border cell, is inside, and what uses pass within `band` mm; `metric` as for
-    /// [`Piece::nearest`].
+    /// [`TrimPiece::nearest`].
     pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
         let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());
         let cell = j * self.count[0] + i;
@@ -270,7 +283,7 @@ impl Trim {
 
 /// The rectangle over which cells are laid: around the loops as far as `reach`, within the domain; and which of its
 /// sides end before the domain does.
-fn gridded(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
+fn grid_bounds(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
     let domain = face.surface.domain();
     let whole = [0, 1].map(|end| Uv::new(domain[0][end], domain[1][end]));
     let points = face.loops.iter().flat_map(|l| &l.uses).flat_map(|u| &u.uv.points);
@@ -279,7 +292,7 @@ fn gridded(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
         let at = p.truncate() / p.z;
         (lo, hi) = (lo.min(at), hi.max(at));
     }
-    let margin = reach + 1e-3 * (hi - lo);
+    let margin = reach + GRID_MARGIN * (hi - lo);
     let (lo, hi) = ((lo - margin).max(whole[0]), (hi + margin).min(whole[1]));
     if !(lo.x < hi.x && lo.y < hi.y) {
         return (whole, Default::default());
@@ -288,7 +301,7 @@ fn gridded(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
 }
 
 /// How far, in u and v, a cell border must keep from a trimming curve so that the band stays in border cells.
-fn reach(face: &Face, extent: Uv, band: f64) -> Uv {
+fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     let [nu, nv] = face.surface.counts();
     let point = |i: usize, j: usize| face.surface.points[i * nv + j].project();
     let longest = |outer: usize, inner: usize, at: &dyn Fn(usize, usize) -> crate::math::Point| {
@@ -298,6 +311,6 @@ fn reach(face: &Face, extent: Uv, band: f64) -> Uv {
     };
     let along_u = longest(nv, nu, &|j, i| point(i, j));
     let along_v = longest(nu, nv, &|i, j| point(i, j));
-    let relative = |length: f64| (64.0 * band / length).clamp(1e-9, 1e-2);
+    let relative = |length: f64| (REACH_OF_BAND * band / length).clamp(LEAST_REACH, LARGEST_REACH);
     Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
 }

@@ -5,9 +5,24 @@ use crate::model::Face;
 use glam::DVec3;
 use smallvec::SmallVec;
 
+/// The height of a trim is solved to this step of the piece's parameter, five ulps of its middle.
+const HEIGHT_STEP: f64 = 1e-15;
+/// Steps after which halving alone has come down to an ulp.
+const HEIGHT_STEPS: usize = 60;
+/// The nearest point of a piece is sought to this step of its parameter: its distance is then right to the square.
+const NEAREST_STEP: f64 = 1e-12;
+/// Steps to the nearest point of a piece, which is monotone and short.
+const NEAREST_STEPS: usize = 8;
+/// A piece that rises by less than this share of a cell is flat: it crosses no height that could be told.
+const FLAT: f64 = 1e-11;
+/// How often a piece is halved for being long.
+const SHORTENED: u32 = 8;
+/// How often a piece is halved for not being monotone: its turn is then within 6e-8 of the piece.
+const DEEPEST: u32 = 24;
+
 /// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
+pub(super) struct TrimPiece {
     pub(super) points: SmallVec<[DVec3; 4]>,
     /// v at the two ends in order of the curve's parameter; bit-equal with the neighbours of the loop.
     pub(super) v: [f64; 2],
@@ -22,7 +37,7 @@ pub(super) struct Piece {
     pub(super) range: [f64; 2],
 }
 
-impl Piece {
+impl TrimPiece {
     fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], (owner, reversed): (u32, bool)) -> Self {
         let at = |p: &DVec3| p.truncate() / p.z;
         let v = [at(&points[0]).y, at(&points[points.len() - 1]).y];
@@ -63,7 +78,7 @@ impl Piece {
         let rising = self.v[1] > self.v[0];
         let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
         let mut u = 0.0;
-        for _ in 0..60 {
+        for _ in 0..HEIGHT_STEPS {
             let (p, d) = self.evaluate(t);
             u = p.x;
             let error = p.y - v;
@@ -77,7 +92,7 @@ impl Piece {
             }
             let newton = t - error / d.y;
             let next = if newton > lo && newton < hi { newton } else { 0.5 * (lo + hi) };
-            if (next - t).abs() <= 1e-15 {
+            if (next - t).abs() <= HEIGHT_STEP {
                 break;
             }
             t = next;
@@ -111,10 +126,10 @@ impl Piece {
         let chord = at(n) - at(0);
         let mut t = (inner(q - at(0), chord) / inner(chord, chord).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         if n > 1 {
-            for _ in 0..8 {
+            for _ in 0..NEAREST_STEPS {
                 let (p, d) = self.evaluate(t);
                 let next = (t + inner(q - p, d) / inner(d, d).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                let done = (next - t).abs() < 1e-12;
+                let done = (next - t).abs() < NEAREST_STEP;
                 t = next;
                 if done {
                     break;
@@ -127,7 +142,7 @@ impl Piece {
 }
 
 /// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed.
-pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
+pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
     let mut all = Vec::new();
     let mut owner = 0;
     for trim in &face.loops {
@@ -150,10 +165,10 @@ pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
         let n = all.len() - first;
         for k in 0..n {
             let end = {
-                let piece: &Piece = &all[first + k];
+                let piece: &TrimPiece = &all[first + k];
                 piece.v[if piece.reversed { 0 } else { 1 }]
             };
-            let next: &mut Piece = &mut all[first + (k + 1) % n];
+            let next: &mut TrimPiece = &mut all[first + (k + 1) % n];
             next.v[if next.reversed { 1 } else { 0 }] = end;
             next.update_hull();
         }
@@ -165,9 +180,9 @@ pub(super) fn pieces_of(face: &Face, longest: Uv) -> Vec<Piece> {
 const MOST: usize = 4096;
 
 /// Control points, parameters at the ends, and how often it was halved.
-type Part = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
+type CurvePart = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
 
-fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, owner: (u32, bool)) {
+fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, bool)) {
     let first = out.len();
     let mut stack = vec![whole];
     while let Some((points, range, depth)) = stack.pop() {
@@ -177,12 +192,12 @@ fn split(out: &mut Vec<Piece>, whole: Part, longest: Uv, owner: (u32, bool)) {
         let monotone = (0..n).all(|k| if rising { at(k + 1).y >= at(k).y } else { at(k + 1).y <= at(k).y });
         let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
         let size = hull.1 - hull.0;
-        let flat = size.y < 1e-11 * (longest.y + hull.1.y.abs());
+        let flat = size.y < FLAT * (longest.y + hull.1.y.abs());
         // Curves far longer than the domain, and more pieces than any real trim has, stay as they are: no input may cost
         // more than this.
-        let short = (size.x <= longest.x && size.y <= longest.y) || depth >= 8;
-        if ((monotone || flat) && short) || depth >= 24 || out.len() > first + MOST {
-            out.push(Piece::new(points, range, owner));
+        let short = (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED;
+        if ((monotone || flat) && short) || depth >= DEEPEST || out.len() > first + MOST {
+            out.push(TrimPiece::new(points, range, owner));
             continue;
         }
         let (mut low, mut high) = (points.clone(), points.clone());

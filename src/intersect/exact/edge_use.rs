@@ -4,9 +4,14 @@ use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::UvCurve;
 use rustc_hash::FxHashMap;
 
+/// Share of the domain within which a trim runs along its end: rounding of parameters in files of nine digits.
+const ON_END: f64 = 1e-9;
+/// Uses that may be passed around a vertex: a seam and a pole at each end are all that a vertex of a face can have.
+const MOST_AROUND: usize = 8;
+
 /// One use of an edge in a loop.
 #[derive(Clone, Debug)]
-pub(super) struct Use {
+pub(super) struct EdgeUse {
     /// The edge that ends the face here; `None` for poles, and for seams where the surface closes on itself.
     pub(super) edge: Option<EdgeId>,
     /// How far the faces on both sides lie off the edge, in the units of the part: rays pass between them, wherever only one of
@@ -21,7 +26,7 @@ pub(super) struct Use {
 }
 
 /// How far the faces that share each of a part's edges lie off it.
-pub(super) fn gaps_of(part: &Part) -> Vec<f64> {
+pub(super) fn edge_gaps(part: &Part) -> Vec<f64> {
     let mut gaps = vec![0f64; part.edges.len()];
     for face in part.shells.iter().flat_map(|s| &s.faces) {
         for edge in face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge) {
@@ -35,14 +40,14 @@ pub(super) fn gaps_of(part: &Part) -> Vec<f64> {
 
 /// All uses of a face in the order of its loops; `closed` says in which parameters its surface closes on itself, `gaps` how far
 /// faces lie off the part's edges.
-pub(super) fn uses_of(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Use> {
+pub(super) fn edge_uses(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<EdgeUse> {
     let mut by_edge: FxHashMap<EdgeId, Vec<u32>> = FxHashMap::default();
     for (k, u) in face.loops.iter().flat_map(|l| &l.uses).enumerate() {
         if let Some(edge) = u.edge {
             by_edge.entry(edge).or_default().push(k as u32);
         }
     }
-    let mut uses: Vec<Use> = Vec::new();
+    let mut uses: Vec<EdgeUse> = Vec::new();
     for trim in &face.loops {
         let (first, n) = (uses.len() as u32, trim.uses.len() as u32);
         for (k, u) in (0u32..).zip(&trim.uses) {
@@ -51,7 +56,7 @@ pub(super) fn uses_of(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Use> 
                 _ => None,
             });
             let twin = twin.filter(|_| is_seam(face, closed, &u.uv));
-            uses.push(Use {
+            uses.push(EdgeUse {
                 edge: u.edge.filter(|_| twin.is_none()),
                 gap: u.edge.and_then(|e| gaps.get(e.0 as usize)).map_or(face.gap, |g| g.max(face.gap)),
                 reversed: u.reversed,
@@ -66,11 +71,10 @@ pub(super) fn uses_of(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Use> 
 
 /// The use that bounds the face on the other side of the vertex where `from` ends in the loop's direction, or begins
 /// when not `forward`; across seams and poles, which bound nothing.
-pub(super) fn around(uses: &[Use], from: u32, forward: bool) -> Option<u32> {
+pub(super) fn next_bounding_use(uses: &[EdgeUse], from: u32, forward: bool) -> Option<u32> {
     let step = |k: u32| if forward { uses[k as usize].next } else { uses[k as usize].previous };
     let mut at = from;
-    // A seam and a pole at each end are all that a vertex of a face can have.
-    for _ in 0..8 {
+    for _ in 0..MOST_AROUND {
         at = step(at);
         let here = &uses[at as usize];
         if here.edge.is_some() {
@@ -86,7 +90,7 @@ fn is_seam(face: &Face, closed: [bool; 2], curve: &UvCurve) -> bool {
     let domain = face.surface.domain();
     (0..2).any(|d| {
         let [lo, hi] = domain[d];
-        let on = |end: f64| curve.points.iter().all(|p| (p.truncate()[d] / p.z - end).abs() <= 1e-9 * (hi - lo));
+        let on = |end: f64| curve.points.iter().all(|p| (p.truncate()[d] / p.z - end).abs() <= ON_END * (hi - lo));
         closed[d] && (on(lo) || on(hi))
     })
 }

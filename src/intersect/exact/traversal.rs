@@ -1,63 +1,140 @@
-//! Many rays at a time. A ray that has come to a leaf asks for its memory and lets the others go on meanwhile: on 10,000
-//! patches, which no cache holds, waiting for memory took two fifths of the time of a ray by itself.
+//! The walk through the hierarchy, of one ray or of many at a time.
 //!
-//! Each ray takes the very steps that it takes alone, so the bits are the same.
+//! In a batch a ray that has come to a leaf asks for its memory and lets the others go on meanwhile: on 10,000 patches, which no
+//! cache holds, waiting for memory took two fifths of the time of a ray by itself. Each ray takes the very steps that it takes
+//! alone, so the bits are the same.
 
-use super::Exact;
 use super::query::Query;
-use super::trace::Stack;
+use super::slabs;
+use super::structure::Exact;
+use super::tree::{LEAF, WIDTH};
 use crate::intersect::prefetch::{prefetch, prefetch_range};
 use crate::intersect::{Cost, Hit};
 use crate::math::Ray;
+use crate::math::simd::{self, Instructions, Kernel};
+use smallvec::SmallVec;
 
 /// Rays under way: enough to cover a fetch from memory, few enough for the first cache.
 const LANES: usize = 8;
+
+/// What is left to visit, with the distance at which it is entered.
+type Stack = SmallVec<[(u32, f32); 64]>;
 
 /// A ray under way.
 struct Lane {
     /// Position in the batch.
     ray: usize,
-    q: Query,
+    query: Query,
     stack: Stack,
     /// The leaf that it waits for; `None` when it has met all and waits for what names its hit.
     leaf: Option<u32>,
 }
 
+/// One ray, for [`simd::dispatch`].
+struct Search<'a> {
+    exact: &'a Exact,
+    query: &'a mut Query,
+}
+
+impl Kernel for Search<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        self.exact.walk::<I>(self.query);
+    }
+}
+
+/// Many rays, for [`simd::dispatch`].
+struct BatchSearch<'a> {
+    exact: &'a Exact,
+    rays: &'a [Ray],
+    hits: &'a mut [Option<Hit>],
+    cost: &'a mut Cost,
+}
+
+impl Kernel for BatchSearch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        self.exact.walk_batch::<I>(self.rays, self.hits, self.cost);
+    }
+}
+
+/// Meets every leaf that the ray may touch.
+#[inline]
+pub(super) fn search(exact: &Exact, query: &mut Query) {
+    simd::dispatch(Search { exact, query });
+}
+
+/// Finds the first hits of many rays.
+#[inline]
+pub(super) fn search_batch(exact: &Exact, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+    simd::dispatch(BatchSearch { exact, rays, hits, cost });
+}
+
 impl Exact {
     /// Meets every leaf that the ray may touch, nearest boxes first.
     #[inline(always)]
-    pub(super) fn walk<const WIDE: bool>(&self, q: &mut Query) {
+    fn walk<I: Instructions>(&self, query: &mut Query) {
         let mut stack = Stack::new();
-        self.enter(q, &mut stack);
-        while let Some(leaf) = self.advance::<WIDE>(q, &mut stack) {
-            self.test_leaf(q, leaf);
+        self.push_root(query, &mut stack);
+        while let Some(leaf) = self.next_leaf::<I>(query, &mut stack) {
+            self.test_leaf(query, leaf);
         }
     }
 
     /// Where every search begins: at the root of the hierarchy.
     #[inline(always)]
-    fn enter(&self, q: &Query, stack: &mut Stack) {
+    fn push_root(&self, query: &Query, stack: &mut Stack) {
         stack.clear();
-        if !q.slabs.misses && !self.tree.nodes.is_empty() {
+        if !query.slabs.misses && !self.tree.nodes.is_empty() {
             stack.push((0, 0.0));
         }
     }
 
+    /// The next leaf that the ray may touch, nearest boxes first; `None` when there is none left.
     #[inline(always)]
-    fn begin(&self, lane: &mut Lane, ray: &Ray) {
-        self.restart(&mut lane.q, ray, self.settings.budget);
-        self.enter(&lane.q, &mut lane.stack);
+    fn next_leaf<I: Instructions>(&self, query: &mut Query, stack: &mut Stack) -> Option<u32> {
+        while let Some((index, near)) = stack.pop() {
+            if near > query.slabs.end {
+                continue;
+            }
+            if index & LEAF != 0 {
+                return Some(index & !LEAF);
+            }
+            query.nodes += 1;
+            let node = &self.tree.nodes[index as usize];
+            let (near, mut met) = slabs::intersect_boxes::<I>(&query.slabs, node);
+            let first = stack.len();
+            while met != 0 {
+                let k = met.trailing_zeros() as usize % WIDTH;
+                met &= met - 1;
+                let entry = (node.child[k], near[k]);
+                // Insertion, farthest first: the nearest is popped next.
+                stack.push(entry);
+                let new = &mut stack[first..];
+                let mut at = new.len() - 1;
+                while at > 0 && new[at - 1].1 < entry.1 {
+                    new[at] = new[at - 1];
+                    at -= 1;
+                }
+                new[at] = entry;
+            }
+        }
+        None
     }
 
-    /// Finds the first hits of many rays; `WIDE` only where [`super::wide`] found the features.
+    /// Finds the first hits of many rays, [`LANES`] of them side by side.
     #[inline(always)]
-    pub(super) fn batch<const WIDE: bool>(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+    fn walk_batch<I: Instructions>(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let mut waiting = rays.iter().enumerate();
         let mut lanes: Vec<Lane> = Vec::with_capacity(LANES);
         for (ray, r) in waiting.by_ref().take(LANES) {
-            let mut lane = Lane { ray, q: Query::IDLE, stack: Stack::new(), leaf: None };
+            let mut lane = Lane { ray, query: Query::IDLE, stack: Stack::new(), leaf: None };
             self.begin(&mut lane, r);
-            self.go_on::<WIDE>(&mut lane);
+            self.walk_to_leaf::<I>(&mut lane);
             lanes.push(lane);
         }
         while !lanes.is_empty() {
@@ -65,9 +142,9 @@ impl Exact {
             while k < lanes.len() {
                 let lane = &mut lanes[k];
                 if let Some(leaf) = lane.leaf {
-                    self.test_leaf(&mut lane.q, leaf);
+                    self.test_leaf(&mut lane.query, leaf);
                 } else {
-                    hits[lane.ray] = self.answer(&lane.q, cost).hit;
+                    hits[lane.ray] = self.answer(&lane.query, cost).hit;
                     let Some((ray, r)) = waiting.next() else {
                         lanes.swap_remove(k);
                         continue;
@@ -75,21 +152,27 @@ impl Exact {
                     lane.ray = ray;
                     self.begin(lane, r);
                 }
-                self.go_on::<WIDE>(lane);
+                self.walk_to_leaf::<I>(lane);
                 k += 1;
             }
         }
     }
 
+    #[inline(always)]
+    fn begin(&self, lane: &mut Lane, ray: &Ray) {
+        self.restart(&mut lane.query, ray, self.settings.budget);
+        self.push_root(&lane.query, &mut lane.stack);
+    }
+
     /// Walks to the next leaf and asks for its memory.
     #[inline(always)]
-    fn go_on<const WIDE: bool>(&self, lane: &mut Lane) {
-        lane.leaf = self.advance::<WIDE>(&mut lane.q, &mut lane.stack);
+    fn walk_to_leaf<I: Instructions>(&self, lane: &mut Lane) {
+        lane.leaf = self.next_leaf::<I>(&mut lane.query, &mut lane.stack);
         if let Some(leaf) = lane.leaf {
-            prefetch(&self.probes, leaf as usize);
+            prefetch(&self.linearizations, leaf as usize);
             let [from, to] = [0, 1].map(|k| self.starts[leaf as usize + k] as usize);
             prefetch_range(&self.pool, from, to - from);
-        } else if let Some(root) = &lane.q.best {
+        } else if let Some(root) = &lane.query.best {
             prefetch(&self.labels, root.leaf as usize);
         }
     }
@@ -100,6 +183,7 @@ mod tests {
     use super::*;
     use crate::intersect::Intersector;
     use crate::intersect::exact::Settings;
+    use crate::math::simd::Portable;
     use crate::math::{Departure, Frame, Point, Uv, Vector};
     use crate::model::{Face, Model, Part, Shell};
     use crate::nurbs::sweep;
@@ -142,7 +226,8 @@ mod tests {
         rays[7].direction = Vector::ZERO;
         rays[8].from = Some(Departure { face: crate::math::FaceId(99), primitive: 0, uv: Uv::ZERO });
         let mut hits = vec![None; rays.len()];
-        let (mut together, mut single) = (Cost::default(), Cost::default());
+        let mut together = Cost::default();
+        let mut single = Cost::default();
         exact.intersect_batch(&rays, &mut hits, &mut together);
         let mut found = 0;
         for (ray, hit) in rays.iter().zip(&hits) {
@@ -152,7 +237,7 @@ mod tests {
         }
         assert!(found > 200);
         assert_eq!((together.rays, together.nodes, together.tests), (single.rays, single.nodes, single.tests));
-        exact.batch::<false>(&rays, &mut hits, &mut Cost::default());
+        exact.walk_batch::<Portable>(&rays, &mut hits, &mut Cost::default());
         for (ray, hit) in rays.iter().zip(&hits) {
             assert_eq!(*hit, exact.intersect(ray, &mut Cost::default()));
         }

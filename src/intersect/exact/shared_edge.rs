@@ -6,10 +6,9 @@
 //! method runs to the nearest point from one of [`SEEDS`] fixed parameters and ends on one of [`STATIONS`], so that all
 //! faces compute the same bits. A ray through a vertex itself falls into one of the sectors between its edges' directions.
 
+use super::edge_use;
 use super::geometry::{FaceRecord, Geometry};
-use super::query::Query;
 use super::trim::{Near, Trim};
-use super::uses;
 use crate::math::{Point, Vector};
 use crate::nurbs::Curve;
 
@@ -18,14 +17,24 @@ const SEEDS: f64 = 64.0;
 /// Fixed parameters at which it may lie; what is lost is the square of 1e-12 of the edge.
 const STATIONS: f64 = (1u64 << 40) as f64;
 
-/// Rays this near to a vertex are told by sectors, mm: what rounds the sides there is a thousandth of it.
-pub(super) const AT_VERTEX: f64 = 1e-9;
+/// Steps of Newton's method to the nearest point.
+const STEPS: usize = 24;
+/// The longest step, in seeds: as far as a seed may be trusted to be on the right turn of the curve.
+const LONGEST_STEP: f64 = 4.0 / SEEDS;
+/// Steps of the parameter below this are rounding.
+const LAST_STEP: f64 = 1e-15;
+/// Square of the least sine between a ray and an edge that it passes.
+const LEAST_SINE_SQUARED: f64 = 1e-20;
+/// As [`LEAST_SINE_SQUARED`], not squared, for chords.
+const LEAST_SINE: f64 = 1e-10;
+/// Ulps of the origin's largest coordinate within which a ray passes a vertex.
+const VERTEX_ROUNDING: f64 = 256.0;
 /// Directions at a vertex are chords over this part of the edge, which tells edges apart that touch there.
 const CHORD: f64 = 1.0 / 1024.0;
 
 /// How a ray passes an edge.
 #[derive(Clone, Copy, Debug)]
-struct Pass {
+struct EdgePassage {
     /// To the left of the edge in the sense of its parameter, seen along the ray.
     left: bool,
     /// Distance from the ray, in the units of the part.
@@ -38,23 +47,24 @@ struct Pass {
 
 /// How a ray, the frame's origin and the two directions across it, passes an edge near a parameter; `None` when it runs
 /// along the edge.
-fn pass(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<Pass> {
+fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<EdgePassage> {
     let [t0, t1] = curve.domain();
     let seed = ((near - t0) / (t1 - t0) * SEEDS).round().clamp(0.0, SEEDS);
     // Relative to the domain.
     let mut s = seed / SEEDS;
     let at = |s: f64| {
         let c = curve.derivatives(if s == 1.0 { t1 } else { t0 + (t1 - t0) * s });
-        let (x, d) = (c.point - o, c.first);
-        let (x, d) = ([n1.dot(x), n2.dot(x)], [n1.dot(d), n2.dot(d)]);
+        let off = c.point - o;
+        let x = [n1.dot(off), n2.dot(off)];
+        let d = [n1.dot(c.first), n2.dot(c.first)];
         let length = d[0] * d[0] + d[1] * d[1];
-        (length > 1e-20 * c.first.length_squared()).then_some((x, d, length))
+        (length > LEAST_SINE_SQUARED * c.first.length_squared()).then_some((x, d, length))
     };
-    for _ in 0..24 {
+    for _ in 0..STEPS {
         let (x, d, length) = at(s)?;
         let step = (x[0] * d[0] + x[1] * d[1]) / (length * (t1 - t0));
-        let next = (s - step.clamp(-4.0 / SEEDS, 4.0 / SEEDS)).clamp(0.0, 1.0);
-        let done = (next - s).abs() <= 1e-15;
+        let next = (s - step.clamp(-LONGEST_STEP, LONGEST_STEP)).clamp(0.0, 1.0);
+        let done = (next - s).abs() <= LAST_STEP;
         s = next;
         if done {
             break;
@@ -64,25 +74,26 @@ fn pass(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<Pass> {
     let (x, along, _) = at(s)?;
     let left = along[1] * x[0] - along[0] * x[1] > 0.0;
     let end = (s == 0.0 || s == 1.0).then_some(s == 1.0);
-    Some(Pass { left, distance: x[0].hypot(x[1]), along, end })
+    Some(EdgePassage { left, distance: x[0].hypot(x[1]), along, end })
 }
 
 impl Geometry {
     /// Whether a root of a face near its trims counts, by the sides of the shared edges; `None` where no edge can tell.
     ///
-    /// `facing` is the sign of `(Su × Sv) · d` at the root, `near` what trims there are about it.
+    /// The ray comes as its origin and the two directions across it. `facing` is the sign of `(Su × Sv) · d` at the root, `near` what
+    /// trims there are about it.
     pub(super) fn side_of_edges(
         &self,
         face: &FaceRecord,
         trim: &Trim,
-        q: &Query,
+        [origin, n1, n2]: [Vector; 3],
         facing: f64,
         near: &[Near],
     ) -> Option<bool> {
         let place = &face.placement;
         // Mirrored placements turn sides around; `facing` is measured in the world as well, so the frame stays the world's.
-        let o: Point = place.local_point(q.o);
-        let frame = [o, place.local_direction(q.n1), place.local_direction(q.n2)];
+        let o: Point = place.local_point(origin);
+        let frame = [o, place.local_direction(n1), place.local_direction(n2)];
         let curve = |owner: u32| {
             let edge = trim.uses[owner as usize].edge?;
             self.edges.get(face.part as usize)?.get(edge.0 as usize)
@@ -92,26 +103,26 @@ impl Geometry {
         if let Some(inside) = self.in_sector(face, trim, near, mirrored, frame) {
             return Some(inside);
         }
-        let mut best: Option<(u32, Pass)> = None;
+        let mut best: Option<(u32, EdgePassage)> = None;
         for n in near.iter().filter(|n| trim.uses[n.owner as usize].edge.is_some()) {
-            let passed = pass(curve(n.owner)?, n.parameter, frame)?;
+            let passed = nearest_passage(curve(n.owner)?, n.parameter, frame)?;
             if best.is_none_or(|b| passed.distance < b.1.distance) {
                 best = Some((n.owner, passed));
             }
         }
         let (owner, first) = best?;
-        let inside = |owner: u32, p: &Pass| p.left ^ trim.uses[owner as usize].reversed ^ mirrored;
-        let own = inside(owner, &first);
-        let Some(at_end) = first.end else { return Some(own) };
+        let inside = |owner: u32, p: &EdgePassage| p.left ^ trim.uses[owner as usize].reversed ^ mirrored;
+        let by_nearest = inside(owner, &first);
+        let Some(at_end) = first.end else { return Some(by_nearest) };
         let forward = at_end != trim.uses[owner as usize].reversed;
-        let Some(other) = uses::around(&trim.uses, owner, forward) else { return Some(own) };
+        let Some(other) = edge_use::next_bounding_use(&trim.uses, owner, forward) else { return Some(by_nearest) };
         let other_curve = curve(other)?;
         // Where the loop comes from the vertex, or goes to it.
         let its_end = forward == trim.uses[other as usize].reversed;
-        let Some(second) = pass(other_curve, other_curve.domain()[usize::from(its_end)], frame) else {
-            return Some(own);
+        let Some(second) = nearest_passage(other_curve, other_curve.domain()[usize::from(its_end)], frame) else {
+            return Some(by_nearest);
         };
-        let direction = |owner: u32, p: &Pass| {
+        let direction = |owner: u32, p: &EdgePassage| {
             let sign = if trim.uses[owner as usize].reversed { -1.0 } else { 1.0 };
             p.along.map(|x| sign * x)
         };
@@ -119,8 +130,8 @@ impl Geometry {
         let turn = a[0] * b[1] - a[1] * b[0];
         // The loop turns towards the face at a convex corner.
         let convex = (turn > 0.0) == (forward != mirrored);
-        let beside = inside(other, &second);
-        Some(if convex { own && beside } else { own || beside })
+        let by_other = inside(other, &second);
+        Some(if convex { by_nearest && by_other } else { by_nearest || by_other })
     }
 
     /// Whether a ray through a vertex falls into one of the face's sectors there; `None` when it passes no vertex.
@@ -137,7 +148,7 @@ impl Geometry {
     ) -> Option<bool> {
         let flat = |x: Vector| [n1.dot(x), n2.dot(x)];
         let angle = |x: [f64; 2]| x[1].atan2(x[0]);
-        let rounding = 256.0 * f64::EPSILON * o.abs().max_element();
+        let rounding = VERTEX_ROUNDING * f64::EPSILON * o.abs().max_element();
         let mut found = None;
         for owner in near.iter().map(|n| n.owner) {
             for forward in [true, false] {
@@ -149,9 +160,9 @@ impl Geometry {
                 if !(vertex[0].hypot(vertex[1]) <= radius.max(rounding)) {
                     continue;
                 }
-                let other = uses::around(&trim.uses, owner, forward)?;
+                let other = edge_use::next_bounding_use(&trim.uses, owner, forward)?;
                 // Away from the vertex along the loop, and back from it.
-                let (goes, comes) = if forward { (other, owner) } else { (owner, other) };
+                let (outgoing, incoming) = if forward { (other, owner) } else { (owner, other) };
                 let away = |owner: u32, leaves: bool| {
                     let u = &trim.uses[owner as usize];
                     let at_end = leaves == u.reversed;
@@ -161,9 +172,9 @@ impl Geometry {
                         if at_end { (t1, t1 - (t1 - t0) * CHORD) } else { (t0, t0 + (t1 - t0) * CHORD) };
                     let chord = curve.evaluate(to) - curve.evaluate(from);
                     let d = flat(chord);
-                    (d[0].hypot(d[1]) > 1e-10 * chord.length()).then(|| angle(d))
+                    (d[0].hypot(d[1]) > LEAST_SINE * chord.length()).then(|| angle(d))
                 };
-                let (from, to) = (away(goes, true)?, away(comes, false)?);
+                let (from, to) = (away(outgoing, true)?, away(incoming, false)?);
                 let (from, to) = if mirrored { (to, from) } else { (from, to) };
                 let at = angle(vertex.map(|x| -x));
                 let inside = if from < to { from <= at && at < to } else { from <= at || at < to };

@@ -1,21 +1,22 @@
 //! What the one-step test reads of a leaf, packed into three cache lines; and what names a hit on it, in one.
 
 use super::geometry::Geometry;
-use super::leaf::{Leaf, REACH, ROUND};
+use super::leaf::Leaf;
 use super::net::{Jet, Slopes, V4};
+use super::tolerances::{COORDINATE_ROUNDING, REACH, ROUND};
 use crate::math::{FaceId, Uv, Vector};
 
 /// A leaf as the one-step test sees it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Probe {
+pub(super) struct Linearization {
     /// By coordinate (x, y, z, weight): middles of the boxes around ∂/∂u and ∂/∂v, the point in the middle, and the sum of the
     /// radii of both boxes. Side by side, so that one pass projects all of them.
     rows: [V4; 4],
     /// Centre in the world.
     pub(super) center: Vector,
-    /// The part of [`super::Exact::noise`] that does not depend on the ray, mm.
-    pub(super) still: f64,
+    /// The part of [`super::structure::Exact::noise`] that does not depend on the ray, mm.
+    pub(super) still_noise: f64,
     /// Half of the rectangle in which roots count, rounded up.
     pub(super) half: [f32; 2],
     /// First control point in the pool.
@@ -30,7 +31,7 @@ pub(super) struct Probe {
 /// What names a hit.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Label {
+pub(super) struct HitLabel {
     /// The rectangle of the surface's domain: low corner and extent.
     from: Uv,
     extent: Uv,
@@ -42,13 +43,13 @@ pub(super) struct Label {
     pub(super) patch: u32,
 }
 
-impl Probe {
+impl Linearization {
     pub(super) fn new(leaf: &Leaf, slopes: &Slopes, middle: &V4) -> Self {
         let half = leaf.reach.map(|[lo, hi]| ((0.5 - lo).max(hi - 0.5) as f32).next_up());
         Self {
             rows: std::array::from_fn(|c| [slopes.u[c], slopes.v[c], middle[c], slopes.ru[c] + slopes.rv[c]]),
             center: leaf.center,
-            still: 32.0 * ROUND * leaf.radius + leaf.slop,
+            still_noise: COORDINATE_ROUNDING * ROUND * leaf.radius + leaf.slop,
             half,
             net: leaf.net,
             degree: leaf.degree,
@@ -58,7 +59,7 @@ impl Probe {
     }
 
     /// The same with its net further on in the pool.
-    pub(super) fn shifted(self, by: u32) -> Self {
+    pub(super) fn moved_in_pool(self, by: u32) -> Self {
         Self { net: self.net + by, ..self }
     }
 
@@ -70,7 +71,7 @@ impl Probe {
 
     /// The Jacobian's row and the value in the middle, seen by `n·A − k·W`.
     #[inline(always)]
-    pub(super) fn seen(&self, n: Vector, k: f64) -> [f64; 3] {
+    pub(super) fn projected(&self, n: Vector, k: f64) -> [f64; 3] {
         let [x, y, z, w] = &self.rows;
         let all: V4 = std::array::from_fn(|i| n.x * x[i] + n.y * y[i] + n.z * z[i] - k * w[i]);
         [all[0], all[1], all[2]]
@@ -78,7 +79,7 @@ impl Probe {
 
     /// How far the Jacobian's row may stray, summed over both parameters.
     #[inline(always)]
-    pub(super) fn spread(&self, n: Vector, k: f64) -> f64 {
+    pub(super) fn radius(&self, n: Vector, k: f64) -> f64 {
         let [x, y, z, w] = &self.rows;
         n.x.abs() * x[3] + n.y.abs() * y[3] + n.z.abs() * z[3] + k.abs() * w[3]
     }
@@ -86,12 +87,12 @@ impl Probe {
 
 /// Value and derivatives of a jet, seen by `n·A − k·W`.
 #[inline(always)]
-pub(super) fn seen(jet: &Jet, n: Vector, k: f64) -> [f64; 3] {
+pub(super) fn projected_jet(jet: &Jet, n: Vector, k: f64) -> [f64; 3] {
     let value = |a: &V4| n.x * a[0] + n.y * a[1] + n.z * a[2] - k * a[3];
     [value(&jet.s), value(&jet.su), value(&jet.sv)]
 }
 
-impl Label {
+impl HitLabel {
     pub(super) fn new(leaf: &Leaf, geometry: &Geometry) -> Self {
         let patch = &geometry.patches[leaf.patch as usize];
         let face = &geometry.faces[leaf.face as usize];

@@ -1,0 +1,73 @@
+//! Whether a root on a leaf is a crossing of the face: in range, not the point that the ray leaves, inside the trims.
+
+use super::edge_use::EdgeUse;
+use super::leaf::Leaf;
+use super::net;
+use super::patch::project;
+use super::query::{Query, Root};
+use super::structure::Exact;
+use super::trim::Region;
+use crate::intersect::Certainty;
+use crate::math::Vector;
+
+impl Exact {
+    /// Takes a root when it lies in range, inside the trims, and is not the point that the ray leaves.
+    pub(super) fn offer(&self, query: &mut Query, index: u32, local: [f64; 2], t: f64, certainty: Certainty) {
+        if !query.is_in_range(t) {
+            return;
+        }
+        let leaf = &self.leaves[index as usize];
+        if query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {
+            return;
+        }
+        let mut near_trim = false;
+        if !self.linearizations[index as usize].whole {
+            let (inside, near) = self.trim_side(query, leaf, local);
+            near_trim = near;
+            if !inside {
+                if near {
+                    query.reject_at_trim(t);
+                }
+                return;
+            }
+        }
+        query.accept(Root { t, leaf: index, local, certainty, near_trim });
+    }
+
+    /// Whether a root lies inside the trims, and whether a trim is within the band.
+    fn trim_side(&self, query: &Query, leaf: &Leaf, local: [f64; 2]) -> (bool, bool) {
+        let face = &self.geometry.faces[leaf.face as usize];
+        let trim = &self.geometry.trims[face.trim as usize];
+        let patch = &self.geometry.patches[leaf.patch as usize];
+        let uv = patch.uv(leaf.to_patch(local));
+        match trim.cell_at(uv) {
+            Region::Border => {}
+            decided => return (decided == Region::Inside, false),
+        }
+        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
+        let (_, du, dv) = project(&jet);
+        // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the
+        // gap over the sine, and still the edge must decide for both of its faces.
+        let scale = |d: usize| (leaf.rect[d][1] - leaf.rect[d][0]) * (patch.domain[d][1] - patch.domain[d][0]);
+        let across = |a: Vector, d: usize| (a - query.d * a.dot(query.d)) / scale(d);
+        let (su, sv) = (across(du, 0), across(dv, 1));
+        let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
+        let mut place = trim.locate(uv, metric, face.flagged);
+        let owner = |n: u32| -> &EdgeUse { &trim.uses[n as usize] };
+        place.near.retain(|n| n.distance <= self.geometry.flagged(owner(n.owner).gap, &face.placement));
+        let flagged = !place.near.is_empty();
+        place.near.retain(|n| n.distance <= face.band);
+        if place.near.is_empty() {
+            return (place.inside, flagged);
+        }
+        let facing = du.cross(dv).dot(query.d);
+        let ray = [query.o, query.n1, query.n2];
+        let inside = match self.geometry.side_of_edges(face, trim, ray, facing, &place.near) {
+            Some(inside) => inside,
+            // Seams and poles bound nothing in space: what lies on them is part of the face.
+            None if place.near.iter().all(|n| owner(n.owner).edge.is_none()) => true,
+            None => place.inside,
+        };
+        (inside, true)
+    }
+}

@@ -1,0 +1,184 @@
+//! What a search has found, as a hit with its certificate, and the searches that callers ask for.
+
+use super::leaf_test;
+use super::patch;
+use super::query::{Query, Root};
+use super::structure::Exact;
+use super::tolerances::{CONTACT_LENGTH, NEWTON_STEP, TANGENT};
+use super::{net, traversal};
+use crate::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
+use crate::math::{Ray, Vector};
+
+/// The first hit with everything that is known about it; also a miss has a certainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// The first hit.
+    pub hit: Option<Hit>,
+    /// Of the hit or of the miss.
+    pub certainty: Certainty,
+    /// Whether a trim lies within the band of the hit, or of a nearer root that the trim turned away.
+    pub near_trim: bool,
+}
+
+/// What a ray crosses all along its way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Passage {
+    /// The crossings in order of t.
+    pub crossings: Vec<Hit>,
+    /// The t, in order, of crossings with a trim within its band, and of those that such a trim turned away.
+    pub near_trims: Vec<f64>,
+}
+
+/// A search for all crossings may take so many times the budget of one for the first.
+const BUDGET_OF_ALL: u32 = 4;
+/// Crossings of one face this near to each other along the ray are one, mm, and [`SAME_CROSSING_FAR`] of their distance.
+const SAME_CROSSING: f64 = 1e-9;
+/// As [`SAME_CROSSING`], relative to t: 450 ulps.
+const SAME_CROSSING_FAR: f64 = 1e-13;
+/// A correction that moves a root farther is not one: where the search went by the net in the ray's frame, rounding may say
+/// otherwise, and its word stands.
+const LARGEST_CORRECTION: f64 = 1e-6;
+/// Corrections before a hit is named; steps square, so that the second is mostly the last.
+const CORRECTIONS: usize = 4;
+
+impl Exact {
+    /// The first hit, with its certificate, also for a miss.
+    pub fn first(&self, ray: &Ray, cost: &mut Cost) -> Answer {
+        let mut query = Query::IDLE;
+        self.restart(&mut query, ray, self.settings.budget);
+        traversal::search(self, &mut query);
+        self.answer(&query, cost)
+    }
+
+    /// Every crossing in order of t, each once. A crossing found from both sides of a patch border counts once.
+    pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
+        self.passage(ray, cost).crossings
+    }
+
+    /// Every crossing in order of t, and where trims were near.
+    pub fn passage(&self, ray: &Ray, cost: &mut Cost) -> Passage {
+        let mut query = Query::IDLE;
+        self.restart(&mut query, ray, self.settings.budget.saturating_mul(BUDGET_OF_ALL));
+        query.collects_all = true;
+        traversal::search(self, &mut query);
+        cost.rays += 1;
+        cost.nodes += u64::from(query.nodes);
+        cost.tests += u64::from(query.leaves_tested);
+        let mut roots = std::mem::take(&mut query.all);
+        roots.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let mut near_trims = query.all_rejected.clone();
+        near_trims.extend(roots.iter().filter(|r| r.near_trim).map(|r| r.t));
+        near_trims.sort_by(f64::total_cmp);
+        let mut hits: Vec<Hit> = Vec::new();
+        for root in roots {
+            let mut hit = self.hit(&query, &root);
+            if hit.t >= query.undecided_from {
+                hit.certainty = Certainty::Uncertified;
+            }
+            if !repeats(&hits, &hit, root.certainty, ray.direction) {
+                hits.push(hit);
+            }
+        }
+        Passage { crossings: hits, near_trims }
+    }
+
+    /// Takes up a ray.
+    #[inline(always)]
+    pub(super) fn restart(&self, query: &mut Query, ray: &Ray, budget: u32) {
+        query.restart(ray, &self.geometry, &self.tree, budget);
+        if !is_sound(ray) {
+            query.slabs.misses = true;
+            query.undecided_from = f64::NEG_INFINITY;
+        }
+    }
+
+    /// What a search has found.
+    #[inline(always)]
+    pub(super) fn answer(&self, query: &Query, cost: &mut Cost) -> Answer {
+        cost.rays += 1;
+        cost.nodes += u64::from(query.nodes);
+        cost.tests += u64::from(query.leaves_tested);
+        let Some(root) = &query.best else {
+            let undecided = query.undecided_from < f64::INFINITY;
+            let certainty = if undecided { Certainty::Uncertified } else { Certainty::Certified };
+            cost.fallbacks += u64::from(certainty == Certainty::Uncertified);
+            return Answer { hit: None, certainty, near_trim: query.nearest_rejected < f64::INFINITY };
+        };
+        let certainty = if query.undecided_from <= root.t { Certainty::Uncertified } else { root.certainty };
+        cost.fallbacks += u64::from(certainty == Certainty::Uncertified);
+        let near_trim = root.near_trim || query.nearest_rejected <= root.t;
+        let hit = Some(Hit { certainty, ..self.hit(query, root) });
+        Answer { hit, certainty, near_trim }
+    }
+
+    /// Names a root, after the steps of Newton's method that the search left to do.
+    #[inline(always)]
+    fn hit(&self, query: &Query, root: &Root) -> Hit {
+        let (leaf, label) = (&self.linearizations[root.leaf as usize], &self.labels[root.leaf as usize]);
+        let control = leaf.net(&self.pool);
+        let mut t = root.t;
+        let mut local = root.local;
+        let mut jet = net::evaluate(control, leaf.degree, local[0], local[1]);
+        if root.certainty == Certainty::Certified {
+            let oc = query.o - leaf.center;
+            for _ in 0..CORRECTIONS {
+                let (step, t_after) = leaf_test::newton_step(query, oc, &jet);
+                let size = step[0].abs().max(step[1].abs());
+                if !(size < LARGEST_CORRECTION) {
+                    break;
+                }
+                t = t_after;
+                local = [local[0] - step[0], local[1] - step[1]];
+                // The normal is that of the point before the step.
+                if size < 2.0 * NEWTON_STEP {
+                    break;
+                }
+                jet = net::evaluate(control, leaf.degree, local[0], local[1]);
+            }
+            t = t.clamp(query.t_min, query.limit);
+        }
+        let inside = local.map(|x| x.clamp(0.0, 1.0));
+        let normal: Vector = label.sign * patch::normal(control, leaf.degree, inside, &jet, label.rounding);
+        let (uv, certainty) = (label.uv(inside), root.certainty);
+        Hit { t, normal, geometric_normal: normal, face: label.face, primitive: label.patch, uv, certainty }
+    }
+}
+
+/// Whether a crossing is one of those before it: the same face at the same place with the same side towards the ray.
+fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> bool {
+    let close = SAME_CROSSING + SAME_CROSSING_FAR * hit.t.abs();
+    // At a pole clipping ends on boxes TANGENT wide across the ray, as often as patches meet there: along the ray they differ by
+    // that over the sine.
+    let sine = hit.geometric_normal.dot(direction).abs();
+    let smeared = close + (2.0 * TANGENT / sine).min(CONTACT_LENGTH * TANGENT);
+    let open = |c: Certainty| c == Certainty::Uncertified;
+    let leaves = |h: &Hit| h.geometric_normal.dot(direction) > 0.0;
+    hits.iter().rev().take_while(|h| hit.t - h.t <= smeared).any(|h| {
+        h.face == hit.face
+            && (hit.t - h.t <= close || open(certainty) && open(h.certainty))
+            && leaves(h) == leaves(hit)
+    })
+}
+
+/// Whether a ray has finite coordinates and a direction.
+fn is_sound(ray: &Ray) -> bool {
+    ray.origin.is_finite() && ray.direction.is_finite() && ray.direction.length_squared() > 0.0
+}
+
+impl Intersector for Exact {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.first(ray, cost).hit
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        traversal::search_batch(self, rays, hits, cost);
+    }
+
+    fn footprint(&self) -> Footprint {
+        Footprint {
+            bytes: self.bytes(),
+            primitives: self.geometry.patches.len(),
+            build_seconds: self.build_seconds,
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! The one-step test of a leaf: exclude it, or prove one root at most and find that.
+//!
+//! Seen along the ray, a leaf is a map `f` of its two parameters to the plane across the ray, in homogeneous form
+//! `f = n·A − (n·o)·W`. With `Y` the inverse of the middle of the derivative boxes, a root in the leaf lies in
+//! `middle − Y f(middle) ± |Y| R · ½` (Krawczyk's operator); when that misses the leaf there is none, and when the row
+//! sums of `|Y| R` stay below 1 there is at most one in the enlarged domain, which Newton's method then finds.
+
+use super::clip;
+use super::leaf::Leaf;
+use super::linearization::{Linearization, projected_jet};
+use super::net::{self, Jet, V4};
+use super::query::Query;
+use super::structure::Exact;
+use super::tolerances::{COORDINATE_ROUNDING, EXTENSION, INVERSE_ROUNDING, NEWTON_STEP, REACH, ROUND, SINGULAR};
+use crate::intersect::Certainty;
+use crate::math::Vector;
+
+/// Row sums above this go to clipping: 5 % is kept for the rounding of `Y`, which stays below [`INVERSE_ROUNDING`].
+const UNIQUE: f64 = 0.95;
+/// Rounding of parameters of a unit square: fifty ulps of its middle.
+const PARAMETER_ROUNDING: f64 = 1e-14;
+/// Newton steps on a leaf; its map is nearly linear, and three do on most.
+const STEPS: usize = 12;
+/// A step this short is the last: the next would be its square.
+const LAST_STEP: f64 = 1e-8;
+/// Steps below this that do not get shorter are rounding.
+const STALLED_STEP: f64 = 1e-6;
+/// Keeps reciprocals of a direction's components finite; far below any component that moves a box.
+const SMALLEST_COMPONENT: f64 = 1e-200;
+
+impl Exact {
+    /// Bound of the rounding error of a leaf's coordinates across a ray, mm.
+    #[inline(always)]
+    pub(super) fn noise(&self, leaf: &Leaf, oc: Vector) -> f64 {
+        COORDINATE_ROUNDING * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs() + leaf.radius) + leaf.slop
+    }
+
+    /// Meets a leaf: excludes it, takes its only root, or hands it to clipping.
+    #[inline(always)]
+    pub(super) fn test_leaf(&self, query: &mut Query, index: u32) {
+        let leaf = &self.linearizations[index as usize];
+        query.leaves_tested += 1;
+        let oc = query.o - leaf.center;
+        let noise = COORDINATE_ROUNDING * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs()) + leaf.still_noise;
+        let (k1, k2) = (query.n1.dot(oc), query.n2.dot(oc));
+
+        // The Jacobian in the middle and its inverse.
+        let [a, b, f1] = leaf.projected(query.n1, k1);
+        let [c, d, f2] = leaf.projected(query.n2, k2);
+        let det = a * d - b * c;
+        if !(det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
+            return self.clip_touched(query, index);
+        }
+        let (r1, r2) = (leaf.radius(query.n1, k1), leaf.radius(query.n2, k2));
+        let inv = 1.0 / det;
+        let (y00, y01, y10, y11) = (d * inv, -b * inv, -c * inv, a * inv);
+
+        // Where its boxes deviate from it by less than itself there is one root at most.
+        let row_u = y00.abs() * r1 + y01.abs() * r2;
+        let row_v = y10.abs() * r1 + y11.abs() * r2;
+        if !(row_u < UNIQUE && row_v < UNIQUE) {
+            return self.clip_touched(query, index);
+        }
+
+        // Krawczyk's operator, about the middle: does it miss the leaf?
+        let du = -(y00 * f1 + y01 * f2);
+        let dv = -(y10 * f1 + y11 * f2);
+        let margin = PARAMETER_ROUNDING + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
+        let reach_u = f64::from(leaf.half[0]) * (1.0 + row_u + INVERSE_ROUNDING) + margin;
+        let reach_v = f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin;
+        if du.abs() > reach_u || dv.abs() > reach_v {
+            return;
+        }
+        let Some((local, s)) = self.newton_on_leaf(query, leaf, [du, dv], [k1, k2]) else {
+            return self.clip_touched(query, index);
+        };
+        self.offer_only_root(query, index, (local, s), oc, margin);
+    }
+
+    /// The only root of a leaf's enlarged domain, in parameters, with the homogeneous point there; `None` where Newton's method
+    /// has left that domain, so that the root may be any.
+    #[inline(always)]
+    fn newton_on_leaf(
+        &self,
+        query: &Query,
+        leaf: &Linearization,
+        [du, dv]: [f64; 2],
+        [k1, k2]: [f64; 2],
+    ) -> Option<([f64; 2], V4)> {
+        let clamp = |x: f64| x.clamp(-EXTENSION, 1.0 + EXTENSION);
+        let (mut u, mut v) = (clamp(0.5 + du), clamp(0.5 + dv));
+        let control = leaf.net(&self.pool);
+        let mut last = du.abs().max(dv.abs());
+        for _ in 0..STEPS {
+            let jet = net::evaluate_inlined(control, leaf.degree, u, v);
+            let ([f1, a, b], [f2, c, d]) = (projected_jet(&jet, query.n1, k1), projected_jet(&jet, query.n2, k2));
+            let inv = 1.0 / (a * d - b * c);
+            let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
+            let step = xu.abs().max(xv.abs());
+            u -= xu;
+            v -= xv;
+            // Steps square: the next would be about step³/last². What is left is taken off where the hit is made.
+            let converged = step < LAST_STEP || step * step * step < NEWTON_STEP * last * last;
+            if converged || (step < STALLED_STEP && step >= last) {
+                let mut s = jet.s;
+                net::axpy(&mut s, -xu, &jet.su);
+                net::axpy(&mut s, -xv, &jet.sv);
+                return (within(u, EXTENSION) && within(v, EXTENSION)).then_some(([u, v], s));
+            }
+            last = step;
+            if !(within(u, 1.0) && within(v, 1.0)) {
+                break;
+            }
+        }
+        None
+    }
+
+    /// Offers the only root of the enlarged domain: outside of the leaf it is another leaf's.
+    #[inline(always)]
+    fn offer_only_root(&self, query: &mut Query, index: u32, ([u, v], s): ([f64; 2], V4), oc: Vector, margin: f64) {
+        let e = margin + 2.0 * NEWTON_STEP;
+        let leaf = &self.linearizations[index as usize];
+        let reach = if leaf.widened { self.leaves[index as usize].reach } else { REACH };
+        let counts = |x: f64, [lo, hi]: [f64; 2]| x >= lo - e && x <= hi + e;
+        if !(counts(u, reach[0]) && counts(v, reach[1])) {
+            return;
+        }
+        let p = Vector::new(s[0], s[1], s[2]) / s[3];
+        let t = query.d.dot(p - oc);
+        if !query.is_in_range(t) {
+            return;
+        }
+        if let Some(own) = query.departure
+            && let Some(left) = own.local_to(&self.leaves[index as usize], &self.geometry)
+            && within(left[0], EXTENSION)
+            && within(left[1], EXTENSION)
+            && own.is_unique_root(t)
+        {
+            return;
+        }
+        self.offer(query, index, [u, v], t, Certainty::Certified);
+    }
+
+    /// Clips a leaf whose oriented box the ray touches.
+    #[inline(always)]
+    fn clip_touched(&self, query: &mut Query, index: u32) {
+        let leaf = &self.leaves[index as usize];
+        let oc = query.o - leaf.center;
+        if touches_oriented_box(query, leaf, oc, self.noise(leaf, oc)) {
+            clip::clip(self, query, index);
+        }
+    }
+}
+
+/// Whether a parameter lies in `[0, 1]` or beyond by no more than `e`.
+#[inline(always)]
+fn within(x: f64, e: f64) -> bool {
+    x >= -e && x <= 1.0 + e
+}
+
+/// A step of Newton's method, to be taken off, and t after it.
+#[inline(always)]
+pub(super) fn newton_step(query: &Query, oc: Vector, jet: &Jet) -> ([f64; 2], f64) {
+    let (k1, k2) = (query.n1.dot(oc), query.n2.dot(oc));
+    let ([f1, a, b], [f2, c, d]) = (projected_jet(jet, query.n1, k1), projected_jet(jet, query.n2, k2));
+    let inv = 1.0 / (a * d - b * c);
+    let (xu, xv) = ((d * f1 - b * f2) * inv, (a * f2 - c * f1) * inv);
+    let mut s = jet.s;
+    net::axpy(&mut s, -xu, &jet.su);
+    net::axpy(&mut s, -xv, &jet.sv);
+    ([xu, xv], query.d.dot(Vector::new(s[0], s[1], s[2]) / s[3] - oc))
+}
+
+/// The oriented box, with the rounding of the rotated origin as margin.
+#[inline(always)]
+fn touches_oriented_box(query: &Query, leaf: &Leaf, oc: Vector, noise: f64) -> bool {
+    let (mut near, mut far) = (query.t_min, query.t_max);
+    for k in 0..3 {
+        let (o, d) = (oc.dot(leaf.axes[k]), query.d.dot(leaf.axes[k]));
+        let inv = 1.0 / if d.abs() < SMALLEST_COMPONENT { SMALLEST_COMPONENT.copysign(d) } else { d };
+        let (a, b) = ((leaf.olo[k] - noise - o) * inv, (leaf.ohi[k] + noise - o) * inv);
+        let (x, y) = if a < b { (a, b) } else { (b, a) };
+        near = if x > near { x } else { near };
+        far = if y < far { y } else { far };
+    }
+    // The division and the product round by three half ulps at most.
+    near <= far + 4.0 * f64::EPSILON * far.abs()
+}

@@ -1,0 +1,162 @@
+//! Bézier patches about centres of their own, and the lines that divide a surface into them.
+
+use super::net::{self, Jet, Net, V4};
+use super::tolerances::{PARALLEL, SAME_POINT};
+use crate::math::{Point, Uv, Vector};
+use crate::model::{Face, PlacedFace};
+use crate::nurbs::BezierPatch;
+
+/// Ulps by which a patch's control points are off, of its size: extraction, shift and placement round each less than ten times.
+const NET_ROUNDING: f64 = 16.0;
+
+/// Break lines of a surface's patches.
+#[derive(Debug)]
+pub(super) struct PatchGrid {
+    pub(super) breaks: [Vec<f64>; 2],
+    /// Whether the surface closes on itself in u and in v.
+    pub(super) closed: [bool; 2],
+    /// Whether the side at the low and at the high end of u, and of v, is a single point.
+    pub(super) poles: [[bool; 2]; 2],
+}
+
+/// A rational Bézier patch in world orientation.
+#[derive(Debug)]
+pub(super) struct Patch {
+    /// Index into [`Geometry::faces`].
+    pub(super) face: u32,
+    pub(super) degree: [u8; 2],
+    /// Control points about `center`, weight 1 in the middle of the patch.
+    pub(super) net: Net,
+    /// Error of the control points, and of derivatives got from them, mm.
+    pub(super) rounding: f64,
+    pub(super) center: Point,
+    /// The rectangle of the surface's domain.
+    pub(super) domain: [[f64; 2]; 2],
+}
+
+impl PatchGrid {
+    pub(super) fn new(face: &Face) -> Self {
+        let s = &face.surface;
+        let counts = s.counts();
+        let breaks = [0, 1].map(|d| {
+            let mut b = s.knots[d][s.degree[d]..=counts[d]].to_vec();
+            b.dedup();
+            b
+        });
+        let domain = s.domain();
+        // As near as a file's nine digits put points of one place, or a micrometre on a metre where it says nothing.
+        let tolerance = SAME_POINT * (1.0 + s.bounds().diagonal());
+        // Five points along the side at the low or high end of a parameter.
+        let side = |d: usize, end: usize| -> [Point; 5] {
+            std::array::from_fn(|k| {
+                let along = domain[1 - d][0] + (domain[1 - d][1] - domain[1 - d][0]) * k as f64 / 4.0;
+                let x = domain[d][end];
+                s.evaluate(if d == 0 { Uv::new(x, along) } else { Uv::new(along, x) })
+            })
+        };
+        let same = |a: &Point, b: &Point| a.distance(*b) <= tolerance;
+        let closed = [0, 1].map(|d| side(d, 0).iter().zip(&side(d, 1)).all(|(a, b)| same(a, b)));
+        let poles = [0, 1].map(|d| [0, 1].map(|end| side(d, end).iter().all(|p| same(p, &side(d, end)[0]))));
+        Self { breaks, closed, poles }
+    }
+}
+
+impl Patch {
+    pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
+        let middle = patch.homogeneous(Uv::splat(0.5))[0];
+        // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
+        let center = middle.project();
+        let net: Net = patch
+            .points
+            .iter()
+            .map(|p| {
+                let w = p.w / middle.w;
+                // Rounded once, so that neighbours still share their border when 1e6 mm are taken off both.
+                let shifted = Vector::new(
+                    f64::mul_add(-center.x, p.w, p.x),
+                    f64::mul_add(-center.y, p.w, p.y),
+                    f64::mul_add(-center.z, p.w, p.z),
+                );
+                let a = placed.placement.vector(shifted / middle.w);
+                [a.x, a.y, a.z, w]
+            })
+            .collect();
+        let size = net.iter().map(|p: &V4| p[0].abs().max(p[1].abs()).max(p[2].abs()) / p[3]).fold(0.0, f64::max);
+        Self {
+            face,
+            degree: patch.degree.map(|d| d as u8),
+            rounding: NET_ROUNDING * f64::EPSILON * size,
+            net,
+            center: placed.placement.point(center),
+            domain: patch.domain,
+        }
+    }
+
+    /// Local parameters of surface parameters.
+    pub(super) fn local(&self, uv: Uv) -> [f64; 2] {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        [(uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0)]
+    }
+
+    /// Surface parameters of local parameters.
+    pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
+        let [[u0, u1], [v0, v1]] = self.domain;
+        Uv::new(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v)
+    }
+
+    /// Homogeneous point about the centre, and derivatives.
+    pub(super) fn jet(&self, [u, v]: [f64; 2]) -> Jet {
+        net::evaluate(&self.net, self.degree, u, v)
+    }
+}
+
+/// Position about the centre and first derivatives of a homogeneous jet.
+#[inline(always)]
+pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
+    let inv = 1.0 / jet.s[3];
+    let xyz = |a: &V4| Vector::new(a[0], a[1], a[2]);
+    let p = xyz(&jet.s) * inv;
+    (p, (xyz(&jet.su) - p * jet.su[3]) * inv, (xyz(&jet.sv) - p * jet.sv[3]) * inv)
+}
+
+/// A derivative shorter than so many times the rounding of the net's points is not trusted: 1e-9 mm from the pole of a sphere
+/// of radius 50 the normal was off by 1e-5 rad otherwise.
+const TRUSTED: f64 = 1e6;
+/// Square of the least sine between two derivatives that give a normal: seven digits of it are right.
+const LEAST_SINE_SQUARED: f64 = 1e-18;
+/// Square of the largest ratio of lengths of two derivatives that give a normal.
+const LARGEST_RATIO_SQUARED: f64 = 1e18;
+/// Shares of the way to the middle of the net at which the limit of the normal is taken at a singular point: the least is right
+/// to about 1e-6 rad; nets that are flatter there need more.
+const LIMIT_STEPS: [f64; 3] = [1e-6, 1e-4, 1e-2];
+
+/// Unit normal along `Su × Sv` at local parameters; at a singular point the limit from the middle of the net.
+///
+/// `rounding` is the error of the net's points, mm.
+pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet, rounding: f64) -> Vector {
+    let (_, du, dv) = project(jet);
+    let n = du.cross(dv);
+    let shortest = TRUSTED * rounding;
+    let trusted = |du: Vector, dv: Vector| du.length_squared().min(dv.length_squared()) > shortest * shortest;
+    if trusted(du, dv) && n.length_squared() > LEAST_SINE_SQUARED * du.length_squared() * dv.length_squared() {
+        let ratio = du.length_squared() / dv.length_squared();
+        if ratio > 1.0 / LARGEST_RATIO_SQUARED && ratio < LARGEST_RATIO_SQUARED {
+            return n.normalize();
+        }
+    }
+    // Where a derivative vanishes the normal is the limit, taken as near as derivatives can be trusted.
+    let toward_middle = |step: f64| {
+        let moved = [u, v].map(|x| x + step * (0.5 - x));
+        let (_, du, dv) = project(&net::evaluate(net, degree, moved[0], moved[1]));
+        let n = du.cross(dv);
+        let clear = n.length() > PARALLEL * du.length() * dv.length();
+        (clear.then(|| n.normalize()), trusted(du, dv))
+    };
+    for step in LIMIT_STEPS {
+        if let (Some(normal), true) = toward_middle(step) {
+            return normal;
+        }
+    }
+    // The farthest, whatever its derivatives; a net that is a point or a line has no normal, and any does.
+    toward_middle(LIMIT_STEPS[LIMIT_STEPS.len() - 1]).0.unwrap_or(Vector::Z)
+}

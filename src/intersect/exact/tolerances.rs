@@ -1,0 +1,43 @@
+//! Tolerances, margins and limits of the exact tracer that more than one file decides by, with their reasons.
+//!
+//! Where nothing else is said a number is a share of a leaf's parameter range, which is the unit square. Bounds of rounding are
+//! counted in half ulps where they are used, in units of [`ROUND`].
+
+/// Half an ulp of 1: the relative error of one rounded operation.
+pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
+
+/// Contact closer than this is a matter of rounding, mm: ten thousand half ulps of 1000 mm.
+pub(super) const TANGENT: f64 = 1e-9;
+/// Along the ray a contact smears over this many times [`TANGENT`]: a circle of radius 0.5 mm rises 1e-9 mm over a chord of 6e-5 mm,
+/// and boxes that are shorter than 1e-6 mm can hold no second contact that would be told from the first.
+pub(super) const CONTACT_LENGTH: f64 = 1e3;
+
+/// Half ulps of `|o − c| + radius` by which a leaf's coordinates across a ray are off: 2 for the shifted origin, 4 for the
+/// frame's departure from perpendicular, 12 for the products, 10 for the value in the middle, 4 for what is left out.
+pub(super) const COORDINATE_ROUNDING: f64 = 32.0;
+
+/// How far beyond its domain a leaf's derivative boxes hold.
+pub(super) const EXTENSION: f64 = 0.1;
+/// Where roots count on a leaf without trims on its border: Newton's method ends within [`NEWTON_STEP`] of a root.
+pub(super) const REACH: [[f64; 2]; 2] = [[-NEWTON_STEP, 1.0 + NEWTON_STEP]; 2];
+/// Newton's method stops where its next step is foreseen below this: 1e-12 of a leaf of 10 mm are 1e-11 mm.
+pub(super) const NEWTON_STEP: f64 = 1e-12;
+
+/// A Jacobian whose determinant is a smaller part of the product of its row sums is not inverted: the rounding of the inverse, two
+/// half ulps over this, would reach [`INVERSE_ROUNDING`].
+pub(super) const SINGULAR: f64 = 1e-8;
+/// Bound of the relative rounding of an inverse Jacobian, and of its products with the radii of the derivative boxes: forty times
+/// what [`SINGULAR`] leaves.
+pub(super) const INVERSE_ROUNDING: f64 = 1e-6;
+
+/// Tangents of the sine below which two directions are taken for one, so that no normal comes of them: their cross product
+/// keeps four digits of sixteen.
+pub(super) const PARALLEL: f64 = 1e-12;
+
+/// Rays this near to a vertex are told by sectors, mm: what rounds the sides there is a thousandth of it.
+pub(super) const VERTEX_RADIUS: f64 = 1e-9;
+/// Distance, as a share of the size of what is looked at, below which points of a model are the same: files carry nine digits.
+pub(super) const SAME_POINT: f64 = 1e-9;
+/// Distance of parameters, as a share of a patch, below which a departure lies on a neighbour's border too: the rounding of
+/// parameters of a knot span of a millionth of the domain.
+pub(super) const SAME_PARAMETER: f64 = 1e-9;
