@@ -14,7 +14,7 @@
 //!
 //! Guarantee when cured: bit for bit the hits of the octree. Weakness: slower by what f64 leaves cost.
 
-use super::facet::{FacetHit, FacetRay, Nearest, Surroundings, usable};
+use super::facet::{FacetHit, FacetRay, Nearest, Surroundings, is_usable};
 use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
@@ -112,7 +112,7 @@ impl<'m> Bvh<'m> {
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
         let half = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
         let codes: Vec<u32> = (0..mesh.facets.len())
-            .filter(|&f| mesh.corners(f).iter().all(|&p| usable(p)))
+            .filter(|&f| mesh.corners(f).iter().all(|&p| is_usable(p)))
             .flat_map(|f| {
                 let one = (f as u32) << 1;
                 std::iter::once(one).chain((!mesh.facets[f].is_triangle()).then_some(one | 1))
@@ -186,7 +186,7 @@ impl<'m> Bvh<'m> {
 
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         let facet_ray = FacetRay::new(ray);
-        let mut best = Nearest::before(ray.t_max);
+        let mut best = Nearest::up_to(ray.t_max);
         let (enter, leave) = self.bounds.clip(ray)?;
         let pull = self.pull - enter;
         let origin = (ray.origin - self.center - ray.direction * pull).as_vec3a();

@@ -11,7 +11,10 @@
 //! Weakness: two coincident sheets of different parts are two facets at the same place, and which of them a ray that
 //! leaves one meets at t = 0 is a matter of rounding.
 
-use super::slopes::OVER;
+pub(crate) use super::facet_hit::{FacetHit, Nearest};
+
+use super::facet_hit::EdgeHit;
+use super::slopes::LEAST_SINE;
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
@@ -21,58 +24,6 @@ use std::hint::select_unpredictable;
 const NUDGE: f64 = 1.0 / 1048576.0;
 /// The most by which it is moved, in units of [`Surroundings::reach`].
 const LONGEST_NUDGE: f64 = 1024.0;
-
-/// A hit on a facet: which, where on it, and how far along the ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FacetHit {
-    pub(crate) t: f64,
-    pub(crate) facet: u32,
-    /// Whether the triangle (0, 2, 3) was hit, not (0, 1, 2).
-    pub(crate) second: bool,
-    /// Weights of that triangle's corners.
-    pub(crate) b: [f64; 3],
-}
-
-/// The nearest hit so far; starts as "nothing before `t_max`".
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Nearest {
-    pub(crate) t: f64,
-    hit: Option<Reached>,
-}
-
-/// A hit with its edge functions.
-#[derive(Clone, Copy, Debug)]
-struct Reached {
-    t: f64,
-    facet: u32,
-    second: bool,
-    edges: [f64; 3],
-}
-
-impl Nearest {
-    pub(crate) fn before(t_max: f64) -> Self {
-        Self { t: t_max, hit: None }
-    }
-
-    pub(crate) fn hit(&self) -> Option<FacetHit> {
-        let Reached { t, facet, second, edges } = self.hit?;
-        // Divided here once, not at each hit that a nearer one supersedes.
-        let det = edges[0] + edges[1] + edges[2];
-        Some(FacetHit { t, facet, second, b: edges.map(|e| e / det) })
-    }
-
-    /// Keeps the nearer hit, of equal ones that on the facet of lowest index, there the first triangle's.
-    #[inline(always)]
-    fn offer(&mut self, hit: Reached) {
-        let nearer = match self.hit {
-            None => hit.t <= self.t,
-            Some(old) => hit.t < old.t || (hit.t == old.t && (hit.facet, hit.second) < (old.facet, old.second)),
-        };
-        if nearer {
-            *self = Self { t: hit.t, hit: Some(hit) };
-        }
-    }
-}
 
 /// What the test knows of the mesh as a whole.
 #[derive(Clone, Copy, Debug)]
@@ -84,16 +35,19 @@ pub(crate) struct Surroundings<'m> {
     pub(crate) bounds: Aabb,
 }
 
-/// Whether a corner can be traced: a number of at most 1e12 mm, so that nothing overflows in f32 boxes.
-pub(crate) fn usable(p: Point) -> bool {
-    p.abs().cmple(Point::splat(1e12)).all()
+/// The largest coordinate that is traced, mm: its cube overflows no `f32` box, and a million kilometres hold any lamp.
+const LARGEST: f64 = 1e12;
+
+/// Whether a corner can be traced: a number of at most [`LARGEST`].
+pub(crate) fn is_usable(p: Point) -> bool {
+    p.abs().cmple(Point::splat(LARGEST)).all()
 }
 
 impl<'m> Surroundings<'m> {
     /// A start is a rounded `origin + t·direction`; 2⁻⁴⁰ of the largest coordinate covers rays a thousand times
     /// longer than the scene and is a picometre for a lamp.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
-        let bounds = Aabb::around(mesh.positions.iter().copied().filter(|&p| usable(p)));
+        let bounds = Aabb::around(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
         Self { mesh, reach: largest * 2f64.powi(-40), bounds }
     }
@@ -167,18 +121,18 @@ impl FacetRay {
     ) {
         let Some(own) = self.from else { return self.quad(facet, triangles, corners, self.origin, best) };
         let [first, second] = if own == facet {
-            self.ways_of_own(&corners.map(|p| *p), around)
+            self.tests_of_own(&corners.map(|p| *p), around)
         } else {
-            match self.ways_of_other(own, facet, corners, around) {
+            match self.tests_of_other(own, facet, corners, around) {
                 None => return self.quad(facet, triangles, corners, self.origin, best),
-                Some(ways) => ways,
+                Some(tests) => tests,
             }
         };
         for (bit, way) in [(1, first), (2, second)] {
             let origin = match way {
-                Way::Plain => self.origin,
-                Way::From(moved) => moved.to_array(),
-                Way::Never => continue,
+                TriangleTest::Plain => self.origin,
+                TriangleTest::From(moved) => moved.to_array(),
+                TriangleTest::Never => continue,
             };
             self.quad(facet, triangles & bit, corners, origin, best);
         }
@@ -203,53 +157,65 @@ impl FacetRay {
     /// The facet that the ray leaves: only its other triangle may be met, and only where the fold between them closes
     /// on the ray.
     #[cold]
-    fn ways_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
+    fn tests_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [TriangleTest; 2] {
         let [a, b, c, d] = *corners;
         let (first, second) = ((b - a).cross(c - a), (c - a).cross(d - a));
-        let over = |n: Vector, side: f64| side * n.dot(self.direction) > OVER * n.length();
+        let over = |n: Vector, side: f64| side * n.dot(self.direction) > LEAST_SINE * n.length();
         let goes = |side: f64| over(first, side) && (c == d || over(second, side));
         if goes(1.0) || goes(-1.0) {
-            return [Way::Never; 2];
+            return [TriangleTest::Never; 2];
         }
         let start = Point::from_array(self.origin);
-        let own = Own::new(corners, start);
+        let own = StartTriangle::new(corners, start);
         let apex = corners[if own.second { 1 } else { 3 }];
         let thick = around.reach * around.reach * own.normal.length_squared();
         let height = own.normal.dot(apex - corners[0]);
         let off_plane = own.normal.dot(start - corners[0]);
         let closes = height * own.normal.dot(self.direction) > 0.0 && height * height > thick;
         let other = if !closes || off_plane * off_plane > thick {
-            Way::Never
+            TriangleTest::Never
         } else if distance_to_segment(start, corners[0], corners[2]) <= around.reach {
-            Way::From(own.moved(start, around.reach))
+            TriangleTest::From(own.moved(start, around.reach))
         } else {
-            Way::Plain
+            TriangleTest::Plain
         };
-        if own.second { [other, Way::Never] } else { [Way::Never, other] }
+        if own.second { [other, TriangleTest::Never] } else { [TriangleTest::Never, other] }
     }
 
     /// How to ask a facet near the start; `None` for all others.
     #[inline(always)]
-    fn ways_of_other(&self, own: u32, facet: u32, corners: [&Point; 4], around: &Surroundings) -> Option<[Way; 2]> {
+    fn tests_of_other(
+        &self,
+        own: u32,
+        facet: u32,
+        corners: [&Point; 4],
+        around: &Surroundings,
+    ) -> Option<[TriangleTest; 2]> {
         let start = Point::from_array(self.origin);
         let corners = &corners.map(|p| *p);
         let [a, b, c, d] = *corners;
         let (low, high) = (a.min(b).min(c).min(d), a.max(b).max(c).max(d));
         let near = start.cmpge(low - around.reach).all() && start.cmple(high + around.reach).all();
-        near.then(|| self.ways_of_neighbour(own, facet, corners, around))
+        near.then(|| self.tests_of_neighbour(own, facet, corners, around))
     }
 
     #[cold]
-    fn ways_of_neighbour(&self, own: u32, facet: u32, corners: &[Point; 4], around: &Surroundings) -> [Way; 2] {
+    fn tests_of_neighbour(
+        &self,
+        own: u32,
+        facet: u32,
+        corners: &[Point; 4],
+        around: &Surroundings,
+    ) -> [TriangleTest; 2] {
         let mesh = around.mesh;
-        let Some(_) = mesh.facets.get(own as usize) else { return [Way::Plain; 2] };
+        let Some(_) = mesh.facets.get(own as usize) else { return [TriangleTest::Plain; 2] };
         let ours = mesh.corner_positions(own as usize);
         let theirs = mesh.corner_positions(facet as usize);
         if !ours.iter().any(|p| theirs.contains(p)) {
-            return [Way::Plain; 2];
+            return [TriangleTest::Plain; 2];
         }
         let start = Point::from_array(self.origin);
-        let own = Own::new(&mesh.corners(own as usize), start);
+        let own = StartTriangle::new(&mesh.corners(own as usize), start);
         let up = own.normal.normalize_or_zero();
         let side = up.dot(self.direction).signum();
         let way = |triangle: [Point; 3]| {
@@ -258,11 +224,15 @@ impl FacetRay {
                 .min(distance_to_segment(start, b, c))
                 .min(distance_to_segment(start, c, a));
             if border > around.reach {
-                return Way::Plain;
+                return TriangleTest::Plain;
             }
             // Nothing of it rises over the plane that the ray leaves.
             let rise = triangle.into_iter().map(|p| side * up.dot(p - start)).fold(0.0, f64::max);
-            if rise <= around.reach { Way::Never } else { Way::From(own.moved(start, around.reach)) }
+            if rise <= around.reach {
+                TriangleTest::Never
+            } else {
+                TriangleTest::From(own.moved(start, around.reach))
+            }
         };
         let [a, b, c, d] = *corners;
         [way([a, b, c]), way([a, c, d])]
@@ -341,28 +311,28 @@ impl Line {
         let t = (u * heights[0] + v * heights[1] + w * heights[2]) * self.shear[2] / det;
         // A NaN (det = 0, or no direction) fails the comparisons.
         if t >= self.t_min && t <= best.t {
-            best.offer(Reached { t, facet, second, edges });
+            best.offer(EdgeHit { t, facet, second, edges });
         }
     }
 }
 
 /// How a triangle is asked.
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum TriangleTest {
     Plain,
     From(Point),
     Never,
 }
 
 /// The triangle of a facet on which a ray starts.
-struct Own {
+struct StartTriangle {
     second: bool,
     /// Twice the area long.
     normal: Vector,
     middle: Point,
 }
 
-impl Own {
+impl StartTriangle {
     fn new(corners: &[Point; 4], start: Point) -> Self {
         let [a, b, c, d] = *corners;
         let second = c != d && (c - a).cross(start - a).dot((c - a).cross(d - b)) > 0.0;

@@ -5,6 +5,7 @@
 pub mod bvh;
 pub mod exact;
 mod facet;
+mod facet_hit;
 mod normals;
 pub mod octree;
 pub mod polish;

@@ -57,10 +57,11 @@ pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mod
     }
 }
 
-/// Of four things at the corners, those of the triangle that was hit.
+/// Of four things at the corners of a facet, those of the triangle that was hit.
 #[inline(always)]
-fn triangle<T: Copy>(second: bool, of: [T; 4]) -> [T; 3] {
-    [of[0], select_unpredictable(second, of[2], of[1]), select_unpredictable(second, of[3], of[2])]
+fn triangle<T: Copy>(second: bool, corners: [T; 4]) -> [T; 3] {
+    let [a, b, c, d] = corners;
+    [a, select_unpredictable(second, c, b), select_unpredictable(second, d, c)]
 }
 
 /// Where the ray meets the cubic patch: its normal there, not of unit length.
@@ -70,10 +71,10 @@ fn cubic(mesh: &FacetMesh, facet: &Facet, ray: &Ray, hit: &FacetHit, flat: Vecto
     let corners = vertices.map(|v| mesh.positions[v.position as usize]);
     if facet.is_triangle() {
         let net = TriangleNet::new(&corners, &vertices);
-        met(|p| net.at(p), Uv::new(hit.b[1], hit.b[2]), ray, flat)
+        normal_on_ray(|p| net.evaluate(p), Uv::new(hit.b[1], hit.b[2]), ray, flat)
     } else {
         let net = QuadNet::new(&corners, &vertices);
-        met(|p| net.at(p), parameters(hit), ray, flat)
+        normal_on_ray(|p| net.evaluate(p), parameters(hit), ray, flat)
     }
 }
 
@@ -107,8 +108,8 @@ fn tangent_point(p: Point, n: Vector, q: Point) -> Point {
     (p * 2.0 + q - n * (q - p).dot(n)) / 3.0
 }
 
-/// A point of a patch with its two derivatives.
-struct Local {
+/// A point of a cubic patch with its two derivatives.
+struct PatchPoint {
     point: Point,
     du: Vector,
     dv: Vector,
@@ -117,16 +118,23 @@ struct Local {
 /// How far outside its patch a ray may meet it: the neighbour's patch continues there with the same tangent.
 const BEYOND: f64 = 0.25;
 
+/// Rays that meet a patch flatter than this, about a degree, keep the normal of their facet hit's place: Newton's method runs away.
+const LEAST_SINE: f64 = 0.02;
+/// Newton steps from a facet hit to the patch; what two leave is a thousandth of what the patch is off the surface.
+const STEPS: usize = 2;
+/// The farthest that steps may lead from the facet hit, as a share of the facet.
+const FARTHEST: f64 = 0.5;
+
 /// Normal, not of unit length, of a patch where a ray meets it near `start`: two Newton steps, which are not taken where they lead
 /// away, as for rays that graze it.
-fn met(patch: impl Fn(Uv) -> Local, start: Uv, ray: &Ray, flat: Vector) -> Vector {
+fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: Vector) -> Vector {
     let mut p = start;
     let mut local = patch(p);
     let normal = local.du.cross(local.dv);
-    for _ in 0..2 {
+    for _ in 0..STEPS {
         let n = local.du.cross(local.dv);
         let slope = n.dot(ray.direction);
-        if slope.abs() < 0.02 * n.length() {
+        if slope.abs() < LEAST_SINE * n.length() {
             return normal;
         }
         // Along the ray to the tangent plane, and from there to parameters.
@@ -136,7 +144,7 @@ fn met(patch: impl Fn(Uv) -> Local, start: Uv, ray: &Ray, flat: Vector) -> Vecto
         let d = Uv::new(step.cross(local.dv).dot(n), local.du.cross(step).dot(n)) / square;
         p += d;
         let outside = (p - p.clamp(Uv::ZERO, Uv::ONE)).abs().max_element();
-        if !d.is_finite() || outside > BEYOND || (p - start).abs().max_element() > 0.5 {
+        if !d.is_finite() || outside > BEYOND || (p - start).abs().max_element() > FARTHEST {
             return normal;
         }
         local = patch(p);
@@ -170,9 +178,9 @@ impl QuadNet {
         Self(net)
     }
 
-    fn at(&self, p: Uv) -> Local {
+    fn evaluate(&self, p: Uv) -> PatchPoint {
         let ((bu, du), (bv, dv)) = (bernstein(p.x), bernstein(p.y));
-        let mut local = Local { point: Point::ZERO, du: Vector::ZERO, dv: Vector::ZERO };
+        let mut local = PatchPoint { point: Point::ZERO, du: Vector::ZERO, dv: Vector::ZERO };
         for i in 0..4 {
             let [a, b, c, d] = self.0[i];
             let on = a * bv[0] + b * bv[1] + c * bv[2] + d * bv[3];
@@ -209,7 +217,7 @@ impl TriangleNet {
         Self { corners, sides, middle }
     }
 
-    fn at(&self, p: Uv) -> Local {
+    fn evaluate(&self, p: Uv) -> PatchPoint {
         let [p300, p030, p003] = self.corners;
         let [p210, p120, p021, p012, p102, p201] = self.sides;
         let p111 = self.middle;
@@ -227,6 +235,6 @@ impl TriangleNet {
             + p021 * (v * v)
             + p003 * (w * w)
             + (p111 * (u * v) + p102 * (u * w) + p012 * (v * w)) * 2.0;
-        Local { point: d_u * u + d_v * v + d_w * w, du: (d_v - d_u) * 3.0, dv: (d_w - d_u) * 3.0 }
+        PatchPoint { point: d_u * u + d_v * v + d_w * w, du: (d_v - d_u) * 3.0, dv: (d_w - d_u) * 3.0 }
     }
 }

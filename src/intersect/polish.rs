@@ -19,9 +19,37 @@ use crate::mesh::FacetMesh;
 
 /// Newton steps before the exact window is asked: residual p99 1e-11 after three on a sphere at 0.05 mm.
 const STEPS: u32 = 6;
-/// A ray of no more than so many sags is asked of the spline as well: where it meets a face flat, the facet there lies farther away than
-/// the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
-const SHORT: f64 = 4.0;
+/// A ray of no more than so many sags is asked of the spline as well: where it meets a face flat, the facet there lies farther
+/// away than the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
+const SHORT_OF_SAGS: f64 = 4.0;
+/// A facet of less sag lies on the spline, mm: no root hides between them.
+const NO_SAG: f64 = 1e-9;
+/// A root is sought this many sags from its facet across the ray: facet and spline lie a sag apart, and either may be met beside
+/// the other's place.
+const WINDOW_OF_SAGS: f64 = 16.0;
+/// The least sine by which that window is lengthened along the ray.
+const LEAST_WINDOW_SINE: f64 = 1e-3;
+/// The shortest window, mm.
+const LEAST_WINDOW: f64 = 1e-6;
+/// The least sine by which a search begins before the facets.
+const LEAST_SLACK_SINE: f64 = 0.05;
+/// Size of a facet that is not known, in sags: of a sphere's facets of a twelfth of its radius.
+const UNKNOWN_SIZE: f64 = 10.0;
+/// A ray whose sine times the facet's length is below so many sags may have its next root between the surface it leaves and the
+/// facets: by `sin²θ / 2κ` and `κL²/8` that is below two, and the rest is room for a curvature that changes.
+const HIDDEN_BELOW: f64 = 12.0;
+/// Such a root is sought over so many lengths of the facet.
+const HIDDEN_LENGTHS: f64 = 4.0;
+/// A root within this distance along the ray may be the one that it leaves, mm: a thousand times what starts are off.
+const OWN_POINT: f64 = 1e-6;
+/// And it is when it lies this near to it, mm, beside [`OWN_ROUNDING`].
+const SAME_POINT: f64 = 1e-7;
+/// Ulps of its largest coordinate that a ray's origin may be off.
+const OWN_ROUNDING: f64 = 64.0;
+/// Facets without a root that a search passes before it gives up.
+const MOST_FACETS: usize = 64;
+/// Facets that a search from outside passes where the spline has nothing.
+const MOST_OUTSIDE: usize = 8;
 /// The primitive of a hit that the spline alone knows.
 const NO_FACET: u32 = u32::MAX;
 /// Sag assumed where none was proved, mm.
@@ -37,7 +65,7 @@ pub struct Polished<'a> {
 }
 
 /// What became of a facet hit.
-enum Outcome {
+enum Polishing {
     Hit(Hit),
     /// It is the point that the ray leaves, or out of the ray's range: look behind it.
     Behind,
@@ -64,7 +92,7 @@ impl<'a> Polished<'a> {
     /// The distance up to which the ray's next root may hide between the surface it leaves and the facets there.
     ///
     /// On a surface of curvature κ a ray at angle θ stays within `sin²θ / 2κ` of it; a facet of length L has sag κL²/8.
-    fn hidden(&self, ray: &Ray, from: &Departure, normal: Vector) -> Option<f64> {
+    fn hidden_range(&self, ray: &Ray, from: &Departure, normal: Vector) -> Option<f64> {
         let facet = from.primitive as usize;
         let known = self.mesh.facets.get(facet).is_some_and(|f| f.face == from.face);
         let (length, sag) = if known {
@@ -72,66 +100,65 @@ impl<'a> Polished<'a> {
             let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
             (length, self.sag_of(from.primitive))
         } else {
-            (10.0 * self.sag, self.sag)
+            (UNKNOWN_SIZE * self.sag, self.sag)
         };
         let sine = normal.dot(ray.direction).abs();
-        (sag > 1e-9 && sine * length < 12.0 * sag).then_some(4.0 * length)
+        (sag > NO_SAG && sine * length < HIDDEN_BELOW * sag).then_some(HIDDEN_LENGTHS * length)
     }
 
     /// A distance within which a facet of the surface that a ray leaves is its neighbour: twice the facet's size.
-    fn near(&self, hit: &Hit) -> f64 {
+    fn neighbourhood(&self, hit: &Hit) -> f64 {
         let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
         2.0 * a.distance(c).max(b.distance(d))
     }
 
-    fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Outcome {
-        let sag = self.sag_of(facet_hit.primitive).max(1e-9);
+    fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Polishing {
+        let sag = self.sag_of(facet_hit.primitive).max(NO_SAG);
         let sine = facet_hit.geometric_normal.dot(ray.direction).abs();
-        let window = (16.0 * sag / sine.max(1e-3)).max(1e-6);
+        let window = (WINDOW_OF_SAGS * sag / sine.max(LEAST_WINDOW_SINE)).max(LEAST_WINDOW);
         let found = self.exact.converge(ray, facet_hit.face, facet_hit.uv, STEPS);
-        let near = found.filter(|p| (p.t - facet_hit.t).abs() <= window);
+        let nearby = found.filter(|p| (p.t - facet_hit.t).abs() <= window);
         let own =
             |p: &SurfacePoint| ray.from.is_some_and(|f| f.face == facet_hit.face && is_own(self.exact, &f, ray, p));
         // Of two roots close by Newton's method may find the one that the ray crosses the other way.
         let turned =
             |p: &SurfacePoint| p.normal.dot(ray.direction) * facet_hit.geometric_normal.dot(ray.direction) <= 0.0;
-        if let Some(point) = near.filter(|p| p.inside && (own(p) || !turned(p))) {
+        if let Some(point) = nearby.filter(|p| p.inside && (own(p) || !turned(p))) {
             if own(&point) || point.t < ray.t_min || point.t > ray.t_max {
-                return Outcome::Behind;
+                return Polishing::Behind;
             }
-            let (normal, certainty) = (point.normal, Certainty::Polished);
-            return Outcome::Hit(Hit {
+            return Polishing::Hit(Hit {
                 t: point.t,
-                normal,
-                geometric_normal: normal,
+                normal: point.normal,
+                geometric_normal: point.normal,
                 uv: point.uv,
-                certainty,
+                certainty: Certainty::Polished,
                 ..*facet_hit
             });
         }
         // Over an edge, at a silhouette, or in a corner of several roots: the exact model decides in a window around.
         let around = ray.within(ray.t_min.max(facet_hit.t - window), ray.t_max.min(facet_hit.t + window));
         if around.t_min > around.t_max {
-            return Outcome::Behind;
+            return Polishing::Behind;
         }
         let answer = self.exact.first(&around, &mut Cost::default());
         match answer.hit {
             Some(hit) => {
-                Outcome::Hit(Hit { primitive: facet_hit.primitive, certainty: Certainty::Polished, ..hit })
+                Polishing::Hit(Hit { primitive: facet_hit.primitive, certainty: Certainty::Polished, ..hit })
             }
             // A silhouette of the facets that the spline does not have. Where the surface goes on beyond its trims, faces gape.
             None if answer.certainty == Certainty::Certified
                 && self.exact.traces(facet_hit.face)
-                && near.is_none_or(|p| p.t < ray.t_min || turned(&p)) =>
+                && nearby.is_none_or(|p| p.t < ray.t_min || turned(&p)) =>
             {
-                Outcome::Behind
+                Polishing::Behind
             }
-            None => Outcome::Lost,
+            None => Polishing::Lost,
         }
     }
 
     /// Whether an answer cannot be: a ray that goes into a closed solid comes out of it again, one that comes out goes into it.
-    fn is_odd(&self, ray: &Ray, (from, normal): (&Departure, Vector), answer: Option<&Hit>) -> bool {
+    fn is_impossible(&self, ray: &Ray, (from, normal): (&Departure, Vector), answer: Option<&Hit>) -> bool {
         let Some(solid) = self.exact.solid_of(from.face) else { return false };
         let inward = normal.dot(ray.direction) < 0.0;
         match answer {
@@ -151,7 +178,7 @@ impl<'a> Polished<'a> {
             let (inward, out) = (left.1.dot(ray.direction) < 0.0, hit.geometric_normal.dot(ray.direction) > 0.0);
             (inward || out) && solid(hit.face).is_some() && solid(hit.face) != solid(left.0.face)
         };
-        answer.is_some_and(other) || self.is_odd(ray, left, answer)
+        answer.is_some_and(other) || self.is_impossible(ray, left, answer)
     }
 
     /// The nearest root of a ray that leaves no face, which the spline is asked for where it would come out of a closed solid first.
@@ -164,7 +191,7 @@ impl<'a> Polished<'a> {
             return Some(hit);
         }
         // A facet where the spline is not; ready meshes may stand behind it.
-        for _ in 0..8 {
+        for _ in 0..MOST_OUTSIDE {
             let behind = ray.within(answer?.t.next_up(), ray.t_max);
             answer = self.search(&behind, None, cost);
             if !self.comes_out(ray, answer.as_ref()) {
@@ -190,13 +217,13 @@ impl<'a> Polished<'a> {
     /// The nearest root that the facets lead to.
     fn search(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
         let mut ray = *ray;
-        // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden` may lead to a root behind it.
+        // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden_range` may lead to a root behind it.
         // Seen flat, facets lie farther from it along the ray: of a short look for a face along the one left, all of them count.
-        let sine = left.map_or(1.0, |(_, normal)| normal.dot(ray.direction).abs().max(0.05));
+        let sine = left.map_or(1.0, |(_, normal)| normal.dot(ray.direction).abs().max(LEAST_SLACK_SINE));
         let slack = 2.0 * self.sag / sine;
         let mut start = ray.t_min - slack;
         if let Some((from, normal)) = left
-            && let Some(reach) = self.hidden(&ray, from, normal)
+            && let Some(reach) = self.hidden_range(&ray, from, normal)
         {
             let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
             if let Some(hit) = self.on_spline(&ray.within(ray.t_min, end)) {
@@ -209,26 +236,26 @@ impl<'a> Polished<'a> {
         let ray = &ray;
         let mut rays = 0;
         let mut answer = None;
-        for _ in 0..64 {
+        for _ in 0..MOST_FACETS {
             let mut own = Cost::default();
             let facet_hit = self.facets.intersect(&ray.within(start, ray.t_max + slack), &mut own);
             rays += own.rays;
             *cost += Cost { rays: 0, ..own };
             let Some(facet_hit) = facet_hit else { break };
             match self.polish(ray, &facet_hit) {
-                Outcome::Hit(hit) => answer = Some(hit),
-                Outcome::Behind => {
+                Polishing::Hit(hit) => answer = Some(hit),
+                Polishing::Behind => {
                     start = facet_hit.t.next_up();
                     continue;
                 }
                 // A ready mesh has no spline to go to; that is no failure.
-                Outcome::Lost if !self.exact.traces(facet_hit.face) => answer = in_range(ray, facet_hit),
+                Polishing::Lost if !self.exact.traces(facet_hit.face) => answer = in_range(ray, facet_hit),
                 // The exact model has no point there: a facet of the surface being left.
-                Outcome::Lost
-                    if ray
-                        .from
-                        .is_some_and(|f| f.face == facet_hit.face && facet_hit.t < self.near(&facet_hit)) => {}
-                Outcome::Lost => {
+                Polishing::Lost
+                    if ray.from.is_some_and(|f| {
+                        f.face == facet_hit.face && facet_hit.t < self.neighbourhood(&facet_hit)
+                    }) => {}
+                Polishing::Lost => {
                     cost.fallbacks += 1;
                     answer = in_range(ray, facet_hit);
                 }
@@ -245,10 +272,10 @@ impl<'a> Polished<'a> {
 
 /// Whether a root is the very point that the ray leaves: the same face, no distance along the ray, the same place.
 fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::SurfacePoint) -> bool {
-    if point.t.abs() > 1e-6 {
+    if point.t.abs() > OWN_POINT {
         return false;
     }
-    let tolerance = 1e-7 + 64.0 * f64::EPSILON * ray.origin.abs().max_element();
+    let tolerance = SAME_POINT + OWN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
     // By parameters where they are regular, by place across a seam or at a pole.
     exact.distance_at(from.face, from.uv, ray.at(point.t)).is_some_and(|d| d <= tolerance)
 }
@@ -260,14 +287,14 @@ impl Intersector for Polished<'_> {
             return self.search_from_outside(ray, cost);
         };
         let mut answer = self.search(ray, Some(left), cost);
-        let asked = (ray.t_max - ray.t_min <= SHORT * self.sag).then(|| self.on_spline(ray));
+        let asked = (ray.t_max - ray.t_min <= SHORT_OF_SAGS * self.sag).then(|| self.on_spline(ray));
         answer = answer.into_iter().chain(asked.flatten()).min_by(|a, b| a.t.total_cmp(&b.t));
         if !self.is_doubtful(ray, left, answer.as_ref()) {
             return answer;
         }
         // Beside an edge a ray may start outside all facets and pass between them.
         let exact = asked.unwrap_or_else(|| self.on_spline(ray));
-        if self.is_odd(ray, left, exact.as_ref()) { answer } else { exact }
+        if self.is_impossible(ray, left, exact.as_ref()) { answer } else { exact }
     }
 
     fn footprint(&self) -> Footprint {

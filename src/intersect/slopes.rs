@@ -6,7 +6,11 @@ use crate::math::{Point, Vector};
 
 /// The least sine of the angle between a ray and the planes of both triangles of its own facet over which nothing of the facet is
 /// ahead of it, whichever triangle it leaves and whether they fold to it or away.
-pub(crate) const OVER: f64 = 1e-3;
+pub(crate) const LEAST_SINE: f64 = 1e-3;
+/// Added to that sine for what `f32` rounds in axis and direction: ten thousand times as much.
+const ROOM_OF_F32: f64 = 1e-3;
+/// Facets folded by more than 120° have no slope over which both triangles are left, nor has one without area.
+const LEAST_COSINE: f64 = 0.5;
 
 /// Above which slope a ray that leaves a facet is known not to meet it again.
 #[derive(Clone, Copy, Debug)]
@@ -16,15 +20,14 @@ pub(crate) struct Slopes {
 }
 
 impl Slopes {
-    pub(crate) fn of([a, b, c, d]: [Point; 4]) -> Self {
+    pub(crate) fn new([a, b, c, d]: [Point; 4]) -> Self {
         let first = (b - a).cross(c - a).normalize_or_zero();
         let second = if c == d { first } else { (c - a).cross(d - a).normalize_or_zero() };
         let axis = (first + second).normalize_or_zero();
         // Half the fold and the angle over the plane, with room for f32.
-        let (cosine, sine) = (axis.dot(first).min(axis.dot(second)), axis.cross(first).length());
-        let sine = (sine + OVER + 1e-3) / cosine;
-        // Without area nothing is known.
-        let sine = if cosine > 0.5 { sine as f32 } else { f32::INFINITY };
+        let cosine = axis.dot(first).min(axis.dot(second));
+        let sine = (axis.cross(first).length() + LEAST_SINE + ROOM_OF_F32) / cosine;
+        let sine = if cosine > LEAST_COSINE { sine as f32 } else { f32::INFINITY };
         Self { axis: axis.as_vec3().to_array(), sine }
     }
 

@@ -5,12 +5,13 @@
 //! says so, solved by Newton when at most one root is left, and halved otherwise. Boxes that come down to rounding are
 //! reported as tangent or uncertified, never dropped.
 
+use super::clip_hull::{Preconditioner, hull, linear_hull, newton, precondition, range_along, seen_along};
 use super::leaf::Leaf;
-use super::net::{self, Net, Slopes, V4, by_degree};
+use super::net::{self, Net, Slopes, V4};
 use super::patch::project;
 use super::query::Query;
 use super::structure::Exact;
-use super::tolerances::{CONTACT_LENGTH, INVERSE_ROUNDING, ROUND, SAME_PARAMETER, SINGULAR, TANGENT};
+use super::tolerances::{CONTACT_LENGTH, ROUND, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
 
@@ -21,9 +22,6 @@ const FINEST: f64 = 1e-13;
 const BEYOND_UNIT: f64 = 1e-9;
 /// Half ulps by which a coordinate across the ray is off, beside those of each de Casteljau step.
 const SHIFT_ROUNDING: f64 = 4.0;
-/// Rounding of the preconditioned hull, as a share of the box: about a thousand half ulps, for sums of four products of which
-/// the inverse magnifies each by no more than what [`SINGULAR`] lets pass and the margin takes into account.
-const HULL_ROUNDING: f64 = 1e-13;
 /// Row sums below this leave at most one root, and Newton's method a tenth of each error at worst; what lies above is halved.
 const UNIQUE: f64 = 0.9;
 /// How far beyond its box a root counts beside twice the margin: Newton's method ends within 1e-14.
@@ -40,13 +38,6 @@ const LEAST_CUT: f64 = 1e-15;
 const REGULAR: f64 = 1e-6;
 /// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
 const TANGENT_SINE: f64 = 1e-3;
-/// Newton steps in a box with one root at most.
-const STEPS: usize = 12;
-/// Newton's method ends at steps of this size, as a share of the box.
-const LAST_STEP: f64 = 1e-14;
-/// Steps below this that do not get shorter are rounding.
-const STALLED_STEP: f64 = 1e-8;
-
 /// A box of parameters with the net over it.
 struct Node {
     net: Net,
@@ -62,23 +53,6 @@ struct Clipping<'a> {
     margin: [f64; 2],
     /// The point that the ray leaves, in the leaf's parameters.
     departure: Option<[f64; 2]>,
-}
-
-/// What a net's hull says of the ray.
-struct Hull {
-    near: f64,
-    far: f64,
-    /// Largest distance from the ray, mm.
-    across: f64,
-}
-
-/// The inverse of the middle Jacobian and what it bounds.
-struct Preconditioner {
-    inverse: [[f64; 2]; 2],
-    /// Largest row sum of its product with the radii of the derivative boxes.
-    deviation: f64,
-    /// Bound of what rounding moves a root, as a share of the box.
-    slack: [f64; 2],
 }
 
 /// A leaf to be clipped, for [`simd::dispatch`].
@@ -246,60 +220,10 @@ impl Exact {
     }
 }
 
-/// A net in the ray's frame (across, across, along, weight), and the largest coordinates across.
-#[inline(always)]
-fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net, [f64; 2]) {
-    let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
-    let mut size = [0f64; 2];
-    let net = control
-        .iter()
-        .map(|p| {
-            let a = glam::DVec3::new(p[0], p[1], p[2]);
-            let x = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
-            size = [size[0].max(x[0].abs()), size[1].max(x[1].abs())];
-            x
-        })
-        .collect();
-    (net, size)
-}
-
 /// Lengths of a box's sides.
 #[inline(always)]
 fn size(rect: &[[f64; 2]; 2]) -> [f64; 2] {
     rect.map(|[lo, hi]| hi - lo)
-}
-
-/// Range of t over a net; everything when a weight is not positive.
-#[inline(always)]
-fn range_along(net: &[V4]) -> (f64, f64) {
-    let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-    for p in net {
-        if p[3] <= 0.0 {
-            return (f64::NEG_INFINITY, f64::INFINITY);
-        }
-        let t = p[2] / p[3];
-        (lo, hi) = (lo.min(t), hi.max(t));
-    }
-    (lo, hi)
-}
-
-/// What a net's hull says of the ray; `None` when it misses it.
-#[inline(always)]
-fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
-    let (mut lo, mut hi, mut least_weight) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], f64::INFINITY);
-    for p in net {
-        for k in 0..2 {
-            lo[k] = lo[k].min(p[k]);
-            hi[k] = hi[k].max(p[k]);
-        }
-        least_weight = least_weight.min(p[3]);
-    }
-    if (0..2).any(|k| lo[k] > margin[k] || hi[k] < -margin[k]) {
-        return None;
-    }
-    let (near, far) = range_along(net);
-    let largest = lo.iter().chain(&hi).fold(0f64, |a, x| a.max(x.abs()));
-    Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
 }
 
 /// The part of a node that the hull leaves.
@@ -339,63 +263,4 @@ fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     } else {
         stack.extend([a, b]);
     }
-}
-
-/// The inverse of the middle Jacobian; `None` where its rounding is not bounded.
-#[inline(always)]
-fn precondition(s: &Slopes, margin: [f64; 2]) -> Option<Preconditioner> {
-    let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
-    let size = (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
-    if !(det.abs() > SINGULAR * size) {
-        return None;
-    }
-    let y = [[s.v[1] / det, -s.v[0] / det], [-s.u[1] / det, s.u[0] / det]];
-    let row = |r: usize| y[r][0].abs() * (s.ru[0] + s.rv[0]) + y[r][1].abs() * (s.ru[1] + s.rv[1]);
-    let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + HULL_ROUNDING);
-    Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING, slack })
-}
-
-/// Ranges of u and v that can hold a root: where `u = u − g(u, v)` for the preconditioned net g.
-#[inline(always)]
-fn linear_hull(net: &[V4], degree: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
-    by_degree!(degree, linear_hull_of_degree(net, y))
-}
-
-#[inline(always)]
-fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2]; 2] {
-    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-    for i in 0..=p {
-        for j in 0..=q {
-            let x = &net[i * (q + 1) + j];
-            let at = [i as f64 / p as f64, j as f64 / q as f64];
-            for k in 0..2 {
-                let g = at[k] - (y[k][0] * x[0] + y[k][1] * x[1]);
-                range[k] = [range[k][0].min(g), range[k][1].max(g)];
-            }
-        }
-    }
-    range
-}
-
-/// The root near `start`, as a share of the box; `None` when it is not found near the box.
-#[inline(always)]
-fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
-    let mut last = f64::INFINITY;
-    for _ in 0..STEPS {
-        let j = net::evaluate_inlined(net, degree, u, v);
-        let inv = 1.0 / (j.su[0] * j.sv[1] - j.sv[0] * j.su[1]);
-        let du = (j.sv[1] * j.s[0] - j.sv[0] * j.s[1]) * inv;
-        let dv = (j.su[0] * j.s[1] - j.su[1] * j.s[0]) * inv;
-        u -= du;
-        v -= dv;
-        let step = du.abs().max(dv.abs());
-        if step < LAST_STEP || (step < STALLED_STEP && step >= last) {
-            return Some([u, v]);
-        }
-        last = step;
-        if !(u > -0.5 && u < 1.5 && v > -0.5 && v < 1.5) {
-            return None;
-        }
-    }
-    None
 }

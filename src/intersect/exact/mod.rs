@@ -14,10 +14,8 @@
 //!
 //! Known weakness: at collapsed edges (poles) no single step can decide, and rays within about 1e-9 mm of one stay uncertified.
 //!
-//! Inside, each module knows only those before it: `tolerances`, `net`, `trim_piece`, `edge_use`, `trim`, `patch`, `geometry`,
-//! `shared_edge`, `leaf`, `linearization`, `subdivision`, `tree`, `slabs`, `query`, `structure`, `acceptance`, `clip`, `leaf_test`,
-//! `traversal` and `answer` (which know of each other only that a walk ends in an answer), `newton`, `traditional`; `audit` knows
-//! none of them.
+//! Inside, each module knows only those before it: numbers and nets, the model as the tracer sees it, leaves and the hierarchy over
+//! them, one ray under way, the search and its answer; the older tracers come last, and [`audit`] knows none of all these.
 
 // Comparisons are negated so that NaN falls on the careful side.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -26,6 +24,7 @@ mod acceptance;
 mod answer;
 pub mod audit;
 mod clip;
+mod clip_hull;
 mod edge_use;
 mod geometry;
 mod leaf;

@@ -3,7 +3,7 @@
 use super::clip::{Box32, clip};
 use super::pack::pack;
 use super::{Settings, Statistics};
-use crate::intersect::facet::usable;
+use crate::intersect::facet::is_usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ pub(super) fn grow(mesh: &FacetMesh, center: Point, settings: &Settings, stats: 
         .filter_map(|f| {
             let corners = mesh.corners(f);
             let part = || Part { facet: f as u32, bounds: Box32::around(&corners.map(|p| p - center)) };
-            corners.iter().all(|&p| usable(p)).then(part)
+            corners.iter().all(|&p| is_usable(p)).then(part)
         })
         .collect();
     stats.left_out = mesh.facets.len() - parts.len();

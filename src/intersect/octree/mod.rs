@@ -150,7 +150,7 @@ impl<'m> Octree<'m> {
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * 1e-6) };
         let frame = state::Frame::new(center, &bounds);
         let mut slopes = huge::with_capacity(mesh.facets.len());
-        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::of(mesh.corners(f))).collect_into_vec(&mut slopes);
+        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
         let build_seconds = started.elapsed().as_secs_f64();
         let horizons = OnceLock::new();
         Self {

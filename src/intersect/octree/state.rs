@@ -151,7 +151,7 @@ impl State {
             boxes: BoxRay::default(),
             sift: SiftRay::default(),
             facets: FacetRay::new(&ray),
-            best: Nearest::before(0.0),
+            best: Nearest::up_to(0.0),
             shift: 0.0,
             at: Link::END,
             own: u32::MAX,
@@ -200,7 +200,7 @@ impl State {
         self.sift.shear = self.facets.shear().map(|s| s as f32);
         self.sift.axes = self.facets.axes().map(|a| a as u8);
         self.sift.slack = moved;
-        self.best = Nearest::before(ray.t_max);
+        self.best = Nearest::up_to(ray.t_max);
         self.cap();
         self.at = Link(select_unpredictable(meets, root.0, Link::END.0));
         self.own = tree.own_of(ray);

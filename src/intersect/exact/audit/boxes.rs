@@ -2,6 +2,9 @@
 
 use crate::math::{Aabb, Ray};
 
+/// Share of its diagonal, and of a millimetre, by which a box is grown: a million times what the slabs round.
+const GROWN: f64 = 1e-9;
+
 /// Boxes in a binary tree, root first.
 #[derive(Debug)]
 pub(super) struct Boxes {
@@ -11,8 +14,15 @@ pub(super) struct Boxes {
 #[derive(Debug)]
 struct Node {
     bounds: Aabb,
-    /// The second child, the first being the next node; or the box itself.
-    second: Result<u32, u32>,
+    content: Content,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Content {
+    /// The second child, the first being the next node.
+    Inner { second: u32 },
+    /// A box by its position.
+    Box(u32),
 }
 
 impl Boxes {
@@ -29,31 +39,34 @@ impl Boxes {
     fn add(&mut self, boxes: &[Aabb], order: &mut [u32]) {
         let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
         let me = self.nodes.len();
-        self.nodes.push(Node { bounds: bounds.grown(1e-9 * (1.0 + bounds.diagonal())), second: Err(order[0]) });
+        self.nodes.push(Node {
+            bounds: bounds.grown(GROWN * (1.0 + bounds.diagonal())),
+            content: Content::Box(order[0]),
+        });
         if order.len() == 1 {
             return;
         }
         let size = bounds.size();
-        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+        let axis = size.max_position();
         let middle = order.len() / 2;
         let key = |i: &u32| boxes[*i as usize].center()[axis];
         order.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
         let (low, high) = order.split_at_mut(middle);
         self.add(boxes, low);
-        self.nodes[me].second = Ok(self.nodes.len() as u32);
+        self.nodes[me].content = Content::Inner { second: self.nodes.len() as u32 };
         self.add(boxes, high);
     }
 
     /// The boxes that a ray meets with where it enters them, in order.
-    pub(super) fn met(&self, ray: &Ray, met: &mut Vec<(f64, u32)>) {
+    pub(super) fn intersected(&self, ray: &Ray, met: &mut Vec<(f64, u32)>) {
         met.clear();
         let mut stack = vec![0u32];
         while let Some(index) = stack.pop() {
             let Some(node) = self.nodes.get(index as usize) else { continue };
             let Some((near, _)) = node.bounds.clip(ray) else { continue };
-            match node.second {
-                Ok(second) => stack.extend([second, index + 1]),
-                Err(own) => met.push((near, own)),
+            match node.content {
+                Content::Inner { second } => stack.extend([second, index + 1]),
+                Content::Box(own) => met.push((near, own)),
             }
         }
         met.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

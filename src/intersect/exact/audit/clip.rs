@@ -1,19 +1,12 @@
 //! Clipping one patch against one ray.
 
-use super::AuditHit;
+use super::hit::AuditHit;
+use super::net::Net;
 use super::single::single_root;
 use crate::math::{FaceId, Homogeneous, Ray, Uv};
 use crate::nurbs::BezierPatch;
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use smallvec::SmallVec;
-
-/// Control points as the ray sees them, `(w·a, w·b, w·t, w)` for two planes through the ray, over a rectangle of the unit square.
-#[derive(Clone)]
-pub(super) struct Net {
-    pub(super) points: SmallVec<[Homogeneous; 16]>,
-    pub(super) degree: [usize; 2],
-    pub(super) domain: [[f64; 2]; 2],
-}
 
 struct Piece {
     net: Net,
@@ -44,90 +37,144 @@ impl View {
 
 /// Steps for a patch and a ray: a simple root takes about ten, a graze hundreds.
 const STEPS: u32 = 4000;
-
 /// Boxes smaller than this part of a patch are asked whether their root is single.
 const SMALL: f64 = 0.02;
+/// Boxes are asked over this much more at least, as parts of a patch, so that rounding leaves something on all sides.
+const LEAST_SURROUNDINGS: f64 = 1e-7;
+/// Share of a patch by which a root may lie beyond its box beside what rounding across the ray moves it: boxes that share a border
+/// both take a root on it.
+const BESIDE: f64 = 1e-11;
+/// Roots move by so many times the rounding across the ray.
+const BESIDE_ROUNDING: f64 = 4.0;
+/// Ulps of the coordinates by which control points across the ray are off.
+const ROUNDING: f64 = 64.0;
+/// A box of this size is a point.
+const POINT: f64 = 1e-12;
+/// A box that lies this near to the ray, mm, and has been cut [`CONTACT_DEPTH`] times is a contact.
+const CONTACT: f64 = 1e-9;
+/// See [`CONTACT`].
+const CONTACT_DEPTH: u32 = 30;
+/// A point farther from the ray, mm, is doubtful.
+const DOUBTFUL: f64 = 1e-7;
+/// A point farther from the ray, mm, is none.
+const BESIDE_RAY: f64 = 1e-6;
+/// A cut that leaves more than this is a halving's worth: Nishita, Sederberg and Kakimoto.
+const WORTH_CUTTING: f64 = 0.8;
 
-/// Adds the crossings of a patch of a surface over `domain`; returns from which distance on some were not searched for, infinity when all were.
-pub(super) fn clip_patch(
-    (ray, view): (&Ray, &View),
+/// A patch of a surface over `domain`, to be searched for crossings of a ray.
+pub(super) struct PatchClipping<'a> {
     face: FaceId,
-    patch: &BezierPatch,
-    domain: [[f64; 2]; 2],
-    out: &mut SmallVec<[AuditHit; 8]>,
-) -> f64 {
-    let View { a, b } = *view;
-    let d = ray.direction;
-    let see = |p: &Homogeneous| {
-        let r = p.truncate() - ray.origin * p.w;
-        Homogeneous::new(r.dot(a), r.dot(b), r.dot(d), p.w)
-    };
-    // Over the unit square: a knot span of 1e-9 has few digits of its own.
-    let all = Net { points: patch.points.iter().map(see).collect(), degree: patch.degree, domain: [[0.0, 1.0]; 2] };
-    let ends = [0, 1].map(|k| [0, 1].map(|end| patch.domain[k][end] == domain[k][end]));
-    let size = all.points.iter().map(|p| p.truncate().abs().max_element()).fold(0.0, f64::max);
-    let rounding = 64.0 * f64::EPSILON * (size + ray.origin.abs().max_element());
-    if all.misses(rounding) {
-        return f64::INFINITY;
+    patch: &'a BezierPatch,
+    /// The patch over the unit square, as the ray sees it: a knot span of 1e-9 has few digits of its own.
+    whole: Net,
+    /// Which ends of the patch are ends of the surface, in u and in v.
+    ends: [[bool; 2]; 2],
+    rounding: f64,
+}
+
+impl<'a> PatchClipping<'a> {
+    pub(super) fn new(
+        (ray, view): (&Ray, &View),
+        face: FaceId,
+        patch: &'a BezierPatch,
+        domain: [[f64; 2]; 2],
+    ) -> Self {
+        let see = |p: &Homogeneous| {
+            let r = p.truncate() - ray.origin * p.w;
+            Homogeneous::new(r.dot(view.a), r.dot(view.b), r.dot(ray.direction), p.w)
+        };
+        let points = patch.points.iter().map(see).collect();
+        let whole = Net { points, degree: patch.degree, domain: [[0.0, 1.0]; 2] };
+        let ends = [0, 1].map(|k| [0, 1].map(|end| patch.domain[k][end] == domain[k][end]));
+        let size = whole.points.iter().map(|p| p.truncate().abs().max_element()).fold(0.0, f64::max);
+        let rounding = ROUNDING * f64::EPSILON * (size + ray.origin.abs().max_element());
+        Self { face, patch, whole, ends, rounding }
     }
-    let mut stack = vec![Piece { net: all.clone(), depth: 0 }];
-    let mut steps = 0;
-    let mut exhausted = f64::INFINITY;
-    while let Some(Piece { mut net, depth }) = stack.pop() {
-        steps += 1;
-        if net.misses(rounding) {
-            continue;
+
+    /// Adds the crossings; returns from which distance on some were not searched for, infinity when all were.
+    pub(super) fn search(&self, out: &mut SmallVec<[AuditHit; 8]>) -> f64 {
+        if self.whole.misses(self.rounding) {
+            return f64::INFINITY;
         }
-        if steps > STEPS {
-            // Where a weight is not positive the hull bounds nothing.
-            let near = |p: &Homogeneous| if p.w > 0.0 { p.z / p.w } else { f64::NEG_INFINITY };
-            exhausted = net.points.iter().map(near).fold(exhausted, f64::min);
-            continue;
-        }
-        let relative = net.domain.map(|[lo, hi]| hi - lo);
-        if relative[0].max(relative[1]) < SMALL {
-            // The box with as much again on all sides, as parts of the whole patch.
-            let [u, v] = [0, 1].map(|k: usize| {
-                let [lo, hi] = net.domain[k];
-                let beyond = (hi - lo).max(1e-7);
-                ([lo, hi], [lo - beyond, hi + beyond])
-            });
-            let wider = all.cut(0, u.1).cut(1, v.1);
-            if let Some((root, moves)) = single_root(&wider) {
-                let at = [(u, root.x), (v, root.y)].map(|((_, [a, b]), x)| a + (b - a) * x);
-                // Boxes that share a border both take a root on it; at the end of the surface rounding decides nothing.
-                let slop = [u, v].map(|(_, [a, b])| 1e-11 + 4.0 * rounding * moves * (b - a));
-                let within = |k: usize, [lo, hi]: [f64; 2]| at[k] >= lo - slop[k] && at[k] <= hi + slop[k];
-                if within(0, u.0) && within(1, v.0) {
-                    let m = all.point(Uv::from(at));
-                    let doubtful =
-                        (0..2).any(|k| ends[k][0] && at[k] < slop[k] || ends[k][1] && at[k] > 1.0 - slop[k]);
-                    out.push(AuditHit { t: m.z / m.w, face, uv: patch.surface_uv(Uv::from(at)), doubtful });
-                }
+        let mut stack = vec![Piece { net: self.whole.clone(), depth: 0 }];
+        let mut steps = 0;
+        let mut exhausted = f64::INFINITY;
+        while let Some(piece) = stack.pop() {
+            steps += 1;
+            if piece.net.misses(self.rounding) {
                 continue;
             }
-        }
-        let across = net.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
-        let tiny = relative[0].max(relative[1]) < 1e-12;
-        let contact = across < 1e-9 && depth > 30;
-        if tiny || contact {
-            let m = net.point(Uv::splat(0.5));
-            let doubtful = !tiny || across > 1e-7;
-            if !doubtful || across < 1e-6 {
-                let local = Uv::from(net.domain.map(|[lo, hi]| lo + 0.5 * (hi - lo)));
-                out.push(AuditHit { t: m.z / m.w, face, uv: patch.surface_uv(local), doubtful });
+            if steps > STEPS {
+                exhausted = exhausted.min(piece.net.nearest());
+                continue;
             }
-            continue;
+            let size = piece.net.domain.map(|[lo, hi]| hi - lo).into_iter().fold(0.0, f64::max);
+            if size < SMALL && self.take_single_root(&piece.net, out) {
+                continue;
+            }
+            if self.take_point(&piece, size, out) {
+                continue;
+            }
+            self.divide(piece, &mut stack);
         }
+        exhausted
+    }
+
+    /// Decides a small box when it can hold one root at most: takes that where it lies inside. Whether it was decided.
+    fn take_single_root(&self, net: &Net, out: &mut SmallVec<[AuditHit; 8]>) -> bool {
+        // The box with as much again on all sides, as parts of the whole patch.
+        let around = net.domain.map(|[lo, hi]| {
+            let beyond = (hi - lo).max(LEAST_SURROUNDINGS);
+            [lo - beyond, hi + beyond]
+        });
+        let Some((root, moves)) = single_root(&self.whole.cut(0, around[0]).cut(1, around[1])) else {
+            return false;
+        };
+        let at = [0, 1].map(|k: usize| {
+            let [a, b] = around[k];
+            a + (b - a) * root[k]
+        });
+        // Boxes that share a border both take a root on it; at the end of the surface rounding decides nothing.
+        let slop = around.map(|[a, b]| BESIDE + BESIDE_ROUNDING * self.rounding * moves * (b - a));
+        let within = |k: usize| {
+            let [lo, hi] = net.domain[k];
+            at[k] >= lo - slop[k] && at[k] <= hi + slop[k]
+        };
+        if within(0) && within(1) {
+            let m = self.whole.point(Uv::from(at));
+            let at_end = |k: usize| self.ends[k][0] && at[k] < slop[k] || self.ends[k][1] && at[k] > 1.0 - slop[k];
+            self.push(m, at, at_end(0) || at_end(1), out);
+        }
+        true
+    }
+
+    /// Decides a box that has come down to a point, or to a contact; whether it was one.
+    fn take_point(&self, piece: &Piece, size: f64, out: &mut SmallVec<[AuditHit; 8]>) -> bool {
+        let net = &piece.net;
+        let across = net.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
+        let tiny = size < POINT;
+        if !tiny && !(across < CONTACT && piece.depth > CONTACT_DEPTH) {
+            return false;
+        }
+        let doubtful = !tiny || across > DOUBTFUL;
+        if !doubtful || across < BESIDE_RAY {
+            let middle = net.domain.map(|[lo, hi]| lo + 0.5 * (hi - lo));
+            self.push(net.point(Uv::splat(0.5)), middle, doubtful, out);
+        }
+        true
+    }
+
+    fn push(&self, m: Homogeneous, local: [f64; 2], doubtful: bool, out: &mut SmallVec<[AuditHit; 8]>) {
+        out.push(AuditHit { t: m.z / m.w, face: self.face, uv: self.patch.surface_uv(Uv::from(local)), doubtful });
+    }
+
+    /// Puts what the hull leaves of a box on the stack, or its halves where that is most of it.
+    fn divide(&self, Piece { mut net, depth }: Piece, stack: &mut Vec<Piece>) {
         let mut longest = (0, 0.0);
         let mut shrunk = false;
-        let mut empty = false;
         for k in 0..2 {
-            let Some([lo, hi]) = net.range(k, rounding) else {
-                empty = true;
-                break;
-            };
-            if hi - lo < 0.8 {
+            let Some([lo, hi]) = net.range(k, self.rounding) else { return };
+            if hi - lo < WORTH_CUTTING {
                 net = net.cut(k, [lo, hi]);
                 shrunk = true;
             }
@@ -135,9 +182,6 @@ pub(super) fn clip_patch(
             if side > longest.1 {
                 longest = (k, side);
             }
-        }
-        if empty {
-            continue;
         }
         if shrunk {
             stack.push(Piece { net, depth: depth + 1 });
@@ -147,114 +191,4 @@ pub(super) fn clip_patch(
             );
         }
     }
-    exhausted
-}
-
-impl Net {
-    /// Whether all control points lie on one side of a plane through the ray.
-    fn misses(&self, rounding: f64) -> bool {
-        let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for p in &self.points {
-            let across = p.truncate().truncate();
-            (lo, hi) = (lo.min(across), hi.max(across));
-        }
-        lo.x > rounding || lo.y > rounding || hi.x < -rounding || hi.y < -rounding
-    }
-
-    fn at(&self, i: usize, j: usize) -> Homogeneous {
-        self.points[i * (self.degree[1] + 1) + j]
-    }
-
-    /// The homogeneous point at local parameters, by de Casteljau.
-    pub(super) fn point(&self, local: Uv) -> Homogeneous {
-        let row = |i: usize| {
-            let line = (0..=self.degree[1]).map(|j| self.at(i, j)).collect();
-            blossom(line, |_| local.y)
-        };
-        blossom((0..=self.degree[0]).map(row).collect(), |_| local.x)
-    }
-
-    /// Extent along a parameter as the ray sees it, in all three coordinates.
-    fn edge_length(&self, direction: usize) -> f64 {
-        let [p, q] = self.degree;
-        let at = |i: usize, j: usize| self.at(i, j).project();
-        if direction == 0 {
-            (0..=q).map(|j| at(0, j).distance(at(p, j))).fold(0.0, f64::max)
-        } else {
-            (0..=p).map(|i| at(i, 0).distance(at(i, q))).fold(0.0, f64::max)
-        }
-    }
-
-    /// Range of one parameter that can hold a root, by the hull of its distances to the line that joins the patch's ends in it.
-    fn range(&self, direction: usize, rounding: f64) -> Option<[f64; 2]> {
-        let [p, q] = self.degree;
-        // A line through the origin roughly along the other parameter, so that distances grow with this one.
-        let flat = |i: usize, j: usize| {
-            let h = self.at(i, j);
-            h.truncate().truncate() / h.w
-        };
-        let along = if direction == 0 {
-            flat(0, q) - flat(0, 0) + flat(p, q) - flat(p, 0)
-        } else {
-            flat(p, 0) - flat(0, 0) + flat(p, q) - flat(0, q)
-        };
-        let Some(normal) = along.perp().try_normalize() else { return Some([0.0, 1.0]) };
-        let n = self.degree[direction];
-        // Lowest and highest distance at each station.
-        let stations: SmallVec<[DVec3; 8]> = (0..=n)
-            .map(|k| {
-                let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-                for line in 0..=self.degree[1 - direction] {
-                    let h = if direction == 0 { self.at(k, line) } else { self.at(line, k) };
-                    let distance = h.truncate().truncate().dot(normal);
-                    (lo, hi) = (lo.min(distance - 2.0 * rounding), hi.max(distance + 2.0 * rounding));
-                }
-                DVec3::new(k as f64 / n as f64, lo, hi)
-            })
-            .collect();
-        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (k, s) in stations.iter().enumerate() {
-            if s.y <= 0.0 && s.z >= 0.0 {
-                (first, last) = (first.min(s.x), last.max(s.x));
-            }
-            for r in &stations[k + 1..] {
-                for (a, b) in [(s.y, r.y), (s.y, r.z), (s.z, r.y), (s.z, r.z)] {
-                    if (a < 0.0) != (b < 0.0) {
-                        let x = s.x + (r.x - s.x) * a / (a - b);
-                        (first, last) = (first.min(x), last.max(x));
-                    }
-                }
-            }
-        }
-        (first <= last).then(|| [(first - 1e-10).max(0.0), (last + 1e-10).min(1.0)])
-    }
-
-    /// The part over `[lo, hi]` of one local parameter.
-    fn cut(&self, direction: usize, [lo, hi]: [f64; 2]) -> Self {
-        let q = self.degree[1];
-        let n = self.degree[direction];
-        let mut out = self.clone();
-        for line in 0..=self.degree[1 - direction] {
-            let index = |k: usize| if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k };
-            for k in 0..=n {
-                // The blossom at n − k times lo and k times hi.
-                let points = (0..=n).map(|i| self.points[index(i)]).collect();
-                out.points[index(k)] = blossom(points, |step| if step < k { hi } else { lo });
-            }
-        }
-        let [a, b] = self.domain[direction];
-        out.domain[direction] = [a + (b - a) * lo, a + (b - a) * hi];
-        out
-    }
-}
-
-/// The blossom of a polynomial: step `k` of de Casteljau's triangle is taken at `at(k)`.
-fn blossom(mut points: SmallVec<[Homogeneous; 8]>, at: impl Fn(usize) -> f64) -> Homogeneous {
-    for step in 0..points.len() - 1 {
-        let x = at(step);
-        for i in 0..points.len() - 1 - step {
-            points[i] = points[i] * (1.0 - x) + points[i + 1] * x;
-        }
-    }
-    points[0]
 }

@@ -1,10 +1,10 @@
 //! The same question by pure clipping, in code that shares nothing with the fast path: what the fast path is tested against.
 //!
-//! Every Bézier patch of every face, halved a few times where that makes its boxes smaller, is clipped as in Nishita, Sederberg and Kakimoto, SIGGRAPH 1990: the signed distances of the
-//! control points to a line in the projection along the ray bound each parameter by the convex hull of (parameter,
-//! distance); what clipping shrinks by less than a fifth is halved, until the box holds a single root or is as small as rounding.
-//! Trims are decided by crossings of a half-line towards +v with
-//! the uv curves, halved until their hulls decide.
+//! Every Bézier patch of every face, halved a few times where that makes its boxes smaller, is clipped as in Nishita, Sederberg
+//! and Kakimoto, SIGGRAPH 1990: the signed distances of the control points to a line in the projection along the ray bound each
+//! parameter by the convex hull of (parameter, distance); what clipping shrinks by less than a fifth is halved, until the box holds
+//! a single root or is as small as rounding. Trims are decided by crossings of a half-line towards +v with the uv curves, halved
+//! until their hulls decide.
 //!
 //! Guarantee: none is claimed near tangency, at singular points and within about 1e-9 mm of trims; there it reports what it
 //! finds. Where a patch took all of its steps it says from which distance on crossings may be missing. Known weakness: slow,
@@ -12,15 +12,19 @@
 
 mod boxes;
 mod clip;
+mod hit;
+mod net;
 mod single;
 
 use crate::math::{Aabb, FaceId, Ray, Uv};
 use crate::model::{Model, TrimLoop};
 use crate::nurbs::BezierPatch;
 use boxes::Boxes;
-use clip::{View, clip_patch};
+use clip::{PatchClipping, View};
 use glam::{DVec2, DVec3};
 use smallvec::SmallVec;
+
+pub use hit::AuditHit;
 
 /// Every patch of a model, to be clipped against rays.
 #[derive(Debug)]
@@ -48,19 +52,6 @@ struct Trim {
     points: Vec<DVec3>,
 }
 
-/// A crossing found by clipping.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AuditHit {
-    /// Distance along the ray, mm.
-    pub t: f64,
-    /// The placed face.
-    pub face: FaceId,
-    /// Parameters on its surface.
-    pub uv: Uv,
-    /// Whether it was found by a box of parameters that could not be made small: a tangency or a singular point.
-    pub doubtful: bool,
-}
-
 /// What clipping found along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AuditAnswer {
@@ -70,8 +61,17 @@ pub struct AuditAnswer {
     pub decided: bool,
 }
 
-/// Distance by which a crossing counts as one with another at most, mm.
+/// Distance by which a crossing counts as one with another at most, mm: a tangency of radius 1 mm is a thousandth of it deep.
 const CLUSTER: f64 = 1e-4;
+/// Crossings nearer than this that are beyond doubt are one, found from two boxes, mm.
+const SAME_CROSSING: f64 = 1e-9;
+/// Crossings nearer than this are one that rounding smears, or a grazing pair, mm; and one this near to the start is the point that
+/// the ray leaves.
+const SMEARED: f64 = 1e-7;
+/// What halving must leave of a patch's box to be worth it.
+const SMALLER: f64 = 0.8;
+/// How often a piece of a trim is halved: below an ulp.
+const DEEPEST_TRIM: u32 = 48;
 
 impl Audit {
     /// Prepares every face that has a surface.
@@ -97,7 +97,7 @@ impl Audit {
     /// The first crossing in `[t_min, t_max]`; the point that the ray leaves is left out.
     pub fn first(&self, ray: &Ray) -> AuditAnswer {
         let mut met = Vec::new();
-        self.boxes.met(ray, &mut met);
+        self.boxes.intersected(ray, &mut met);
         let view = View::new(ray);
         // By face, in order of the boxes in which they were found.
         let mut found: Vec<(u32, SmallVec<[AuditHit; 8]>)> = Vec::new();
@@ -111,7 +111,7 @@ impl Audit {
             let (face, patch) = &self.pieces[piece as usize];
             let AuditFace { id, domain, .. } = self.faces[*face as usize];
             let mut own: SmallVec<[AuditHit; 8]> = SmallVec::new();
-            let unsearched = clip_patch((ray, &view), id, patch, domain, &mut own);
+            let unsearched = PatchClipping::new((ray, &view), id, patch, domain).search(&mut own);
             if unsearched <= ray.t_max {
                 exhausted = exhausted.min(unsearched);
             }
@@ -145,7 +145,7 @@ fn split(patch: BezierPatch, face: u32, out: &mut Vec<(u32, BezierPatch)>) {
             .then(|| [0, 1].map(|d| patch.halves(d)))
             .and_then(|both| both.into_iter().min_by(|a, b| smaller(a).total_cmp(&smaller(b))));
         match best {
-            Some(halves) if smaller(&halves) < 0.8 * whole => stack.extend(halves.map(|h| (h, depth + 1))),
+            Some(halves) if smaller(&halves) < SMALLER * whole => stack.extend(halves.map(|h| (h, depth + 1))),
             _ => out.push((face, patch)),
         }
     }
@@ -158,7 +158,7 @@ const DEPTH: u32 = 6;
 fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
     let mut out = Vec::new();
     let mut add = |points: Vec<DVec3>| {
-        let (lo, hi) = around(&points);
+        let (lo, hi) = hull_corners(&points);
         out.push(Trim { lo, hi, points });
     };
     for l in loops {
@@ -194,7 +194,7 @@ fn area(loops: &[TrimLoop]) -> f64 {
     .sum()
 }
 
-fn around(points: &[DVec3]) -> (DVec2, DVec2) {
+fn hull_corners(points: &[DVec3]) -> (DVec2, DVec2) {
     points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| {
         let at = p.truncate() / p.z;
         (lo.min(at), hi.max(at))
@@ -207,12 +207,12 @@ impl AuditFace {
         own.sort_by(|a, b| a.t.total_cmp(&b.t));
         // Boxes that share a border, and clusters around a tangency, find the same crossing several times.
         own.dedup_by(|b, a| {
-            let same = b.t - a.t < if a.doubtful || b.doubtful { CLUSTER } else { 1e-9 };
+            let same = b.t - a.t < if a.doubtful || b.doubtful { CLUSTER } else { SAME_CROSSING };
             a.doubtful |= same && b.doubtful;
             same
         });
         // Crossings that come down to boxes side by side are one that rounding smears, or a grazing pair.
-        let smeared = |a: &AuditHit, b: &AuditHit| b.t - a.t < 1e-7;
+        let smeared = |a: &AuditHit, b: &AuditHit| b.t - a.t < SMEARED;
         for k in 1..own.len() {
             if smeared(&own[k - 1], &own[k]) {
                 own[k - 1].doubtful = true;
@@ -220,7 +220,7 @@ impl AuditFace {
             }
         }
         own.into_iter().find(|h| {
-            let leaving = ray.from.is_some_and(|f| f.face == h.face && h.t.abs() < 1e-7);
+            let leaving = ray.from.is_some_and(|f| f.face == h.face && h.t.abs() < SMEARED);
             !leaving && h.t >= ray.t_min && h.t <= ray.t_max
         })
     }
@@ -239,7 +239,7 @@ impl AuditFace {
 fn above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
     let at = |p: &DVec3| p.truncate() / p.z;
     let (first, last) = (at(&points[0]), at(&points[points.len() - 1]));
-    let (lo, hi) = around(points);
+    let (lo, hi) = hull_corners(points);
     if q.x < lo.x || q.x >= hi.x || q.y > hi.y {
         return 0;
     }
@@ -248,7 +248,7 @@ fn above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
         // All of it lies above: only the ends count.
         return spans;
     }
-    if depth > 48 || points.len() == 2 {
+    if depth > DEEPEST_TRIM || points.len() == 2 {
         let v = first.y + (last.y - first.y) * (q.x - first.x) / (last.x - first.x);
         return if v > q.y { spans } else { 0 };
     }

@@ -4,12 +4,19 @@
 //! varies: when, preconditioned by the inverse of its middle, it deviates from the identity by less than 1, the map from
 //! parameters to the plane across the ray is injective (its root is single), and Newton's method finds it.
 
-use super::clip::Net;
+use super::net::Net;
 use crate::math::Uv;
 use crate::nurbs::BezierPatch;
 
-/// The only root over a patch as the ray sees it, in local parameters, and how far these move with a unit across the ray; `None` where more than one cannot be ruled out, or none is
-/// found.
+/// A Jacobian whose determinant is a smaller part of the product of its row sums has no inverse worth having: ten digits are left.
+const SINGULAR: f64 = 1e-6;
+/// The Jacobian may deviate by less than this, half of what injectivity needs, so that Newton's method converges as well.
+const DEVIATION: f64 = 0.5;
+/// Newton's method ends at a step this short, the next being its square.
+const LAST_STEP: f64 = 1e-6;
+
+/// The only root over a patch as the ray sees it, in local parameters, and how far these move with a unit across the ray; `None`
+/// where more than one cannot be ruled out, or none is found.
 pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let q = patch.degree[1];
     // Ranges of ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v from the differences of the control points.
@@ -33,13 +40,13 @@ pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let radius = range.map(|row| row.map(|(lo, hi)| 0.5 * (hi - lo)));
     let inverse = |[[a, b], [c, d]]: [[f64; 2]; 2]| {
         let det = a * d - b * c;
-        (det.abs() > 1e-6 * (a.abs() + b.abs()) * (c.abs() + d.abs()))
+        (det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs()))
             .then(|| [[d / det, -b / det], [-c / det, a / det]])
     };
     let y = inverse(middle)?;
     let deviates =
         |r: usize| (0..2).map(|c| y[r][0].abs() * radius[0][c] + y[r][1].abs() * radius[1][c]).sum::<f64>();
-    if !(deviates(0) < 0.5 && deviates(1) < 0.5) {
+    if !(deviates(0) < DEVIATION && deviates(1) < DEVIATION) {
         return None;
     }
     let unit = [[0.0, 1.0]; 2];
@@ -53,7 +60,7 @@ pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
         if !(at.x > -0.5 && at.x < 1.5 && at.y > -0.5 && at.y < 1.5) {
             return None;
         }
-        if step.abs().max_element() < 1e-6 {
+        if step.abs().max_element() < LAST_STEP {
             let inside = at.x >= 0.0 && at.x <= 1.0 && at.y >= 0.0 && at.y <= 1.0;
             return inside.then_some((at, y.iter().flatten().map(|x| x.abs()).sum()));
         }

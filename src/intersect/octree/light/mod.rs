@@ -277,7 +277,7 @@ pub(super) fn answer<L: Lanes>(
             let look = &looks[usize::from(*k) % TOGETHER];
             let slots = &maps[usize::from(look.map)].slots;
             let index = usize::from(look.index);
-            let mut best = Nearest::before(rays[index].t_max);
+            let mut best = Nearest::up_to(rays[index].t_max);
             let mut first = 0;
             while first < entries.len() {
                 if f64::from(entries[first].near) > best.t * look.scale + look.shift {

@@ -5,7 +5,7 @@
 //! they are by far more than a ray's place can be wrong.
 
 use super::{DIVIDED, Entry, FINE, Map, Slot, Square, View};
-use crate::intersect::facet::usable;
+use crate::intersect::facet::is_usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
 use rustc_hash::FxHashMap;
@@ -207,7 +207,7 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
 fn shadows(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Shadow> {
     let shadow = |f: usize| {
         let corners = mesh.corners(f);
-        corners.iter().all(|p| usable(*p)).then(|| Shadow::new(f as u32, corners, view, face)).flatten()
+        corners.iter().all(|p| is_usable(*p)).then(|| Shadow::new(f as u32, corners, view, face)).flatten()
     };
     let mut shadows: Vec<Shadow> = (0..mesh.facets.len()).filter_map(shadow).collect();
     shadows.sort_by(|a, b| a.near.total_cmp(&b.near).then(a.facet.cmp(&b.facet)));
