@@ -196,15 +196,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
 ];
 
 /// Large folders whose order is still to be stated; `cargo test --test architecture propose -- --ignored --nocapture` prints one.
-pub(crate) const UNORDERED: &[&str] = &[
-    "intersect/octree",
-    "optics",
-    "simulate",
-    "simulate/kernel",
-    "simulate/scene",
-    "step/product",
-    "study",
-];
+pub(crate) const UNORDERED: &[&str] =
+    &["intersect/octree", "optics", "simulate", "simulate/kernel", "simulate/scene", "step/product", "study"];
 
 /// Crates that only these modules may name.
 pub(crate) const DOORS: &[(&str, &[&str])] = &[
