@@ -39,7 +39,7 @@ impl Exact {
         let face = &self.geometry.faces[leaf.face as usize];
         let trim = &self.geometry.trims[face.trim as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
-        let uv = patch.uv(leaf.to_patch(local));
+        let uv = patch.uv(leaf.patch_parameters(local));
         match trim.cell_at(uv) {
             Region::Border => {}
             decided => return (decided == Region::Inside, false),

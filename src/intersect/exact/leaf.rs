@@ -58,7 +58,7 @@ impl Leaf {
 
     /// Local parameters of the patch at local parameters of the leaf.
     #[inline]
-    pub(super) fn to_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn patch_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [u0 + (u1 - u0) * u, v0 + (v1 - v0) * v]
     }
@@ -68,7 +68,7 @@ impl Leaf {
     }
 
     /// Local parameters of the leaf at local parameters of the patch.
-    pub(super) fn from_patch(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+    pub(super) fn leaf_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [(u - u0) / (u1 - u0), (v - v0) / (v1 - v0)]
     }

@@ -176,7 +176,7 @@ impl DeparturePoint {
             }
             local = local.map(|x| x.clamp(0.0, 1.0));
         }
-        Some(leaf.from_patch(local))
+        Some(leaf.leaf_parameters(local))
     }
 
     /// Whether the only root near the departure, `distance` along the ray, is the departure itself.
@@ -192,7 +192,7 @@ impl DeparturePoint {
         }
         let grid = &geometry.grids[geometry.faces[self.face as usize].grid as usize];
         let patch = &geometry.patches[leaf.patch as usize];
-        let uv = patch.uv(leaf.to_patch(local));
+        let uv = patch.uv(leaf.patch_parameters(local));
         let on_border = |p: Uv| {
             (0..2).any(|d| {
                 let b = &grid.breaks[d];

@@ -153,7 +153,8 @@ impl<'a> PatchClipping<'a> {
         let net = &piece.net;
         let across = net.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
         let tiny = size < POINT;
-        if !tiny && !(across < CONTACT && piece.depth > CONTACT_DEPTH) {
+        let contact = across < CONTACT && piece.depth > CONTACT_DEPTH;
+        if !(tiny || contact) {
             return false;
         }
         let doubtful = !tiny || across > DOUBTFUL;
