@@ -21,7 +21,7 @@ const LARGEST_CIRCLE: usize = 5;
 const LARGEST_UNORDERED: usize = 8;
 
 /// Sizes of the circles that are still to be untied, the largest first.
-const CIRCLES_LEFT: &[usize] = &[26, 16, 10, 6];
+const CIRCLES_LEFT: &[usize] = &[26, 16, 6];
 
 /// Files that are still to get a header.
 const HEADERLESS_LEFT: usize = 86;
