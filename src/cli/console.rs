@@ -1,9 +1,13 @@
 //! How a command talks: messages and progress on stderr, data on stdout, colours where the terminal has them.
 
+use crate::formats::{printable, printable_line};
 use crate::report::Provenance;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
+
+/// Bold, dim, and normal again (ECMA-48, SGR).
+const EMPHASIS: [&str; 3] = ["\x1b[1m", "\x1b[2m", "\x1b[0m"];
 
 /// Columns for messages where neither `COLUMNS` nor a terminal says how many there are.
 const DEFAULT_WIDTH: usize = 120;
@@ -46,8 +50,23 @@ impl Console {
     pub(crate) fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
             // A closed stderr is no reason to stop working.
-            let _ = writeln!(io::stderr().lock(), "{message}");
+            let _ = writeln!(io::stderr().lock(), "{}", self.shown(&message.to_string()));
         }
+    }
+
+    /// What a terminal may be given: names are data, so that all it would obey is written out, but for our own emphasis.
+    pub(crate) fn shown(&self, text: &str) -> String {
+        if !self.colour {
+            return printable(text).into_owned();
+        }
+        let mut shown = String::with_capacity(text.len());
+        let mut rest = text;
+        while let Some((at, code)) = EMPHASIS.iter().filter_map(|code| Some((rest.find(code)?, code))).min() {
+            shown += &printable(&rest[..at]);
+            shown += code;
+            rest = &rest[at + code.len()..];
+        }
+        shown + &printable(rest)
     }
 
     /// Emphasis, where the terminal has it.
@@ -89,7 +108,7 @@ impl Console {
         let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let style = style.with_key("rate", rate);
         bar.set_style(style.progress_chars("━╸ "));
-        bar.set_message(label.to_owned());
+        bar.set_message(printable_line(label).into_owned());
         bar
     }
 
@@ -103,7 +122,7 @@ impl Console {
         let style = ProgressStyle::with_template("  {prefix:<14} {bar:30} {percent:>3} %  {msg}");
         let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style.progress_chars("━╸ "));
-        bar.set_prefix(label.to_owned());
+        bar.set_prefix(printable_line(label).into_owned());
         bar
     }
 
@@ -116,7 +135,7 @@ impl Console {
         }
         let style = ProgressStyle::with_template("  {spinner} {msg}  {elapsed}");
         spinner.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        spinner.set_message(label.to_owned());
+        spinner.set_message(printable_line(label).into_owned());
         spinner.enable_steady_tick(std::time::Duration::from_millis(100));
         spinner
     }
@@ -134,11 +153,15 @@ impl Console {
     }
 }
 
-/// Data on stdout. A reader that has gone away (`| head`) is no failure of ours to explain.
+/// Data on stdout, with what a terminal would obey written out. A reader that has gone away (`| head`) is no failure: what
+/// was to be written to files is there all the same.
 pub(crate) fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()
+    let written = out.write_all(printable(text).as_bytes()).and_then(|()| out.flush());
+    match written {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
 }
 
 /// The command as a person would type it again.
@@ -158,13 +181,23 @@ fn command_line(line: &[OsString]) -> String {
 /// The bar follows the study's own clock, remaining time included.
 pub(crate) fn show_progress(bar: &ProgressBar, p: &crate::study::Progress) {
     let remaining = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
-    bar.set_message(format!("{}{remaining}", p.stage));
+    bar.set_message(printable_line(&format!("{}{remaining}", p.stage)).into_owned());
     bar.set_position((STAGE_STEPS as f64 * p.done.clamp(0.0, 1.0)) as u64);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_our_own_emphasis_reaches_a_terminal() {
+        let mut console = Console::new(false, false, 0, &[]);
+        console.colour = true;
+        let line = format!("{} \x1b]0;x\x07 \u{9b}2J", console.bold("lens"));
+        assert_eq!(console.shown(&line), "\x1b[1mlens\x1b[0m \\u{1b}]0;x\\u{7} \\u{9b}2J");
+        console.colour = false;
+        assert_eq!(console.shown("\x1b[1mlens"), "\\u{1b}[1mlens");
+    }
 
     #[test]
     fn the_command_can_be_typed_again() {

@@ -1,6 +1,7 @@
 //! Why a command stops: the message, what to do, the line at fault, the exit code.
 
 use super::console::Console;
+use crate::formats::{printable, printable_in_place, printable_line};
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::io::Write;
@@ -28,7 +29,7 @@ struct Excerpt {
 
 impl Failure {
     fn new(code: u8, message: impl Into<String>) -> Self {
-        Self { code, message: message.into(), help: None, excerpt: None }
+        Self { code, message: printable(&message.into()).into_owned(), help: None, excerpt: None }
     }
 
     /// Exit code 1.
@@ -48,7 +49,7 @@ impl Failure {
 
     /// Adds what to do about it.
     pub(crate) fn with_help(mut self, help: impl Into<String>) -> Self {
-        self.help = Some(help.into());
+        self.help = Some(printable(&help.into()).into_owned());
         self
     }
 
@@ -56,7 +57,8 @@ impl Failure {
     pub(crate) fn with_excerpt(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
         // A span beyond the text, which only a message about another file could have, is cut to it.
         let span = span.start.min(text.len())..span.end.min(text.len());
-        let [file, text, label] = [file, text, label].map(str::to_owned);
+        let [file, label] = [file, label].map(|text| printable_line(text).into_owned());
+        let text = printable_in_place(text).into_owned();
         self.excerpt = Some(Box::new(Excerpt { file, text, span, label }));
         self
     }

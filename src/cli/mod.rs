@@ -12,15 +12,18 @@ mod commands;
 mod completion;
 mod console;
 mod failure;
+mod interruption;
 mod machine;
 mod output;
 mod work;
 
+use crate::formats::{is_unprintable, printable};
 use arguments::command::Arguments;
 use clap::Parser;
 use completion::Completion;
 use console::Console;
 use std::ffi::OsString;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Runs the command with these arguments (the first is the program's name) and tells how it ended.
@@ -34,12 +37,19 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(e) => {
             // Help and version go to stdout with code 0, mistakes to stderr with code 2.
             let code = e.exit_code();
-            let _ = e.print();
+            let shown = e.render().to_string();
+            if shown.contains(is_unprintable) {
+                // What was typed holds terminal codes: said without them, and so without colours of our own.
+                let _ = writeln!(std::io::stderr().lock(), "{}", printable(&shown));
+            } else {
+                let _ = e.print();
+            }
             return ExitCode::from(u8::try_from(code).unwrap_or(2));
         }
     };
     let Arguments { command, json, quiet, verbose } = arguments;
     let console = Console::new(json, quiet, verbose, &typed);
+    interruption::watch();
     match commands::execute(command, &console) {
         Ok(Completion::Complete) => ExitCode::SUCCESS,
         Ok(Completion::Incomplete) => ExitCode::from(4),

@@ -1,10 +1,16 @@
+//! Files that are whole or not there, and names that are safe in a path.
+
 use super::{Error, ErrorKind};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 static SERIAL: AtomicU32 = AtomicU32::new(0);
+
+/// Files that this process has begun and not finished.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file beside its final name and renames it when `write` has succeeded, so that the name never holds half a file.
 ///
@@ -14,6 +20,7 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     let beside = unfinished(path);
     remove_stale(path);
     let attempt = || -> io::Result<()> {
+        let _registered = Unfinished::register(&beside);
         let mut out = BufWriter::with_capacity(1 << 18, File::create(&beside)?);
         write(&mut out)?;
         out.into_inner().map_err(|e| e.into_error())?;
@@ -24,6 +31,30 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
         let _ = fs::remove_file(&beside);
         Error::new(path, ErrorKind::Write(e))
     })
+}
+
+/// A file that is removed when the process is stopped while it is being written.
+#[derive(Debug)]
+pub(super) struct Unfinished(PathBuf);
+
+impl Unfinished {
+    pub(super) fn register(path: &Path) -> Self {
+        UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).push(path.to_path_buf());
+        Self(path.to_path_buf())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).retain(|path| *path != self.0);
+    }
+}
+
+/// Removes what this process has begun to write and not finished, for a process that is about to end.
+pub fn remove_unfinished_files() {
+    for path in UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
+        let _ = fs::remove_file(path);
+    }
 }
 
 /// A name in the same folder (renaming across devices is a copy) that no other process or thread uses.
@@ -57,10 +88,22 @@ pub(super) fn remove_stale(path: &Path) {
     }
 }
 
-/// A name that is safe in a path: what is no letter, digit, `-` or `_` becomes `_`.
+/// Longest stem of a file name, bytes: file systems take 255, of which extensions and the names of unfinished files need some.
+const LONGEST_STEM: usize = 120;
+
+/// A name that is safe in a path: what is no letter, digit, `-` or `_` becomes `_`. A name too long for a file system is cut,
+/// and ends in a hash of the whole, so that long names that begin alike stay apart.
 pub fn file_stem(name: &str) -> String {
-    let safe: String =
+    let mut safe: String =
         name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+    if safe.len() > LONGEST_STEM {
+        // FNV-1a (Fowler, Noll, Vo), 64 bits.
+        let hash =
+            name.bytes().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+        let kept = safe.floor_char_boundary(LONGEST_STEM - 17);
+        safe.truncate(kept);
+        safe += &format!("-{hash:016x}");
+    }
     if safe.is_empty() { "unnamed".into() } else { safe }
 }
 
@@ -99,6 +142,14 @@ mod tests {
             fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         left.sort();
         assert_eq!(left, [own.as_str(), ".b.csv.4294967295-0.part", "a.csv"]);
+    }
+
+    #[test]
+    fn stems_fit_any_file_system_and_stay_apart() {
+        let long = |last: char| format!("{}{last}", "ä".repeat(300));
+        let [a, b] = [file_stem(&long('a')), file_stem(&long('b'))];
+        assert!(a.len() <= LONGEST_STEM && b.len() <= LONGEST_STEM && a != b, "{a} {b}");
+        assert_eq!(file_stem("../a b\u{1b}"), "___a_b_");
     }
 
     #[test]

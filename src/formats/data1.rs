@@ -1,6 +1,7 @@
 //! The light part of the seed's file format (Data_1): the number of rays, then for each ray its origin in mm, its direction
 //! and its power, one ray a line, seven numbers separated by blanks.
 
+use super::input::read_text;
 use super::rays::LightRay;
 use super::{Error, ErrorKind, write_atomic};
 use std::io::{self, Write};
@@ -19,7 +20,7 @@ pub fn write_data1(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
 /// # Errors
 /// When the file cannot be read, a line does not hold a ray, or the count is not that of the lines.
 pub fn read_data1(path: &Path) -> Result<Vec<LightRay>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut lines = Lines::of(path, &text);
     let rays = lines.rays()?;
     lines.end()?;

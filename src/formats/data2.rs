@@ -2,6 +2,7 @@
 //! corners in mm and the refractive-index ratio, one facet a line, sixteen numbers separated by blanks.
 
 use super::facets::{Facets, flat_normal};
+use super::input::read_text;
 use super::{Error, ErrorKind, write_atomic};
 use crate::math::{Point, Vector};
 use std::path::Path;
@@ -38,7 +39,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
 /// # Errors
 /// When the file cannot be read, a line does not hold sixteen finite numbers, or the count is not that of the lines.
 pub fn read_data2(path: &Path) -> Result<Vec<Data2Facet>, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
     let (first, count) = lines
         .next()

@@ -4,6 +4,7 @@
 //! rays and the rays as in Data_1: origin (the point of arrival), direction, power.
 
 use super::data1::{Lines, ray_block};
+use super::input::read_text;
 use super::rays::LightRay;
 use super::{Error, ErrorKind, write_atomic};
 use std::path::Path;
@@ -46,7 +47,7 @@ pub fn write_data3(path: &Path, data: &Data3) -> Result<(), Error> {
 /// # Errors
 /// When the file cannot be read or is not laid out as [`write_data3`] does; the message names the line.
 pub fn read_data3(path: &Path) -> Result<Data3, Error> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut lines = Lines::of(path, &text);
     let [rows, columns] = lines.counts("rows and columns of the results")?;
     let mut results = Vec::new();

@@ -1,5 +1,6 @@
 //! Luminous intensity in the EULUMDAT format (`.ldt`), by the `eulumdat` crate.
 
+use super::input::read_bytes;
 use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
 use eulumdat::{Eulumdat, LampSet, Symmetry, TypeIndicator};
 use std::path::Path;
@@ -9,7 +10,7 @@ use std::path::Path;
 /// # Errors
 /// When the file cannot be read or is not EULUMDAT.
 pub fn read_eulumdat(path: &Path) -> Result<Photometry, Error> {
-    let bytes = std::fs::read(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let bytes = read_bytes(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     parse_eulumdat(path, &String::from_utf8_lossy(&bytes))
 }
 

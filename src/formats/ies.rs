@@ -1,5 +1,6 @@
 //! Luminous intensity in the format of IES LM-63: editions of 1986 to 2019 are read, that of 2002 is written.
 
+use super::input::read_bytes;
 use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
 use std::path::Path;
 
@@ -16,7 +17,7 @@ const LONGEST_LINE: usize = 130;
 /// # Errors
 /// When the file cannot be read or is not LM-63; the message names the line.
 pub fn read_ies(path: &Path) -> Result<Photometry, Error> {
-    let bytes = std::fs::read(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let bytes = read_bytes(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     parse_ies(path, &String::from_utf8_lossy(&bytes))
 }
 

@@ -20,19 +20,21 @@ mod facets;
 mod glb;
 mod grid;
 mod ies;
+mod input;
 mod npz;
 mod obj;
 mod photometry;
 mod ply;
 mod png;
 mod polylines;
+mod printable;
 mod ray_files;
 mod rays;
 mod stl;
 mod stream;
 mod vtk;
 
-pub use atomic::{file_stem, write_atomic};
+pub use atomic::{file_stem, remove_unfinished_files, write_atomic};
 pub use base64::base64;
 pub use data1::{read_data1, write_data1};
 pub use data2::{Data2Facet, read_data2};
@@ -43,10 +45,14 @@ pub use export::{FACET_EXTENSIONS, is_facet_file, write_facets};
 pub use facets::{Facets, Group};
 pub use grid::{Axis, Grid, Layer, write_grid_csv, write_grid_npz};
 pub use ies::{parse_ies, read_ies, write_ies};
+pub use input::{open_file, read_bytes, read_text};
 pub use npz::{NpyArray, write_npz};
 pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
+pub use printable::{
+    csv_quoted_text, csv_text, is_unprintable, printable, printable_in_place, printable_json, printable_line,
+};
 pub use ray_files::{
     Flux, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_set, read_tm25, write_tm25,
 };

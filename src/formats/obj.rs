@@ -1,7 +1,7 @@
 //! Wavefront OBJ: shared positions, one normal a corner, quads as quads, a group for every part.
 
 use super::facets::Facets;
-use super::{Error, write_atomic};
+use super::{Error, printable_line, write_atomic};
 use std::path::Path;
 
 /// Writes positions, normals and quads; numbers read back bit for bit.
@@ -20,7 +20,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
                 continue;
             }
             // A name with blanks would read as several groups.
-            writeln!(w, "g {}", group.name.split_whitespace().collect::<Vec<_>>().join("_"))?;
+            writeln!(w, "g {}", printable_line(&group.name).split_whitespace().collect::<Vec<_>>().join("_"))?;
             for i in list {
                 let facet = &mesh.facets[i];
                 let corners = if facet.is_triangle() { 3 } else { 4 };

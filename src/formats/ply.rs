@@ -2,7 +2,7 @@
 //! face id, sag and part of every facet.
 
 use super::facets::Facets;
-use super::{Error, write_atomic};
+use super::{Error, printable_line, write_atomic};
 use std::path::Path;
 
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
@@ -11,7 +11,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     write_atomic(path, |w| {
         writeln!(w, "ply\nformat binary_little_endian 1.0\ncomment lampyris {}, mm", env!("CARGO_PKG_VERSION"))?;
         for (k, group) in facets.groups.iter().enumerate() {
-            writeln!(w, "comment part {k} {}", group.name.replace(['\n', '\r'], " "))?;
+            writeln!(w, "comment part {k} {}", printable_line(&group.name))?;
         }
         writeln!(w, "element vertex {}", mesh.vertices.len())?;
         for name in ["x", "y", "z", "nx", "ny", "nz", "u", "v"] {

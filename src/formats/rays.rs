@@ -1,9 +1,9 @@
 //! Lists of light rays: origin, direction, power and wavelength, as CSV or NPZ.
 
+use super::input::{open_file, read_text};
 use super::{Error, ErrorKind, NpyArray, write_atomic, write_npz};
 use crate::math::{Point, Vector};
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -19,6 +19,14 @@ pub struct LightRay {
     /// Vacuum wavelength, nm, if the list says.
     pub wavelength_nm: Option<f64>,
 }
+
+/// The first so many columns are needed; the wavelength may be missing.
+const REQUIRED_COLUMNS: usize = 7;
+
+/// Arrays of an NPZ file may unpack to this many times its size: directions, half of the numbers of a ray, hardly shrink.
+const MOST_INFLATION: u64 = 50;
+/// And to this much whatever its size, bytes: small files of equal rays shrink far.
+const LEAST_BUDGET: u64 = 1 << 26;
 
 /// Names of the columns of a CSV file, in the order they are written.
 const COLUMNS: [&str; 8] = ["x", "y", "z", "dx", "dy", "dz", "power", "wavelength_nm"];
@@ -64,7 +72,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
         return read_npz(path);
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     parse_csv(path, &text)
 }
 
@@ -171,19 +179,28 @@ fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
             n => Err(format!("{n} columns; a ray has {} and, if wanted, wavelength_nm", COLUMNS[..7].join(", "))),
         };
     }
-    let find = |name: &str| cells.iter().position(|c| c.eq_ignore_ascii_case(name));
     let mut order = Vec::new();
-    for name in &COLUMNS[..7] {
-        order
-            .push(find(name).ok_or_else(|| format!("no column '{name}'; needed are {}", COLUMNS[..7].join(", ")))?);
+    for (k, name) in COLUMNS.iter().enumerate() {
+        let mut places = (0..cells.len()).filter(|&i| cells[i].eq_ignore_ascii_case(name));
+        match (places.next(), places.next()) {
+            (_, Some(again)) => {
+                return Err(format!("column '{name}' stands twice, the second time as column {}", again + 1));
+            }
+            (Some(place), None) => order.push(place),
+            (None, None) if k < REQUIRED_COLUMNS => {
+                return Err(format!("no column '{name}'; needed are {}", COLUMNS[..REQUIRED_COLUMNS].join(", ")));
+            }
+            (None, None) => {}
+        }
     }
-    order.extend(find(COLUMNS[7]));
     Ok(order)
 }
 
 fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
-    let file = File::open(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let size = file.metadata().map_err(|e| Error::new(path, ErrorKind::Read(e)))?.len();
+    let mut budget = LEAST_BUDGET.max(MOST_INFLATION.saturating_mul(size));
     let mut zip = zip::ZipArchive::new(file).map_err(|e| malformed(format!("not an NPZ file: {e}")))?;
     let mut array = |name: &str, width: usize| -> Result<Option<Vec<f64>>, Error> {
         let entry = match zip.by_name(&format!("{name}.npy")) {
@@ -191,7 +208,7 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
             Err(zip::result::ZipError::FileNotFound) => return Ok(None),
             Err(e) => return Err(malformed(format!("array '{name}': {e}"))),
         };
-        read_array(entry, width).map(Some).map_err(|m| malformed(format!("array '{name}': {m}")))
+        read_array(entry, width, &mut budget).map(Some).map_err(|m| malformed(format!("array '{name}': {m}")))
     };
     let mut needed = |name: &str, width: usize| {
         array(name, width)?
@@ -213,8 +230,8 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
         .collect()
 }
 
-/// The values of an NPY array of shape `(n, width)`, or `(n,)` for a width of 1.
-fn read_array(mut entry: impl Read, width: usize) -> Result<Vec<f64>, String> {
+/// The values of an NPY array of shape `(n, width)`, or `(n,)` for a width of 1; their bytes are taken from the budget.
+fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Vec<f64>, String> {
     let cut = |e: std::io::Error| e.to_string();
     let mut start = [0u8; 10];
     entry.read_exact(&mut start).map_err(cut)?;
@@ -246,6 +263,9 @@ fn read_array(mut entry: impl Read, width: usize) -> Result<Vec<f64>, String> {
         return Err(format!("shape ({shape}), where (n, {width}) in C order is needed"));
     }
     let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);
+    *budget = budget.checked_sub(wanted).ok_or_else(|| {
+        format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays")
+    })?;
     // What is read grows with what is there, whatever the header says.
     let mut raw = Vec::new();
     entry.take(wanted).read_to_end(&mut raw).map_err(cut)?;
@@ -323,6 +343,7 @@ pub(super) mod tests {
             ("0,0,0,0,0,1,1\n0,0,0,0,1,0,0,5\n", "r.csv:2: 8 values in this line, but 7 in the first one"),
             ("0,0,0\n", "r.csv:1: 3 columns"),
             ("0,0,0,0,0,1,inf\n", "r.csv:1: inf is no finite number"),
+            ("x,y,z,dx,dy,dz,power,X\n", "r.csv:1: column 'x' stands twice, the second time as column 8"),
         ] {
             let e = parse_csv(Path::new("r.csv"), text).unwrap_err().to_string();
             assert!(e.starts_with(message), "{e}");

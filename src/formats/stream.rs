@@ -3,7 +3,7 @@
 //! The number of rows stands at the head of every array, so each column waits in a file beside the final one until all rows
 //! are known, and is then packed; the disk holds the rows twice for that while.
 
-use super::atomic::remove_stale;
+use super::atomic::{Unfinished, remove_stale};
 use super::npz::header;
 use super::{Error, ErrorKind, write_atomic};
 use std::fs::{self, File};
@@ -30,6 +30,7 @@ pub struct NpzStream {
     path: PathBuf,
     columns: Vec<(Column, PathBuf, BufWriter<File>)>,
     rows: u64,
+    unfinished: Vec<Unfinished>,
 }
 
 impl NpzStream {
@@ -38,11 +39,12 @@ impl NpzStream {
     /// # Errors
     /// When the folder cannot be written.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, Error> {
-        let mut stream = Self { path: path.to_path_buf(), columns: Vec::new(), rows: 0 };
+        let mut stream = Self { path: path.to_path_buf(), columns: Vec::new(), rows: 0, unfinished: Vec::new() };
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         remove_stale(path);
         for column in columns {
             let beside = path.with_file_name(format!(".{name}.{}.{}.part", std::process::id(), column.name));
+            stream.unfinished.push(Unfinished::register(&beside));
             let file = File::create(&beside).map_err(|e| Error::new(path, ErrorKind::Write(e)))?;
             stream.columns.push((*column, beside, BufWriter::with_capacity(1 << 16, file)));
         }

@@ -3,7 +3,7 @@
 
 use super::base64::base64;
 use super::facets::Facets;
-use super::{Error, Grid, Polylines, write_atomic};
+use super::{Error, Grid, Polylines, printable_line, write_atomic};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -31,7 +31,7 @@ fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::R
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+    printable_line(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 fn open(w: &mut dyn Write, kind: &str) -> io::Result<()> {

@@ -66,6 +66,11 @@ fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, mos
 }
 
 impl SimulationReport<'_> {
+    /// The report with these 3-D views.
+    pub fn with_views(self, views: Vec<View>) -> Self {
+        Self { views, ..self }
+    }
+
     fn share(&self, power: f64) -> String {
         format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
     }

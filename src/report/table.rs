@@ -1,4 +1,7 @@
+//! Tables for the page and as CSV.
+
 use super::number::{figures, grouped};
+use crate::formats::csv_text;
 
 /// A table that can be sorted and copied; also written as CSV.
 #[derive(Clone, Debug, Default)]
@@ -63,19 +66,12 @@ impl Table {
         self
     }
 
-    /// The table as CSV (RFC 4180), units in the header, numbers in full.
+    /// The table as CSV (RFC 4180), units in the header, numbers in full, text such that no spreadsheet takes it for a formula.
     pub fn to_csv(&self) -> String {
-        let quoted = |text: &str| {
-            if text.contains([',', '"', '\n', '\r']) {
-                format!("\"{}\"", text.replace('"', "\"\""))
-            } else {
-                text.to_owned()
-            }
-        };
-        let header: Vec<String> = self.columns.iter().map(|c| quoted(&c.heading())).collect();
+        let header: Vec<String> = self.columns.iter().map(|c| csv_text(&c.heading())).collect();
         let mut text = header.join(",") + "\n";
         for row in &self.rows {
-            let cells: Vec<String> = row.iter().map(|c| quoted(&c.plain())).collect();
+            let cells: Vec<String> = row.iter().map(|c| csv_text(&c.plain())).collect();
             text += &(cells.join(",") + "\n");
         }
         text

@@ -1,6 +1,6 @@
 use super::document::{Block, Report};
 use super::{chart_png, html, raster, static_chart};
-use crate::formats::{Error, ErrorKind, write_atomic, write_png};
+use crate::formats::{Error, ErrorKind, printable, write_atomic, write_png};
 use std::path::{Path, PathBuf};
 
 impl Report {
@@ -29,7 +29,8 @@ impl Report {
                 Block::Text(_) => continue,
                 Block::Chart(chart) => {
                     let path = inside("figures", format!("{}.svg", chart.name))?;
-                    write_atomic(&path, |w| w.write_all(static_chart::draw(chart).svg().as_bytes()))?;
+                    let drawing = static_chart::draw(chart).svg();
+                    write_atomic(&path, |w| w.write_all(printable(&drawing).as_bytes()))?;
                     written.push(path.clone());
                     if let Some(picture) = chart_png::picture(chart) {
                         let path = path.with_extension("png");

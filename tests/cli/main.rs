@@ -6,6 +6,9 @@ mod demo;
 #[path = "../support/files.rs"]
 mod files;
 mod info;
+mod mishaps;
+mod names;
+mod newcomer;
 mod overrides;
 mod race;
 mod receiver_files;

@@ -1,7 +1,12 @@
+//! The commands and their own options.
+
 use super::help_text;
 use super::options::{AccuracyOption, MeshingOptions, TracingOptions};
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+
+/// Share of energy that may be lost without a word: what rounding and grazing rays lose in a sound scene is far below it.
+const MOST_LOST: f64 = 1e-6;
 
 /// Heading of the options that every command has.
 const EVERYWHERE: &str = "Everywhere";
@@ -31,6 +36,8 @@ pub(crate) enum Command {
         /// Folder for the report and all results
         #[arg(short, long, default_value = "lampyris-demo", value_name = "DIR")]
         output: PathBuf,
+        #[command(flatten)]
+        page: PageOption,
         #[command(flatten)]
         meshing: MeshingOptions,
         #[command(flatten)]
@@ -93,6 +100,8 @@ pub(crate) enum Command {
         /// Folder for a report with the disagreeing rays in 3-D, and for check.json
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        #[command(flatten)]
+        page: PageOption,
         /// Write the rays used and the octree's answers
         #[arg(long, value_name = "FILE")]
         rays_out: Option<PathBuf>,
@@ -116,18 +125,33 @@ pub(crate) enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
         #[command(flatten)]
+        page: PageOption,
+        #[command(flatten)]
         meshing: MeshingOptions,
         #[command(flatten)]
         tracing: TracingOptions,
     },
     /// Merge the results of shards into one
     Merge {
-        /// The .tally files of all shards
-        #[arg(required = true, value_name = "PART")]
+        /// The .tally files of all shards, or the folder that they are in
+        #[arg(required = true, value_name = "PART|DIR")]
         parts: Vec<PathBuf>,
         /// Folder for the merged results
         #[arg(short, long, value_name = "DIR")]
         output: PathBuf,
+        /// The scene, where it is no longer at the place that the parts name
+        #[arg(long, value_name = "FILE")]
+        scene: Option<PathBuf>,
+        /// Wait at most so many seconds until all parts are there
+        #[arg(long, value_name = "SECONDS")]
+        wait: Option<f64>,
+        /// Largest share of energy that may be lost before the exit code becomes 4
+        #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
+        max_lost: f64,
+        #[command(flatten)]
+        page: PageOption,
+        #[command(flatten)]
+        limits: RefusalLimit,
     },
     /// Judge a far field by a lamp regulation: pass, fail or unsure, row by row
     Assess {
@@ -150,6 +174,18 @@ pub(crate) enum Command {
         #[arg(long)]
         list: bool,
     },
+    /// Write a commented scene for a STEP file
+    Init {
+        /// STEP file
+        file: PathBuf,
+        /// Scene file to write; by default named after the STEP file, in the working folder
+        #[arg(short, long, value_name = "SCENE.toml")]
+        output: Option<PathBuf>,
+    },
+    /// List the media that a scene may name
+    Media,
+    /// Print the licences of what the binary holds
+    Licences,
     /// Print the JSON Schema of the scene file
     Schema,
     /// Print a completion script
@@ -170,9 +206,13 @@ pub(crate) enum Command {
 pub(crate) struct TraceOptions {
     #[command(flatten)]
     pub(crate) precision: AccuracyOption,
-    /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`
-    #[arg(long, value_name = "I/N")]
+    /// Trace only part I of N (I from 1) into a .tally file, for `lampyris merge`; `auto` takes both from the launcher (Slurm,
+    /// Open MPI, PMI, PBS, Kubernetes)
+    #[arg(long, value_name = "I/N|auto", conflicts_with_all = ["paths", "verify_pruning", "until_error"])]
     pub(crate) shard: Option<String>,
+    /// Number of parts for `--shard auto` where the launcher does not say it
+    #[arg(long, value_name = "N", requires = "shard")]
+    pub(crate) shards: Option<u32>,
     /// Go on where an interrupted run stopped
     #[arg(long)]
     pub(crate) resume: bool,
@@ -198,10 +238,29 @@ pub(crate) struct TraceOptions {
     #[arg(long)]
     pub(crate) dry_run: bool,
     /// Largest share of energy that may be lost before the exit code becomes 4
-    #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
+    #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
     pub(crate) max_lost: f64,
     #[command(flatten)]
+    pub(crate) page: PageOption,
+    #[command(flatten)]
     pub(crate) limits: RefusalLimit,
+}
+
+/// Whether a page is written.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(crate) struct PageOption {
+    /// Write no report.html, figures and tables: numbers alone
+    #[arg(long, overrides_with = "report")]
+    no_report: bool,
+    /// Write report.html, figures and tables (the default)
+    #[arg(long, overrides_with = "no_report")]
+    report: bool,
+}
+
+impl PageOption {
+    pub(crate) fn is_wanted(self) -> bool {
+        !self.no_report
+    }
 }
 
 /// What of a model may be missing.

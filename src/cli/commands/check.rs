@@ -1,6 +1,6 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
-use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::arguments::command::{PageOption, RefusalLimit};
 use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
@@ -11,6 +11,7 @@ use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::cross_check::LIFT_IN_TOLERANCES;
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::intersectors::IntersectorChoice;
+use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::ray_sampler::RaySampler;
 use crate::cli::work::{accuracy_target, facets, paired_receivers, threads};
 use crate::formats::write_atomic;
@@ -39,6 +40,7 @@ pub(crate) struct CheckCommand<'a> {
     pub(crate) rays_in: Option<&'a PathBuf>,
     pub(crate) disagreements: Option<&'a PathBuf>,
     pub(crate) output: Option<&'a PathBuf>,
+    pub(crate) page: PageOption,
     pub(crate) limits: RefusalLimit,
 }
 
@@ -163,7 +165,10 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
             also: reached.iter().map(|a| a.answer.clone()).collect(),
             provenance: console.provenance(Some(seed), threads),
         };
-        report.report().write(folder)?;
+        let _owned = OutputPlace::folder(folder)?;
+        if command.page.is_wanted() {
+            report.report().write(folder)?;
+        }
         write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?;
     }
     if console.json {
@@ -172,7 +177,25 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         print(&(summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
         say_files(command, &found, console);
     }
-    Ok(input_files::report_refusals(&loaded.reports, command.limits.max_refused, console))
+    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
+    Ok(refused.and(report_defects(&found, console)))
+}
+
+/// Says what no check may find: no facets, answers that differ on the same facets, differences without a cause.
+fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
+    let disagreements = found.octree_vs_bvh.disagree;
+    let unexplained = found.facets_vs_exact.unexplained;
+    let defects = [
+        (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
+        (disagreements > 0, format!("octree and BVH answer {} rays differently", grouped(disagreements))),
+        (unexplained > 0, format!("{} differences from the spline are unexplained", grouped(unexplained))),
+    ];
+    let mut completion = Completion::Complete;
+    for (_, defect) in defects.iter().filter(|(is_found, _)| *is_found) {
+        console.say(defect);
+        completion = Completion::Incomplete;
+    }
+    completion
 }
 
 /// Build time, size and rate of every intersector.
@@ -220,7 +243,10 @@ fn write_rays(
 fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     match command.output {
         Some(folder) => {
-            console.say(format_args!("\n  {}", console.bold(&folder.join("report.html").display().to_string())));
+            if command.page.is_wanted() {
+                console
+                    .say(format_args!("\n  {}", console.bold(&folder.join("report.html").display().to_string())));
+            }
             console.say(format_args!("  {}", folder.join("check.json").display()));
         }
         None if !found.disagreements.is_empty() => {

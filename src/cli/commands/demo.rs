@@ -1,13 +1,16 @@
 //! `lampyris demo`: the main job on the built-in three-cavity lamp, in any folder, with nothing else installed.
 
+use crate::cli::arguments::command::PageOption;
 use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::output::closing;
 use crate::cli::work::cross_check;
 use crate::cli::work::input_files::{self, LoadedModel};
+use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::results_folder;
 use crate::cli::work::scene_run::{self, SceneJob, TraceRequest};
 use crate::cli::{completion::Completion, failure::Failure};
+use crate::formats::write_atomic;
 use crate::report::{figures, grouped, seconds};
 use crate::simulate::Scene;
 use crate::step;
@@ -15,6 +18,8 @@ use std::path::Path;
 
 /// The lamp: housing with three paraboloids, clear cover, three LED blocks.
 const LAMP: &[u8] = include_bytes!("../../../fixtures/step/lamp_multicavity.stp");
+/// Its name in the scene.
+const LAMP_FILE: &str = "../step/lamp_multicavity.stp";
 /// LEDs, media, mirrors and receivers around it.
 const SCENE: &str = include_str!("../../../fixtures/scenes/demo.toml");
 
@@ -26,6 +31,7 @@ pub(crate) fn run(
     folder: &Path,
     meshing: &MeshingOptions,
     tracing: &TracingOptions,
+    page: PageOption,
     console: &Console,
 ) -> Result<Completion, Failure> {
     console.say(console.bold("lampyris demo: a three-cavity lamp, from its STEP file to its light"));
@@ -42,7 +48,11 @@ pub(crate) fn run(
     let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
     say_step("tessellate", what, prepared.tessellation_seconds);
     let start = std::time::Instant::now();
-    let mut run = cross_check::trace_and_check(&prepared, TraceRequest::default(), console);
+    let _owned = OutputPlace::folder(folder)?;
+    let with_page = page.is_wanted();
+    results_folder::try_folder(&prepared, folder, with_page)?;
+    let mut run = cross_check::trace_and_check(&prepared, TraceRequest::default(), console)
+        .map_err(|_| Failure::running("demo: the run was stopped"))?;
     let both = start.elapsed().as_secs_f64();
     let r = &run.results;
     let s = r.seconds;
@@ -55,9 +65,15 @@ pub(crate) fn run(
     }
     let comparison = comparison(r);
     let start = std::time::Instant::now();
-    let (document, report) = results_folder::write(&prepared, folder, &mut run, comparison, console)?;
+    let (document, answer) = results_folder::write(&prepared, folder, &mut run, comparison, with_page, console)?;
+    write_atomic(&folder.join("lamp.stp"), |w| w.write_all(LAMP))?;
+    write_atomic(&folder.join("lamp.toml"), |w| w.write_all(SCENE.replace(LAMP_FILE, "lamp.stp").as_bytes()))?;
     say_step("write", format!("report, pictures, data into {}", folder.display()), start.elapsed().as_secs_f64());
-    closing::print_results(&document, &report.answer, folder, &run.results, console)?;
+    closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
+    console.say(format_args!(
+        "  {}",
+        console.dim("lamp.stp and lamp.toml beside them are yours to copy: `lampyris trace lamp.toml`")
+    ));
     Ok(Completion::Complete)
 }
 

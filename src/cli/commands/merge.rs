@@ -1,33 +1,137 @@
 //! `lampyris merge`: the results of all parts of a run.
 
+use crate::cli::arguments::command::RefusalLimit;
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
+use crate::cli::work::checkpoint::CHECKPOINT;
 use crate::cli::work::cross_check;
+use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
+use crate::cli::work::shards::replicates_of_shard;
 use crate::cli::work::tally_file::{TallyHeader, fingerprint};
-use crate::cli::work::{input_files, results_folder};
+use crate::cli::work::{input_files, lost_rays, results_folder};
 use crate::simulate::Portion;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// What `merge` was asked for.
+pub(crate) struct MergeCommand<'a> {
+    pub(crate) parts: &'a [PathBuf],
+    pub(crate) folder: &'a Path,
+    pub(crate) scene: Option<&'a Path>,
+    pub(crate) wait: Option<f64>,
+    pub(crate) max_lost: f64,
+    pub(crate) with_page: bool,
+    pub(crate) limits: RefusalLimit,
+}
+
+/// How long to wait before looking for parts again.
+const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
 /// Puts the parts together and writes the results of the whole run.
-pub(crate) fn run(parts: &[PathBuf], folder: &Path, console: &Console) -> Result<Completion, Failure> {
-    let [first, ..] = parts else { return Err(Failure::arguments("merge: no parts given")) };
-    let header: TallyHeader = Portion::header(&read(first)?).map_err(|m| unreadable(first, m))?;
-    let (scene, loaded) = input_files::scene_file(&header.scene, console)?;
+pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
+    let patience = Patience::new(command.wait)?;
+    let first = first_part(command, &patience, console)?;
+    let header: TallyHeader = Portion::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
+    let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
+    let (scene, loaded) = input_files::scene_file(&scene_path, console).map_err(|failure| match command.scene {
+        Some(_) => failure,
+        None => failure.with_help("where the scene has moved since, --scene FILE says where it is"),
+    })?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let job = SceneJob { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, accuracy: None };
     let prepared = scene_run::prepare(job, console)?;
-    let whole = sum(parts, &header, &prepared)?;
-    if !whole.is_whole() {
-        return Err(Failure::input(missing_parts(&whole, header.shard)).with_help("merge all parts at once"));
+    let mut whole = sum(&part_files(command.parts)?, &header, &prepared)?;
+    while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, header.shard)) {
+        whole = sum(&part_files(command.parts)?, &header, &prepared)?;
     }
+    if !whole.is_whole() {
+        let failure = Failure::input(missing_parts(&whole, header.shard));
+        return Err(
+            failure.with_help("merge all parts at once; --wait SECONDS waits for those that are still traced")
+        );
+    }
+
+    let _owned = OutputPlace::folder(command.folder)?;
+    results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
-    let mut run = cross_check::trace_and_check(&prepared, request, console);
-    let (document, report) = results_folder::write(&prepared, folder, &mut run, Vec::new(), console)?;
-    closing::print_results(&document, &report.answer, folder, &run.results, console)?;
-    Ok(Completion::Complete)
+    let mut run = cross_check::trace_and_check(&prepared, request, console)
+        .map_err(|_| Failure::running("merge: the run is not whole"))?;
+    let written =
+        results_folder::write(&prepared, command.folder, &mut run, Vec::new(), command.with_page, console);
+    let (document, answer) = match written {
+        Ok(written) => written,
+        Err(failure) => {
+            let place = results_folder::write_anywhere(&prepared, &mut run, &[], command.with_page, console);
+            let saved = place.map(|folder| format!("nothing is lost: the results are in {}", folder.display()));
+            return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
+        }
+    };
+    closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
+    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
+    Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
+        .and(refused))
+}
+
+/// How long to wait for parts.
+struct Patience {
+    start: Instant,
+    limit: Duration,
+}
+
+impl Patience {
+    fn new(seconds: Option<f64>) -> Result<Self, Failure> {
+        let limit = Duration::try_from_secs_f64(seconds.unwrap_or(0.0)).map_err(|_| {
+            Failure::arguments(format!("--wait {}: not a number of seconds", seconds.unwrap_or(0.0)))
+        })?;
+        Ok(Self { start: Instant::now(), limit })
+    }
+
+    /// Waits a little, unless the time is over.
+    fn lasts(&self, console: &Console, missing: &str) -> bool {
+        if self.start.elapsed() >= self.limit {
+            return false;
+        }
+        if console.verbose > 0 {
+            console.say(missing);
+        }
+        std::thread::sleep(LOOK_AGAIN);
+        true
+    }
+}
+
+/// The first part there is, waited for where that was asked.
+fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<PathBuf, Failure> {
+    loop {
+        let files = part_files(command.parts)?;
+        match files.into_iter().find(|file| file.exists()) {
+            Some(file) => return Ok(file),
+            None if patience.lasts(console, "no part is there yet") => {}
+            None => {
+                let missing = command.parts.first().map_or_else(String::new, |p| p.display().to_string());
+                return Err(Failure::input(format!("{missing}: no .tally file is there")));
+            }
+        }
+    }
+}
+
+/// The files among the arguments, and the parts in the folders among them in the order of their names.
+fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for argument in arguments {
+        if !argument.is_dir() {
+            files.push(argument.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(argument).map_err(|e| unreadable(argument, e))?;
+        let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        inside.retain(|path| path.extension().is_some_and(|e| e == "tally") && !path.ends_with(CHECKPOINT));
+        inside.sort();
+        files.extend(inside);
+    }
+    Ok(files)
 }
 
 fn unreadable(path: &Path, message: impl std::fmt::Display) -> Failure {
@@ -35,24 +139,24 @@ fn unreadable(path: &Path, message: impl std::fmt::Display) -> Failure {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|e| unreadable(path, e))
+    crate::formats::read_bytes(path).map_err(|e| unreadable(path, e))
 }
 
 /// The sum of all parts, each of which must be of the run that the first one's header names.
-fn sum(parts: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Result<Portion, Failure> {
+fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Result<Portion, Failure> {
     let expected = fingerprint(prepared)?.0;
     let check = |h: &TallyHeader| {
         if h.fingerprint == expected {
             return Ok(());
         }
         Err(if h.fingerprint == header.fingerprint {
-            format!("the scene {} or the program has changed since this part was traced", h.scene.display())
+            format!("the scene {} or the program has changed since this part was traced", h.scene().display())
         } else {
-            format!("it is part of another run ({}) than {}", h.command, parts[0].display())
+            format!("it is part of another run ({}) than the first one", h.command)
         })
     };
     let mut sum: Option<Portion> = None;
-    for path in parts {
+    for path in files {
         let part = Portion::read(&read(path)?, check, &prepared.bound).map_err(|m| unreadable(path, m))?;
         match &mut sum {
             Some(sum) => sum.merge(&part).map_err(|m| unreadable(path, m))?,
@@ -68,9 +172,8 @@ fn missing_parts(whole: &Portion, shard: Option<[u32; 2]>) -> String {
     let count = (0..whole.replicates).filter(absent).count();
     let mut text = format!("{count} of the {} replicates of the run are missing", whole.replicates);
     if let Some([_, n]) = shard {
-        let first = |k: u32| (u64::from(whole.replicates) * u64::from(k) / u64::from(n)) as u32;
         let shards: Vec<String> = (0..n)
-            .filter(|&k| (first(k)..first(k + 1)).any(|r| absent(&r)))
+            .filter(|&k| replicates_of_shard(whole.replicates, [k, n]).any(|r| absent(&r)))
             .map(|k| format!("{}/{n}", k + 1))
             .collect();
         text += &format!(": those of shard {}", shards.join(", "));

@@ -6,6 +6,9 @@ mod check;
 mod demo;
 mod facet;
 mod info;
+mod init;
+mod licences;
+mod media;
 mod merge;
 mod meta;
 mod replay;
@@ -19,7 +22,7 @@ use crate::cli::{completion::Completion, failure::Failure};
 /// Does what a command asks for.
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     match command {
-        Command::Demo { output, meshing, tracing } => demo::run(&output, &meshing, &tracing, console),
+        Command::Demo { output, page, meshing, tracing } => demo::run(&output, &meshing, &tracing, page, console),
         Command::Info { file, limits } => info::run(&file, limits, console),
         Command::Facet { file, output, meshing, precision, baseline, threads, limits } => {
             let command = facet::FacetCommand {
@@ -43,7 +46,18 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             };
             trace::run(&command, console)
         }
-        Command::Check { file, meshing, tracing, precision, output, rays_out, rays_in, disagreements, limits } => {
+        Command::Check {
+            file,
+            meshing,
+            tracing,
+            precision,
+            output,
+            page,
+            rays_out,
+            rays_in,
+            disagreements,
+            limits,
+        } => {
             let command = check::CheckCommand {
                 file: &file,
                 meshing: &meshing,
@@ -53,15 +67,33 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
                 rays_in: rays_in.as_ref(),
                 disagreements: disagreements.as_ref(),
                 output: output.as_ref(),
+                page,
                 limits,
             };
             check::run(&command, console)
         }
-        Command::Study { kind, file, output, meshing, tracing } => {
+        Command::Study { kind, file, output, page, meshing, tracing } => {
             let (file, output) = (file.as_deref(), output.as_ref());
-            study::run(&study::StudyCommand { kind, file, output, meshing: &meshing, tracing: &tracing }, console)
+            study::run(
+                &study::StudyCommand { kind, file, output, page, meshing: &meshing, tracing: &tracing },
+                console,
+            )
         }
-        Command::Merge { parts, output } => merge::run(&parts, &output, console),
+        Command::Merge { parts, output, scene, wait, max_lost, page, limits } => {
+            let command = merge::MergeCommand {
+                parts: &parts,
+                folder: &output,
+                scene: scene.as_deref(),
+                wait,
+                max_lost,
+                with_page: page.is_wanted(),
+                limits,
+            };
+            merge::run(&command, console)
+        }
+        Command::Init { file, output } => init::run(&file, output.as_deref(), console),
+        Command::Media => media::run(console),
+        Command::Licences => licences::run(),
         Command::Assess { list: true, .. } => assess::list(console),
         Command::Assess { result, regulation, receiver, left_hand, as_placed, list: _ } => {
             let command = assess::AssessCommand {

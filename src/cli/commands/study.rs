@@ -1,12 +1,13 @@
 //! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
 use super::demo;
-use crate::cli::arguments::command::StudyKind;
+use crate::cli::arguments::command::{PageOption, StudyKind};
 use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{octree_shape, terminal_tables};
 use crate::cli::work::input_files::{self, Input, LoadedModel};
+use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::{
     facets,
     intersectors::{self, IntersectorChoice},
@@ -37,6 +38,7 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) kind: StudyKind,
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
+    pub(crate) page: PageOption,
     pub(crate) meshing: &'a MeshingOptions,
     pub(crate) tracing: &'a TracingOptions,
 }
@@ -68,6 +70,14 @@ impl StudyResult {
 fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
     let kind = command.kind;
+    if let Some(file) = command.file.filter(|_| matches!(kind, Complexity | Stability)) {
+        let reason = if kind == Stability { "its cases are built in" } else { "its three lamps are built in" };
+        let failure =
+            Failure::arguments(format!("study {} does not take {}: {reason}", kind.name(), file.display()));
+        return Err(
+            failure.with_help("leave it out; `lampyris study accuracy FILE` and `study bvh FILE` take a file")
+        );
+    }
     let m = command.meshing;
     let t = command.tracing;
     let traces_scene = kind == Effects;
@@ -91,6 +101,10 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     refuse_unused_options(command)?;
     let threads = threads::set_threads(command.tracing.threads)?;
     let seed = command.tracing.seed.unwrap_or(1);
+    // Tried before the work, which may take minutes.
+    let folder: PathBuf =
+        command.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", command.kind.name()).into());
+    let _owned = OutputPlace::folder(&folder)?;
     let bar = console.stage_bar(command.kind.name());
     let progress = |p: Progress| show_progress(&bar, &p);
     let mut shapes = Vec::new();
@@ -122,10 +136,6 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     for (name, rows) in found.extra_rows {
         document[name] = rows;
     }
-    let folder =
-        command.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", command.kind.name()).into());
-    std::fs::create_dir_all(&folder)
-        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
     let text = json_text(&document)?;
     write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
     let mut report = study_report(&document, provenance);
@@ -136,13 +146,17 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         report.sections.insert(1, octree_shape::octree_section(&shapes));
         octree_shape::write_octree_files(&folder, &shapes)?;
     }
-    report.write(&folder)?;
+    if command.page.is_wanted() {
+        report.write(&folder)?;
+    }
     if console.json {
         print(&text)?;
     } else {
         console.say(format_args!("{}", terminal_tables::study_tables(&report, console.width())));
         console.say(format_args!("  {}\n", report.answer.replace("**", "")));
-        console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));
+        if command.page.is_wanted() {
+            console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));
+        }
         console.say(format_args!("  {}", folder.join("study.json").display()));
     }
     Ok(Completion::Complete)

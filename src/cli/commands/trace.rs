@@ -6,18 +6,22 @@ use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
-use crate::cli::output::closing::{self, LEDGER};
+use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::cross_check::{self, SceneResults};
-use crate::cli::work::error_target::{ErrorTarget, TargetResult};
+use crate::cli::work::error_target::ErrorTarget;
+use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
 use crate::cli::work::path_file::PathFile;
 use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
 use crate::cli::work::{accuracy_target, input_files, lost_rays, results_folder, shards};
-use crate::report::{bytes, figures, grouped, seconds};
+use crate::report::{bytes, grouped, seconds};
 use crate::simulate::Portion;
 use serde_json::json;
 use std::path::Path;
+
+/// Room that the sums of a shard need at least, bytes.
+const LEAST_TALLY_BYTES: u64 = 100_000;
 
 /// What `trace` was asked for.
 pub(crate) struct TraceCommand<'a> {
@@ -32,7 +36,8 @@ pub(crate) struct TraceCommand<'a> {
 pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completion, Failure> {
     let TraceCommand { folder, extra, .. } = *command;
     // What is wrong with the options themselves is said before any file is read.
-    let shard = extra.shard.as_deref().map(shards::parse_shard).transpose()?;
+    let shard =
+        extra.shard.as_deref().map(|text| shards::requested_shard(text, extra.shards, console)).transpose()?;
     let replay = replay::parse_request(&extra.replay)?;
     if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
@@ -81,17 +86,34 @@ fn trace_whole(
     console: &Console,
 ) -> Result<Completion, Failure> {
     let TraceCommand { folder, extra, .. } = *command;
-    let target = target.map(|target| {
-        let (portion, result) = target.trace(prepared, console);
-        (target.sentence(&result), portion, result)
-    });
-    let (sentence, portion, result) = match target {
-        Some((sentence, portion, result)) => (Some(sentence), Some(portion), Some(result)),
-        None => (None, None, None),
-    };
-    let prepared = &*prepared;
     let file = folder.join(CHECKPOINT);
-    let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console);
+
+    // All that can go wrong with the place of the results is tried before anything is traced.
+    let _owned = OutputPlace::folder(folder)?;
+    if !extra.resume {
+        refuse_overwriting(&file)?;
+    }
+    let with_page = extra.page.is_wanted();
+    results_folder::try_folder(prepared, folder, with_page)?;
+    if let Some(file) = &extra.paths {
+        make_folder(&folder_of(file))?;
+    }
+    let paths = extra.paths.as_deref().map(PathFile::create).transpose()?;
+
+    // With an error to reach, the number of rays is found by tracing.
+    let found = target.map(|target| target.trace(prepared, console));
+    let prepared = &*prepared;
+    let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
+    let (traced, result) = match found {
+        Some((portion, result)) if !portion.is_whole() => {
+            let rays = result.rays;
+            return Err(checkpoint.stopped(&portion, "interrupted").with_help(format!(
+                "--rays {rays} --resume in place of --until-error goes on with this many rays"
+            )));
+        }
+        Some((portion, result)) => (Some(portion), Some(result)),
+        None => (None, None),
+    };
     let saved = if extra.resume { checkpoint.read()? } else { None };
     if extra.resume {
         console.say(match &saved {
@@ -99,55 +121,79 @@ fn trace_whole(
             None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
         });
     }
-    let paths = extra.paths.as_deref().map(PathFile::create).transpose()?;
+
     let save = |p: &Portion| checkpoint.save_when_due(p);
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
-        finished: portion.is_none().then_some(&save),
-        from: portion.or(saved),
+        finished: traced.is_none().then_some(&save),
+        from: traced.or(saved),
         every: checkpoint.interval(),
+        is_saveable: true,
         paths: paths.as_ref(),
         ..TraceRequest::default()
     };
-    let mut run = cross_check::trace_and_check(prepared, request, console);
-    if let (Some(paths), Some(file)) = (paths, &extra.paths) {
-        let vertices = paths.finish()?;
-        console.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
-    }
+    let mut run = match cross_check::trace_and_check(prepared, request, console) {
+        Ok(run) => run,
+        Err(portion) => {
+            let because = paths.and_then(|p| p.finish().err()).map_or("interrupted".into(), |e| e.to_string());
+            return Err(checkpoint.stopped(&portion, &because));
+        }
+    };
+    let path_failure = match (paths, &extra.paths) {
+        (Some(paths), Some(file)) => say_paths(paths, file, console).err(),
+        _ => None,
+    };
     say_verification(&run, console)?;
-    let sentences = sentence.into_iter().collect();
-    let (mut document, report) = results_folder::write(prepared, folder, &mut run, sentences, console)?;
+
+    let sentences: Vec<String> = target.zip(result.as_ref()).map(|(t, r)| t.sentence(r)).into_iter().collect();
+    for sentence in &sentences {
+        console.say(sentence.replace("**", ""));
+    }
+    let written = results_folder::write(prepared, folder, &mut run, sentences.clone(), with_page, console);
+    let (mut document, answer) = match written {
+        Ok(written) => written,
+        Err(failure) => return Err(rescue(&mut run, &sentences, &checkpoint, with_page, failure)),
+    };
+    // Rays that cannot be traced again for their paths alone are not lost with these.
+    if let Some(failure) = path_failure {
+        return Err(failure);
+    }
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
-    closing::print_results(&document, &report.answer, folder, &run.results, console)?;
+    closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     checkpoint.remove();
-    Ok(completion(&run, prepared, command, result.as_ref(), console))
+    let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
+    Ok(lost.and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
 }
 
-/// Whether the error that was asked for was reached, and no more energy lost than allowed.
-fn completion(
-    run: &SceneResults,
-    prepared: &PreparedScene,
-    command: &TraceCommand,
-    target: Option<&TargetResult>,
-    console: &Console,
-) -> Completion {
-    if target.is_some_and(|result| !result.reached) {
-        return Completion::Incomplete;
+/// Completes the file of paths.
+fn say_paths(paths: PathFile, file: &Path, console: &Console) -> Result<(), Failure> {
+    let vertices = paths.finish()?;
+    console.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
+    Ok(())
+}
+
+/// Results that could not be written where they should: they go where they can, or their sums do.
+fn rescue(
+    run: &mut SceneResults,
+    sentences: &[String],
+    checkpoint: &Checkpoint,
+    with_page: bool,
+    failure: Failure,
+) -> Failure {
+    let (prepared, console) = (checkpoint.prepared, checkpoint.console);
+    if let Some(folder) = results_folder::write_anywhere(prepared, run, sentences, with_page, console) {
+        return failure.with_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
-    let power = &run.results.power;
-    let share = power.lost / power.emitted;
-    if share <= command.extra.max_lost {
-        return Completion::Complete;
+    let Some(sums) = &run.sums else { return failure };
+    match checkpoint.save_anywhere(sums) {
+        Ok(file) => failure.with_help(format!(
+            "nothing is lost: `lampyris merge {} -o DIR` writes the results into another folder",
+            file.display()
+        )),
+        Err(_) => failure.with_help("nor could the sums be saved anywhere else"),
     }
-    console.say(format_args!(
-        "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
-        figures(100.0 * share, 2),
-        lost_rays::reasons(&run.results, prepared),
-        command.folder.join(LEDGER).display()
-    ));
-    Completion::Incomplete
 }
 
 /// Says that both kernels agree.
@@ -188,18 +234,39 @@ fn trace_shard(
         return Err(Failure::arguments(message).with_help("raise `replicates` in [run] of the scene"));
     }
     let file = shards::shard_file(command.folder, shard);
-    let checkpoint = Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console);
-    let from = if command.extra.resume { checkpoint.read()? } else { None };
+    let _owned = OutputPlace::file(&file)?;
+    require_space(&folder_of(&file), LEAST_TALLY_BYTES)?;
+    let checkpoint =
+        Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console)?;
+    let from = checkpoint.read()?;
+    if let Some(portion) = from.as_ref().filter(|p| shards::is_complete(p, shard)) {
+        console.say("traced already: nothing is left to do");
+        say_shard(&checkpoint.file, portion, shard, console)?;
+        return Ok(Completion::Complete);
+    }
+    if !command.extra.resume {
+        refuse_overwriting(&checkpoint.file)?;
+    }
     let save = |p: &Portion| checkpoint.save_when_due(p);
     let request = TraceRequest {
         from,
         shard: Some(shard),
         finished: Some(&save),
         every: checkpoint.interval(),
+        is_saveable: true,
         ..TraceRequest::default()
     };
     let portion = prepared.trace_part(request, console);
-    checkpoint.save(&portion)?;
+    if !shards::is_complete(&portion, shard) {
+        return Err(checkpoint.stopped(&portion, "interrupted"));
+    }
+    let file = checkpoint.save_anywhere(&portion)?;
+    if file != checkpoint.file {
+        let message = format!("{}: cannot be written", checkpoint.file.display());
+        return Err(
+            Failure::running(message).with_help(format!("nothing is lost: the shard is in {}", file.display()))
+        );
+    }
     say_shard(&checkpoint.file, &portion, shard, console)?;
     Ok(Completion::Complete)
 }

@@ -20,23 +20,27 @@ pub(crate) fn print_results(
     answer: &str,
     folder: &Path,
     results: &Results,
+    with_page: bool,
     console: &Console,
 ) -> Result<(), Failure> {
     if console.json {
         return Ok(print(&json_text(document)?)?);
     }
-    say_closing_lines(answer, folder, results, console);
+    say_closing_lines(answer, folder, results, with_page, console);
     Ok(())
 }
 
 /// The last lines of a traced scene: what was found, which file to open.
-pub(crate) fn say_closing_lines(answer: &str, folder: &Path, results: &Results, console: &Console) {
+fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
     console.say("");
     for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH)) {
         console.say(format_args!("  {line}"));
     }
     console.say("");
-    let files = notable_files(folder, results);
+    let mut files = notable_files(folder, results);
+    if !with_page {
+        files.remove(0);
+    }
     let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).max().unwrap_or(0);
     for (k, (path, what)) in files.iter().enumerate() {
         let name = format!("{:<widest$}", path.display().to_string());

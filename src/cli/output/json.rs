@@ -1,6 +1,7 @@
 //! JSON documents of commands: every one is made, written and printed the same way.
 
 use crate::cli::failure::Failure;
+use crate::formats::printable_json;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -12,5 +13,5 @@ pub(crate) fn json_value(piece: &impl Serialize) -> Result<Value, Failure> {
 /// A document as text, its last line ended.
 pub(crate) fn json_text(document: &impl Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(document).map_err(|e| Failure::running(e.to_string()))?;
-    Ok(text + "\n")
+    Ok(printable_json(text + "\n"))
 }

@@ -2,8 +2,8 @@
 
 use crate::cli::failure::Failure;
 use crate::formats::{
-    Data3, Grid, LightRay, PhotometricType, Photometry, write_data3, write_grid_csv, write_grid_npz,
-    write_grid_png, write_ies, write_vti,
+    Data3, Grid, LightRay, PhotometricType, Photometry, printable_line, write_data3, write_grid_csv,
+    write_grid_npz, write_grid_png, write_ies, write_vti,
 };
 use crate::report::{file_stem, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
@@ -97,7 +97,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
             ("MANUFAC", "see results.json"),
             ("LUMINAIRE", receiver.name.as_str()),
         ]
-        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .map(|(key, value)| (key.to_owned(), printable_line(value).into_owned()))
         .into(),
     };
     let factor = lumens / photometry.flux();

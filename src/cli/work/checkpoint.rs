@@ -1,5 +1,6 @@
 //! The file that a run is saved to while it goes on, for `--resume`.
 
+use super::output_place::{folder_of, make_folder, rescue_folders};
 use super::scene_run::PreparedScene;
 use super::tally_file::{TallyHeader, fingerprint};
 use crate::cli::console::Console;
@@ -16,30 +17,33 @@ pub(crate) const CHECKPOINT: &str = "checkpoint.tally";
 /// Each thread looks this often, at least, whether it is time to save: a saved run lacks no more than this of each.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
-/// A file that a run is saved to while it goes on.
+/// The file of one run, with what stands at its head.
 pub(crate) struct Checkpoint<'a> {
-    prepared: &'a PreparedScene<'a>,
-    header: Mutex<Option<TallyHeader>>,
-    scene: &'a Path,
-    shard: Option<[u32; 2]>,
+    pub(crate) prepared: &'a PreparedScene<'a>,
+    header: TallyHeader,
     pub(crate) file: PathBuf,
     every: Duration,
     last: Mutex<Instant>,
-    console: &'a Console,
+    pub(crate) console: &'a Console,
 }
 
 impl<'a> Checkpoint<'a> {
+    /// For a run that is about to be traced; nothing is written yet.
+    ///
+    /// # Errors
+    /// When a file of the scene can no longer be read.
     pub(crate) fn new(
         prepared: &'a PreparedScene<'a>,
-        scene: &'a Path,
+        scene: &Path,
         file: PathBuf,
         shard: Option<[u32; 2]>,
         every_seconds: f64,
         console: &'a Console,
-    ) -> Self {
+    ) -> Result<Self, Failure> {
+        // Made before tracing: the files of the scene may be gone when it ends.
+        let header = TallyHeader::new(prepared, scene, shard, console)?;
         let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
-        let (header, last) = (Mutex::new(None), Mutex::new(Instant::now()));
-        Self { prepared, header, scene, shard, file, every, last, console }
+        Ok(Self { prepared, header, file, every, last: Mutex::new(Instant::now()), console })
     }
 
     /// How often to look whether it is time to save.
@@ -47,7 +51,10 @@ impl<'a> Checkpoint<'a> {
         self.every.min(LOOK_EVERY)
     }
 
-    /// What an earlier run left behind; `None` when there is nothing.
+    /// What an earlier run of the same scene, files, options and program left behind; `None` when there is nothing.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is damaged or is of another run.
     pub(crate) fn read(&self) -> Result<Option<Portion>, Failure> {
         let bytes = match std::fs::read(&self.file) {
             Ok(bytes) => bytes,
@@ -64,7 +71,7 @@ impl<'a> Checkpoint<'a> {
         };
         Portion::read(&bytes, same, &self.prepared.bound).map(Some).map_err(|m| {
             Failure::arguments(format!("{}: cannot go on from here: {m}", self.file.display()))
-                .with_help("run with the same scene, files, options and program, or without --resume")
+                .with_help("run with the same scene, files, options and program, or into another place with -o")
         })
     }
 
@@ -83,20 +90,58 @@ impl<'a> Checkpoint<'a> {
 
     /// Saves the run now.
     pub(crate) fn save(&self, portion: &Portion) -> Result<(), Failure> {
-        let mut header = self.header.lock().unwrap_or_else(|e| e.into_inner());
-        let header = match &mut *header {
-            Some(header) => header,
-            none => none.insert(TallyHeader::new(self.prepared, self.scene, self.shard, self.console)?),
+        make_folder(&folder_of(&self.file))?;
+        Ok(write_atomic(&self.file, |w| portion.write(&self.header, w))?)
+    }
+
+    /// Saves the run in its own file or, where that cannot be written, wherever one can; gives the file.
+    ///
+    /// # Errors
+    /// When none of the places can be written.
+    pub(crate) fn save_anywhere(&self, portion: &Portion) -> Result<PathBuf, Failure> {
+        let reason = match self.save(portion) {
+            Ok(()) => return Ok(self.file.clone()),
+            Err(failure) => failure,
         };
-        if let Some(folder) = self.file.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder)
-                .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+        let name = format!("lampyris-rescued-{}.tally", std::process::id());
+        let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
+        places.find(|file| write_atomic(file, |w| portion.write(&self.header, w)).is_ok()).ok_or(reason)
+    }
+
+    /// Why a run stopped before its end, and how to go on from what was saved of it.
+    pub(crate) fn stopped(&self, portion: &Portion, because: &str) -> Failure {
+        let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
+        match self.save_anywhere(portion) {
+            Ok(file) if file == self.file => {
+                Failure::running(format!("{because}: {share} are saved in {}", file.display()))
+                    .with_help("the same command with --resume goes on from there")
+            }
+            Ok(file) => {
+                Failure::running(format!("{because}: {share} are saved in {}", file.display())).with_help(format!(
+                    "copy it to {}, and the same command with --resume goes on from there",
+                    self.file.display()
+                ))
+            }
+            Err(failure) => Failure::running(format!("{because}, and {share} could not be saved: {failure}")),
         }
-        Ok(write_atomic(&self.file, |w| portion.write(header, w))?)
     }
 
     /// Removes the file of a run that is over.
     pub(crate) fn remove(&self) {
         let _ = std::fs::remove_file(&self.file);
     }
+}
+
+/// Refuses to write over what an interrupted run left.
+///
+/// # Errors
+/// When the file is there.
+pub(crate) fn refuse_overwriting(file: &Path) -> Result<(), Failure> {
+    if !file.exists() {
+        return Ok(());
+    }
+    let header = std::fs::read(file).ok().and_then(|bytes| Portion::header::<TallyHeader>(&bytes).ok());
+    let whose = header.map_or(String::new(), |h| format!(" ({})", h.command));
+    let failure = Failure::arguments(format!("{}: an interrupted run{whose} is saved there", file.display()));
+    Err(failure.with_help("--resume goes on with it; else give another place with -o, or remove the file"))
 }

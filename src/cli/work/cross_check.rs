@@ -10,7 +10,7 @@ use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::simulate::{Results, RunSettings, Verification, replay, verify_pruning};
+use crate::simulate::{Portion, Results, RunSettings, Verification, replay, verify_pruning};
 use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
 use crate::study::geometric_error::{GeometricError, geometric_error};
 
@@ -36,25 +36,38 @@ pub(crate) struct SceneResults {
     pub(crate) geometric: Option<GeometricError>,
     /// The pruned kernel against the full one, when asked for.
     pub(crate) verification: Option<Verification>,
+    /// The sums that the results were made of, to be saved where they cannot be written; none of a verified run.
+    pub(crate) sums: Option<Portion>,
 }
 
 /// Traces the scene, and asks some of its rays again of BVH and spline.
-pub(crate) fn trace_and_check(prepared: &PreparedScene, request: TraceRequest, console: &Console) -> SceneResults {
+///
+/// # Errors
+/// What was traced, when the run was stopped before its end.
+pub(crate) fn trace_and_check(
+    prepared: &PreparedScene,
+    request: TraceRequest,
+    console: &Console,
+) -> Result<SceneResults, Box<Portion>> {
     prepared.with_intersector(console, |intersector, build_seconds| {
         let settings = prepared.run_settings();
-        let (mut results, verification) = if request.verify_pruning {
+        let (mut results, verification, sums) = if request.verify_pruning {
             let (results, verification) = verify_pruning(&prepared.bound, intersector, &settings, &|_| true);
-            (results, Some(verification))
+            (results, Some(verification), None)
         } else {
             let traced = prepared.run(intersector, &settings, request, console);
-            (Results::of(&prepared.bound, &settings, traced), None)
+            if !traced.portion.is_whole() {
+                return Err(Box::new(traced.portion));
+            }
+            let sums = traced.portion.clone();
+            (Results::of(&prepared.bound, &settings, traced), None, Some(sums))
         };
         // What was done before tracing.
         results.seconds.read = prepared.job.loaded.seconds;
         results.seconds.tessellate = prepared.tessellation_seconds;
         results.seconds.build = build_seconds;
         let (check, geometric) = recheck(prepared, &results, intersector, console);
-        SceneResults { results, check, geometric, verification }
+        Ok(SceneResults { results, check, geometric, verification, sums })
     })
 }
 

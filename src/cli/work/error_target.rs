@@ -39,7 +39,7 @@ pub(crate) struct TargetResult {
     quantity: &'static str,
     asked_percent: f64,
     found_percent: Option<f64>,
-    rays: u64,
+    pub(crate) rays: u64,
     pub(crate) reached: bool,
 }
 
@@ -74,7 +74,7 @@ impl ErrorTarget {
         (power > 0.0).then(|| 100.0 * error / power)
     }
 
-    /// Traces until the error is small enough.
+    /// Traces until the error is small enough, the most rays are traced, or a signal asks to stop: then not all is traced.
     pub(crate) fn trace(&self, prepared: &mut PreparedScene, console: &Console) -> (Portion, TargetResult) {
         let most = prepared.job.tracing.rays.unwrap_or(MOST_RAYS);
         let mut rays = FIRST_RAYS.min(most);
@@ -82,7 +82,8 @@ impl ErrorTarget {
             prepared.rays = Some(rays);
             let (portion, found) = self.attempt(prepared, console);
             let reached = found.is_some_and(|e| e <= self.percent);
-            if reached || rays >= most {
+            let is_stopped = !portion.is_whole();
+            if reached || is_stopped || rays >= most {
                 let quantity = if self.cells { "cells" } else { "power" };
                 let result = TargetResult {
                     receiver: self.receiver.clone(),
@@ -110,7 +111,8 @@ impl ErrorTarget {
     fn attempt(&self, prepared: &PreparedScene, console: &Console) -> (Portion, Option<f64>) {
         let settings = prepared.run_settings();
         prepared.with_intersector(console, |intersector, _| {
-            let traced = prepared.run(intersector, &settings, TraceRequest::default(), console);
+            let request = TraceRequest { is_saveable: true, ..TraceRequest::default() };
+            let traced = prepared.run(intersector, &settings, request, console);
             let portion = traced.portion.clone();
             (portion, self.error(&Results::of(&prepared.bound, &settings, traced)))
         })

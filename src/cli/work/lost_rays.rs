@@ -1,10 +1,12 @@
 //! The lost-ray ledger: one line a lost ray, with all that is needed to trace it again.
 
 use super::scene_run::PreparedScene;
+use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
-use crate::formats::write_atomic;
+use crate::formats::{csv_quoted_text, write_atomic};
+use crate::report::figures;
 use crate::simulate::{Cause, LostRay, Results};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -27,9 +29,9 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
         for l in &results.ledger {
             let power = l.quanta as f64 * results.quantum;
             let (o, d) = (l.origin, l.direction);
-            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(quoted);
+            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(csv_quoted_text);
             let face = l.face.map(|f| f.to_string()).unwrap_or_default();
-            let hit = quoted(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
+            let hit = csv_quoted_text(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
             writeln!(
                 w,
                 "{},{},{},{},{power},{},{},{},{},{},{},{instance},{medium},{face},{hit},{},{}",
@@ -57,8 +59,29 @@ pub(crate) fn warn(prepared: &PreparedScene, console: &Console) {
     prepared.bound.notes().iter().for_each(|note| console.say(note));
 }
 
+/// Says so where more light was lost than allowed.
+pub(crate) fn report_lost_light(
+    results: &Results,
+    prepared: &PreparedScene,
+    max_lost: f64,
+    folder: &Path,
+    console: &Console,
+) -> Completion {
+    let share = results.power.lost / results.power.emitted;
+    if share <= max_lost {
+        return Completion::Complete;
+    }
+    console.say(format_args!(
+        "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
+        figures(100.0 * share, 2),
+        reasons(results, prepared),
+        folder.join(LEDGER).display()
+    ));
+    Completion::Incomplete
+}
+
 /// Why rays were lost and where, the most frequent first.
-pub(crate) fn reasons(results: &Results, prepared: &PreparedScene) -> String {
+fn reasons(results: &Results, prepared: &PreparedScene) -> String {
     let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for l in &results.ledger {
         let hit = l.face.and_then(|f| prepared.bound.instance(f));
@@ -81,10 +104,6 @@ fn meaning(cause: Cause) -> &'static str {
         Cause::TooDeep => "were in more than 7 bodies at once, as after entering an open shell again and again,",
         _ => "had a distance or direction that is no number",
     }
-}
-
-fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
 }
 
 /// Name of the cause, as in the ledger.

@@ -2,6 +2,7 @@
 
 use super::cross_check::SceneResults;
 use super::lost_rays;
+use super::output_place::{make_folder, require_space, rescue_folders};
 use super::scene_run::PreparedScene;
 use crate::cli::arguments::options::IntersectorKind;
 use crate::cli::console::Console;
@@ -11,29 +12,74 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
-use crate::report::{Cell, Provenance, Report, SimulationReport, Table, View, path_lines};
+use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, path_lines};
 use crate::simulate::arrivals;
 use crate::simulate::scene::PowerUnit;
 use crate::study;
 use crate::study::figures::{ReceiverFigures, Surface};
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// What the page takes at least, bytes: plotly.js and a few pictures.
+const PAGE_BYTES: u64 = 5_000_000;
+/// What a cell of a receiver takes at least in all its files, bytes: its number as text, twice in binary.
+const CELL_BYTES: u64 = 40;
+/// What a facet takes at least in the model of the folder, bytes: corners and normals in single precision.
+const FACET_BYTES: u64 = 50;
+
+/// Tries, before anything is traced, whether the folder can hold the results: room, and a file of every receiver's name.
+///
+/// # Errors
+/// When it cannot.
+pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: bool) -> Result<(), Failure> {
+    let scene = prepared.job.scene;
+    let cells: u64 = scene.receivers.iter().map(|r| r.cells.iter().map(|&n| n as u64).product::<u64>()).sum();
+    let facets = prepared.tessellation.mesh.facets.len() as u64;
+    let page = if with_page { PAGE_BYTES } else { 0 };
+    require_space(folder, page + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
+    for receiver in &scene.receivers {
+        let file = folder.join(format!("{}.try", file_stem(&receiver.name)));
+        write_atomic(&file, |_| Ok(()))?;
+        std::fs::remove_file(&file)?;
+    }
+    Ok(())
+}
+
+/// Writes the results where they can be written, when they cannot where they should; gives the folder.
+pub(crate) fn write_anywhere(
+    prepared: &PreparedScene,
+    run: &mut SceneResults,
+    sentences: &[String],
+    with_page: bool,
+    console: &Console,
+) -> Option<PathBuf> {
+    let name = format!("lampyris-rescued-{}", std::process::id());
+    let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
+    places.find(|folder| {
+        let written = write(prepared, folder, run, sentences.to_vec(), with_page, console);
+        if written.is_err() {
+            // Half of the results tells nobody anything.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+        written.is_ok()
+    })
+}
 
 /// Paths are shown as far as this share of the model's diagonal around it.
 const PATH_MARGIN: f64 = 0.35;
 
-/// Writes everything into a folder; the report comes last, so that a folder with a report is complete. Gives the document of
-/// `results.json`.
+/// Writes everything into a folder; the page comes last, so that a folder with a page is complete. Gives the document of
+/// `results.json` and the answer in words.
 pub(crate) fn write(
     prepared: &PreparedScene,
     folder: &Path,
     run: &mut SceneResults,
     sentences: Vec<String>,
+    with_page: bool,
     console: &Console,
-) -> Result<(Value, Report), Failure> {
+) -> Result<(Value, String), Failure> {
     let spinner = console.spinner("writing");
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+    make_folder(folder)?;
     for k in 0..run.results.receivers.len() {
         let rays = arrivals(&prepared.bound, k, &run.results);
         let receiver = &run.results.receivers[k];
@@ -59,9 +105,12 @@ pub(crate) fn write(
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
     let report = page(prepared, run, &all_figures, &facets, sentences, provenance);
-    report.write(folder)?;
+    let answer = report.answer();
+    if with_page {
+        report.with_views(views(prepared, &facets)).report().write(folder)?;
+    }
     spinner.finish_and_clear();
-    Ok((document, report))
+    Ok((document, answer))
 }
 
 /// Unit of powers.
@@ -124,14 +173,14 @@ fn document(
 }
 
 /// The page of a traced scene.
-fn page(
-    prepared: &PreparedScene,
-    run: &SceneResults,
-    all_figures: &[ReceiverFigures],
-    facets: &Facets,
+fn page<'a>(
+    prepared: &'a PreparedScene,
+    run: &'a SceneResults,
+    all_figures: &'a [ReceiverFigures],
+    facets: &'a Facets,
     sentences: Vec<String>,
     provenance: Provenance,
-) -> Report {
+) -> SimulationReport<'a> {
     let scene = prepared.job.scene;
     let title = if scene.title.is_empty() { prepared.job.loaded.model.name.clone() } else { scene.title.clone() };
     SimulationReport {
@@ -143,12 +192,11 @@ fn page(
         figures: all_figures,
         geometric: run.geometric.as_ref(),
         chosen: prepared.chosen.as_ref(),
-        views: views(prepared, facets),
+        views: Vec::new(),
         tables: vec![model_table(prepared), facet_table(prepared)],
         comparison: sentences,
         provenance,
     }
-    .report()
 }
 
 /// How finely the facets follow the surface, and how the octree sorts them.

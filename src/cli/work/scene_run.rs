@@ -9,6 +9,7 @@ use super::threads;
 use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::cli::interruption::{self, SaveableRun};
 use crate::intersect::Intersector;
 use crate::simulate::{
     BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, RunSettings, Scene, Traced, trace,
@@ -59,6 +60,8 @@ pub(crate) struct TraceRequest<'a> {
     /// Told of all that is done, each thread after so long.
     pub(crate) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
     pub(crate) every: Duration,
+    /// Whether what is traced is saved when a signal asks the run to stop.
+    pub(crate) is_saveable: bool,
     /// Takes every path.
     pub(crate) paths: Option<&'a PathFile>,
 }
@@ -135,7 +138,8 @@ impl PreparedScene<'_> {
         })
     }
 
-    /// Traces with progress on the terminal; ends early when the paths can no longer be written.
+    /// Traces with progress on the terminal; ends early when the paths can no longer be written, and when a signal asks a run to
+    /// stop that can be saved.
     pub(crate) fn run(
         &self,
         intersector: &dyn Intersector,
@@ -143,11 +147,13 @@ impl PreparedScene<'_> {
         request: TraceRequest,
         console: &Console,
     ) -> Traced {
+        let saveable = request.is_saveable.then(SaveableRun::begin);
         let bar = console.progress_bar("tracing", "rays", settings.rays);
         let progress = |p: Progress| {
             bar.set_length(p.total);
             bar.set_position(p.rays);
-            request.paths.is_none_or(|paths| !paths.has_failed())
+            let is_stopped = saveable.is_some() && interruption::is_requested();
+            !is_stopped && request.paths.is_none_or(|paths| !paths.has_failed())
         };
         let take = request.paths.map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
         let hooks = Hooks {

@@ -1,6 +1,8 @@
 //! Parts of a run that are traced by themselves: which one, and where it goes.
 
+use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::simulate::Portion;
 use std::path::{Path, PathBuf};
 
 /// More shards than any cluster starts; a typing error beyond it is refused.
@@ -13,6 +15,109 @@ pub(crate) fn parse_shard(text: &str) -> Result<[u32; 2], Failure> {
         Some((i, n)) if (1..=n).contains(&i) && n <= MOST_SHARDS => Ok([i - 1, n]),
         _ => Err(Failure::arguments(format!("--shard {text}: write I/N with I from 1 to N, as in 2/8"))),
     }
+}
+
+/// The part that is asked for: `I/N`, or `auto` for that of the launcher.
+///
+/// # Errors
+/// When it is neither, or no launcher says which part this is.
+pub(crate) fn requested_shard(text: &str, count: Option<u32>, console: &Console) -> Result<[u32; 2], Failure> {
+    if text.trim() != "auto" {
+        if count.is_some() {
+            return Err(Failure::arguments("--shards says how many parts `--shard auto` has, not those of I/N"));
+        }
+        return parse_shard(text);
+    }
+    let from_launcher = launcher_shard(&|name| std::env::var(name).ok(), count)?;
+    let [index, count] = from_launcher.shard;
+    console.say(format_args!("shard {} of {count}, from {}", index + 1, from_launcher.launcher));
+    Ok(from_launcher.shard)
+}
+
+/// What a launcher said.
+#[derive(Debug, PartialEq)]
+struct LauncherShard {
+    launcher: &'static str,
+    shard: [u32; 2],
+}
+
+/// Variables in which a launcher says which part a process is, and of how many.
+struct Launcher {
+    name: &'static str,
+    /// Counted from 0, or from the value of `first`.
+    index: &'static str,
+    /// The number of parts, where the launcher says it.
+    count: Option<&'static str>,
+    /// The smallest index and the step from one to the next, where these are free to choose.
+    first: Option<&'static str>,
+    step: Option<&'static str>,
+}
+
+/// Arrays before ranks: a task of an array may hold ranks of its own, whose number is 1 then.
+const LAUNCHERS: [Launcher; 6] = [
+    Launcher {
+        name: "SLURM_ARRAY_TASK_ID",
+        index: "SLURM_ARRAY_TASK_ID",
+        count: Some("SLURM_ARRAY_TASK_COUNT"),
+        first: Some("SLURM_ARRAY_TASK_MIN"),
+        step: Some("SLURM_ARRAY_TASK_STEP"),
+    },
+    Launcher { name: "PBS_ARRAY_INDEX", index: "PBS_ARRAY_INDEX", count: None, first: None, step: None },
+    Launcher { name: "JOB_COMPLETION_INDEX", index: "JOB_COMPLETION_INDEX", count: None, first: None, step: None },
+    Launcher {
+        name: "OMPI_COMM_WORLD_RANK",
+        index: "OMPI_COMM_WORLD_RANK",
+        count: Some("OMPI_COMM_WORLD_SIZE"),
+        first: None,
+        step: None,
+    },
+    Launcher { name: "PMI_RANK", index: "PMI_RANK", count: Some("PMI_SIZE"), first: None, step: None },
+    Launcher { name: "SLURM_PROCID", index: "SLURM_PROCID", count: Some("SLURM_NTASKS"), first: None, step: None },
+];
+
+/// The part that the environment names; `parts` is `--shards N`.
+fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>) -> Result<LauncherShard, Failure> {
+    let number = |name: &str| -> Result<Option<u32>, Failure> {
+        let Some(text) = variable(name).filter(|text| !text.trim().is_empty()) else { return Ok(None) };
+        let wrong = |_| Failure::arguments(format!("--shard auto: {name}={text} is no number of a part"));
+        text.trim().parse().map(Some).map_err(wrong)
+    };
+    for launcher in &LAUNCHERS {
+        let Some(index) = number(launcher.index)? else { continue };
+        let stated = launcher.count.map(number).transpose()?.flatten();
+        let Some(count) = parts.or(stated) else {
+            let failure = Failure::arguments(format!("--shard auto: {} says no number of parts", launcher.name));
+            return Err(failure.with_help("add --shards N"));
+        };
+        // PBS arrays may begin anywhere; from 1 to N is their custom, and without a 0 nothing else is known.
+        let is_from_one = launcher.index == "PBS_ARRAY_INDEX";
+        let first = launcher.first.map(number).transpose()?.flatten().unwrap_or(u32::from(is_from_one));
+        let step = launcher.step.map(number).transpose()?.flatten().unwrap_or(1).max(1);
+        let place = index.checked_sub(first).filter(|offset| offset % step == 0).map(|offset| offset / step);
+        return match place {
+            Some(place) if place < count && count <= MOST_SHARDS => {
+                Ok(LauncherShard { launcher: launcher.name, shard: [place, count] })
+            }
+            _ => Err(Failure::arguments(format!(
+                "--shard auto: {}={index} is no part of {count} (counted from {first} in steps of {step})",
+                launcher.index
+            ))),
+        };
+    }
+    let known: Vec<&str> = LAUNCHERS.iter().map(|l| l.index).collect();
+    Err(Failure::arguments("--shard auto: no launcher says which part this is")
+        .with_help(format!("it takes {}; else write --shard I/N", known.join(", "))))
+}
+
+/// The replicates of a shard: from the first to before the second.
+pub(crate) fn replicates_of_shard(replicates: u32, [index, count]: [u32; 2]) -> std::ops::Range<u32> {
+    let first = |k: u32| (u64::from(replicates) * u64::from(k) / u64::from(count.max(1))) as u32;
+    first(index)..first(index + 1)
+}
+
+/// Whether all replicates of the shard are done.
+pub(crate) fn is_complete(portion: &Portion, shard: [u32; 2]) -> bool {
+    replicates_of_shard(portion.replicates, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 
 /// Where the tally of a shard goes: the file that was asked for, or one in the folder that was.
@@ -34,6 +139,42 @@ mod tests {
         assert_eq!(parse_shard("1/1").unwrap(), [0, 1]);
         for wrong in ["0/8", "9/8", "8", "a/b", "-1/2", "1/0", "1/70000"] {
             assert!(parse_shard(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn every_launcher_is_understood() {
+        let shard = |pairs: &[(&str, &str)], parts: Option<u32>| {
+            let find = |name: &str| pairs.iter().find(|(k, _)| *k == name).map(|(_, v)| (*v).to_owned());
+            launcher_shard(&find, parts).map(|s| s.shard).map_err(|e| e.to_string())
+        };
+        let array = [
+            ("SLURM_ARRAY_TASK_ID", "7"),
+            ("SLURM_ARRAY_TASK_COUNT", "4"),
+            ("SLURM_ARRAY_TASK_MIN", "1"),
+            ("SLURM_ARRAY_TASK_STEP", "2"),
+            ("SLURM_PROCID", "0"),
+            ("SLURM_NTASKS", "1"),
+        ];
+        assert_eq!(shard(&array, None), Ok([3, 4]));
+        assert_eq!(shard(&array[4..], None), Ok([0, 1]));
+        assert_eq!(shard(&[("OMPI_COMM_WORLD_RANK", "2"), ("OMPI_COMM_WORLD_SIZE", "3")], None), Ok([2, 3]));
+        assert_eq!(shard(&[("PMI_RANK", "0"), ("PMI_SIZE", "3")], None), Ok([0, 3]));
+        assert_eq!(shard(&[("PBS_ARRAY_INDEX", "8")], Some(8)), Ok([7, 8]));
+        assert_eq!(shard(&[("JOB_COMPLETION_INDEX", "0")], Some(8)), Ok([0, 8]));
+        for (pairs, parts, says) in [
+            (&[][..], None, "no launcher"),
+            (&[("JOB_COMPLETION_INDEX", "0")][..], None, "no number of parts"),
+            (&[("JOB_COMPLETION_INDEX", "8")][..], Some(8), "no part of 8"),
+            (&[("PMI_RANK", "x"), ("PMI_SIZE", "3")][..], None, "PMI_RANK=x"),
+            (
+                &[("SLURM_ARRAY_TASK_ID", "4"), ("SLURM_ARRAY_TASK_MIN", "1"), ("SLURM_ARRAY_TASK_STEP", "2")],
+                Some(9),
+                "no part",
+            ),
+        ] {
+            let refused = shard(pairs, parts).unwrap_err();
+            assert!(refused.contains(says), "{refused}");
         }
     }
 

@@ -14,7 +14,10 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct TallyHeader {
     pub(crate) fingerprint: String,
-    pub(crate) scene: PathBuf,
+    scene: String,
+    /// The path of the scene as the system has it, where it is no UTF-8.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    scene_bytes: Option<Vec<u8>>,
     tolerance: Option<[u64; 2]>,
     angle: Option<u64>,
     part: Vec<(String, [u64; 2])>,
@@ -38,23 +41,36 @@ impl TallyHeader {
         shard: Option<[u32; 2]>,
         console: &Console,
     ) -> Result<Self, Failure> {
-        let (m, t) = (prepared.job.meshing, prepared.job.tracing);
+        let m = prepared.job.meshing;
+        let t = prepared.job.tracing;
+        let scene = std::path::absolute(scene).unwrap_or_else(|_| scene.to_path_buf());
         let bits = |x: [f64; 2]| x.map(f64::to_bits);
         Ok(Self {
             fingerprint: fingerprint(prepared)?.0,
-            scene: std::path::absolute(scene).unwrap_or_else(|_| scene.to_path_buf()),
+            scene_bytes: scene.to_str().is_none().then(|| scene.as_os_str().as_encoded_bytes().to_vec()),
+            scene: scene.to_string_lossy().into_owned(),
             tolerance: m.tolerance.map(bits),
             angle: m.angle.map(f64::to_bits),
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
-            rays: t.rays,
+            rays: prepared.rays.or(t.rays),
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
             shard,
             command: console.command.clone(),
         })
+    }
+
+    /// Where the scene was when the part was traced.
+    pub(crate) fn scene(&self) -> PathBuf {
+        #[cfg(unix)]
+        if let Some(bytes) = &self.scene_bytes {
+            use std::os::unix::ffi::OsStrExt;
+            return PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
+        }
+        PathBuf::from(&self.scene)
     }
 
     /// The options that decided the facets.

@@ -1,5 +1,6 @@
 //! Little-endian fields of a binary file, read in order; an end that comes too early names the byte and the field.
 
+use super::super::input::open_file;
 use super::super::{Error, ErrorKind, LightRay};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -22,7 +23,7 @@ pub(super) struct ByteReader {
 impl ByteReader {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let unreadable = |e| Error::new(path, ErrorKind::Read(e));
-        let file = File::open(path).map_err(unreadable)?;
+        let file = open_file(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         Ok(Self { path: path.to_owned(), file: BufReader::with_capacity(BUFFER, file), position: 0, length })
     }

@@ -16,8 +16,8 @@ mod zemax;
 pub use tm25::{Tm25, Tm25Reader, read_tm25, write_tm25};
 pub use tm25_header::{SpectralData, Tm25Columns, Tm25Header};
 
+use super::input::open_file;
 use super::{Error, ErrorKind, LightRay};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -77,7 +77,7 @@ impl RaySet {
 /// When the file cannot be read or is not what its first bytes promise; the message names the byte or the ray.
 pub fn read_ray_set(path: &Path, preferred: Flux) -> Result<RaySet, Error> {
     let mut start = [0; 4];
-    let mut file = File::open(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    let mut file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     // A file of fewer than four bytes is none of the binary formats; the reader of lists says what it lacks.
     let binary = file.read_exact(&mut start).is_ok();
     match &start {

@@ -1,0 +1,149 @@
+//! `lampyris init`: a commented scene for a STEP file, ready to be traced and to be changed.
+
+use crate::cli::completion::Completion;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::json::json_text;
+use crate::cli::work::input_files::{self, LoadedModel};
+use crate::cli::work::output_place::{folder_of, make_folder};
+use crate::formats::{printable_line, write_atomic};
+use crate::model::{Model, Part};
+use crate::report::figures;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Parts that get a rule of their own; of more, a comment says how many there are.
+const MOST_RULES: usize = 40;
+/// Distance of source and receiver from the model, and margin of the beam, as shares of the box' diagonal.
+const DISTANCE: f64 = 0.5;
+const BEAM_MARGIN: f64 = 1.05;
+/// The receiver is so many times as wide as the beam.
+const RECEIVER_WIDTHS: f64 = 4.0;
+
+/// Writes the scene; a file that is there is never written over.
+pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
+    let loaded = input_files::model_file(file, console)?;
+    let scene_file = match output {
+        Some(path) => path.to_path_buf(),
+        None => PathBuf::from(file.file_stem().unwrap_or_default()).with_extension("toml"),
+    };
+    if scene_file.exists() {
+        let failure = Failure::arguments(format!("{}: is there already", scene_file.display()));
+        return Err(failure.with_help("give another name with -o"));
+    }
+    make_folder(&folder_of(&scene_file))?;
+    let text = scene_text(file, &model_reference(file, &scene_file), &loaded);
+    write_atomic(&scene_file, |w| w.write_all(text.as_bytes()))?;
+    if console.json {
+        print(&json_text(&json!({"scene": scene_file.display().to_string()}))?)?;
+    } else {
+        console.say(format_args!("wrote {}", scene_file.display()));
+        console.say(
+            console
+                .dim(&format!("  say what the parts are made of, then `lampyris trace {}`", scene_file.display())),
+        );
+    }
+    Ok(Completion::Complete)
+}
+
+/// The model as the scene names it: relative where both are in one folder.
+fn model_reference(file: &Path, scene_file: &Path) -> String {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
+    let path = if is_beside { PathBuf::from(file.file_name().unwrap_or_default()) } else { absolute(file) };
+    path.to_string_lossy().into_owned()
+}
+
+/// The whole scene.
+fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
+    let model = &loaded.model;
+    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut text = format!(
+        "# A scene for {}: lengths in mm, powers in W. `lampyris schema` says what else may stand here.\n\
+         title = {}\n\n[run]\nrays = 1_000_000\n\n[[model]]\nfile = {}\n\n",
+        printable_line(&name),
+        quoted(&name),
+        quoted(reference)
+    );
+    text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, face, entity (the #id of\n\
+        # the file), colour or at (a point near the face); a later rule wins. `lampyris media` lists the media that have names.\n";
+    for part in model.parts.iter().filter(|p| p.face_count() > 0).take(MOST_RULES) {
+        text += &rule(part);
+    }
+    let rest = model.parts.len().saturating_sub(MOST_RULES);
+    if rest > 0 {
+        text += &format!("# … and {rest} more parts: `lampyris info` names them\n\n");
+    }
+    text + &light(model, loaded)
+}
+
+/// A rule for one part, with what may be said of it.
+fn rule(part: &Part) -> String {
+    let closed = part.shells.iter().filter(|s| s.closed).count();
+    let bodies = match (closed, part.shells.len() - closed) {
+        (n, 0) => format!("{n} closed"),
+        (0, n) => format!("{n} open: a medium would have a gap"),
+        (n, m) => format!("{n} closed, {m} open"),
+    };
+    let selector = if part.name.is_empty() { "\"*\"".to_owned() } else { quoted(&part.name) };
+    format!(
+        "[[material]]\n\
+         part = {selector}  # {} faces; shells: {bodies}\n\
+         surface = \"absorber\"  # or \"mirror\" with reflectance = 0.9; or, in place of surface: medium = \"PMMA\"\n\n",
+        part.face_count()
+    )
+}
+
+/// A beam along z that covers the model, and a plane behind it.
+fn light(model: &Model, loaded: &LoadedModel) -> String {
+    let bounds = loaded.reports.iter().find_map(|r| r.bbox_mm).unwrap_or([[-1.0; 3], [1.0; 3]]);
+    let [low, high] = bounds;
+    let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
+    let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
+    let diagonal = 2.0 * half.iter().map(|h| h * h).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    let radius = BEAM_MARGIN * half[0].hypot(half[1]).max(DISTANCE * diagonal / 10.0);
+    let at = |z: f64| format!("[{}, {}, {}]", short(middle[0]), short(middle[1]), short(z));
+    let width = short(RECEIVER_WIDTHS * radius);
+    let parts = model.parts.len();
+    format!(
+        "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm.\n\n\
+         # A parallel beam along z that covers it. Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays.\n\
+         [[source]]\nkind = \"collimated\"\nat = {}\ndirection = [0, 0, 1]\nradius = {}\npower = 1\n\n\
+         # What comes out on the other side, cell by cell; `kind = \"far_field\"` collects directions instead.\n\
+         [[receiver]]\nname = \"behind\"\nkind = \"plane\"\nat = {}\nnormal = [0, 0, 1]\nsize = [{width}, {width}]\ncells = [100, 100]\n",
+        if parts == 1 { "" } else { "s" },
+        short(low[0]),
+        short(high[0]),
+        short(low[1]),
+        short(high[1]),
+        short(low[2]),
+        short(high[2]),
+        at(low[2] - DISTANCE * diagonal),
+        short(radius),
+        at(high[2] + DISTANCE * diagonal),
+    )
+}
+
+/// A number of five digits as TOML takes it.
+fn short(value: f64) -> String {
+    let digits = figures(value, 5).replace('−', "-").replace('\u{202f}', "");
+    digits.parse::<f64>().map_or_else(|_| value.to_string(), |_| digits)
+}
+
+/// A text as a TOML string.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_are_toml() {
+        assert_eq!([short(-1234567.0), short(1e-7), short(0.1 + 0.2)], ["-1234567", "1e-7", "0.3"]);
+        let text = "a\"\\\u{1b}\nb";
+        let back: toml::Table = format!("x = {}", quoted(text)).parse().unwrap();
+        assert_eq!(back["x"].as_str(), Some(text));
+    }
+}

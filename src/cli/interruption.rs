@@ -1,0 +1,64 @@
+//! What SIGINT, SIGTERM and SIGHUP do: a run that can be saved is stopped and saved; anything else ends at once, without
+//! unfinished files left behind.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Runs that are being traced and can be saved.
+static SAVEABLE_RUNS: AtomicUsize = AtomicUsize::new(0);
+/// Whether a signal asked such a run to stop.
+static REQUESTED: AtomicBool = AtomicBool::new(false);
+
+/// A run that stops by itself and is saved when a signal comes, for as long as this value lives.
+pub(crate) struct SaveableRun(());
+
+impl SaveableRun {
+    pub(crate) fn begin() -> Self {
+        SAVEABLE_RUNS.fetch_add(1, Ordering::SeqCst);
+        Self(())
+    }
+}
+
+impl Drop for SaveableRun {
+    fn drop(&mut self) {
+        SAVEABLE_RUNS.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Whether a signal asked the run to stop.
+pub(crate) fn is_requested() -> bool {
+    REQUESTED.load(Ordering::SeqCst)
+}
+
+/// Listens to the signals from now on, where the system has them.
+#[cfg(unix)]
+pub(crate) fn watch() {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal));
+    // Without a listener the signals end the command at once, as they do anyway.
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else { return };
+    let listen = move || {
+        for signal in &mut signals {
+            let is_first = !REQUESTED.swap(true, Ordering::SeqCst);
+            if is_first && SAVEABLE_RUNS.load(Ordering::SeqCst) > 0 {
+                let message = "\nstopping: what is being traced is finished and saved; once more stops at once\n";
+                let _ = std::io::Write::write_all(&mut std::io::stderr().lock(), message.as_bytes());
+                continue;
+            }
+            crate::formats::remove_unfinished_files();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    };
+    let _ = std::thread::Builder::new().name("signals".into()).spawn(listen);
+}
+
+#[cfg(not(unix))]
+pub(crate) fn watch() {}
+
+/// Whether whoever started the command asked that the signal be ignored, as `nohup` does; known on Linux alone.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let bits = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    bits.is_some_and(|bits| bits >> (signal - 1) & 1 == 1)
+}

@@ -1,0 +1,183 @@
+//! Where results go: tried before any work is done, and owned by one process at a time.
+
+use crate::cli::failure::Failure;
+use std::fs::{self, File, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// Name of the lock of a folder of results.
+const FOLDER_LOCK: &str = ".lampyris.lock";
+/// Longest content of a lock file that is read: the number of a process.
+const LOCK_BYTES: u64 = 32;
+
+/// A folder, or a file, that no other lampyris writes while this value lives.
+///
+/// The lock is one of the operating system on a file beside the results, which also names the process: it goes with the process
+/// however that ends, so that no lock outlives its owner. Known weakness: network file systems without locks.
+#[derive(Debug)]
+pub(crate) struct OutputPlace {
+    lock: PathBuf,
+    // Held for its lock alone.
+    _file: File,
+}
+
+impl OutputPlace {
+    /// A folder for results, made when missing, in which files can be made.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or written, or another process writes into it.
+    pub(crate) fn folder(folder: &Path) -> Result<Self, Failure> {
+        Self::claim(folder, folder.join(FOLDER_LOCK))
+    }
+
+    /// A single file, whose folder is made when missing.
+    ///
+    /// # Errors
+    /// As [`OutputPlace::folder`].
+    pub(crate) fn file(path: &Path) -> Result<Self, Failure> {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        Self::claim(&folder_of(path), path.with_file_name(format!(".{name}.lock")))
+    }
+
+    fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
+        make_folder(folder)?;
+        let unwritable = |e: std::io::Error| {
+            Failure::running(format!("{}: cannot be written: {e}", folder.display()))
+                .with_help("nothing was traced; give another folder with -o")
+        };
+        // The owner before may remove its lock file between opening and locking: then once more.
+        loop {
+            let mut file = File::options()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .open(&lock)
+                .map_err(unwritable)?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(owned_by_another(folder, &mut file)),
+                // A file system without locks: nothing can be known of others.
+                Err(TryLockError::Error(_)) => {}
+            }
+            if !is_file_at(&file, &lock) {
+                continue;
+            }
+            let written = file.set_len(0).and_then(|()| write!(file, "{}", std::process::id()));
+            written.map_err(unwritable)?;
+            return Ok(Self { lock, _file: file });
+        }
+    }
+}
+
+impl Drop for OutputPlace {
+    fn drop(&mut self) {
+        // Where it cannot be removed it is stale, which the next owner notices.
+        let _ = fs::remove_file(&self.lock);
+    }
+}
+
+fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
+    let mut owner = String::new();
+    let read = file.rewind().and_then(|()| file.take(LOCK_BYTES).read_to_string(&mut owner));
+    let process = match (read, owner.trim().parse::<u32>()) {
+        (Ok(_), Ok(id)) => format!(" (process {id})"),
+        _ => String::new(),
+    };
+    Failure::running(format!("{}: another lampyris{process} is writing there", folder.display()))
+        .with_help("wait until it has ended, or give another folder with -o")
+}
+
+/// Whether the open file is still the one of that name.
+#[cfg(unix)]
+fn is_file_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |m: fs::Metadata| (m.dev(), m.ino());
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(opened), Ok(named)) => identity(opened) == identity(named),
+        _ => false,
+    }
+}
+
+#[cfg(not(unix))]
+fn is_file_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// When that fails.
+pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))
+}
+
+/// The folder that a file is in.
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.unwrap_or(Path::new(".")).to_path_buf()
+}
+
+/// Refuses a place with less free space than the results need at least.
+///
+/// # Errors
+/// When the file system says that it has less.
+pub(crate) fn require_space(folder: &Path, needed_bytes: u64) -> Result<(), Failure> {
+    match free_bytes(folder) {
+        Some(free) if free < needed_bytes => {
+            let [needed, free] = [needed_bytes, free].map(crate::report::bytes);
+            let message = format!("{}: {free} are free, and the results need {needed} at least", folder.display());
+            Err(Failure::running(message)
+                .with_help("nothing was traced; make room, or give another folder with -o"))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(unix)]
+fn free_bytes(folder: &Path) -> Option<u64> {
+    let system = rustix::fs::statvfs(folder).ok()?;
+    // File systems that do not count their blocks say 0 of 0.
+    (system.f_blocks > 0).then(|| system.f_bavail.saturating_mul(system.f_frsize))
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
+
+/// Places for what could not be written where it should: the working folder, that of temporary files, and the home.
+pub(crate) fn rescue_folders() -> Vec<PathBuf> {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    [std::env::current_dir().ok(), Some(std::env::temp_dir()), home].into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_has_one_owner_and_a_stale_lock_is_taken_over() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("a/b");
+        let first = OutputPlace::folder(&folder).unwrap();
+        let refused = OutputPlace::folder(&folder).unwrap_err().to_string();
+        assert!(refused.contains(&format!("process {}", std::process::id())), "{refused}");
+        // Files in the folder are claimed apart: shards write beside one another.
+        let shard = OutputPlace::file(&folder.join("1.tally")).unwrap();
+        drop(OutputPlace::file(&folder.join("2.tally")).unwrap());
+        drop((first, shard));
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+        // Left by a process that was killed: nobody holds its lock.
+        fs::write(folder.join(FOLDER_LOCK), "4294967295").unwrap();
+        drop(OutputPlace::folder(&folder).unwrap());
+    }
+
+    #[test]
+    fn space_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(require_space(folder.path(), 1).is_ok());
+        #[cfg(unix)]
+        assert!(require_space(folder.path(), u64::MAX).is_err());
+    }
+}

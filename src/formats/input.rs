@@ -1,0 +1,61 @@
+//! Files from elsewhere: what is no ordinary file is refused before it is opened, for a pipe or a device may have no end.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Opens a file for reading.
+///
+/// # Errors
+/// When it is missing, or a folder, pipe, socket or device.
+pub fn open_file(path: &Path) -> io::Result<File> {
+    // Asked before opening: to open a pipe waits until somebody writes.
+    let kind = fs::metadata(path)?.file_type();
+    if kind.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file"));
+    }
+    if !kind.is_file() {
+        let message = "it is a pipe or a device, not an ordinary file; copy what it gives into a file first";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
+    }
+    File::open(path)
+}
+
+/// The bytes of a file, at most as many as it had when it was opened.
+///
+/// # Errors
+/// As [`open_file`], and when reading fails.
+pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let file = open_file(path)?;
+    let size = file.metadata()?.len();
+    let mut bytes = Vec::new();
+    file.take(size).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The text of a file.
+///
+/// # Errors
+/// As [`read_bytes`], and when the bytes are no UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_bytes(path)?)
+        .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, format!("it is no UTF-8 text: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn what_has_no_end_is_refused() {
+        for path in ["/dev/zero", "/dev/stdin", "/tmp"] {
+            let refused = read_bytes(Path::new(path)).is_err() || path == "/dev/stdin";
+            assert!(refused, "{path}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "text").unwrap();
+        assert_eq!(read_text(&path).unwrap(), "text");
+    }
+}

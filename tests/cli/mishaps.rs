@@ -1,0 +1,185 @@
+//! Bad luck while a scene is traced: nothing that was traced is lost, and nothing that was saved is written over.
+
+use crate::files::fixture;
+use crate::support::lampyris_in;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A folder with the lens of scene S1 and its model.
+fn lens(change: impl Fn(String) -> String) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(fixture("step/lens_planoconvex_nurbs.stp"), folder.path().join("model.stp")).unwrap();
+    let scene = fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
+    let scene = scene.replace("../step/lens_planoconvex_nurbs.stp", "model.stp").replace("1_000_000", "20_000");
+    fs::write(folder.path().join("scene.toml"), change(scene)).unwrap();
+    folder
+}
+
+fn digest(folder: &Path) -> Value {
+    let text = fs::read_to_string(folder.join("results.json")).unwrap();
+    serde_json::from_str::<Value>(&text).unwrap()["digest"].clone()
+}
+
+/// The names of all that is in a folder, hidden files too.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Rays of a run that takes seconds, saved after each of its 128 replicates.
+const LONG: [&str; 9] = ["trace", "scene.toml", "--rays", "3000000", "--threads", "1", "--checkpoint", "0", "-o"];
+
+/// A long run that has saved some of itself.
+fn saving_run(folder: &Path) -> Child {
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(folder)
+        .args(LONG)
+        .arg("out")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    for _ in 0..6000 {
+        if folder.join("out/checkpoint.tally").is_file() {
+            return child;
+        }
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it saved anything");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("nothing was saved");
+}
+
+#[test]
+fn a_place_that_cannot_be_written_is_refused_before_tracing() {
+    let folder = lens(|s| s.replace("20_000", "2_000_000_000"));
+    fs::write(folder.path().join("file"), "").unwrap();
+    for place in ["file/out", "file"] {
+        let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", place]);
+        assert!(code == 1 && err.contains("cannot be"), "{place}: {code} {err}");
+        let (code, _, err) =
+            lampyris_in(folder.path(), &["trace", "scene.toml", "--shard", "1/2", "-o", "file/a.tally"]);
+        assert!(code == 1 && err.contains("cannot be"), "{code} {err}");
+    }
+}
+
+#[test]
+fn a_receiver_with_a_name_longer_than_a_file_name_has_its_files() {
+    let folder = lens(|s| s.replace("\"focus\"", &format!("\"{}\"", "A".repeat(260))));
+    let (code, out, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let files = document["receivers"][0]["files"].as_array().unwrap();
+    assert!(files.len() >= 4);
+    assert!(files.iter().all(|f| folder.path().join("out").join(f.as_str().unwrap()).is_file()), "{files:?}");
+}
+
+#[test]
+fn results_that_cannot_be_written_where_they_should_are_written_elsewhere() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    assert_eq!(lampyris_in(path, &["trace", "scene.toml", "-o", "whole"]).0, 0);
+    // A folder where a file should go: found out when the rays are traced.
+    fs::create_dir_all(path.join("out/facets.glb/full")).unwrap();
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "-o", "out"]);
+    let err = err.replace('\n', " ");
+    assert!(code == 1 && err.contains("nothing is lost") && err.contains("facets.glb"), "{code} {err}");
+    let rescued = names(path).into_iter().find(|n| n.starts_with("lampyris-rescued-")).unwrap();
+    assert_eq!(digest(&path.join(rescued)), digest(&path.join("whole")));
+}
+
+#[test]
+fn what_an_interrupted_run_saved_is_not_written_over() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    let mut child = saving_run(path);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let saved = path.join("out/checkpoint.tally");
+    let before = fs::read(&saved).unwrap();
+    for rays in ["3000000", "1000"] {
+        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", rays, "-o", "out"]);
+        assert!(code == 2 && err.contains("--resume"), "{code} {err}");
+        assert!(fs::read(&saved).unwrap() == before);
+    }
+}
+
+#[test]
+fn a_folder_has_one_owner_at_a_time() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    let mut child = saving_run(path);
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "-o", "out", "--resume"]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(code == 1 && err.contains(&format!("process {}", child.id())), "{code} {err}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_saves_the_run_and_the_run_goes_on_to_the_same_bits() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    for signal in ["-INT", "-TERM", "-HUP"] {
+        let child = saving_run(path);
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let err = String::from_utf8(output.stderr).unwrap().replace('\n', " ");
+        assert_eq!(output.status.code(), Some(1), "{signal}: {err}");
+        assert!(err.contains("replicates are saved in") && err.contains("--resume"), "{signal}: {err}");
+        assert_eq!(names(&path.join("out")), ["checkpoint.tally"], "{signal}");
+        fs::rename(path.join("out"), path.join(signal)).unwrap();
+    }
+    let whole = [&LONG[..], &["whole", "--threads", "4"]].concat();
+    let whole: Vec<&str> = whole.into_iter().filter(|w| !["--threads", "1", "4"].contains(w)).collect();
+    assert_eq!(lampyris_in(path, &whole).0, 0);
+    let again = [&LONG[..], &["-TERM", "--resume"]].concat();
+    let again: Vec<String> = again.iter().map(|w| w.replace("-TERM", "./-TERM")).collect();
+    let again: Vec<&str> = again.iter().map(String::as_str).collect();
+    let (code, _, err) = lampyris_in(path, &again);
+    assert!(code == 0 && err.contains("going on from"), "{code} {err}");
+    assert_eq!(digest(&path.join("-TERM")), digest(&path.join("whole")));
+}
+
+#[test]
+fn a_reader_that_has_gone_away_costs_nothing() {
+    let folder = lens(|s| s);
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(folder.path())
+        .args(["trace", "scene.toml", "-o", "out", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(folder.path().join("out/report.html").is_file());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_scene_whose_path_is_no_text_is_traced_in_parts_and_merged() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = lens(|s| s);
+    let path = folder.path();
+    let odd = std::ffi::OsStr::from_bytes(b"sc\xff\xfene.toml");
+    fs::copy(path.join("scene.toml"), path.join(odd)).unwrap();
+    let run = |arguments: &[&std::ffi::OsStr]| {
+        let binary = assert_cmd::cargo::cargo_bin("lampyris");
+        Command::new(binary).current_dir(path).args(arguments).output().unwrap()
+    };
+    for part in ["1/2", "2/2"] {
+        let words = ["trace", "--shard", part, "-o", "parts"].map(std::ffi::OsStr::new);
+        let output = run(&[&words[..], &[odd]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(lampyris_in(path, &["trace", "scene.toml", "-o", "whole"]).0, 0);
+    assert_eq!(digest(&path.join("out")), digest(&path.join("whole")));
+}

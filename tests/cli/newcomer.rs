@@ -1,0 +1,45 @@
+//! What somebody with a STEP file and no scene does first.
+
+use crate::files::fixture;
+use crate::support::{lampyris, lampyris_in};
+use serde_json::Value;
+use std::fs;
+
+#[test]
+fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::copy(fixture("step/lens_planoconvex_nurbs.stp"), path.join("my lens.stp")).unwrap();
+    let (code, _, err) = lampyris_in(path, &["init", "my lens.stp"]);
+    assert!(code == 0 && err.contains("my lens.toml"), "{err}");
+    let text = fs::read_to_string(path.join("my lens.toml")).unwrap();
+    assert!(
+        text.contains("file = \"my lens.stp\"") && text.contains("# A face that no rule names absorbs"),
+        "{text}"
+    );
+    let arguments = ["trace", "my lens.toml", "--rays", "2000", "-o", "out", "--json", "--no-report"];
+    let (code, out, err) = lampyris_in(path, &arguments);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    // The beam covers the lens and a rim around it, which reaches the receiver.
+    assert!(
+        found["power"]["absorbed"].as_f64().unwrap() > 0.5 && found["power"]["received"].as_f64().unwrap() > 0.01
+    );
+    assert!(path.join("out/results.json").is_file() && !path.join("out/report.html").exists());
+    // Never over a file that is there; into folders that are not.
+    assert_eq!(lampyris_in(path, &["init", "my lens.stp"]).0, 2);
+    assert_eq!(lampyris_in(path, &["init", "my lens.stp", "-o", "a/b/s.toml"]).0, 0);
+    assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
+}
+
+#[test]
+fn media_and_licences_are_listed() {
+    let (code, out, _) = lampyris(&["media", "--json"]);
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let media = found["media"].as_array().unwrap();
+    let glass = media.iter().find(|m| m["name"] == "N-BK7").unwrap();
+    // Schott's data sheet: n_d = 1.51680.
+    assert!(code == 0 && (glass["index"].as_f64().unwrap() - 1.51680).abs() < 5e-6, "{glass}");
+    let (code, out, _) = lampyris(&["licences"]);
+    assert!(code == 0 && out.contains("UBUNTU FONT LICENCE") && out.contains("Plotly, Inc."), "{out}");
+}
