@@ -2,6 +2,10 @@
 //!
 //! Sound because the instruction is part of every x86-64, reads nothing and never faults, whatever the address.
 #![allow(unsafe_code)]
+#![cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
+
+/// Bytes of a cache line on every x86-64.
+const LINE: usize = 64;
 
 /// Asks for the cache lines of one element; does nothing where the processor is not known.
 #[inline(always)]
@@ -20,7 +24,7 @@ pub(crate) fn prefetch_range<T>(slice: &[T], first: usize, count: usize) {
         while line < count * size_of::<T>() {
             // SAFETY: see the head of the file.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line)) };
-            line += 64;
+            line += LINE;
         }
     }
     #[cfg(not(target_arch = "x86_64"))]
@@ -41,10 +45,28 @@ pub(crate) fn prefetch_either<T, U>(choice: bool, yes: (&[T], usize), no: (&[U],
         let mut line = 0;
         while line < size_of::<T>().max(size_of::<U>()) {
             // SAFETY: see the head of the file.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line.min(size - 64))) };
-            line += 64;
+            // The smaller element's last line may be asked for twice; one below a line long is asked for at its start.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line.min(size.saturating_sub(LINE)))) };
+            line += LINE;
         }
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (choice, yes, no);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn elements_smaller_than_a_cache_line_are_asked_for() {
+        let small = [1u8, 2, 3];
+        let large = [[0u64; 32]; 2];
+        // The index may be out of bounds: nothing is read.
+        for choice in [true, false] {
+            prefetch_either(choice, (&small, 2), (&large, 7));
+            prefetch_either(choice, (&large, 1), (&small, 1000));
+        }
+        prefetch(&small, 1);
+    }
 }
