@@ -201,7 +201,7 @@ fn report(
         asked.threads.iter().map(|&threads| RunSettings { threads, ..one.clone() }).collect();
     let mut rows: Vec<Row> = all.iter().map(|_| Row::default()).collect();
     let fresh = |settings: &RunSettings| match octree {
-        Some(octree) => simulate(bound, &octree.anew(), settings, &|_| true),
+        Some(octree) => simulate(bound, &octree.without_preparation(), settings, &|_| true),
         None => simulate(bound, engine, settings, &|_| true),
     };
     let (mut scaling, most) = (Vec::new(), asked.threads.iter().copied().max().unwrap_or(1));

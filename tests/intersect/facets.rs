@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
-use lampyris::intersect::octree::{self, Octree, Path};
+use lampyris::intersect::octree::{self, InstructionSet, Octree};
 use lampyris::intersect::{Cost, Hit, Intersector};
 use lampyris::math::{Departure, Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
@@ -10,13 +10,16 @@ use lampyris::mesh::FacetMesh;
 /// Names and structures under test: all must give the same bits.
 fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
     let octree = octree::Settings::default();
-    let portable = octree::Settings { path: Path::Portable, ..octree };
+    let portable = octree::Settings { instruction_set: InstructionSet::Portable, ..octree };
     let bvh = bvh::Settings::default();
     vec![
         ("octree", Box::new(Octree::build(mesh, &octree))),
         (
             "octree, AVX2",
-            Box::new(Octree::build(mesh, &octree::Settings { path: Path::Avx2, ..octree::Settings::default() })),
+            Box::new(Octree::build(
+                mesh,
+                &octree::Settings { instruction_set: InstructionSet::Avx2, ..octree::Settings::default() },
+            )),
         ),
         ("octree, portable", Box::new(Octree::build(mesh, &portable))),
         ("octree, textbook", Box::new(Octree::build(mesh, &octree::Settings::textbook()))),

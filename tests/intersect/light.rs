@@ -42,10 +42,10 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     let ((known, less), (walked, more)) = (ask(&knowing), ask(&plain));
     let (judged, _) = ask(&judge);
     assert!(known.iter().all(Option::is_none) || less.nodes < more.nodes / 4, "{name}: {less:?} against {more:?}");
-    for path in [octree::Path::Avx2, octree::Path::Portable] {
-        let other = Octree::build(mesh, &octree::Settings { path, ..octree::Settings::default() });
+    for instruction_set in [octree::InstructionSet::Avx2, octree::InstructionSet::Portable] {
+        let other = Octree::build(mesh, &octree::Settings { instruction_set, ..octree::Settings::default() });
         other.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams });
-        assert!(ask(&other).0 == walked, "{name}: {beam:?} {path:?}");
+        assert!(ask(&other).0 == walked, "{name}: {beam:?} {instruction_set:?}");
     }
     for (k, ray) in rays.iter().enumerate() {
         assert_eq!(known[k], walked[k], "{name}: {beam:?} {ray:?}");

@@ -4,10 +4,12 @@
 //! fixed-size arrays of [`Node`], [`Block`] and [`BoxRay`], whose row indices are below six.
 #![allow(unsafe_code)]
 
-use super::Octree;
-use super::engine::{self, Lanes};
+use super::lanes::Lanes;
+use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
-use super::state::{BoxRay, SiftRay, corner_error, edge_error};
+use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use super::tree::Tree;
+use super::walk;
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::math::Ray;
@@ -27,14 +29,26 @@ pub(super) fn available() -> bool {
 ///
 /// # Panics
 /// Where [`available`] is false.
-pub(super) fn walk(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
+pub(super) fn walk(
+    tree: &Tree,
+    light_buffers: &[LightBuffer],
+    rays: &[Ray],
+    hits: &mut [Option<FacetHit>],
+    cost: &mut Cost,
+) {
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    fn run(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
-        engine::walk::<Avx2>(tree, rays, hits, cost);
+    fn run(
+        tree: &Tree,
+        light_buffers: &[LightBuffer],
+        rays: &[Ray],
+        hits: &mut [Option<FacetHit>],
+        cost: &mut Cost,
+    ) {
+        walk::walk::<Avx2>(tree, light_buffers, rays, hits, cost);
     }
     assert!(available());
     // SAFETY: the features were just found.
-    unsafe { run(tree, rays, hits, cost) }
+    unsafe { run(tree, light_buffers, rays, hits, cost) }
 }
 
 /// Eight lanes of f32.
@@ -42,7 +56,7 @@ pub(super) struct Avx2;
 
 /// Component `K` in all lanes.
 #[inline(always)]
-unsafe fn spread<const K: i32>(v: __m128) -> __m256 {
+unsafe fn broadcast<const K: i32>(v: __m128) -> __m256 {
     unsafe { _mm256_broadcastss_ps(_mm_permute_ps::<K>(v)) }
 }
 
@@ -55,13 +69,13 @@ unsafe fn row(node: &Node, row: usize) -> __m256 {
 }
 
 #[inline(always)]
-unsafe fn spread_at(v: &[f32; 3], axis: usize) -> __m256 {
+unsafe fn broadcast_axis(v: &[f32; 3], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
 }
 
 /// Half a row of corners against the ray's origin.
 #[inline(always)]
-unsafe fn coarse(block: &Block, axis: usize, first: usize, step: __m256, to: __m256) -> __m256 {
+unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: __m256) -> __m256 {
     unsafe {
         let corners = _mm_loadu_si128(block.corners.get_unchecked(axis).as_ptr().add(first).cast());
         _mm256_fmadd_ps(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(corners)), step, to)
@@ -79,14 +93,14 @@ unsafe fn layer<const LESS: i32>(keys: __m256i, partner: __m256i) -> __m256i {
 /// A key is a distance that is not negative with the child in its lowest three bits; children that are not met have
 /// the key −1 and come last.
 #[inline(always)]
-pub(super) unsafe fn sort<const ALONE: bool>(
+pub(super) unsafe fn sort<const SINGLE: bool>(
     met: u32,
     keys: __m256i,
     node: &Node,
     enters: &mut [f32; 8],
     links: &mut [u32; 8],
 ) -> usize {
-    if ALONE && met & met.wrapping_sub(1) == 0 {
+    if SINGLE && met & met.wrapping_sub(1) == 0 {
         if met != 0 {
             // It is taken at once, so that its distance is of no interest.
             links[0] = node.children[(met.trailing_zeros() & 7) as usize];
@@ -100,7 +114,7 @@ pub(super) unsafe fn sort<const ALONE: bool>(
         let k = layer::<0x30>(k, _mm256_permute4x64_epi64::<0xD8>(k));
         let k = layer::<0x50>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7)));
         let k = layer::<0x54>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 2, 1, 4, 3, 6, 5, 7)));
-        let children = _mm256_load_si256(node.children.as_ptr().cast());
+        let children = _mm256_loadu_si256(node.children.as_ptr().cast());
         _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, k));
         _mm256_storeu_si256(enters.as_mut_ptr().cast(), k);
         met.count_ones() as usize
@@ -109,7 +123,7 @@ pub(super) unsafe fn sort<const ALONE: bool>(
 
 impl Lanes for Avx2 {
     #[inline(always)]
-    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.
         unsafe {
             let inverse = _mm_load_ps(ray.inverse.as_ptr());
@@ -118,19 +132,19 @@ impl Lanes for Avx2 {
             let base = _mm_mul_ps(to, inverse);
             let scale = _mm_mul_ps(_mm_load_ps(node.step.as_ptr()), inverse);
             let (early, late) = (_mm_sub_ps(base, slack), _mm_add_ps(base, slack));
-            let (sx, sy, sz) = (spread::<0x00>(scale), spread::<0x55>(scale), spread::<0xAA>(scale));
-            let [nx, ny, nz] = [ray.near(0), ray.near(1), ray.near(2)];
-            let enter_x = _mm256_fmadd_ps(row(node, nx), sx, spread::<0x00>(early));
-            let enter_y = _mm256_fmadd_ps(row(node, ny), sy, spread::<0x55>(early));
-            let enter_z = _mm256_fmadd_ps(row(node, nz), sz, spread::<0xAA>(early));
-            let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, spread::<0x00>(late));
-            let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, spread::<0x55>(late));
-            let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, spread::<0xAA>(late));
+            let (sx, sy, sz) = (broadcast::<0x00>(scale), broadcast::<0x55>(scale), broadcast::<0xAA>(scale));
+            let [nx, ny, nz] = [ray.entry_row(0), ray.entry_row(1), ray.entry_row(2)];
+            let enter_x = _mm256_fmadd_ps(row(node, nx), sx, broadcast::<0x00>(early));
+            let enter_y = _mm256_fmadd_ps(row(node, ny), sy, broadcast::<0x55>(early));
+            let enter_z = _mm256_fmadd_ps(row(node, nz), sz, broadcast::<0xAA>(early));
+            let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, broadcast::<0x00>(late));
+            let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, broadcast::<0x55>(late));
+            let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, broadcast::<0xAA>(late));
             let enter =
                 _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
             let leave =
                 _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
-            let leave = _mm256_mul_ps(leave, _mm256_set1_ps(1.0 + 5e-7));
+            let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             let used = _mm256_sllv_epi32(
                 _mm256_set1_epi32(node.used as i32),
@@ -143,12 +157,12 @@ impl Lanes for Avx2 {
             );
             let none = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
             let keys = _mm256_castps_si256(_mm256_blendv_ps(none, _mm256_castsi256_ps(keys), met));
-            sort::<ALONE>(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
+            sort::<SINGLE>(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
         }
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
         // SAFETY: see the head of the file; `axes` are 0..3 by construction.
         unsafe {
             let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
@@ -159,12 +173,12 @@ impl Lanes for Avx2 {
             let [kx, ky, kz] = ray.axes.map(usize::from);
             let [sx, sy, sz] = ray.shear;
             let (sx, sy, sz) = (_mm256_set1_ps(sx), _mm256_set1_ps(sy), _mm256_set1_ps(sz));
-            let (tx, ty, tz) = (spread_at(&to, kx), spread_at(&to, ky), spread_at(&to, kz));
-            let (az, bz) = (coarse(block, kz, 0, step, tz), coarse(block, kz, 8, step, tz));
-            let ax = _mm256_fnmadd_ps(sx, az, coarse(block, kx, 0, step, tx));
-            let ay = _mm256_fnmadd_ps(sy, az, coarse(block, ky, 0, step, ty));
-            let bx = _mm256_fnmadd_ps(sx, bz, coarse(block, kx, 8, step, tx));
-            let by = _mm256_fnmadd_ps(sy, bz, coarse(block, ky, 8, step, ty));
+            let (tx, ty, tz) = (broadcast_axis(&to, kx), broadcast_axis(&to, ky), broadcast_axis(&to, kz));
+            let (az, bz) = (sieve_row(block, kz, 0, step, tz), sieve_row(block, kz, 8, step, tz));
+            let ax = _mm256_fnmadd_ps(sx, az, sieve_row(block, kx, 0, step, tx));
+            let ay = _mm256_fnmadd_ps(sy, az, sieve_row(block, ky, 0, step, ty));
+            let bx = _mm256_fnmadd_ps(sx, bz, sieve_row(block, kx, 8, step, tx));
+            let by = _mm256_fnmadd_ps(sy, bz, sieve_row(block, ky, 8, step, ty));
             let (cx, cy) = (_mm256_permute2f128_ps::<1>(ax, ax), _mm256_permute2f128_ps::<1>(ay, ay));
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));

@@ -5,12 +5,14 @@
 //! because octants are below eight and axes below three.
 #![allow(unsafe_code)]
 
-use super::Octree;
 use super::avx2::{self, Avx2};
-use super::engine::{self, Lanes};
-use super::light::pair::{Corners, Edges};
+use super::facet_pair::{Corners, Edges};
+use super::lanes::Lanes;
+use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
-use super::state::{BoxRay, SiftRay, corner_error, edge_error};
+use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use super::tree::Tree;
+use super::walk;
 use crate::intersect::Cost;
 use crate::intersect::facet::{FacetHit, Line};
 use crate::math::Ray;
@@ -28,14 +30,26 @@ pub(super) fn available() -> bool {
 ///
 /// # Panics
 /// Where [`available`] is false.
-pub(super) fn walk(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
+pub(super) fn walk(
+    tree: &Tree,
+    light_buffers: &[LightBuffer],
+    rays: &[Ray],
+    hits: &mut [Option<FacetHit>],
+    cost: &mut Cost,
+) {
     #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl")]
-    fn run(tree: &Octree, rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
-        engine::walk::<Avx512>(tree, rays, hits, cost);
+    fn run(
+        tree: &Tree,
+        light_buffers: &[LightBuffer],
+        rays: &[Ray],
+        hits: &mut [Option<FacetHit>],
+        cost: &mut Cost,
+    ) {
+        walk::walk::<Avx512>(tree, light_buffers, rays, hits, cost);
     }
     assert!(available());
     // SAFETY: the features were just found.
-    unsafe { run(tree, rays, hits, cost) }
+    unsafe { run(tree, light_buffers, rays, hits, cost) }
 }
 
 struct Avx512;
@@ -59,13 +73,13 @@ static ROWS: [[u64; 8]; 8] = {
 
 /// Bytes as numbers.
 #[inline(always)]
-unsafe fn numbers(bytes: __m128i) -> __m512 {
+unsafe fn widen_bytes(bytes: __m128i) -> __m512 {
     unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes)) }
 }
 
 /// Lane `k` in the lower half, lane `k + 4` in the upper.
 #[inline(always)]
-unsafe fn spread(v: __m256, k: i32) -> __m512 {
+unsafe fn broadcast_halves(v: __m256, k: i32) -> __m512 {
     unsafe {
         let lanes = _mm512_mask_blend_epi32(0xFF00, _mm512_set1_epi32(k), _mm512_set1_epi32(k + 4));
         _mm512_permutexvar_ps(lanes, _mm512_castps256_ps512(v))
@@ -74,13 +88,13 @@ unsafe fn spread(v: __m256, k: i32) -> __m512 {
 
 /// The lower half in both halves exchanged: lanes 4–7, then 0–3.
 #[inline(always)]
-unsafe fn exchanged(v: __m256) -> __m256 {
+unsafe fn swap_halves(v: __m256) -> __m256 {
     unsafe { _mm256_permute2f128_ps::<1>(v, v) }
 }
 
 /// The corners of a block along an axis against the ray's origin.
 #[inline(always)]
-unsafe fn coarse(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512 {
+unsafe fn sieve_row(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512 {
     unsafe {
         let axis = usize::from(axis);
         let corners = _mm256_loadu_si256(block.corners.get_unchecked(axis).as_ptr().cast());
@@ -91,7 +105,7 @@ unsafe fn coarse(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512
 
 /// The corners of two facets along an axis.
 #[inline(always)]
-unsafe fn both(corners: [&Corners; 2], axis: usize) -> __m512d {
+unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
     unsafe {
         let [a, b] = [_mm256_loadu_pd(corners[0][axis].as_ptr()), _mm256_loadu_pd(corners[1][axis].as_ptr())];
         _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(a), b)
@@ -100,7 +114,7 @@ unsafe fn both(corners: [&Corners; 2], axis: usize) -> __m512d {
 
 impl Lanes for Avx512 {
     #[inline(always)]
-    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         // SAFETY: see the head of the file.
         unsafe {
             // Leaving is computed negated, so that the greatest is wanted of both.
@@ -113,28 +127,28 @@ impl Lanes for Avx512 {
             let base = _mm256_fmsub_ps(to, inverse, slack);
             let order = _mm512_loadu_si512(ROWS.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
             let rows = _mm512_permutexvar_epi64(order, _mm512_loadu_si512((node as *const Node).cast()));
-            let x = numbers(_mm512_castsi512_si128(rows));
-            let y = numbers(_mm512_extracti64x2_epi64::<1>(rows));
-            let z = numbers(_mm512_extracti64x2_epi64::<2>(rows));
+            let x = widen_bytes(_mm512_castsi512_si128(rows));
+            let y = widen_bytes(_mm512_extracti64x2_epi64::<1>(rows));
+            let z = widen_bytes(_mm512_extracti64x2_epi64::<2>(rows));
             let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(-ray.t_max));
-            let x = _mm512_fmadd_ps(x, spread(scale, 0), spread(base, 0));
-            let y = _mm512_fmadd_ps(y, spread(scale, 1), spread(base, 1));
-            let z = _mm512_fmadd_ps(z, spread(scale, 2), spread(base, 2));
+            let x = _mm512_fmadd_ps(x, broadcast_halves(scale, 0), broadcast_halves(base, 0));
+            let y = _mm512_fmadd_ps(y, broadcast_halves(scale, 1), broadcast_halves(base, 1));
+            let z = _mm512_fmadd_ps(z, broadcast_halves(scale, 2), broadcast_halves(base, 2));
             let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
             let enter = _mm512_castps512_ps256(most);
-            let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-(1.0 + 5e-7)));
+            let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-LEAVE_STRETCH));
             let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.used as u8, enter, leave);
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             // The distance but its sign and lowest three bits, these of the lane.
             let distance = _mm256_set1_epi32(0x7FFF_FFF8);
             let keys = _mm256_ternarylogic_epi32::<0xF8>(lanes, _mm256_castps_si256(enter), distance);
             let keys = _mm256_mask_blend_epi32(met, _mm256_set1_epi32(-1), keys);
-            avx2::sort::<ALONE>(u32::from(met), keys, node, enters, links)
+            avx2::sort::<SINGLE>(u32::from(met), keys, node, enters, links)
         }
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
         // SAFETY: see the head of the file.
         unsafe {
             let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
@@ -144,14 +158,14 @@ impl Lanes for Avx512 {
             let step = _mm512_set1_ps(block.step);
             let [kx, ky, kz] = ray.axes;
             let [sx, sy, sz] = ray.shear;
-            let z = coarse(block, kz, step, &to);
-            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, coarse(block, kx, step, &to));
-            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, coarse(block, ky, step, &to));
+            let z = sieve_row(block, kz, step, &to);
+            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, sieve_row(block, kx, step, &to));
+            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, sieve_row(block, ky, step, &to));
             let t = _mm512_mul_ps(z, _mm512_set1_ps(sz));
             let (ax, bx) = (_mm512_castps512_ps256(x), _mm512_extractf32x8_ps::<1>(x));
             let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
             let (at, bt) = (_mm512_castps512_ps256(t), _mm512_extractf32x8_ps::<1>(t));
-            let (cx, cy, ct) = (exchanged(ax), exchanged(ay), exchanged(at));
+            let (cx, cy, ct) = (swap_halves(ax), swap_halves(ay), swap_halves(at));
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
             let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));
@@ -171,7 +185,7 @@ impl Lanes for Avx512 {
     fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
         // SAFETY: see the head of the file; eight numbers are stored to arrays of eight that start at multiples of 64 bytes.
         unsafe {
-            let (x, y, z) = (both(corners, 0), both(corners, 1), both(corners, 2));
+            let (x, y, z) = (load_pair(corners, 0), load_pair(corners, 1), load_pair(corners, 2));
             let [ox, oy, oz] = line.origin;
             let [sx, sy, _] = line.shear;
             // Not fused, to have the bits of plain Rust.

@@ -27,25 +27,25 @@ impl Box32 {
     }
 
     /// Around points, rounded outward.
-    pub(super) fn around(points: &[Point]) -> Self {
+    pub(super) fn bounding(points: &[Point]) -> Self {
         let mut low = Point::INFINITY;
         let mut high = Point::NEG_INFINITY;
         for &p in points {
             low = low.min(p);
             high = high.max(p);
         }
-        Self { low: low.to_array().map(down), high: high.to_array().map(up) }
+        Self { low: low.to_array().map(round_down), high: high.to_array().map(round_up) }
     }
 }
 
 /// The nearest f32 that is not larger.
-pub(super) fn down(x: f64) -> f32 {
+pub(super) fn round_down(x: f64) -> f32 {
     let y = x as f32;
     if f64::from(y) > x { y.next_down() } else { y }
 }
 
 /// The nearest f32 that is not smaller.
-pub(super) fn up(x: f64) -> f32 {
+pub(super) fn round_up(x: f64) -> f32 {
     let y = x as f32;
     if f64::from(y) < x { y.next_up() } else { y }
 }
@@ -58,9 +58,9 @@ struct Polygon {
 }
 
 impl Polygon {
-    /// Keeps what lies on the side `sign` of the plane `axis = at`.
-    fn cut(&mut self, axis: usize, at: f64, sign: f64) {
-        let height = |p: &[f64; 3]| (p[axis] - at) * sign;
+    /// Keeps what lies on the side `sign` of the plane `axis = position`.
+    fn cut(&mut self, axis: usize, position: f64, sign: f64) {
+        let height = |p: &[f64; 3]| (p[axis] - position) * sign;
         let points = &self.points[..self.count];
         if points.iter().all(|p| height(p) >= 0.0) {
             return;
@@ -75,7 +75,7 @@ impl Polygon {
             if (hp > 0.0 && hq < 0.0) || (hp < 0.0 && hq > 0.0) {
                 let s = hp / (hp - hq);
                 let mut between: [f64; 3] = std::array::from_fn(|a| p[a] + (q[a] - p[a]) * s);
-                between[axis] = at;
+                between[axis] = position;
                 kept.push(between);
             }
         }
@@ -117,7 +117,7 @@ pub(super) fn clip(corners: &[Point; 4], cell: &Box32, pad: f64) -> Option<Box32
         return None;
     }
     Some(Box32 {
-        low: std::array::from_fn(|a| down(low[a] - pad).max(cell.low[a])),
-        high: std::array::from_fn(|a| up(high[a] + pad).min(cell.high[a])),
+        low: std::array::from_fn(|a| round_down(low[a] - pad).max(cell.low[a])),
+        high: std::array::from_fn(|a| round_up(high[a] + pad).min(cell.high[a])),
     })
 }

@@ -1,8 +1,8 @@
 //! From cells to nodes and blocks: sparse octants merged into full nodes, children next to each other.
 
-use super::build::{Cell, Content};
+use super::cell::{Cell, Content};
 use super::node::{Block, Link, Node};
-use super::{Settings, Statistics, huge};
+use super::{Settings, Statistics, huge_pages};
 use crate::math::Point;
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ pub(super) fn flatten(
     let mut draft = Draft::default();
     let root = draft.add(cell, settings.collapse, 0, None);
     assert!(draft.blocks.len() <= Link::MOST_BLOCKS, "more blocks than links can name");
-    let mut blocks = huge::with_capacity(draft.blocks.len());
+    let mut blocks = huge_pages::with_capacity(draft.blocks.len());
     (draft.blocks.par_iter())
         .map(|(count, facets)| {
             let corners = facets.map(|f| {
@@ -45,7 +45,7 @@ pub(super) fn flatten(
             Block::new(&corners[..usize::from(*count)])
         })
         .collect_into_vec(&mut blocks);
-    let mut nodes = huge::with_capacity(draft.nodes.len());
+    let mut nodes = huge_pages::with_capacity(draft.nodes.len());
     nodes.extend_from_slice(&draft.nodes);
     let left_out = stats.left_out;
     *stats = draft.stats;
@@ -66,7 +66,7 @@ impl Draft {
                 let me = reserved.unwrap_or_else(|| self.reserve(1));
                 self.stats.nodes += 1;
                 let children = if collapse { merge(cells) } else { cells };
-                let mut node = Node::around(&cell.bounds);
+                let mut node = Node::bounding(&cell.bounds);
                 let boxes: Vec<_> = children.iter().map(|c| c.bounds).collect();
                 let links = if depth < PARALLEL_LEVELS {
                     self.add_parallel(children, collapse, depth)

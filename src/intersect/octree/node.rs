@@ -1,7 +1,16 @@
 //! What is walked: 128-byte nodes of up to eight children, 192-byte blocks of up to four facets.
 
-use super::clip::{Box32, down};
+use super::clip::{Box32, round_down};
 use crate::math::{Aabb, Point};
+
+/// By how much steps are made larger, so that the last bound reaches the far side whatever their rounding to f32: sixteen roundings.
+const STEP_ROOM: f64 = 1.0 + 1e-6;
+/// Least step of a node relative to its origin: the spacing of f32 there, below which `origin + bound · step` would stand still.
+const LEAST_RELATIVE_STEP: f32 = 1e-7;
+/// Least step of a node, mm: its product with the inverse of a direction stays a normal number.
+const LEAST_NODE_STEP: f32 = 1e-20;
+/// Least step of a block, mm: squares of it vanish, but the sieve keeps what is not above its error.
+const LEAST_BLOCK_STEP: f32 = 1e-30;
 
 /// Where a child is: a node, or a block with its number of facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,14 +102,14 @@ impl Node {
     };
 
     /// A node around `all` without children.
-    pub(super) fn around(all: &Box32) -> Self {
+    pub(super) fn bounding(all: &Box32) -> Self {
         let mut node = Self::EMPTY;
         for a in 0..3 {
             let origin = all.low[a].next_down();
             // A step below the spacing of f32 at the origin would be lost in `origin + bound · step`.
-            let step = ((f64::from(all.high[a]) - f64::from(origin)) / 254.0 * (1.0 + 1e-6)) as f32;
+            let step = ((f64::from(all.high[a]) - f64::from(origin)) / 254.0 * STEP_ROOM) as f32;
             node.origin[a] = origin;
-            node.step[a] = step.max(origin.abs() * 1e-7).max(1e-20);
+            node.step[a] = step.max(origin.abs() * LEAST_RELATIVE_STEP).max(LEAST_NODE_STEP);
         }
         node
     }
@@ -123,12 +132,12 @@ impl Node {
 impl Node {
     /// The box of a child about the middle of the mesh.
     pub(super) fn child(&self, slot: usize) -> Aabb {
-        let at = |row: usize| {
+        let corner = |row: usize| {
             Point::from_array(std::array::from_fn(|a| {
                 f64::from(self.origin[a]) + f64::from(self.bounds[2 * a + row][slot]) * f64::from(self.step[a])
             }))
         };
-        Aabb { min: at(0), max: at(1) }
+        Aabb { min: corner(0), max: corner(1) }
     }
 }
 
@@ -151,9 +160,9 @@ impl Block {
         let points = facets.iter().flat_map(|f| f.2);
         let low = points.clone().fold(Point::INFINITY, Point::min);
         let high = points.fold(Point::NEG_INFINITY, Point::max);
-        let origin = low.to_array().map(down);
+        let origin = low.to_array().map(round_down);
         let largest = (0..3).map(|a| high[a] - f64::from(origin[a])).fold(0.0, f64::max);
-        let step = ((largest / 65535.0 * (1.0 + 1e-6)) as f32).max(1e-30);
+        let step = ((largest / 65535.0 * STEP_ROOM) as f32).max(LEAST_BLOCK_STEP);
         let mut block = Self { corners: [[0; 16]; 3], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
         for (lane, (facet, positions, corners)) in facets.iter().enumerate() {
             block.facets[lane] = *facet;

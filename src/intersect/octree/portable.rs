@@ -1,22 +1,22 @@
 //! The walk in plain Rust.
 
-use super::engine::Lanes;
+use super::lanes::Lanes;
 use super::node::{Block, Node};
-use super::state::{BoxRay, SiftRay, corner_error, edge_error};
+use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
 
 /// Eight lanes as arrays; compilers vectorise most of it for the baseline of the target.
 pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter<const ALONE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
         let mut enter = [ray.t_min; 8];
         let mut leave = [ray.t_max; 8];
         for a in 0..3 {
             let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
             let scale = node.step[a] * ray.inverse[a];
             let (early, late) = (base - ray.slack[a], base + ray.slack[a]);
-            let near = ray.near(a);
+            let near = ray.entry_row(a);
             for k in 0..8 {
                 enter[k] = enter[k].max(f32::from(node.bounds[near][k]) * scale + early);
                 leave[k] = leave[k].min(f32::from(node.bounds[near ^ 1][k]) * scale + late);
@@ -24,7 +24,7 @@ impl Lanes for Portable {
         }
         let mut count = 0;
         for k in 0..8 {
-            if node.used >> k & 1 == 1 && enter[k] <= leave[k] * (1.0 + 5e-7) {
+            if node.used >> k & 1 == 1 && enter[k] <= leave[k] * LEAVE_STRETCH {
                 let mut place = count;
                 while place > 0 && enters[place - 1] < enter[k] {
                     enters[place] = enters[place - 1];
@@ -40,7 +40,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SiftRay, boxes: &BoxRay) -> u32 {
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
         let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
         let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
         let corner = corner_error(block.step, far, ray.slack);

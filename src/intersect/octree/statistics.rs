@@ -59,7 +59,8 @@ impl fmt::Display for Statistics {
         if self.left_out > 0 {
             writeln!(f, "facets left out: {}", self.left_out)?;
         }
-        let most = self.depths.iter().copied().max().unwrap_or(0).max(1);
+        // At least one, so that an empty tree draws no bars.
+        let most = self.depths.iter().fold(1, |most, &count| most.max(count));
         for (depth, &count) in self.depths.iter().enumerate().filter(|(_, c)| **c > 0) {
             writeln!(f, "depth {depth:2} {count:9} {}", "#".repeat((count * 50).div_ceil(most)))?;
         }

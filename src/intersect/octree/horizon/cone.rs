@@ -6,25 +6,28 @@
 //! is nearest to the axis, which lies across one or two of the differences. Only boxes that may be nearer to the axis than what was
 //! found already are opened.
 
-use super::{Lines, lines_around};
-use crate::intersect::octree::Octree;
+use super::{BOX_ROOM, Lines, lines_around};
 use crate::intersect::octree::node::{Link, Target};
+use crate::intersect::octree::tree::Tree;
 use crate::math::{Aabb, Point, Vector};
 
 /// Half an angle below which a cone is of no use.
-const NARROW: f64 = 0.02;
+const LEAST_HALF_ANGLE: f64 = 0.02;
 /// Taken off the half angle for the rounding of starts and of what is asked in f32.
-const ROOM: f64 = 1e-3;
+const ANGLE_ROOM: f64 = 1e-3;
+
+/// By how much balls are made larger, for the rounding of distances in f64 and much more.
+const BALL_ROOM: f64 = 1e-9;
 
 /// The cosine of half the angle of a free cone of a facet, which is not made wider than half of `widest`; `None` where there is none.
-pub(super) fn cosine(tree: &Octree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
-    let mesh = tree.around.mesh;
+pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
+    let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
-    let first = Base::new([a, b, c], tree.around.reach)?;
+    let first = Base::new([a, b, c], tree.surroundings.reach)?;
     let bases = if mesh.facets[facet].is_triangle() {
         [Some((first, [a, b, c, c])), None]
     } else {
-        let second = Base::new([a, c, d], tree.around.reach)?;
+        let second = Base::new([a, c, d], tree.surroundings.reach)?;
         [Some((first, [a, c, d, d])), Some((second, [a, b, c, c]))]
     };
     let mut limit = Limit::new(axis, widest);
@@ -37,7 +40,7 @@ pub(super) fn cosine(tree: &Octree, facet: usize, axis: Vector, widest: f64) -> 
         base.search(tree, facet, &mut limit);
     }
     let angle = limit.sine.clamp(0.0, 1.0).asin();
-    (angle > NARROW).then(|| (angle - ROOM).cos())
+    (angle > LEAST_HALF_ANGLE).then(|| (angle - ANGLE_ROOM).cos())
 }
 
 /// A cone that is made narrower.
@@ -83,11 +86,11 @@ impl Base {
     }
 
     /// Narrows the cone to what no facet of the tree but its own reaches.
-    fn search(&self, tree: &Octree, facet: usize, limit: &mut Limit) {
-        let mesh = tree.around.mesh;
+    fn search(&self, tree: &Tree, facet: usize, limit: &mut Limit) {
+        let mesh = tree.surroundings.mesh;
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
-            if limit.sine < NARROW {
+            if limit.sine < LEAST_HALF_ANGLE {
                 return;
             }
             match link.target() {
@@ -114,14 +117,14 @@ impl Base {
     /// Whether a ray within the cone may meet a box about `center`.
     fn may_meet(&self, b: &Aabb, center: Point, limit: &Limit) -> bool {
         let (middle, half) = (b.center() + center, 0.5 * b.size());
-        let room = 1e-6 * half.max_element();
+        let room = BOX_ROOM * half.max_element();
         let height = (middle - self.corners[0]).dot(self.normal) + half.dot(self.normal.abs()) + room;
         height > self.reach && self.may_meet_ball(middle, half.length() + room, limit)
     }
 
     /// Whether a ray within the cone may meet a ball.
     fn may_meet_ball(&self, middle: Point, radius: f64, limit: &Limit) -> bool {
-        let (to, radius) = (middle - self.middle, (self.radius + radius) * (1.0 + 1e-9));
+        let (to, radius) = (middle - self.middle, (self.radius + radius) * (1.0 + BALL_ROOM));
         let (along, beside) = (to.dot(limit.axis), to.length_squared() - radius * radius);
         // Of the angle to its middle and that which it fills.
         beside <= 0.0 || along > limit.cosine * beside.sqrt() - limit.sine * radius

@@ -10,28 +10,35 @@
 mod cone;
 mod skyline;
 
-use super::Octree;
+use super::tree::Tree;
 use crate::math::{Point, Vector, orthonormal_pair};
 use skyline::{Horizon, sector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Rays of a run for each facet below which no facet is watched.
-const WORTH: u64 = 64;
+/// Rays of a run for each facet below which no facet is record.
+const LEAST_RAYS_PER_FACET: u64 = 64;
 /// Rays that leave a facet before its free cone is found: to find one takes some 3 µs, and it saves a ray that leaves 0.1 µs.
-const FIRST: u32 = 8;
+const RAYS_BEFORE_CONE: u32 = 8;
 /// Rays that leave a facet beside its cone before its horizon is found: to find one takes some 20 µs.
-const PATIENCE: u32 = 200;
+const RAYS_BESIDE_CONE: u32 = 200;
 /// The same where the rays of the run suffice for all facets.
-const IMPATIENCE: u32 = 32;
+const FEWER_BESIDE_CONE: u32 = 32;
 /// A horizon is not found more closely than this share of the least slope of the rays so far, and only in the sectors where they
 /// ran: what stands lower or elsewhere is not looked at.
-const BELOW: f64 = 0.2;
-/// Half the angle of a free cone is not made wider than this share of that of the first rays and so much more.
-const WIDER: [f64; 2] = [2.0, 0.5];
+const FLOOR_SHARE: f64 = 0.2;
+/// Half the angle of a free cone is not made wider than this multiple of that of the first rays and [`CONE_ROOM`] more.
+const CONE_GROWTH: f64 = 2.0;
+/// See [`CONE_GROWTH`], radians.
+const CONE_ROOM: f64 = 0.5;
+/// What is added to the cosine of a free cone for the rounding to f32 of axis, direction and product: sixteen roundings.
+const COSINE_ROOM: f32 = 1e-6;
 /// Directions are gathered in such steps.
-const STEP: f64 = 1.0 / (1 << 20) as f64;
+const DIRECTION_STEP: f64 = 1.0 / (1 << 20) as f64;
+
+/// By how much boxes are grown, relative to their size, for the rounding of f32 bounds: sixteen roundings.
+const BOX_ROOM: f64 = 1e-6;
 
 /// Three sides and three corners.
 const LINES: usize = 6;
@@ -59,8 +66,8 @@ fn lines_around(corners: [Point; 3]) -> Option<(Vector, Lines)> {
 /// The free cones and horizons of the facets that many rays have left.
 pub(super) struct Horizons {
     cones: Vec<Cone>,
-    facets: Vec<Watched>,
-    patience: u32,
+    facets: Vec<RayRecord>,
+    rays_before_search: u32,
 }
 
 /// Rays nearer to the axis than this cosine meet nothing.
@@ -72,7 +79,7 @@ struct Cone {
 
 impl Cone {
     /// None yet.
-    fn around(axis: Vector) -> Self {
+    fn unknown(axis: Vector) -> Self {
         Self { axis: axis.to_array().map(|x| AtomicU32::new((x as f32).to_bits())), cosine: 2f32.to_bits().into() }
     }
 
@@ -81,12 +88,12 @@ impl Cone {
             own.store((x as f32).to_bits(), Ordering::Relaxed);
         }
         // Whoever sees it sees the axis.
-        self.cosine.store((cosine as f32 + 1e-6).to_bits(), Ordering::Release);
+        self.cosine.store((cosine as f32 + COSINE_ROOM).to_bits(), Ordering::Release);
     }
 
     /// The cosine of the angle of a ray to the axis, and that of the cone.
     #[inline(always)]
-    fn ask(&self, direction: Vector) -> (f32, f32) {
+    fn cosines(&self, direction: Vector) -> (f32, f32) {
         let cosine = f32::from_bits(self.cosine.load(Ordering::Acquire));
         let [x, y, z] = [0, 1, 2].map(|k| f32::from_bits(self.axis[k].load(Ordering::Relaxed)));
         let d = direction.as_vec3();
@@ -95,7 +102,7 @@ impl Cone {
 }
 
 /// What is gathered of the rays that leave a facet.
-struct Watched {
+struct RayRecord {
     /// How many did while it had no cone, and between which bounds their directions lie.
     left: AtomicU32,
     low: [AtomicI32; 3],
@@ -108,7 +115,7 @@ struct Watched {
     horizon: OnceLock<Box<Horizon>>,
 }
 
-impl Watched {
+impl RayRecord {
     fn new() -> Self {
         Self {
             left: AtomicU32::new(0),
@@ -121,10 +128,10 @@ impl Watched {
         }
     }
 
-    /// Watches a ray; after enough of them one thread finds the cone or the horizon, the others walk on.
+    /// Notes a ray; after enough of them one thread finds the cone or the horizon, the others walk on.
     #[cold]
-    fn watch(&self, tree: &Octree, facet: usize, cone: &Cone, direction: Vector, patience: u32) {
-        let [a, b, c, _] = tree.around.mesh.corners(facet);
+    fn note(&self, tree: &Tree, facet: usize, cone: &Cone, direction: Vector, rays_before_search: u32) {
+        let [a, b, c, _] = tree.surroundings.mesh.corners(facet);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let up = normal.dot(direction);
         let slope = up / (direction - normal * up).length();
@@ -132,44 +139,45 @@ impl Watched {
         if slope.is_nan() || slope <= 0.0 {
             return;
         }
-        if self.left.load(Ordering::Relaxed) <= FIRST {
+        if self.left.load(Ordering::Relaxed) <= RAYS_BEFORE_CONE {
             return self.gather(tree, facet, cone, normal, direction);
         }
         let (x, y) = orthonormal_pair(normal);
         // The bits of positive numbers are in their order.
         self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
         self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
-        if self.beside.fetch_add(1, Ordering::Relaxed) == patience {
+        if self.beside.fetch_add(1, Ordering::Relaxed) == rays_before_search {
             let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
             let sectors = self.sectors.load(Ordering::Relaxed);
-            let floor = std::array::from_fn(|s| if sectors >> s & 1 == 1 { least * BELOW } else { f64::INFINITY });
+            let floor =
+                std::array::from_fn(|s| if sectors >> s & 1 == 1 { least * FLOOR_SHARE } else { f64::INFINITY });
             let _ = self.horizon.set(Box::new(skyline::of_facet(tree, facet, &floor)));
         }
     }
 
     /// Takes the ray for one of those that the cone is laid around.
-    fn gather(&self, tree: &Octree, facet: usize, cone: &Cone, normal: Vector, direction: Vector) {
+    fn gather(&self, tree: &Tree, facet: usize, cone: &Cone, normal: Vector, direction: Vector) {
         let direction = direction.to_array();
         for axis in 0..3 {
-            let place = (direction[axis] / STEP) as i32;
+            let place = (direction[axis] / DIRECTION_STEP) as i32;
             self.low[axis].fetch_min(place, Ordering::Relaxed);
             self.high[axis].fetch_max(place, Ordering::Relaxed);
         }
-        if self.left.fetch_add(1, Ordering::Relaxed) != FIRST {
+        if self.left.fetch_add(1, Ordering::Relaxed) != RAYS_BEFORE_CONE {
             return;
         }
         let corner = |of: &[AtomicI32; 3]| {
-            Vector::from_array([0, 1, 2].map(|k| f64::from(of[k].load(Ordering::Relaxed)) * STEP))
+            Vector::from_array([0, 1, 2].map(|k| f64::from(of[k].load(Ordering::Relaxed)) * DIRECTION_STEP))
         };
         let (low, high) = (corner(&self.low), corner(&self.high));
-        let widest = WIDER[0] * 0.5 * (high - low).length() + WIDER[1];
+        let widest = CONE_GROWTH * 0.5 * (high - low).length() + CONE_ROOM;
         // Where rays leave to all sides none is farther than that from the normal.
         let axis = if widest < FRAC_PI_2 { low + high } else { normal };
         if let Some(axis) = axis.try_normalize() {
             let widest = widest.min(FRAC_PI_2);
             match cone::cosine(tree, facet, axis, widest) {
                 Some(cosine) => cone.set(axis, cosine),
-                // Something stands right ahead: what leaves is met, and the facet no longer watched.
+                // Something stands right ahead: what leaves is met, and the facet no longer record.
                 None => cone.axis.iter().for_each(|x| x.store(0, Ordering::Relaxed)),
             }
         }
@@ -178,38 +186,39 @@ impl Watched {
 
 impl Horizons {
     /// None yet, for a run of so many rays; `None` when they are too few for the search.
-    pub(super) fn expecting(rays: u64, tree: &Octree) -> Option<Self> {
-        let mesh = tree.around.mesh;
+    pub(super) fn if_worth(rays: u64, tree: &Tree) -> Option<Self> {
+        let mesh = tree.surroundings.mesh;
         let each = rays / mesh.facets.len().max(1) as u64;
-        let patience = if each >= 2 * u64::from(PATIENCE) { IMPATIENCE } else { PATIENCE };
+        let rays_before_search =
+            if each >= 2 * u64::from(RAYS_BESIDE_CONE) { FEWER_BESIDE_CONE } else { RAYS_BESIDE_CONE };
         let cone = |f: usize| {
             let [a, b, c, _] = mesh.corners(f);
-            Cone::around((b - a).cross(c - a).normalize_or_zero())
+            Cone::unknown((b - a).cross(c - a).normalize_or_zero())
         };
-        (each >= WORTH).then(|| Self {
+        (each >= LEAST_RAYS_PER_FACET).then(|| Self {
             cones: (0..mesh.facets.len()).map(cone).collect(),
-            facets: mesh.facets.iter().map(|_| Watched::new()).collect(),
-            patience,
+            facets: mesh.facets.iter().map(|_| RayRecord::new()).collect(),
+            rays_before_search,
         })
     }
 
     /// Whether a ray that leaves this facet is known to meet nothing.
     #[inline(always)]
-    pub(super) fn clear(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
+    pub(super) fn is_free(&self, tree: &Tree, facet: usize, direction: Vector) -> bool {
         let Some(cone) = self.cones.get(facet) else { return false };
-        let (along, cosine) = cone.ask(direction);
+        let (along, cosine) = cone.cosines(direction);
         // Far from the axis it goes into the body.
-        along > cosine || (along > 0.0 && self.rises(tree, facet, direction))
+        along > cosine || (along > 0.0 && self.is_above_horizon(tree, facet, direction))
     }
 
     /// The same of a ray beside the cone of the facet.
     #[inline(never)]
-    fn rises(&self, tree: &Octree, facet: usize, direction: Vector) -> bool {
-        let watched = &self.facets[facet];
-        match watched.horizon.get() {
+    fn is_above_horizon(&self, tree: &Tree, facet: usize, direction: Vector) -> bool {
+        let record = &self.facets[facet];
+        match record.horizon.get() {
             Some(horizon) => horizon.is_below(direction),
             None => {
-                watched.watch(tree, facet, &self.cones[facet], direction, self.patience);
+                record.note(tree, facet, &self.cones[facet], direction, self.rays_before_search);
                 false
             }
         }

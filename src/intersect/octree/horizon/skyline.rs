@@ -7,14 +7,23 @@
 //!
 //! Weakness: eight sectors of one angle each, so that out of a narrow shaft no ray is seen to be free.
 
-use super::{LINES, Lines, lines_around};
-use crate::intersect::octree::Octree;
+use super::{BOX_ROOM, LINES, Lines, lines_around};
 use crate::intersect::octree::node::{Link, Target};
+use crate::intersect::octree::tree::Tree;
 use crate::math::{Aabb, Point, Vector, orthonormal_pair};
 use std::f64::consts::FRAC_PI_8;
 
 /// Slope above which a horizon is of no use.
-const STEEP: f64 = 8.0;
+const STEEPEST_OF_USE: f64 = 8.0;
+/// Square of the sine to the normal below which a ray counts as upright: its coordinates in the plane are then rounded by 2⁻²⁴ of
+/// 1e-3, a ten-thousandth of a sector's width.
+const UPRIGHT: f32 = 1e-6;
+/// Half a sector is widened by this much, radians, for f32 coordinates at [`UPRIGHT`].
+const SECTOR_ROOM: f64 = 1e-3;
+/// Relative room on squared slopes for the rounding of what is asked in f32.
+const SLOPE_ROOM: f64 = 1e-4;
+/// Absolute room on squared slopes, for slopes near zero.
+const UPRIGHT_ROOM: f64 = 1e-6;
 /// Sectors around a triangle: a ray is in one by the signs and the order of its two coordinates in the plane.
 pub(super) const SECTORS: usize = 8;
 
@@ -52,7 +61,7 @@ impl Skyline {
         let (up, x, y) = (dot(self.normal), dot(self.x), dot(self.y));
         let flat2 = x * x + y * y;
         // Nearly upright the sector is a matter of rounding.
-        let upright = flat2 < 1e-6;
+        let upright = flat2 < UPRIGHT;
         let slope2 = if upright { self.steepest } else { self.slope2[sector(x, y)] };
         up > 0.0 && up * up > slope2 * flat2 && slope2 < f32::INFINITY
     }
@@ -67,19 +76,20 @@ impl Horizon {
 }
 
 /// The horizon of a facet, in each sector no lower than the slope `floor`.
-pub(super) fn of_facet(tree: &Octree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
-    let mesh = tree.around.mesh;
+pub(super) fn of_facet(tree: &Tree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
+    let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
     let [first, second] = [[a, b, c], [a, c, d]];
-    let of = |own: [Point; 3], other: [Point; 3]| {
-        let base = Base::new(own, tree.around.reach)?;
+    let skyline_from = |own: [Point; 3], other: [Point; 3]| {
+        let base = Base::new(own, tree.surroundings.reach)?;
         let rise = base.rise(&other);
         Some(base.skyline(tree, facet, std::array::from_fn(|s| rise[s].max(floor[s]))))
     };
-    let one = of(first, second).unwrap_or(Skyline::UNKNOWN);
-    match mesh.facets[facet].is_triangle() {
-        true => Horizon([one; 2]),
-        false => Horizon([one, of(second, first).unwrap_or(Skyline::UNKNOWN)]),
+    let one = skyline_from(first, second).unwrap_or(Skyline::UNKNOWN);
+    if mesh.facets[facet].is_triangle() {
+        Horizon([one; 2])
+    } else {
+        Horizon([one, skyline_from(second, first).unwrap_or(Skyline::UNKNOWN)])
     }
 }
 
@@ -101,7 +111,7 @@ impl Base {
         let (normal, lines) = lines_around(corners)?;
         let (x, y) = orthonormal_pair(normal);
         // Half a sector, and room for the rounding of where a ray belongs.
-        let half = FRAC_PI_8 + 1e-3;
+        let half = FRAC_PI_8 + SECTOR_ROOM;
         let toward = lines.map(|(across, _)| {
             std::array::from_fn(|sector| {
                 let middle = if sector & 4 == 0 { FRAC_PI_8 } else { 3.0 * FRAC_PI_8 };
@@ -115,14 +125,14 @@ impl Base {
     }
 
     /// How steeply anything stands over the plane, seen from the triangle, at least `slopes`.
-    fn skyline(&self, tree: &Octree, facet: usize, mut slopes: [f64; SECTORS]) -> Skyline {
-        let mesh = tree.around.mesh;
+    fn skyline(&self, tree: &Tree, facet: usize, mut slopes: [f64; SECTORS]) -> Skyline {
+        let mesh = tree.surroundings.mesh;
         let higher = |slopes: &[f64; SECTORS], rise: &[f64; SECTORS]| {
-            slopes.iter().zip(rise).any(|(slope, rise)| *slope <= STEEP && rise > slope)
+            slopes.iter().zip(rise).any(|(slope, rise)| *slope <= STEEPEST_OF_USE && rise > slope)
         };
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
-            if slopes.iter().all(|s| *s > STEEP) {
+            if slopes.iter().all(|s| *s > STEEPEST_OF_USE) {
                 return Skyline::UNKNOWN;
             }
             match link.target() {
@@ -150,7 +160,9 @@ impl Base {
             }
         }
         // Room for f32.
-        let slope2 = slopes.map(|s| if s <= STEEP { (s * s * (1.0 + 1e-4) + 1e-6) as f32 } else { f32::INFINITY });
+        let slope2 = slopes.map(|s| {
+            if s <= STEEPEST_OF_USE { (s * s * (1.0 + SLOPE_ROOM) + UPRIGHT_ROOM) as f32 } else { f32::INFINITY }
+        });
         let [normal, x, y] = [self.normal, self.x, self.y].map(|v| v.to_array().map(|x| x as f32));
         Skyline { normal, x, y, slope2, steepest: slope2.into_iter().fold(0.0, f32::max) }
     }
@@ -158,7 +170,7 @@ impl Base {
     /// No less than [`Self::rise`] of its corners, from the highest of them and those nearest to the lines.
     fn rise_of_box(&self, b: &Aabb) -> [f64; SECTORS] {
         let (middle, half) = (b.center() - self.origin, 0.5 * b.size());
-        let room = 1e-6 * half.max_element();
+        let room = BOX_ROOM * half.max_element();
         let height = middle.dot(self.normal) + half.dot(self.normal.abs()) + room;
         if height <= self.reach {
             return [0.0; SECTORS];

@@ -1,10 +1,10 @@
-//! Drawing facets into the squares of a map.
+//! Drawing facets into the squares of a light buffer.
 //!
-//! A square of the map is a pyramid, or a prism, in space; a facet is put into it unless all its corners lie beyond one of its
-//! sides, or, where the facet is wholly in front, its two triangles as the map shows them pass the square by. Squares are wider than
+//! A square is a pyramid, or a prism, in space; a facet is put into it unless all its corners lie beyond one of its
+//! sides, or, where the facet is wholly in front, its two triangles as the source sees them pass the square by. Squares are wider than
 //! they are by far more than a ray's place can be wrong.
 
-use super::{DIVIDED, Entry, FINE, Map, Slot, Square, View};
+use super::{BufferFacet, DIVIDED, DIVISIONS, Entry, LightBuffer, PLANE_ROOM, Square, View};
 use crate::intersect::facet::is_usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
@@ -12,20 +12,25 @@ use rustc_hash::FxHashMap;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Room around a square, in units of the half side of the map.
+/// Room around a square, in units of the half side of the buffer.
 const ROOM: f64 = 1e-8;
+/// Least depth of the corners of a facet that is projected, relative to its farthest corner: nearer to the plane of the source its
+/// place would be wrong by more than the room around squares.
+const LEAST_DEPTH: f64 = 1e-6;
+/// How far beyond a side of a window all corners must lie, relative to the farthest of them, to be beyond it whatever the rounding of f64.
+const BEHIND: f64 = 1e-12;
 /// Facets in a square that is not divided further: four meet at a corner of a grid of quads, however small the squares.
-const FEW: usize = 6;
-/// How often a square of the map may be divided.
-const DEEPEST: u32 = 3;
-/// Parts along a side of a map that are drawn at the same time.
-const SHEETS: usize = 4;
-/// Squares of the whole map for each facet before any is divided.
+const MOST_ENTRIES: usize = 6;
+/// How often a square of the buffer may be divided.
+const MOST_DIVISIONS: u32 = 3;
+/// Tiles along a side of a buffer that are drawn at the same time.
+const TILES: usize = 4;
+/// Squares of the whole buffer for each facet before any is divided.
 const SQUARES: usize = 16;
 /// Squares and entries for each facet at which dividing ends.
-const ROOMY: usize = 64;
+const MOST_PER_FACET: usize = 64;
 
-/// A square of the map with the room around it.
+/// A square of the buffer with the room around it.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     low: [f64; 2],
@@ -35,7 +40,7 @@ struct Window {
 impl Window {
     const WHOLE: Self = Self { low: [-1.0 - ROOM; 2], high: [1.0 + ROOM; 2] };
 
-    fn misses(&self, o: &Self) -> bool {
+    fn is_apart(&self, o: &Self) -> bool {
         (self.low[0] > o.high[0])
             | (self.low[1] > o.high[1])
             | (o.low[0] > self.high[0])
@@ -52,9 +57,9 @@ impl Window {
     }
 }
 
-/// A facet as a map shows it.
+/// A facet as the source sees it.
 #[derive(Clone, Copy, Debug)]
-struct Shadow {
+struct Projection {
     facet: u32,
     /// Homogeneous places of the corners: `[x, y, w]` stands at `[x/w, y/w]`.
     corners: [[f64; 3]; 4],
@@ -69,7 +74,7 @@ struct Shadow {
     whole: bool,
 }
 
-impl Shadow {
+impl Projection {
     fn new(facet: u32, corners: [Point; 4], view: &View, side: usize) -> Option<Self> {
         let mut depths = [0.0; 4];
         let corners: [[f64; 3]; 4] = std::array::from_fn(|k| {
@@ -91,12 +96,12 @@ impl Shadow {
             }
         });
         let size = corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let front = corners.iter().all(|c| c[2] > 1e-6 * size);
+        let front = corners.iter().all(|c| c[2] > LEAST_DEPTH * size);
         let places = front.then(|| corners.map(|[x, y, w]| [x / w, y / w]));
         let (near, far) =
             depths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), d| (l.min(*d), h.max(*d)));
         let (start, stray) = match view {
-            View::Point(_) => (0.0, 1e-9 * far.abs()),
+            View::Point(_) => (0.0, PLANE_ROOM * far.abs()),
             View::Along { start, stray, .. } => (*start, *stray),
         };
         let bounds = places.map_or(Window::WHOLE, |places| Window {
@@ -105,23 +110,23 @@ impl Shadow {
         });
         // Room for the rounding of depths.
         let (near, far) = (near - 2.0 * stray, far + 2.0 * stray);
-        let shadow = Self { facet, corners, places, bounds, near, far, whole: near > start };
-        (far >= start && shadow.meets(&Window::WHOLE)).then_some(shadow)
+        let projection = Self { facet, corners, places, bounds, near, far, whole: near > start };
+        (far >= start && projection.overlaps(&Window::WHOLE)).then_some(projection)
     }
 
     /// Whether a ray through the window may meet it.
-    fn meets(&self, window: &Window) -> bool {
-        if self.bounds.misses(window) {
+    fn overlaps(&self, window: &Window) -> bool {
+        if self.bounds.is_apart(window) {
             return false;
         }
         let Some([a, b, c, d]) = self.places else { return self.is_around(window) };
-        triangle_meets([a, b, c], window) || (c != d && triangle_meets([a, c, d], window))
+        triangle_overlaps([a, b, c], window) || (c != d && triangle_overlaps([a, c, d], window))
     }
 
     /// Whether its corners do not all lie beyond one side of the window, nor behind.
     fn is_around(&self, window: &Window) -> bool {
         let size = self.corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let beyond = |value: &dyn Fn(&[f64; 3]) -> f64| self.corners.iter().all(|c| value(c) < -1e-12 * size);
+        let beyond = |value: &dyn Fn(&[f64; 3]) -> f64| self.corners.iter().all(|c| value(c) < -BEHIND * size);
         let out = |a: usize| beyond(&|c| c[a] - window.low[a] * c[2]) || beyond(&|c| window.high[a] * c[2] - c[a]);
         !(out(0) || out(1) || beyond(&|c| c[2]))
     }
@@ -140,19 +145,19 @@ impl Shadow {
         }
         let edges: &[[usize; 2]] =
             if triangle { &[[0, 1], [1, 2], [2, 0]] } else { &[[0, 1], [1, 2], [2, 3], [3, 0]] };
-        edges.iter().all(|&[i, j]| least(p[i], p[j], first.signum(), window) > 0.0)
+        edges.iter().all(|&[i, j]| least_edge(p[i], p[j], first.signum(), window) > 0.0)
     }
 }
 
 /// The least of the edge function of a line over the window, times `sign`.
-fn least(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
+fn least_edge(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
     let [dx, dy] = [sign * (q[0] - p[0]), sign * (q[1] - p[1])];
     let x = if dy > 0.0 { window.high[0] } else { window.low[0] };
     let y = if dx > 0.0 { window.low[1] } else { window.high[1] };
     dx * (y - p[1]) - dy * (x - p[0])
 }
 
-fn triangle_meets(t: [[f64; 2]; 3], window: &Window) -> bool {
+fn triangle_overlaps(t: [[f64; 2]; 3], window: &Window) -> bool {
     for a in 0..2 {
         let beyond = |past: &dyn Fn(f64) -> bool| t.iter().all(|p| past(p[a]));
         if beyond(&|x| x < window.low[a]) || beyond(&|x| x > window.high[a]) {
@@ -161,30 +166,31 @@ fn triangle_meets(t: [[f64; 2]; 3], window: &Window) -> bool {
     }
     let turn = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
     // The greatest of an edge function is the least of its negative.
-    turn == 0.0 || [[0, 1], [1, 2], [2, 0]].iter().all(|&[i, j]| least(t[i], t[j], -turn.signum(), window) <= 0.0)
+    turn == 0.0
+        || [[0, 1], [1, 2], [2, 0]].iter().all(|&[i, j]| least_edge(t[i], t[j], -turn.signum(), window) <= 0.0)
 }
 
-/// Draws all facets of a mesh, with so many threads; the map does not depend on their number.
-pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> Map {
+/// Draws all facets of a mesh, with so many threads; the buffer does not depend on their number.
+pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> LightBuffer {
     let facets = mesh.facets.len();
     let squares = (SQUARES * facets) as f64 / view.sides() as f64;
     let side = (squares.sqrt() as usize).next_power_of_two().clamp(8, 1024);
-    let shadows = in_parallel(view.sides(), threads, |face| shadows(mesh, &view, face));
-    let room = ROOMY * facets.max(64) / 8;
-    let sheets = in_parallel(view.sides() * SHEETS * SHEETS, threads, |k| {
-        let window = Window::WHOLE.part(SHEETS, [k % SHEETS, k / SHEETS % SHEETS]);
-        Sheet::draw(&shadows[k / (SHEETS * SHEETS)], &window, side / SHEETS, room)
+    let projections = in_parallel(view.sides(), threads, |face| projections(mesh, &view, face));
+    let room = MOST_PER_FACET * facets.max(64) / 8;
+    let tiles = in_parallel(view.sides() * TILES * TILES, threads, |k| {
+        let window = Window::WHOLE.part(TILES, [k % TILES, k / TILES % TILES]);
+        Tile::draw(&projections[k / (TILES * TILES)], &window, side / TILES, room)
     });
     let squares = vec![Square::default(); view.sides() * side * side];
-    let facets: Vec<Vec<u32>> = shadows.iter().map(|s| s.iter().map(|s| s.facet).collect()).collect();
-    let slots = Slot::all(mesh, &view, &facets);
-    let mut map = Map { view, side, squares, entries: Vec::new(), slots };
-    for (k, sheet) in sheets.into_iter().enumerate() {
-        // Slots stand side after side in the order of the shadows.
-        let first: usize = facets[..k / (SHEETS * SHEETS)].iter().map(Vec::len).sum();
-        sheet.paste(&mut map, k, first as u32);
+    let facets: Vec<Vec<u32>> = projections.iter().map(|s| s.iter().map(|s| s.facet).collect()).collect();
+    let shown = BufferFacet::on_all_sides(mesh, &view, &facets);
+    let mut buffer = LightBuffer { view, side, squares, entries: Vec::new(), facets: shown };
+    for (k, tile) in tiles.into_iter().enumerate() {
+        // Facets stand side after side in the order of the projections.
+        let first: usize = facets[..k / (TILES * TILES)].iter().map(Vec::len).sum();
+        tile.copy_into(&mut buffer, k, first as u32);
     }
-    map
+    buffer
 }
 
 /// The values of a function at 0 to `n`, worked out on so many threads.
@@ -203,120 +209,129 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
     values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-/// All facets that a map shows, the nearest first.
-fn shadows(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Shadow> {
-    let shadow = |f: usize| {
+/// All facets that a buffer shows, the nearest first.
+fn projections(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Projection> {
+    let projection = |f: usize| {
         let corners = mesh.corners(f);
-        corners.iter().all(|p| is_usable(*p)).then(|| Shadow::new(f as u32, corners, view, face)).flatten()
+        corners.iter().all(|p| is_usable(*p)).then(|| Projection::new(f as u32, corners, view, face)).flatten()
     };
-    let mut shadows: Vec<Shadow> = (0..mesh.facets.len()).filter_map(shadow).collect();
-    shadows.sort_by(|a, b| a.near.total_cmp(&b.near).then(a.facet.cmp(&b.facet)));
-    shadows
+    let mut projections: Vec<Projection> = (0..mesh.facets.len()).filter_map(projection).collect();
+    projections.sort_by(|a, b| a.near.total_cmp(&b.near).then(a.facet.cmp(&b.facet)));
+    projections
 }
 
-/// A part of a map, drawn by itself: its squares row by row, then those of divided squares.
-struct Sheet {
+/// A part of a buffer, drawn by itself: its squares row by row, then those of divided squares.
+struct Tile {
     side: usize,
     squares: Vec<Square>,
     entries: Vec<Entry>,
 }
 
-impl Sheet {
-    fn draw(shadows: &[Shadow], window: &Window, side: usize, room: usize) -> Self {
-        let sheet = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
-        let mut drawing = Drawing { sheet, written: FxHashMap::default(), shadows, room };
-        let all: Vec<u32> = (0..shadows.len() as u32).collect();
-        drawing.quarter(drawing.seen(&all, window), window, [0, 0], side);
-        drawing.sheet
+impl Tile {
+    fn draw(projections: &[Projection], window: &Window, side: usize, room: usize) -> Self {
+        let tile = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
+        let mut rasterizer = Rasterizer { tile, written: FxHashMap::default(), projections, room };
+        let all: Vec<u32> = (0..projections.len() as u32).collect();
+        rasterizer.divide_tile(rasterizer.visible(&all, window), window, [0, 0], side);
+        rasterizer.tile
     }
 
-    /// Puts it into its place in the map.
-    fn paste(self, map: &mut Map, k: usize, first_slot: u32) {
-        let (face, i, j) = (k / (SHEETS * SHEETS), k % SHEETS, k / SHEETS % SHEETS);
+    /// Puts it into its place in the buffer.
+    fn copy_into(self, buffer: &mut LightBuffer, k: usize, first_facet: u32) {
+        let (face, i, j) = (k / (TILES * TILES), k % TILES, k / TILES % TILES);
         let own = self.side * self.side;
-        let (squares, entries) = (map.squares.len(), map.entries.len());
-        let moved = |s: &Square| match s.count & DIVIDED != 0 {
-            true => Square { first: (s.first as usize - own + squares) as u32, ..*s },
-            false => Square { first: (s.first as usize + entries) as u32, ..*s },
+        let (squares, entries) = (buffer.squares.len(), buffer.entries.len());
+        let moved = |s: &Square| {
+            let first = s.first as usize;
+            let first = if s.count & DIVIDED != 0 { first - own + squares } else { first + entries };
+            Square { first: first as u32, ..*s }
         };
         for (row, own) in self.squares[..own].chunks(self.side).enumerate() {
-            let at = (face * map.side + j * self.side + row) * map.side + i * self.side;
-            map.squares[at..at + self.side].iter_mut().zip(own).for_each(|(to, from)| *to = moved(from));
+            let at = (face * buffer.side + j * self.side + row) * buffer.side + i * self.side;
+            buffer.squares[at..at + self.side].iter_mut().zip(own).for_each(|(to, from)| *to = moved(from));
         }
-        map.squares.extend(self.squares[own..].iter().map(moved));
-        map.entries.extend(self.entries.into_iter().map(|e| Entry { slot: e.slot + first_slot, ..e }));
+        buffer.squares.extend(self.squares[own..].iter().map(moved));
+        buffer.entries.extend(self.entries.into_iter().map(|e| Entry { facet: e.facet + first_facet, ..e }));
     }
 }
 
-struct Drawing<'a> {
+struct Rasterizer<'a> {
     /// The nearest first.
-    shadows: &'a [Shadow],
-    sheet: Sheet,
+    projections: &'a [Projection],
+    tile: Tile,
     /// Where lists of facets stand, which several squares share.
     written: FxHashMap<Vec<u32>, u32>,
     /// Squares and entries at which dividing ends.
     room: usize,
 }
 
-impl Drawing<'_> {
+impl Rasterizer<'_> {
     /// Those of `list` that a ray through the window may meet first, in their order.
-    fn seen(&self, list: &[u32], window: &Window) -> Vec<u32> {
-        let mut seen = Vec::new();
+    fn visible(&self, list: &[u32], window: &Window) -> Vec<u32> {
+        let mut visible = Vec::new();
         let mut end = f64::INFINITY;
         for &k in list {
-            let shadow = &self.shadows[k as usize];
-            if shadow.near > end {
+            let projection = &self.projections[k as usize];
+            if projection.near > end {
                 break;
             }
-            if shadow.meets(window) {
-                seen.push(k);
-                if shadow.fills(window) {
-                    end = end.min(shadow.far);
+            if projection.overlaps(window) {
+                visible.push(k);
+                if projection.fills(window) {
+                    end = end.min(projection.far);
                 }
             }
         }
-        seen.retain(|&k| self.shadows[k as usize].near <= end);
-        seen
+        visible.retain(|&k| self.projections[k as usize].near <= end);
+        visible
     }
 
-    /// Goes down to the squares of the sheet, `side` of which lie along a side of this window.
-    fn quarter(&mut self, list: Vec<u32>, window: &Window, at: [usize; 2], side: usize) {
+    /// Goes down to the squares of the tile, `side` of which lie along a side of this window.
+    fn divide_tile(&mut self, list: Vec<u32>, window: &Window, at: [usize; 2], side: usize) {
         if list.is_empty() {
             return;
         }
         if side == 1 {
-            return self.settle(list, window, at[1] * self.sheet.side + at[0], 0);
+            return self.write_square(list, window, at[1] * self.tile.side + at[0], 0);
         }
         for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let part = window.part(2, [i, j]);
-            self.quarter(self.seen(&list, &part), &part, [at[0] + i * side / 2, at[1] + j * side / 2], side / 2);
+            self.divide_tile(
+                self.visible(&list, &part),
+                &part,
+                [at[0] + i * side / 2, at[1] + j * side / 2],
+                side / 2,
+            );
         }
     }
 
     /// Writes the facets of a square, or divides it.
-    fn settle(&mut self, list: Vec<u32>, window: &Window, place: usize, depth: u32) {
-        let sheet = &mut self.sheet;
-        if list.len() <= FEW || depth == DEEPEST || sheet.squares.len() + sheet.entries.len() > self.room {
+    fn write_square(&mut self, list: Vec<u32>, window: &Window, place: usize, depth: u32) {
+        let tile = &mut self.tile;
+        if list.len() <= MOST_ENTRIES
+            || depth == MOST_DIVISIONS
+            || tile.squares.len() + tile.entries.len() > self.room
+        {
             let count = list.len() as u32;
             let first = *self.written.entry(list).or_insert_with_key(|list| {
-                let first = sheet.entries.len() as u32;
-                sheet.entries.extend(list.iter().map(|&k| {
-                    let shadow = &self.shadows[k as usize];
-                    Entry { near: (shadow.near as f32).next_down(), slot: k }
+                let first = tile.entries.len() as u32;
+                tile.entries.extend(list.iter().map(|&k| {
+                    let projection = &self.projections[k as usize];
+                    Entry { near: (projection.near as f32).next_down(), facet: k }
                 }));
                 first
             });
-            sheet.squares[place] = Square { first, count };
+            tile.squares[place] = Square { first, count };
             return;
         }
-        let first = sheet.squares.len();
-        sheet.squares[place] = Square { first: first as u32, count: DIVIDED };
-        sheet.squares.resize(first + FINE * FINE, Square::default());
-        for j in 0..FINE {
-            for i in 0..FINE {
-                let part = window.part(FINE, [i, j]);
-                let seen = self.seen(&list, &part);
-                self.settle(seen, &part, first + j * FINE + i, depth + 1);
+        let first = tile.squares.len();
+        tile.squares[place] = Square { first: first as u32, count: DIVIDED };
+        tile.squares.resize(first + DIVISIONS * DIVISIONS, Square::default());
+        for j in 0..DIVISIONS {
+            for i in 0..DIVISIONS {
+                let part = window.part(DIVISIONS, [i, j]);
+                let visible = self.visible(&list, &part);
+                self.write_square(visible, &part, first + j * DIVISIONS + i, depth + 1);
             }
         }
     }

@@ -1,38 +1,46 @@
 //! What a source sees: the first facets that rays from one point, or along one direction, may meet.
 //!
 //! All rays of a point source start at one place, and those of a collimated one run one way: which facet such a ray meets first
-//! depends on two numbers alone. A map of squares over these two, on the six sides of a cube around the point or in a plane across
-//! the direction, keeps for each square the facets that a ray through it may meet, the nearest first, without those behind a facet
-//! that fills the square. A ray looks its square up and tests the one or two facets there, and does not walk the tree.
+//! depends on two numbers alone. A light buffer is a grid of squares over these two, on the six sides of a cube around the point or
+//! in a plane across the direction. Each square keeps the facets that a ray through it may meet, the nearest first, without those
+//! behind a facet that fills the square. A ray looks its square up and tests the one or two facets there, and does not walk the tree.
 //!
 //! Source: Haines, Greenberg, *The Light Buffer: A Shadow-Testing Accelerator*, IEEE CG&A 6(9), 1986, here for nearest hits, with
 //! squares that are divided where many facets meet.
 //!
 //! Guarantee: the hits of the walk, bit by bit; facets are put into squares with room for rounding, and the facet's own test
-//! decides. Weakness: a source with an extent has no such map.
+//! decides. Weakness: a source with an extent has no light buffer.
 
-pub(super) mod pair;
+mod buffer_facet;
+mod pair;
 mod raster;
-mod slot;
 
-use super::Octree;
-use super::engine::Lanes;
+use super::facet_pair::Edges;
+use super::lanes::Lanes;
+use super::tree::Tree;
 use crate::intersect::facet::{FacetHit, FacetRay, Line, Nearest};
 use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, ExpectedRays};
 use crate::math::{Point, Ray, Vector, orthonormal_pair};
-use pair::Edges;
-use slot::Slot;
+use buffer_facet::BufferFacet;
 use std::hint::select_unpredictable;
 
-/// Rays for each facet from which on a map pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
-const WORTH: u64 = 200;
-/// Facets above which no map is drawn: drawing takes 500 bytes for each.
-const LARGEST: usize = 1 << 18;
-/// Most maps that are kept.
-const MOST: usize = 16;
+/// Rays for each facet from which on a light buffer pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
+const LEAST_RAYS_PER_FACET: u64 = 200;
+/// Facets above which none is drawn: one takes 500 bytes for each.
+const MOST_FACETS: usize = 1 << 18;
+/// By how much the grid of a collimated source is wider than the mesh, relative to it: sixteen roundings of f32, far above those of f64.
+const SPAN_ROOM: f64 = 1e-6;
+/// Distance of the mesh from the origin, in half widths of the grid, above which none is drawn: a place is then wrong by up to
+/// 2⁻⁵³·10⁶ ≈ 1e-10 of the grid, a hundredth of the room around its squares.
+const FARTHEST_MIDDLE: f64 = 1e6;
+/// By how much starts may stray from the plane of a collimated source, relative to its place and the mesh: a million roundings, so that
+/// starts which were computed in any way are taken.
+const PLANE_ROOM: f64 = 1e-9;
+/// Most buffers that are kept.
+const MOST_BUFFERS: usize = 16;
 /// Squares along each side of a divided square.
-const FINE: usize = 4;
+const DIVISIONS: usize = 4;
 /// Set in [`Square::count`] where the square is divided.
 const DIVIDED: u32 = 1 << 31;
 
@@ -46,9 +54,10 @@ struct Square {
 /// A facet that a ray may meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Entry {
-    /// It lies nowhere nearer than this, in the depth of the map.
+    /// It lies nowhere nearer than this, in the depth of the buffer.
     near: f32,
-    slot: u32,
+    /// Index into [`LightBuffer::facets`].
+    facet: u32,
 }
 
 /// How places are seen from a source.
@@ -61,36 +70,36 @@ enum View {
     Along { origin: Point, direction: Vector, across: [Vector; 2], middle: [f64; 2], start: f64, stray: f64 },
 }
 
-/// The maps of one source.
+/// The buffers of one source.
 #[derive(Clone, Debug)]
-pub(super) struct Map {
+pub(super) struct LightBuffer {
     view: View,
-    /// Squares along each side of the map.
+    /// Squares along each side of the buffer.
     side: usize,
-    /// Those of the map, side after side of the cube, then those of divided squares.
+    /// Those of the buffer, side after side of the cube, then those of divided squares.
     squares: Vec<Square>,
     entries: Vec<Entry>,
-    slots: Vec<Slot>,
+    facets: Vec<BufferFacet>,
 }
 
-/// Where a ray looks.
+/// Where a ray lookups.
 #[derive(Clone, Copy)]
-struct Look {
+struct Lookup {
     index: u16,
-    map: u16,
+    buffer: u16,
     square: u32,
     /// Place in the square.
     rest: [f64; 2],
-    /// From distances along the ray to depths of the map.
+    /// From distances along the ray to depths of the buffer.
     scale: f64,
     shift: f64,
     line: Line,
 }
 
-impl Look {
+impl Lookup {
     const IDLE: Self = Self {
         index: 0,
-        map: 0,
+        buffer: 0,
         square: 0,
         rest: [0.0; 2],
         scale: 1.0,
@@ -100,26 +109,26 @@ impl Look {
 }
 
 /// Rays that are looked up together.
-const TOGETHER: usize = 32;
+const LOOKUP_BATCH: usize = 32;
 
 impl View {
-    fn of(beam: &Beam, tree: &Octree) -> Option<Self> {
+    fn from_beam(beam: &Beam, tree: &Tree) -> Option<Self> {
         match beam {
             Beam::Point(origin) => origin.is_finite().then(|| Self::Point(origin.to_array())),
             Beam::Collimated { origin, direction } => {
                 let (x, y) = orthonormal_pair(*direction);
                 let span = |axis: Vector| {
-                    let along = tree.around.bounds.corners().map(|p| p.dot(axis));
+                    let along = tree.surroundings.bounds.corners().map(|p| p.dot(axis));
                     let (low, high) =
                         along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
-                    (0.5 * (low + high), 0.5 * (high - low) * (1.0 + 1e-6))
+                    (0.5 * (low + high), 0.5 * (high - low) * (1.0 + SPAN_ROOM))
                 };
                 let ((a, width), (b, height)) = (span(x), span(y));
                 let half = width.max(height);
                 // Rounding must stay small against a square.
-                let fits = half > 0.0 && (a.abs() + b.abs()) < 1e6 * half && direction.is_normalized();
+                let fits = half > 0.0 && (a.abs() + b.abs()) < FARTHEST_MIDDLE * half && direction.is_normalized();
                 let start = origin.dot(*direction);
-                let stray = 1e-9 * (start.abs() + half);
+                let stray = PLANE_ROOM * (start.abs() + half);
                 let (across, middle) = ([x / half, y / half], [a / half, b / half]);
                 (fits && origin.is_finite()).then_some(Self::Along {
                     origin: *origin,
@@ -133,14 +142,14 @@ impl View {
         }
     }
 
-    /// Number of maps.
+    /// Number of buffers.
     fn sides(&self) -> usize {
         if matches!(self, Self::Point(_)) { 6 } else { 1 }
     }
 
-    /// Whether a ray that starts on no face is one of those that are seen.
+    /// Whether a ray that starts on no face is one of those that the buffer shows.
     #[inline(always)]
-    fn sees(&self, ray: &Ray) -> bool {
+    fn shows(&self, ray: &Ray) -> bool {
         match self {
             Self::Point(origin) => ray.origin.to_array() == *origin,
             Self::Along { direction, start, stray, .. } => {
@@ -150,32 +159,37 @@ impl View {
     }
 }
 
-/// The maps for these sources, as far as they pay; those that are there already are kept.
-pub(super) fn find(tree: &Octree, expected: &ExpectedRays<'_>, mut there: Vec<Map>) -> Vec<Map> {
-    let mut maps: Vec<Map> = Vec::new();
-    let facets = tree.around.mesh.facets.len();
-    let worth = |rays: u64| facets <= LARGEST && rays / WORTH >= facets as u64;
-    let views = expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::of(beam, tree));
+/// The buffers for these sources, as far as they pay; those of `kept` are not drawn again.
+pub(super) fn draw_expected(
+    tree: &Tree,
+    expected: &ExpectedRays<'_>,
+    mut kept: Vec<LightBuffer>,
+) -> Vec<LightBuffer> {
+    let mut buffers: Vec<LightBuffer> = Vec::new();
+    let facets = tree.surroundings.mesh.facets.len();
+    let worth = |rays: u64| facets <= MOST_FACETS && rays / LEAST_RAYS_PER_FACET >= facets as u64;
+    let views =
+        expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::from_beam(beam, tree));
     for view in views {
-        if maps.len() < MOST && maps.iter().all(|m| m.view != view) {
-            let own = there.iter().position(|m| m.view == view).map(|k| there.swap_remove(k));
-            maps.push(own.unwrap_or_else(|| raster::draw(tree.around.mesh, view, expected.threads)));
+        if buffers.len() < MOST_BUFFERS && buffers.iter().all(|m| m.view != view) {
+            let drawn = kept.iter().position(|m| m.view == view).map(|k| kept.swap_remove(k));
+            buffers.push(drawn.unwrap_or_else(|| raster::draw(tree.surroundings.mesh, view, expected.threads)));
         }
     }
-    maps
+    buffers
 }
 
-impl Map {
-    /// Where a ray looks first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
+impl LightBuffer {
+    /// Where a ray lookups first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
     /// instruction set.
     #[inline(always)]
-    fn look(&self, (index, map): (usize, usize), ray: &Ray, look: &mut Look) -> bool {
+    fn locate(&self, ray: &Ray, lookup: &mut Lookup) -> bool {
         let prepared = FacetRay::new(ray);
-        look.line = prepared.line();
+        lookup.line = prepared.line();
         let (side, [x, y], scale, shift) = match &self.view {
             View::Point(_) => {
-                let [sx, sy, sz] = look.line.shear;
-                // Slopes are against the main axis as it points; the sides of the cube look outward.
+                let [sx, sy, sz] = lookup.line.shear;
+                // Slopes are against the main axis as it points; the sides of the cube lookup outward.
                 let sign = 1f64.copysign(sz);
                 let main = prepared.axes()[2];
                 (2 * main + usize::from(sz < 0.0), [sx * sign, sy * sign], ray.direction[main].abs(), 0.0)
@@ -190,40 +204,40 @@ impl Map {
         // False for NaN too.
         let inside = (x >= 0.0) & (x <= n) & (y >= 0.0) & (y <= n);
         let (i, j) = ((x as usize).min(self.side - 1), (y as usize).min(self.side - 1));
-        look.square = select_unpredictable(inside, (side * self.side + j) * self.side + i, 0) as u32;
-        look.rest = [x - i as f64, y - j as f64];
-        (look.scale, look.shift) = (scale, shift);
-        (look.index, look.map) = (index as u16, map as u16);
+        lookup.square = select_unpredictable(inside, (side * self.side + j) * self.side + i, 0) as u32;
+        lookup.rest = [x - i as f64, y - j as f64];
+        lookup.scale = scale;
+        lookup.shift = shift;
         inside
     }
 
     /// The facets that a ray may meet.
     #[inline(always)]
-    fn entries(&self, look: &Look) -> &[Entry] {
-        let mut square = self.squares[look.square as usize];
-        let [mut x, mut y] = look.rest;
+    fn entries(&self, lookup: &Lookup) -> &[Entry] {
+        let mut square = self.squares[lookup.square as usize];
+        let [mut x, mut y] = lookup.rest;
         while square.count & DIVIDED != 0 {
-            (x, y) = (x * FINE as f64, y * FINE as f64);
-            let (i, j) = ((x as usize).min(FINE - 1), (y as usize).min(FINE - 1));
+            (x, y) = (x * DIVISIONS as f64, y * DIVISIONS as f64);
+            let (i, j) = ((x as usize).min(DIVISIONS - 1), (y as usize).min(DIVISIONS - 1));
             (x, y) = (x - i as f64, y - j as f64);
-            square = self.squares[square.first as usize + j * FINE + i];
+            square = self.squares[square.first as usize + j * DIVISIONS + i];
         }
         &self.entries[square.first as usize..(square.first + square.count) as usize]
     }
 }
 
-/// The map that shows a ray; `last` is the first to be looked at.
+/// The buffer that shows a ray; `last` is tried first.
 #[inline(always)]
-fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
+fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usize> {
     if ray.from.is_some() | (ray.t_min != 0.0) {
         return None;
     }
-    if maps[last].view.sees(ray) {
+    if buffers[last].view.shows(ray) {
         return Some(last);
     }
     let mut k = 0;
-    while k < maps.len() {
-        if maps[k].view.sees(ray) {
+    while k < buffers.len() {
+        if buffers[k].view.shows(ray) {
             return Some(k);
         }
         k += 1;
@@ -231,27 +245,31 @@ fn map_of(maps: &[Map], last: usize, ray: &Ray) -> Option<usize> {
     None
 }
 
-/// Answers the rays that are on a map; gives the number of the others, whose places come first in `rest`.
+/// Answers the rays that are on a buffer; gives the number of the others, whose places come first in `rest`.
 #[inline(always)]
 pub(super) fn answer<L: Lanes>(
-    maps: &[Map],
+    buffers: &[LightBuffer],
     rays: &[Ray],
     hits: &mut [Option<FacetHit>],
     rest: &mut [u16],
     cost: &mut Cost,
 ) -> usize {
-    let (mut others, mut next, mut last) = (0, 0, 0);
-    let mut looks = [Look::IDLE; TOGETHER];
+    let mut others = 0;
+    let mut next = 0;
+    let mut last = 0;
+    let mut lookups = [Lookup::IDLE; LOOKUP_BATCH];
     let mut edges = Edges::default();
-    let mut found: [(&[Entry], u8); TOGETHER] = [(&[], 0); TOGETHER];
+    let mut found: [(&[Entry], u8); LOOKUP_BATCH] = [(&[], 0); LOOKUP_BATCH];
     while next < rays.len() {
         let mut n = 0;
-        while n < TOGETHER && next < rays.len() {
+        while n < LOOKUP_BATCH && next < rays.len() {
             let ray = &rays[next];
-            if let Some(map) = map_of(maps, last, ray) {
-                last = map;
-                let inside = maps[map].look((next, map), ray, &mut looks[n]);
-                prefetch(&maps[map].squares, looks[n].square as usize);
+            if let Some(buffer) = buffer_showing(buffers, last, ray) {
+                last = buffer;
+                let inside = buffers[buffer].locate(ray, &mut lookups[n]);
+                lookups[n].index = next as u16;
+                lookups[n].buffer = buffer as u16;
+                prefetch(&buffers[buffer].squares, lookups[n].square as usize);
                 n += usize::from(inside);
             } else {
                 rest[others] = next as u16;
@@ -261,33 +279,33 @@ pub(super) fn answer<L: Lanes>(
         }
         // Which rays find nothing is not to be guessed.
         let mut full = 0;
-        for (k, look) in looks[..n].iter().enumerate() {
-            let entries = maps[usize::from(look.map)].entries(look);
+        for (k, lookup) in lookups[..n].iter().enumerate() {
+            let entries = buffers[usize::from(lookup.buffer)].entries(lookup);
             prefetch(entries, 0);
             found[full] = (entries, k as u8);
             full += usize::from(!entries.is_empty());
         }
         for (entries, k) in &found[..full] {
-            let map = &maps[usize::from(looks[usize::from(*k) % TOGETHER].map)];
+            let buffer = &buffers[usize::from(lookups[usize::from(*k) % LOOKUP_BATCH].buffer)];
             for entry in entries.iter().take(2) {
-                prefetch(&map.slots, entry.slot as usize);
+                prefetch(&buffer.facets, entry.facet as usize);
             }
         }
         for (entries, k) in &found[..full] {
-            let look = &looks[usize::from(*k) % TOGETHER];
-            let slots = &maps[usize::from(look.map)].slots;
-            let index = usize::from(look.index);
+            let lookup = &lookups[usize::from(*k) % LOOKUP_BATCH];
+            let shown = &buffers[usize::from(lookup.buffer)].facets;
+            let index = usize::from(lookup.index);
             let mut best = Nearest::up_to(rays[index].t_max);
             let mut first = 0;
             while first < entries.len() {
-                if f64::from(entries[first].near) > best.t * look.scale + look.shift {
+                if f64::from(entries[first].near) > best.t * lookup.scale + lookup.shift {
                     break;
                 }
                 let other = entries.get(first + 1);
                 cost.tests += 1 + u64::from(other.is_some());
-                let one = &slots[entries[first].slot as usize];
-                let other = other.map(|e| &slots[e.slot as usize]);
-                pair::test::<L>(one, other, &look.line, &mut edges, &mut best);
+                let one = &shown[entries[first].facet as usize];
+                let other = other.map(|e| &shown[e.facet as usize]);
+                pair::test::<L>(one, other, &lookup.line, &mut edges, &mut best);
                 first += 2;
             }
             hits[index] = best.hit();

@@ -1,9 +1,9 @@
-//! Facets as the rays of a map ask them.
+//! Facets as the rays of a source ask them.
 
 use super::View;
-use super::pair::Corners;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
-use crate::intersect::octree::huge;
+use crate::intersect::octree::facet_pair::Corners;
+use crate::intersect::octree::huge_pages;
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
 
@@ -11,15 +11,15 @@ use crate::mesh::FacetMesh;
 /// its corners in the mesh are four places behind four indices.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
-pub(super) struct Slot {
+pub(super) struct BufferFacet {
     pub(super) corners: Corners,
     pub(super) facet: u32,
     /// One bit for each triangle.
     triangles: u32,
 }
 
-impl Slot {
-    /// A facet as it is seen on one side of the map.
+impl BufferFacet {
+    /// A facet as it is seen on one side of the buffer.
     fn new(mesh: &FacetMesh, facet: u32, view: &View, side: usize) -> Self {
         let axes = view.axes(side);
         let positions = mesh.corner_positions(facet as usize);
@@ -29,17 +29,17 @@ impl Slot {
     }
 
     /// Those of some facets on each side, side after side.
-    pub(super) fn all(mesh: &FacetMesh, view: &View, facets: &[Vec<u32>]) -> Vec<Self> {
-        let mut slots = huge::with_capacity(facets.iter().map(Vec::len).sum());
+    pub(super) fn on_all_sides(mesh: &FacetMesh, view: &View, facets: &[Vec<u32>]) -> Vec<Self> {
+        let mut shown = huge_pages::with_capacity(facets.iter().map(Vec::len).sum());
         for (side, facets) in facets.iter().enumerate() {
-            slots.extend(facets.iter().map(|f| Self::new(mesh, *f, view, side)));
+            shown.extend(facets.iter().map(|f| Self::new(mesh, *f, view, side)));
         }
-        slots
+        shown
     }
 
     /// One bit for each triangle, two apart.
     #[inline(always)]
-    pub(super) fn sides(&self) -> u8 {
+    pub(super) fn triangle_bits(&self) -> u8 {
         (self.triangles & 1 | (self.triangles & 2) << 1) as u8
     }
 
@@ -51,7 +51,7 @@ impl Slot {
 }
 
 impl View {
-    /// The axes of the rays on a side of the map, the main one last.
+    /// The axes of the rays on a side of the buffer, the main one last.
     pub(super) fn axes(&self, side: usize) -> [usize; 3] {
         match self {
             Self::Point(_) => [[1, 2, 0], [2, 0, 1], [0, 1, 2]][side / 2 % 3],

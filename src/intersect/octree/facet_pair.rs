@@ -1,0 +1,50 @@
+//! The f64 edge functions of two facets at once, with the arithmetic of [`Line::quad`] step by step, so that they have the same bits.
+
+use crate::intersect::facet::Line;
+
+/// Corners of a facet, axis by axis in the order of the ray's.
+pub(super) type Corners = [[f64; 4]; 3];
+
+/// Edge functions of two facets, four numbers for each.
+#[derive(Default)]
+#[repr(C, align(64))]
+pub(super) struct Edges {
+    /// From each corner to the one before.
+    pub(super) outline: [f64; 8],
+    /// The same four times.
+    pub(super) diagonal: [f64; 8],
+    /// Of the corners, along the main axis.
+    pub(super) heights: [f64; 8],
+    /// One bit for each that is negative, of the outline and of the diagonal; then for each that is positive.
+    pub(super) below: [u8; 2],
+    pub(super) above: [u8; 2],
+}
+
+impl Edges {
+    /// In plain Rust.
+    #[inline(always)]
+    pub(super) fn set(&mut self, corners: [&Corners; 2], line: &Line) {
+        let ([ox, oy, oz], [sx, sy, _]) = (line.origin, line.shear);
+        (self.below, self.above) = ([0; 2], [0; 2]);
+        for (facet, c) in corners.into_iter().enumerate() {
+            let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
+            for k in 0..4 {
+                let z = c[2][k] - oz;
+                x[k] = (c[0][k] - ox) - sx * z;
+                y[k] = (c[1][k] - oy) - sy * z;
+                self.heights[4 * facet + k] = z;
+            }
+            let diagonal = x[0] * y[2] - y[0] * x[2];
+            for k in 0..4 {
+                let (next, lane) = ((k + 1) % 4, 4 * facet + k);
+                let edge = x[next] * y[k] - y[next] * x[k];
+                self.outline[lane] = edge;
+                self.diagonal[lane] = diagonal;
+                self.below[0] |= u8::from(edge < 0.0) << lane;
+                self.above[0] |= u8::from(edge > 0.0) << lane;
+                self.below[1] |= u8::from(diagonal < 0.0) << lane;
+                self.above[1] |= u8::from(diagonal > 0.0) << lane;
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! The mesh as rays see it from far: the box they must enter, and the middle about which nodes and blocks are given.
+
+use crate::math::{Aabb, Point, Ray};
+
+/// Twice the two roundings of `(bound − origin) · inverse`, relative, and some more: how wrong a crossing of the mesh's box may be.
+const CROSSING_ERROR: f64 = 8.0 * f64::EPSILON;
+
+/// What rays need of the mesh, in four lanes of which the last means nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub(super) center: [f64; 4],
+    /// Around all facets, grown a little.
+    low: [f64; 4],
+    high: [f64; 4],
+    /// Three times the size: what an f32 box test is wrong by, in roundings.
+    pub(super) reach: [f32; 4],
+}
+
+/// Where a ray enters and leaves the mesh, wide enough for the rounding.
+pub(super) struct Passage {
+    pub(super) near: f64,
+    pub(super) far: f64,
+    /// Whether the ray starts inside.
+    pub(super) inside: bool,
+}
+
+impl Frame {
+    pub(super) fn new(center: Point, bounds: &Aabb) -> Self {
+        let lanes = |p: Point, last: f64| [p.x, p.y, p.z, last];
+        Self {
+            center: lanes(center, 0.0),
+            low: lanes(bounds.min, f64::NEG_INFINITY),
+            high: lanes(bounds.max, f64::INFINITY),
+            reach: lanes(bounds.size() * 3.0, 0.0).map(|x| x as f32),
+        }
+    }
+
+    /// Where a ray with this origin and inverse direction, in four lanes, passes the mesh.
+    #[inline(always)]
+    pub(super) fn passage(&self, ray: &Ray, origin: [f64; 4], inverse: [f64; 4]) -> Passage {
+        let mut enter = [0.0; 4];
+        let mut leave = [0.0; 4];
+        let mut inside = true;
+        for a in 0..4 {
+            let low = (self.low[a] - origin[a]) * inverse[a];
+            let high = (self.high[a] - origin[a]) * inverse[a];
+            let first = ordered_min(low, high);
+            let last = ordered_max(low, high);
+            enter[a] = first - first.abs() * CROSSING_ERROR;
+            leave[a] = last + last.abs() * CROSSING_ERROR;
+            inside &= (origin[a] >= self.low[a]) & (origin[a] <= self.high[a]);
+        }
+        let near = ordered_max(ordered_max(enter[0], enter[1]), ordered_max(enter[2], ray.t_min));
+        let far = ordered_min(ordered_min(leave[0], leave[1]), ordered_min(leave[2], ray.t_max));
+        Passage { near, far, inside }
+    }
+}
+
+/// The least of two numbers in one instruction: `f64::min` takes three for the sake of NaN, after which nothing is met here.
+#[inline(always)]
+fn ordered_min(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The greatest of two numbers in one instruction.
+#[inline(always)]
+fn ordered_max(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}

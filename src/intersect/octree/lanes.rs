@@ -1,0 +1,23 @@
+//! What the walk does eight lanes at a time, to be written once for each instruction set.
+
+use super::facet_pair::{Corners, Edges};
+use super::node::{Block, Node};
+use super::ray::{BoxRay, SieveRay};
+use crate::intersect::facet::Line;
+
+/// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
+pub(super) trait Lanes {
+    /// Where the ray enters the children that it may meet before `t_max`, and their links, the farthest first; gives
+    /// their number. What lies beyond it is of no meaning. `SINGLE` is for a ray that nothing else is done beside: it
+    /// rather guesses that one child is met than wait for a network to sort it.
+    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
+    /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;
+    /// The edge functions of two facets, all with the same bits.
+    #[inline(always)]
+    fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
+        edges.set(corners, line);
+    }
+    /// Which distances do not lie beyond `t_max`, one bit each.
+    fn open(enters: &[f32; 16], t_max: f32) -> u32;
+}

@@ -1,0 +1,187 @@
+//! A ray on its way through the tree.
+
+use super::lanes::Lanes;
+use super::node::{Link, Node};
+use super::ray::{BoxRay, SieveRay};
+use super::tree::Tree;
+use crate::intersect::facet::{FacetRay, Nearest};
+use crate::math::{Point, Ray, Vector};
+use std::hint::select_unpredictable;
+
+/// Places on a stack: seven for each of 32 levels of cells and 30 of packing, eight written beyond the top, and the
+/// ground.
+const STACK: usize = 464;
+/// Places below the first entry, so that sixteen can be looked at at once; all lead to the end of the ray.
+const GROUND: usize = 16;
+
+/// Smallest component of a direction that is divided by: along it a ray moves by less than the room around boxes in 10⁵ scene
+/// sizes, and 1e12 mm times its inverse is still a number in f32.
+const LEAST_COMPONENT: f64 = 1e-18;
+/// What a start that was moved along its ray is wrong by, relative to the way: four roundings in f64.
+const SHIFT_ERROR: f64 = 1e-15;
+/// Rounding of f32, 2⁻²⁴, rounded up.
+const ROUNDING: f32 = 6e-8;
+/// By how much limits in f32 are widened: sixteen roundings, so that ties are seen.
+const LIMIT_ROOM: f64 = 1e-6;
+/// The least `t_max` of box tests: the lowest bits of a distance are not its own.
+const LEAST_LIMIT: f32 = 1e-30;
+
+/// One ray under way.
+///
+/// The size is no multiple of a page, so that the rays under way do not fight for the same sets of the cache.
+#[repr(C, align(64))]
+pub(super) struct RayState {
+    pub(super) boxes: BoxRay,
+    pub(super) sieve: SieveRay,
+    /// Where the ray goes next.
+    pub(super) next: Link,
+    /// As [`Tree::unmet_facet`].
+    pub(super) unmet_facet: u32,
+    /// Triangles of `block` that the sieve left, to be tested.
+    pub(super) candidates: u32,
+    pub(super) block: u32,
+    /// Where box distances start, mm along the ray.
+    shift: f64,
+    pub(super) index: usize,
+    pub(super) facets: FacetRay,
+    pub(super) best: Nearest,
+    top: usize,
+    enters: [f32; STACK],
+    links: [u32; STACK],
+    spread: [u64; 40],
+}
+
+impl RayState {
+    pub(super) fn idle() -> Self {
+        let ray = Ray::new(Point::ZERO, Vector::Z);
+        Self {
+            boxes: BoxRay::default(),
+            sieve: SieveRay::default(),
+            facets: FacetRay::new(&ray),
+            best: Nearest::up_to(0.0),
+            shift: 0.0,
+            next: Link::END,
+            unmet_facet: u32::MAX,
+            candidates: 0,
+            block: 0,
+            top: GROUND,
+            index: usize::MAX,
+            enters: [f32::NEG_INFINITY; STACK],
+            links: [Link::END.0; STACK],
+            spread: [0; 40],
+        }
+    }
+
+    /// Puts a ray on its way, at once to the end when it passes by the whole mesh. What differs from ray to ray is
+    /// chosen without branches.
+    #[inline(always)]
+    pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
+        let direction = [ray.direction.x, ray.direction.y, ray.direction.z, 1.0];
+        let origin = [ray.origin.x, ray.origin.y, ray.origin.z, 0.0];
+        let inverse =
+            direction.map(|d| 1.0 / if d.abs() < LEAST_COMPONENT { LEAST_COMPONENT.copysign(d) } else { d });
+        let frame = &tree.frame;
+        // Far origins are moved to where they enter, since f32 is good only near the mesh.
+        let passage = frame.passage(ray, origin, inverse);
+        let inside = passage.inside & (ray.t_min >= 0.0);
+        let meets = inside | ((passage.near <= passage.far) & passage.near.is_finite());
+        self.shift = select_unpredictable(inside, 0.0, passage.near);
+        let moved = (tree.surroundings.slack(ray) + self.shift.abs() * SHIFT_ERROR) as f32;
+        let b = &mut self.boxes;
+        let mut octant = 0;
+        for a in 0..4 {
+            let inverse = inverse[a] as f32;
+            let exact = (origin[a] - frame.center[a]) + direction[a] * self.shift;
+            let o = exact as f32;
+            b.origin[a] = o;
+            b.inverse[a] = inverse;
+            b.inverse[a + 4] = -inverse;
+            b.slack[a] = ((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs();
+            self.sieve.high[a] = o;
+            self.sieve.low[a] = (exact - f64::from(o)) as f32;
+            octant |= u8::from(inverse < 0.0) << a;
+        }
+        b.octant = octant & 7;
+        // Adding zero makes −0.0 positive: distances are sorted by their bits.
+        b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
+        self.facets = FacetRay::new(ray);
+        self.sieve.shear = self.facets.shear().map(|s| s as f32);
+        self.sieve.axes = self.facets.axes().map(|a| a as u8);
+        self.sieve.slack = moved;
+        self.best = Nearest::up_to(ray.t_max);
+        self.limit_to_hit();
+        self.next = Link(select_unpredictable(meets, root.0, Link::END.0));
+        self.unmet_facet = tree.unmet_facet(ray);
+        self.candidates = 0;
+        self.top = GROUND;
+        self.index = index;
+    }
+
+    /// Boxes that begin after the nearest hit are of no interest; rounded up, so that ties are seen, and never to zero, since the lowest
+    /// bits of a distance are not its own.
+    #[inline(always)]
+    pub(super) fn limit_to_hit(&mut self) {
+        self.boxes.t_max = (((self.best.t - self.shift) * (1.0 + LIMIT_ROOM)) as f32).max(LEAST_LIMIT);
+    }
+
+    /// Writes the children of a node that the ray may meet above the top of the stack; gives their number.
+    #[inline(always)]
+    pub(super) fn enter<L: Lanes, const SINGLE: bool>(&mut self, node: &Node) -> usize {
+        let base = self.top.min(STACK - 8);
+        let enters = self.enters[base..base + 8].first_chunk_mut();
+        let links = self.links[base..base + 8].first_chunk_mut();
+        match (enters, links) {
+            (Some(enters), Some(links)) => L::enter::<SINGLE>(node, &self.boxes, enters, links),
+            _ => unreachable!("eight places"),
+        }
+    }
+
+    /// Goes to the nearest of `count` entries that were just written and keeps the others.
+    #[inline(always)]
+    pub(super) fn take_nearest(&mut self, count: usize) -> Link {
+        self.top = (self.top + count - 1).min(STACK - 9);
+        Link(self.links[self.top])
+    }
+
+    /// Goes on with the topmost entry that is not beyond `t_max`.
+    #[inline(always)]
+    pub(super) fn pop(&mut self, t_max: f32) -> Link {
+        while self.top > GROUND {
+            self.top -= 1;
+            if self.enters[self.top] <= t_max {
+                return Link(self.links[self.top]);
+            }
+        }
+        Link::END
+    }
+
+    /// The nearest of `count` entries that were just written, else the topmost that is not beyond `t_max`: no branch
+    /// depends on which.
+    #[inline(always)]
+    pub(super) fn advance<L: Lanes>(&mut self, count: usize) -> Link {
+        let mut top = self.top.clamp(GROUND, STACK - 8);
+        let open = loop {
+            let upper = self.enters[top - GROUND..].first_chunk();
+            let open = upper.map_or(1, |upper| L::open(upper, self.boxes.t_max));
+            // The ground is open to all.
+            if open != 0 || top == GROUND {
+                break open | 1;
+            }
+            if count > 0 {
+                break 1;
+            }
+            top = (top - GROUND).max(GROUND);
+        };
+        let below = top - 1 - (open << 16).leading_zeros() as usize;
+        let above = top + count - 1;
+        self.top = select_unpredictable(count > 0, above, below).min(STACK - 9);
+        Link(self.links[self.top])
+    }
+
+    /// Looks again at what was next, after `t_max` has come nearer.
+    #[inline(always)]
+    pub(super) fn recheck_next<L: Lanes>(&mut self) {
+        self.top += usize::from(self.next != Link::END);
+        self.next = self.advance::<L>(0);
+    }
+}

@@ -1,0 +1,67 @@
+//! How an octree is built and walked.
+
+use crate::intersect::NormalMode;
+
+/// How the tree is built and walked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// T: a box is split while more facets than this meet it. 128 was fastest on lamps; 8 without `collapse` is the
+    /// textbook tree, 64 suits scenes of long thin facets.
+    pub threshold: usize,
+    /// Depth at which splitting ends, at most 32. Uneven scenes need 20 and more.
+    pub max_depth: u32,
+    /// Merge sparse octants into full eight-wide nodes.
+    pub collapse: bool,
+    /// A box is no longer split once its facets have been duplicated this often on the way to it, so that memory stays bounded.
+    pub max_duplication: f64,
+    /// Instructions to walk with; the hits are the same.
+    pub instruction_set: InstructionSet,
+    /// How the normal at a hit is got.
+    pub normals: NormalMode,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            threshold: 128,
+            max_depth: 24,
+            collapse: true,
+            max_duplication: 16.0,
+            instruction_set: InstructionSet::Fastest,
+            normals: NormalMode::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// The octree of textbooks: T = 8, every octant its own child.
+    ///
+    /// ```
+    /// use lampyris::intersect::octree::Settings;
+    ///
+    /// let textbook = Settings::textbook();
+    /// assert!(textbook.threshold < Settings::default().threshold && !textbook.collapse);
+    /// ```
+    pub fn textbook() -> Self {
+        Self { threshold: 8, collapse: false, ..Self::default() }
+    }
+}
+
+/// Instructions to walk the tree with; all find the same hits, bit for bit.
+///
+/// ```
+/// use lampyris::intersect::octree::{InstructionSet, Settings};
+///
+/// let portable = Settings { instruction_set: InstructionSet::Portable, ..Settings::default() };
+/// assert_ne!(portable, Settings::default());
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum InstructionSet {
+    /// The widest that the processor offers, asked at run time.
+    #[default]
+    Fastest,
+    /// AVX2 where the processor has it, else plain Rust.
+    Avx2,
+    /// Plain Rust.
+    Portable,
+}

@@ -1,0 +1,79 @@
+//! The tree as rays walk it, and what its walkers need of the mesh.
+
+use super::frame::Frame;
+use super::node::{Block, Link, Node, Target};
+use super::{Settings, Statistics, build, flatten, huge_pages};
+use crate::intersect::facet::Surroundings;
+use crate::intersect::slopes::Slopes;
+use crate::math::{Aabb, Point, Ray};
+use crate::mesh::FacetMesh;
+use rayon::prelude::*;
+
+/// By how much the box around the mesh is grown, in diagonals: far more than the rounding of where a ray enters it.
+const BOUNDS_ROOM: f64 = 1e-6;
+
+/// Nodes and blocks with the mesh that they are of.
+#[derive(Clone)]
+pub(super) struct Tree<'m> {
+    pub(super) surroundings: Surroundings<'m>,
+    /// Middle of the mesh, about which nodes and blocks are given.
+    pub(super) center: Point,
+    pub(super) frame: Frame,
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<Block>,
+    /// `None` without facets.
+    pub(super) root: Option<Link>,
+    /// Of all facets.
+    pub(super) slopes: Vec<Slopes>,
+}
+
+impl<'m> Tree<'m> {
+    /// Builds the tree with the threads of the current rayon pool.
+    pub(super) fn build(mesh: &'m FacetMesh, settings: &Settings, statistics: &mut Statistics) -> Self {
+        let surroundings = Surroundings::new(mesh);
+        let finite = surroundings.bounds;
+        let center = if finite.is_empty() { Point::ZERO } else { finite.center() };
+        let cell = build::subdivide(mesh, center, settings, statistics);
+        let flat = cell.map(|cell| flatten::flatten(mesh, center, cell, settings, statistics));
+        let (nodes, blocks, root) = match flat {
+            Some(flat) => (flat.nodes, flat.blocks, Some(flat.root)),
+            None => (Vec::new(), Vec::new(), None),
+        };
+        let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
+        let frame = Frame::new(center, &bounds);
+        let mut slopes = huge_pages::with_capacity(mesh.facets.len());
+        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
+        Self { surroundings, center, frame, nodes, blocks, root, slopes }
+    }
+
+    /// The facet that a ray leaves where it is known not to meet it again, else one that no block has.
+    #[inline(always)]
+    pub(super) fn unmet_facet(&self, ray: &Ray) -> u32 {
+        let Some(from) = ray.from else { return u32::MAX };
+        match self.slopes.get(from.primitive as usize) {
+            Some(slopes) if slopes.leaves(ray.direction) => from.primitive,
+            _ => u32::MAX,
+        }
+    }
+
+    /// The boxes of all nodes and blocks with their depth; the root's children have depth 1.
+    pub(super) fn boxes(&self) -> Vec<(usize, Aabb)> {
+        let mut boxes = Vec::new();
+        let mut open: Vec<(Link, usize)> = self.root.iter().map(|&root| (root, 1)).collect();
+        while let Some((link, depth)) = open.pop() {
+            let Target::Node(index) = link.target() else { continue };
+            let node = &self.nodes[index];
+            for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
+                let b = node.child(slot);
+                boxes.push((depth, Aabb { min: b.min + self.center, max: b.max + self.center }));
+                open.push((Link(node.children[slot]), depth + 1));
+            }
+        }
+        boxes
+    }
+
+    /// Bytes held, without the mesh.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.slopes)
+    }
+}
