@@ -4,13 +4,15 @@
 //! Compressed Wide BVHs*, HPG 2017), built on the triangles of the facets. As shipped they work in f32: a hit is wrong by
 //! about 1e-5 mm, one ray in eight aimed at an edge slips through, and some rays miss everything. `cured` mends what
 //! can be mended from outside, so that answers are those of the octree:
-//! 1. hits come from the f64 test of this room, the nearest one is kept in f64;
+//! 1. hits come from the f64 test of this module, the nearest one is kept in f64;
 //! 2. boxes are taken about the middle of the mesh, rounded outward and padded for the rounding of node tests;
 //! 3. +0.0 is added to directions, for CwBvh orders children wrongly for −0.0;
 //! 4. inverse directions near zero are ±1e30 instead of ±1/f32::EPSILON;
 //! 5. a tree too deep for the fixed stack of CwBvh is walked as the binary tree;
 //! 6. rays start where they enter the mesh, so that f32 origins are good from any distance, and a little earlier,
-//!    for the node test of CwBvh discards what ends before t = 1e-4.
+//!    for the node test of CwBvh discards what ends before t = 1e-4;
+//! 7. the mesh is scaled by a power of two to a size of about a hundred, for such absolute limits let rays pass through a mesh
+//!    of 1e-4 mm.
 //!
 //! Guarantee when cured: bit for bit the hits of the octree. Weakness: slower by what f64 leaves cost.
 
@@ -29,6 +31,19 @@ use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use obvhs::{Boundable, BvhBuildParams, traverse};
 use std::time::{Duration, Instant};
+
+/// Size of a cured tree in its own units: that of the lamps on which the absolute limits of obvhs were seen to be harmless.
+const TREE_SIZE: f64 = 100.0;
+/// By how much boxes are grown, in sizes of the mesh: sixteen roundings of f32 at the size of the mesh.
+const BOX_ROOM: f64 = 1.0 / (1 << 20) as f64;
+/// By how much a cured ray starts earlier, in units of the tree: twenty times the 1e-4 before which CwBvh discards boxes, and four
+/// times the room around boxes.
+const EARLIER: f64 = 2e-3 + 2.0 * TREE_SIZE * 4.0 * BOX_ROOM;
+/// By how much limits in f32 are widened: sixteen roundings, so that ties are seen.
+const LIMIT_ROOM: f64 = 1e-6;
+/// Inverse of a direction's component that is next to zero: its product with any size is a number in f32, and with the least distance
+/// from a padded box larger than any size.
+const LARGEST_INVERSE: f32 = 1e30;
 
 /// Which hierarchy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -57,7 +72,7 @@ pub struct Settings {
     pub kind: Kind,
     /// Build effort.
     pub quality: Quality,
-    /// Whether the defects named in the room's notes are mended; otherwise the crate is used as shipped, in f32.
+    /// Whether the defects named in the module's notes are mended; otherwise the crate is used as shipped, in f32.
     pub cured: bool,
     /// How the normal at a hit is got.
     pub normals: NormalMode,
@@ -71,7 +86,7 @@ impl Default for Settings {
 
 /// A hierarchy over the facets of a mesh.
 pub struct Bvh<'m> {
-    around: Surroundings<'m>,
+    surroundings: Surroundings<'m>,
     normals: NormalMode,
     tree: Tree,
     leaves: Leaves,
@@ -79,8 +94,8 @@ pub struct Bvh<'m> {
     codes: Vec<u32>,
     center: Point,
     bounds: Aabb,
-    /// By how much a cured ray starts earlier, mm.
-    pull: f64,
+    /// Units of the tree in a millimetre: a power of two, so that scaling does not round; 1 as shipped.
+    scale: f64,
     build_seconds: f64,
 }
 
@@ -107,10 +122,11 @@ impl<'m> Bvh<'m> {
     /// Builds the hierarchy; facets with corners that are no finite numbers are left out.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
-        let around = Surroundings::new(mesh);
-        let bounds = around.bounds;
+        let surroundings = Surroundings::new(mesh);
+        let bounds = surroundings.bounds;
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
-        let half = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
+        let size = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
+        let scale = if settings.cured { unit_scale(size) } else { 1.0 };
         let codes: Vec<u32> = (0..mesh.facets.len())
             .filter(|&f| mesh.corners(f).iter().all(|&p| is_usable(p)))
             .flat_map(|f| {
@@ -126,8 +142,8 @@ impl<'m> Bvh<'m> {
         let tree = if codes.is_empty() {
             Tree::Empty
         } else if settings.cured {
-            let pad = half * 2f64.powi(-20);
-            let boxes: Vec<Bounded> = codes.iter().map(|&c| outer_box(mesh, c, center, pad)).collect();
+            let pad = size * BOX_ROOM;
+            let boxes: Vec<Bounded> = codes.iter().map(|&c| outer_box(mesh, c, center, pad, scale)).collect();
             match settings.kind {
                 Kind::Bvh2 => Tree::Binary(build_bvh2(&boxes, params, &mut core)),
                 Kind::CwBvh => wide_or_binary(&boxes, &params),
@@ -150,10 +166,9 @@ impl<'m> Bvh<'m> {
         } else {
             Leaves::Shipped(codes.iter().map(|&c| RtTriangle::from(&triangle32(mesh, c))).collect())
         };
-        let bounds = bounds.grown(half * 2f64.powi(-20));
-        let pull = 2e-3 + half * 2f64.powi(-18);
+        let bounds = bounds.grown(size * BOX_ROOM);
         let build_seconds = started.elapsed().as_secs_f64();
-        Self { around, normals: settings.normals, tree, leaves, codes, center, bounds, pull, build_seconds }
+        Self { surroundings, normals: settings.normals, tree, leaves, codes, center, bounds, scale, build_seconds }
     }
 
     /// The hit without its normal.
@@ -188,19 +203,22 @@ impl<'m> Bvh<'m> {
         let facet_ray = FacetRay::new(ray);
         let mut best = Nearest::up_to(ray.t_max);
         let (enter, leave) = self.bounds.clip(ray)?;
-        let pull = self.pull - enter;
-        let origin = (ray.origin - self.center - ray.direction * pull).as_vec3a();
+        // In units of the tree from here on; `begin` is the distance along the ray at which it starts there.
+        let begin = enter - EARLIER / self.scale;
+        let origin = ((ray.origin - self.center + ray.direction * begin) * self.scale).as_vec3a();
         let direction = ray.direction.as_vec3a() + Vec3A::ZERO;
         if !(origin.is_finite() && direction.is_finite()) {
             return None;
         }
         let far = |t: f64| {
-            let t = ((t + pull) * (1.0 + 1e-6)) as f32;
+            let t = ((t - begin) * self.scale * (1.0 + LIMIT_ROOM)) as f32;
             if t.is_finite() { t } else { f32::MAX }
         };
-        let mut ray32 = Ray32::new(origin, direction, 0.0, far(leave + self.pull));
+        let mut ray32 = Ray32::new(origin, direction, 0.0, far(leave) + EARLIER as f32);
         ray32.inv_direction = Vec3A::from_array(
-            direction.to_array().map(|d| if d.abs() < 1e-30 { 1e30f32.copysign(d) } else { 1.0 / d }),
+            direction
+                .to_array()
+                .map(|d| if d.abs() < 1.0 / LARGEST_INVERSE { LARGEST_INVERSE.copysign(d) } else { 1.0 / d }),
         );
         self.walk(ray32, cost, |_, id| {
             let before = best.t;
@@ -208,7 +226,7 @@ impl<'m> Bvh<'m> {
                 self.codes[id] >> 1,
                 1 << (self.codes[id] & 1),
                 corners[id].each_ref(),
-                &self.around,
+                &self.surroundings,
                 &mut best,
             );
             if best.t < before { far(best.t) } else { f32::INFINITY }
@@ -263,7 +281,7 @@ impl<'m> Bvh<'m> {
 
 impl Intersector for Bvh<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
-        self.nearest(ray, cost).map(|hit| normals::describe(self.around.mesh, ray, &hit, self.normals))
+        self.nearest(ray, cost).map(|hit| normals::describe(self.surroundings.mesh, ray, &hit, self.normals))
     }
 
     fn footprint(&self) -> Footprint {
@@ -277,7 +295,7 @@ impl Intersector for Bvh<'_> {
             Leaves::Cured(l) => size_of_val(&**l),
         };
         let bytes = tree + leaves + size_of_val(&*self.codes);
-        Footprint { bytes, primitives: self.around.mesh.facets.len(), build_seconds: self.build_seconds }
+        Footprint { bytes, primitives: self.surroundings.mesh.facets.len(), build_seconds: self.build_seconds }
     }
 }
 
@@ -315,9 +333,15 @@ fn triangle32(mesh: &FacetMesh, code: u32) -> Triangle {
     Triangle { v0, v1, v2 }
 }
 
-fn outer_box(mesh: &FacetMesh, code: u32, center: Point, pad: f64) -> Bounded {
+/// The box of a triangle about the middle of the mesh, grown by `pad` millimetres, in units of the tree.
+fn outer_box(mesh: &FacetMesh, code: u32, center: Point, pad: f64, scale: f64) -> Bounded {
     let corners = triangle(mesh, code).map(|p| p - center);
     let low = corners.into_iter().fold(Vector::INFINITY, Vector::min) - pad;
     let high = corners.into_iter().fold(Vector::NEG_INFINITY, Vector::max) + pad;
-    Bounded(Box32 { min: low.as_vec3a(), max: high.as_vec3a() })
+    Bounded(Box32 { min: (low * scale).as_vec3a(), max: (high * scale).as_vec3a() })
+}
+
+/// The power of two that makes a mesh of this size about [`TREE_SIZE`] large; 1 for one without extent.
+fn unit_scale(size: f64) -> f64 {
+    if size > 0.0 && size.is_finite() { (TREE_SIZE / size).log2().round().exp2() } else { 1.0 }
 }
