@@ -200,6 +200,7 @@ impl<'m> Bvh<'m> {
     }
 
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
+        let ray = &self.surroundings.lifted(ray);
         let facet_ray = FacetRay::new(ray);
         let mut best = Nearest::up_to(ray.t_max);
         let (enter, leave) = self.bounds.clip(ray)?;

@@ -8,22 +8,30 @@
 //! A ray that leaves a facet ([`Ray::from`]) cannot meet the triangle it starts on. Facets that share a vertex with
 //! it and have the start on their border are asked from a point moved a millionth of a facet into the starting
 //! triangle: so a concave neighbour is met where it is, and a convex one is not, whatever the rounding of the start.
-//! Weakness: two coincident sheets of different parts are two facets at the same place, and which of them a ray that
-//! leaves one meets at t = 0 is a matter of rounding.
+//! A ray that grazes the facet that it leaves starts a little over it ([`Surroundings::lifted`]).
+//! Weakness: which half of a folded quad a ray leaves that starts on its diagonal, at less than the angle of the fold, is a matter of
+//! rounding, and with it whether it meets the other half at once. Two coincident sheets of different parts are two facets at the same
+//! place, and which of them a ray that leaves one meets at t = 0 is a matter of rounding.
 
 pub(crate) use super::facet_hit::{FacetHit, Nearest};
 
 use super::facet_hit::EdgeHit;
-use super::slopes::LEAST_SINE;
+use super::slopes::{LEAST_SINE, Slopes};
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
 use std::hint::select_unpredictable;
 
+/// How far from where it should be a start may lie, relative to the largest coordinate: see [`Surroundings::new`].
+const REACH: f64 = 1.0 / (1u64 << 40) as f64;
 /// Share of the way to the middle of its triangle by which a start on a border is moved inside.
 const NUDGE: f64 = 1.0 / 1048576.0;
 /// The most by which it is moved, in units of [`Surroundings::reach`].
 const LONGEST_NUDGE: f64 = 1024.0;
+
+/// Height over the facet that it leaves to which the start of a grazing ray is lifted, relative to the largest coordinate: 16 to 32
+/// units in its last place, more than the rounding of a point computed on the facet, and of what asks where it lies.
+const LIFT: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// What the test knows of the mesh as a whole.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +57,30 @@ impl<'m> Surroundings<'m> {
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
         let bounds = Aabb::around(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
-        Self { mesh, reach: largest * 2f64.powi(-40), bounds }
+        Self { mesh, reach: largest * REACH, bounds }
+    }
+
+    /// A ray that leaves a facet at a grazing angle, started over that facet and not under it: what rounding put on the wrong side would
+    /// pass under the next facet where it starts nearer to their common edge than it rises. Other rays rise out of the rounding
+    /// within [`Self::reach`] of an edge, where neighbours are asked from a point inside the facet.
+    pub(crate) fn lifted(&self, ray: &Ray) -> Ray {
+        let Some(own) = ray.from.map(|d| d.primitive as usize).filter(|&f| f < self.mesh.facets.len()) else {
+            return *ray;
+        };
+        let corners = self.mesh.corners(own);
+        if Slopes::new(corners).leaves(ray.direction) {
+            return *ray;
+        }
+        let own = StartTriangle::new(&corners, ray.origin);
+        let up = own.normal.normalize_or_zero();
+        let up = if up.dot(ray.direction) < 0.0 { -up } else { up };
+        let height = up.dot(ray.origin - corners[0]);
+        let wanted = self.reach / REACH * LIFT;
+        // What is farther off does not start on the facet.
+        if height.abs() > self.reach || height >= wanted {
+            return *ray;
+        }
+        Ray { origin: ray.origin + up * (wanted - height), ..*ray }
     }
 
     /// Room that a box test must leave around a start so that a moved start stays inside, mm.

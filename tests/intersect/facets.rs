@@ -151,6 +151,32 @@ fn nothing_slips_through_a_mesh_smaller_than_a_wavelength() {
     }
 }
 
+#[test]
+fn grazing_rays_that_start_on_edges_stay_inside() {
+    for (size, shift) in [(50.0, 0.0), (50.0, 1e6), (5e-5, 0.0)] {
+        let middle = Point::new(shift, -shift, shift);
+        for mesh in [globe(24, 13, |v| v * size + middle), globe(64, 33, |v| v * size + middle)] {
+            let mut r = Random(77);
+            let mut rays = Vec::new();
+            let octree = Octree::build(&mesh, &octree::Settings::default());
+            for k in 0..4000 {
+                let first = at_a_seam(&mesh, middle, size, k, &mut r);
+                let Some(hit) = octree.intersect(&first, &mut Cost::default()) else {
+                    panic!("slipped through: {first:?}")
+                };
+                let inward = -hit.geometric_normal;
+                let sideways = r.direction();
+                let sideways = (sideways - inward * inward.dot(sideways)).normalize();
+                let sine = 10f64.powi(-((k % 10) as i32)) * r.within(0.1, 0.999);
+                let direction = (sideways * (1.0 - sine * sine).sqrt() + inward * sine).normalize();
+                rays.push(leave(first, &hit, direction));
+            }
+            let lost = ask(&mesh, &rays).iter().filter(|hit| hit.is_none()).count();
+            assert_eq!(lost, 0, "of {} rays in a mesh of {size} mm at {middle}", rays.len());
+        }
+    }
+}
+
 fn leave(ray: Ray, hit: &Hit, direction: Vector) -> Ray {
     Ray::new(ray.at(hit.t), direction).leaving(Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv })
 }

@@ -76,6 +76,14 @@ impl RayState {
     /// chosen without branches.
     #[inline(always)]
     pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
+        self.unmet_facet = tree.unmet_facet(ray);
+        let lifted;
+        let ray = if ray.from.is_some() & (self.unmet_facet == u32::MAX) {
+            lifted = grazing(tree, ray);
+            &lifted
+        } else {
+            ray
+        };
         let direction = [ray.direction.x, ray.direction.y, ray.direction.z, 1.0];
         let origin = [ray.origin.x, ray.origin.y, ray.origin.z, 0.0];
         let inverse =
@@ -111,7 +119,6 @@ impl RayState {
         self.best = Nearest::up_to(ray.t_max);
         self.limit_to_hit();
         self.next = Link(select_unpredictable(meets, root.0, Link::END.0));
-        self.unmet_facet = tree.unmet_facet(ray);
         self.candidates = 0;
         self.top = GROUND;
         self.index = index;
@@ -184,4 +191,11 @@ impl RayState {
         self.top += usize::from(self.next != Link::END);
         self.next = self.advance::<L>(0);
     }
+}
+
+/// As [`crate::intersect::facet::Surroundings::lifted`]; few rays graze the facet that they leave.
+#[cold]
+#[inline(never)]
+fn grazing(tree: &Tree, ray: &Ray) -> Ray {
+    tree.surroundings.lifted(ray)
 }
