@@ -138,13 +138,8 @@ mod tests {
     fn square(name: &str) -> Face {
         Face {
             name: name.into(),
-            entity: None,
-            colour: None,
-            surface: sweep::plane(&Frame::IDENTITY, [[0.0, 1.0], [0.0, 1.0]]),
             analytic: Analytic::Plane { frame: Frame::IDENTITY },
-            reversed: false,
-            loops: Vec::new(),
-            gap: 0.0,
+            ..Face::whole(sweep::plane(&Frame::IDENTITY, [[0.0, 1.0], [0.0, 1.0]]))
         }
     }
 

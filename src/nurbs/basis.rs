@@ -36,7 +36,7 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
 
 /// The basis functions alone, in place of a table: the same bits as [`basis`] gives for them. Meshing asks for little else.
 #[inline]
-pub(super) fn functions<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> [f64; W] {
+pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> [f64; W] {
     assert!(degree < W && span >= degree && span + degree < knots.len());
     let mut value = [0.0; W];
     let (mut left, mut right) = ([0.0; W], [0.0; W]);
@@ -138,7 +138,7 @@ mod tests {
             let t = i as f64 / 50.0;
             let span = find_span(&knots, 3, t);
             let b: Basis<NARROW> = basis(&knots, 3, span, t, 0);
-            assert_eq!(functions::<NARROW>(&knots, 3, span, t), b.value[0]);
+            assert_eq!(basis_functions::<NARROW>(&knots, 3, span, t), b.value[0]);
         }
     }
 

@@ -37,13 +37,13 @@ impl FundamentalForms {
     }
 
     /// The largest absolute normal curvature, 1/mm.
-    pub fn sharpest(&self) -> f64 {
+    pub fn largest_curvature(&self) -> f64 {
         let [a, b] = self.principal();
         a.abs().max(b.abs())
     }
 
     /// Normal curvature in a direction of the parameter plane, 1/mm; 0 for a zero direction.
-    pub fn along(&self, d: Uv) -> f64 {
+    pub fn normal_curvature(&self, d: Uv) -> f64 {
         let form = |q: [f64; 3]| q[0] * d.x * d.x + 2.0 * q[1] * d.x * d.y + q[2] * d.y * d.y;
         let length = form(self.first);
         if length > 0.0 { form(self.second) / length } else { 0.0 }
@@ -78,7 +78,7 @@ mod tests {
             for (k, e) in forms.principal().iter().zip(expected) {
                 assert!((k - e).abs() < 1e-11, "{k} {e}");
             }
-            assert!((forms.along(Uv::Y) + 1.0 / minor).abs() < 1e-11);
+            assert!((forms.normal_curvature(Uv::Y) + 1.0 / minor).abs() < 1e-11);
         }
     }
 }

@@ -9,18 +9,18 @@
 //! [`BezierPatch`]es first.
 
 mod basis;
+mod blossom;
 pub mod conic;
 mod curvature;
-mod cut;
+mod curve;
 mod patch;
 pub mod project;
 pub mod sanitise;
-mod spline;
 mod surface;
 pub mod sweep;
 
 pub use basis::{MAX_DEGREE, find_span};
 pub use curvature::FundamentalForms;
+pub use curve::{ControlPoint, Curve, CurveDerivatives, Spline, UvCurve};
 pub use patch::BezierPatch;
-pub use spline::{ControlPoint, Curve, CurveDerivatives, Spline, UvCurve};
 pub use surface::{Derivatives, SecondDerivatives, Surface};

@@ -67,8 +67,8 @@ impl BezierPatch {
 
     fn homogeneous_in<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
         let [p, q] = self.degree;
-        let (bu, du) = bernstein::<W>(p, local.x);
-        let (bv, dv) = bernstein::<W>(q, local.y);
+        let (bu, du) = bernstein_to_first::<W>(p, local.x);
+        let (bv, dv) = bernstein_to_first::<W>(q, local.y);
         let mut sums = [Homogeneous::ZERO; 3];
         for i in 0..=p {
             let (mut row, mut row_v) = (Homogeneous::ZERO, Homogeneous::ZERO);
@@ -91,8 +91,8 @@ impl BezierPatch {
 
     fn point_in<const W: usize>(&self, local: Uv) -> Homogeneous {
         let [p, q] = self.degree;
-        let bu = values::<W>(p, local.x);
-        let bv = values::<W>(q, local.y);
+        let bu = bernstein::<W>(p, local.x);
+        let bv = bernstein::<W>(q, local.y);
         let mut sum = Homogeneous::ZERO;
         for (row, &b) in self.points.chunks_exact(q + 1).zip(&bu[..=p]) {
             sum += row.iter().zip(&bv).fold(Homogeneous::ZERO, |s, (&c, &v)| s + c * v) * b;
@@ -107,7 +107,7 @@ impl BezierPatch {
 
     fn lattice_in<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
         let [p, q] = self.degree;
-        let (bu, bv) = (u.map(|x| values::<W>(p, x)), v.map(|x| values::<W>(q, x)));
+        let (bu, bv) = (u.map(|x| bernstein::<W>(p, x)), v.map(|x| bernstein::<W>(q, x)));
         let mut sums = [[Homogeneous::ZERO; 3]; 3];
         for (i, row) in self.points.chunks_exact(q + 1).enumerate() {
             for b in 0..3 {
@@ -127,7 +127,7 @@ impl BezierPatch {
 
     fn second_in<const W: usize>(&self, local: Uv) -> SecondDerivatives {
         let [p, q] = self.degree;
-        let (bu, bv) = (two_derivatives::<W>(p, local.x), two_derivatives::<W>(q, local.y));
+        let (bu, bv) = (bernstein_to_second::<W>(p, local.x), bernstein_to_second::<W>(q, local.y));
         let mut sums = [Homogeneous::ZERO; 6];
         for (i, row) in self.points.chunks_exact(q + 1).enumerate() {
             let mut along = [Homogeneous::ZERO; 3];
@@ -186,7 +186,7 @@ impl BezierPatch {
 }
 
 /// Bernstein polynomials of degree `n < W` at `t`.
-fn values<const W: usize>(n: usize, t: f64) -> [f64; W] {
+fn bernstein<const W: usize>(n: usize, t: f64) -> [f64; W] {
     let s = 1.0 - t;
     let mut b = [0.0; W];
     b[0] = 1.0;
@@ -203,11 +203,11 @@ fn values<const W: usize>(n: usize, t: f64) -> [f64; W] {
 }
 
 /// Bernstein polynomials of degree `n < W` and their first two derivatives at `t`.
-fn two_derivatives<const W: usize>(n: usize, t: f64) -> [[f64; W]; 3] {
-    let (b, d) = bernstein::<W>(n, t);
+fn bernstein_to_second<const W: usize>(n: usize, t: f64) -> [[f64; W]; 3] {
+    let (b, d) = bernstein_to_first::<W>(n, t);
     let mut dd = [0.0; W];
     if n > 1 {
-        let c = values::<W>(n - 2, t);
+        let c = bernstein::<W>(n - 2, t);
         let at = |i: usize, back: usize| if i >= back && i - back + 2 <= n { c[i - back] } else { 0.0 };
         for i in 0..=n {
             dd[i] = (n * (n - 1)) as f64 * (at(i, 2) - 2.0 * at(i, 1) + at(i, 0));
@@ -217,18 +217,18 @@ fn two_derivatives<const W: usize>(n: usize, t: f64) -> [[f64; W]; 3] {
 }
 
 /// Bernstein polynomials of degree `n < W` and their derivatives at `t`.
-fn bernstein<const W: usize>(n: usize, t: f64) -> ([f64; W], [f64; W]) {
+fn bernstein_to_first<const W: usize>(n: usize, t: f64) -> ([f64; W], [f64; W]) {
     let mut d = [0.0; W];
     if n > 0 {
         // Derivatives from degree n − 1: n (B_{i−1} − B_i).
-        let b = values::<W>(n - 1, t);
+        let b = bernstein::<W>(n - 1, t);
         for i in 0..=n {
             let before = if i > 0 { b[i - 1] } else { 0.0 };
             let here = if i < n { b[i] } else { 0.0 };
             d[i] = n as f64 * (before - here);
         }
     }
-    (values::<W>(n, t), d)
+    (bernstein::<W>(n, t), d)
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ pub fn nearest_from(curve: &Curve, p: Point, start: f64, expected: f64) -> (f64,
 /// The parameter that minimises the length of `offset(curve(t))`, and that length. `offset` must be affine.
 pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<(f64, f64)>) -> (f64, f64) {
     if let Some((t, expected)) = start {
-        let found = descend(curve, &offset, t);
+        let found = descend_from(curve, &offset, t);
         if found.1 <= expected {
             return found;
         }
@@ -55,7 +55,7 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
         let lower = (i == 0 || d <= seeds[i - 1].1) && (i + 1 == seeds.len() || d <= seeds[i + 1].1);
         // A dip between samples cannot be much below its samples unless they are near: try the promising ones.
         if lower && d.sqrt() <= 2.0 * best.1 + 1e-300 || best.1.is_infinite() {
-            let found = descend(curve, &offset, seeds[i].0);
+            let found = descend_from(curve, &offset, seeds[i].0);
             if found.1 < best.1 {
                 best = found;
             }
@@ -65,7 +65,7 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
 }
 
 /// Newton steps on the derivative of the squared length, halved while they do not descend.
-fn descend(curve: &Curve, offset: &impl Fn(Point) -> Point, start: f64) -> (f64, f64) {
+fn descend_from(curve: &Curve, offset: &impl Fn(Point) -> Point, start: f64) -> (f64, f64) {
     let [t0, t1] = curve.domain();
     let zero = offset(Point::ZERO);
     let mut t = start.clamp(t0, t1);

@@ -54,11 +54,11 @@ pub struct Repairs {
 
 impl Repairs {
     /// Whether anything was changed.
-    pub fn any(&self) -> bool {
+    pub fn has_changes(&self) -> bool {
         *self != Self::default()
     }
 
-    fn and(self, o: Self) -> Self {
+    fn union(self, o: Self) -> Self {
         Self {
             clamped: self.clamped || o.clamped,
             merged_knots: self.merged_knots || o.merged_knots,
@@ -115,7 +115,7 @@ pub fn surface(
     let rows = (0..nu).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
     let (rows, kv, repairs_v) = conform(degree[1], kv, rows, fixed_v)?;
     let points = rows.into_iter().flatten().collect();
-    Ok((Surface { degree, knots: [ku, kv], points }, repairs_u.and(repairs_v)))
+    Ok((Surface { degree, knots: [ku, kv], points }, repairs_u.union(repairs_v)))
 }
 
 fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogeneous>, Defect> {

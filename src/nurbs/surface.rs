@@ -1,4 +1,4 @@
-use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, find_span, functions};
+use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, basis_functions, find_span};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 
@@ -92,8 +92,8 @@ impl Surface {
         let [p, q] = self.degree;
         let count_v = self.counts()[1];
         let (span_u, span_v) = (find_span(&self.knots[0], p, uv.x), find_span(&self.knots[1], q, uv.y));
-        let bu = functions::<W>(&self.knots[0], p, span_u, uv.x);
-        let bv = functions::<W>(&self.knots[1], q, span_v, uv.y);
+        let bu = basis_functions::<W>(&self.knots[0], p, span_u, uv.x);
+        let bv = basis_functions::<W>(&self.knots[1], q, span_v, uv.y);
         let mut sum = Homogeneous::ZERO;
         for (i, &b) in bu[..=p].iter().enumerate() {
             let start = (span_u - p + i) * count_v + span_v - q;

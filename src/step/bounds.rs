@@ -11,11 +11,11 @@ const GRID: [usize; 2] = [12, 256];
 const STARTS: usize = 3;
 
 /// A box around all placed faces; within about 1e-3 of a face's size.
-pub(super) fn of_model(model: &Model) -> Aabb {
+pub(super) fn model_bounds(model: &Model) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for placed in model.placed_faces() {
         if let Some(face) = placed.face {
-            bounds = of_face(face, placed.placement, bounds);
+            bounds = grow_by_face(face, placed.placement, bounds);
         } else if let Some(ready) = placed.tessellated {
             let points = ready.mesh.positions.iter().map(|&p| placed.placement.point(p));
             bounds = bounds.union(Aabb::around(points));
@@ -25,7 +25,7 @@ pub(super) fn of_model(model: &Model) -> Aabb {
 }
 
 /// Grows a box by a face.
-fn of_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
+fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     let at = |uv: Uv| placement.point(face.surface.evaluate(uv));
     let inside = |b: &Aabb, p: Point| b.contains(p);
     let hull = Aabb::around(face.surface.points.iter().map(|p| placement.point(p.position())));

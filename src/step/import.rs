@@ -1,9 +1,9 @@
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
-use super::product::assembly::{Assembly, Placed};
-use super::product::part::{Converted, convert};
+use super::product::assembly::{Assembly, PlacedRepresentation};
+use super::product::conversion::{ConvertedPart, convert};
 use super::product::styles::Styles;
-use super::product::topology::Items;
+use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, SurfaceCounts};
 use super::{Error, ErrorKind, Settings, bounds};
 use crate::math::Frame;
@@ -52,7 +52,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     }
     let model = assemble(&file, name, settings, &mut report);
     if let (false, b) = {
-        let b = bounds::of_model(&model);
+        let b = bounds::model_bounds(&model);
         (b.is_empty(), b)
     } {
         report.bbox_mm = Some([b.min.to_array(), b.max.to_array()]);
@@ -89,7 +89,7 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
             }
         }
     }
-    let common = Common { file, styles: Styles::read(file), settings };
+    let common = SharedInput { file, styles: Styles::read(file), settings };
     let assembly = Assembly::read(
         file,
         units,
@@ -120,7 +120,7 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
                 }
             }
             let units = assembly.units_of(p.representation);
-            let made = make_part(&common, units, &p, &items, &mut model, report);
+            let made = convert_representation(&common, units, &p, &items, &mut model, report);
             parts.insert(p.representation, made);
             made
         });
@@ -146,30 +146,30 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
 }
 
 /// What all parts of a file share.
-struct Common<'f, 'a> {
+struct SharedInput<'f, 'a> {
     file: &'f File<'a>,
     styles: Styles,
     settings: &'f Settings,
 }
 
 /// Converts a representation that holds shapes; `None` when it holds none.
-fn make_part(
-    common: &Common<'_, '_>,
+fn convert_representation(
+    common: &SharedInput<'_, '_>,
     units: Units,
-    placed: &Placed,
+    placed: &PlacedRepresentation,
     ids: &[u64],
     model: &mut Model,
     report: &mut ImportReport,
 ) -> Option<(PartId, usize)> {
-    let Common { file, styles, settings } = common;
-    let mut items = Items::default();
+    let SharedInput { file, styles, settings } = common;
+    let mut items = ShapeItems::default();
     for &id in ids {
         items.add(file, id);
     }
     if items.is_empty() {
         return None;
     }
-    let Converted { mut part, found, refused, repaired } = convert(file, units, &items, styles, settings);
+    let ConvertedPart { mut part, found, refused, repaired } = convert(file, units, &items, styles, settings);
     part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
     part.colour = styles.colour(placed.representation);
     report.faces.found += found;
@@ -181,7 +181,7 @@ fn make_part(
     report.repairs.extend(repaired.into_iter().map(note));
     let mut counted = FxHashSet::default();
     for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e))) {
-        count(&mut report.by_surface, &face.analytic);
+        count_surface(&mut report.by_surface, &face.analytic);
         report.gap_max_mm = report.gap_max_mm.max(face.gap);
     }
     report.by_surface.tessellated += part.tessellated.len();
@@ -189,7 +189,7 @@ fn make_part(
     Some((PartId(model.parts.len() as u32 - 1), found))
 }
 
-fn count(counts: &mut SurfaceCounts, analytic: &Analytic) {
+fn count_surface(counts: &mut SurfaceCounts, analytic: &Analytic) {
     let slot = match analytic {
         Analytic::Plane { .. } => &mut counts.plane,
         Analytic::Cylinder { .. } => &mut counts.cylinder,

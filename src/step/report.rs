@@ -13,7 +13,7 @@ pub struct ImportReport {
     pub units: UnitNames,
     /// Distinct shapes.
     pub parts: usize,
-    /// Placed shapes.
+    /// PlacedRepresentation shapes.
     pub instances: usize,
     /// Shells of distinct shapes.
     pub shells: usize,
@@ -21,7 +21,7 @@ pub struct ImportReport {
     pub faces: FaceCounts,
     /// Faces counted once for every instance.
     pub faces_placed: PlacedCounts,
-    /// Converted distinct faces by the kind of surface.
+    /// ConvertedPart distinct faces by the kind of surface.
     pub by_surface: SurfaceCounts,
     /// Lower and upper corner of the trimmed faces, mm; `None` without any.
     pub bbox_mm: Option<[[f64; 3]; 2]>,

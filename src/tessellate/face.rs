@@ -106,8 +106,8 @@ fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: 
     for uv in at {
         let d = surface.second_derivatives(uv);
         let Some(forms) = FundamentalForms::new(&d) else { continue };
-        sum.x += chords(forms.along(Uv::X), d.du.length());
-        sum.y += chords(forms.along(Uv::Y), d.dv.length());
+        sum.x += chords(forms.normal_curvature(Uv::X), d.du.length());
+        sum.y += chords(forms.normal_curvature(Uv::Y), d.dv.length());
         count += 1.0;
     }
     let s = sum / count;

@@ -218,7 +218,7 @@ impl<'a> FaceSurface<'a> {
             let center = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
             self.forms(uv.lerp(center, BESIDE_POLE))
         });
-        self.field.tolerance_at(forms.map_or(f64::INFINITY, |f| f.sharpest()))
+        self.field.tolerance_at(forms.map_or(f64::INFINITY, |f| f.largest_curvature()))
     }
 }
 

@@ -55,13 +55,8 @@ pub use tessellation::{FacetQuality, Tessellation};
 /// let frame = Frame::IDENTITY;
 /// let face = Face {
 ///     name: "ball".into(),
-///     entity: None,
-///     colour: None,
-///     surface: sweep::sphere(&frame, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]),
 ///     analytic: Analytic::Sphere { frame, radius: 10.0 },
-///     reversed: false,
-///     loops: Vec::new(),
-///     gap: 0.0,
+///     ..Face::whole(sweep::sphere(&frame, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]))
 /// };
 /// let shell = Shell { faces: vec![face], closed: true, ..Shell::default() };
 /// let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });

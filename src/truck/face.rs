@@ -50,7 +50,7 @@ pub(super) fn convert<'a>(
         }
     };
     let reversed = flipped == oriented;
-    Ok(Face { name: String::new(), entity: None, colour: None, surface, analytic, reversed, loops, gap })
+    Ok(Face { analytic, reversed, loops, gap, ..Face::whole(surface) })
 }
 
 type Parts = (Surface, Analytic, bool, Vec<TrimLoop>, f64);

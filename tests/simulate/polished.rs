@@ -34,10 +34,7 @@ const GUIDE: &str = "[[medium]]\nname = 'core'\nindex = 1.6\n[[material]]\npart 
 #[test]
 fn light_that_runs_round_in_a_ring_stays_in_it() {
     let surface = sweep::torus(&Frame::IDENTITY, 20.0, 2.0, [0.0, TAU], [0.0, TAU]);
-    let (analytic, name) = (Analytic::Other, String::new());
-    let (entity, colour, loops, reversed) = (None, None, Vec::new(), false);
-    let face = Face { name, entity, colour, surface, analytic, reversed, loops, gap: 0.0 };
-    let shells = vec![Shell { faces: vec![face], closed: true, ..Shell::default() }];
+    let shells = vec![Shell { faces: vec![Face::whole(surface)], closed: true, ..Shell::default() }];
     let part = Part { name: "ring".into(), shells, ..Part::default() };
     let placed = Instance { name: "ring".into(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
     let model = Model { parts: vec![part], instances: vec![placed], ..Model::default() };

@@ -35,8 +35,7 @@ fn face(name: &str, shape: &Shape) -> Face {
         }
         Shape::Rectangle { frame, half: [a, b] } => (sweep::plane(&frame, [[-a, a], [-b, b]]), false),
     };
-    let (entity, colour, loops) = (None, None, Vec::new());
-    Face { name: name.into(), entity, colour, surface, analytic: Analytic::Other, reversed, loops, gap: 0.0 }
+    Face { name: name.into(), reversed, ..Face::whole(surface) }
 }
 
 impl World {

@@ -9,16 +9,7 @@ use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use std::f64::consts::PI;
 
 fn face(surface: Surface, reversed: bool, loops: Vec<TrimLoop>) -> Face {
-    Face {
-        name: String::new(),
-        entity: None,
-        colour: None,
-        surface,
-        analytic: Analytic::Other,
-        reversed,
-        loops,
-        gap: 0.0,
-    }
+    Face { reversed, loops, ..Face::whole(surface) }
 }
 
 fn whole(surface: Surface) -> Model {

@@ -99,12 +99,12 @@ impl Chart {
             flipped: false,
             error: 0.0,
         };
-        chart.measure();
+        chart.characterise();
         chart
     }
 
     /// Fills in periods, bounds, poles and size.
-    fn measure(&mut self) {
+    fn characterise(&mut self) {
         const TURN: f64 = 2.0 * PI;
         match &self.kind {
             Kind::Plane { .. } => {}
@@ -166,7 +166,7 @@ impl Chart {
     }
 
     /// Whether a parameter is an angle, whose spline parameter differs from it.
-    pub(super) fn angular(&self) -> [bool; 2] {
+    pub(super) fn angular_directions(&self) -> [bool; 2] {
         match self.kind {
             Kind::Cone { .. } | Kind::Revolution { .. } => [true, false],
             Kind::Torus { .. } => [true, true],
@@ -187,11 +187,11 @@ impl Chart {
             Kind::Extrusion { base, direction } => swept::locate_extrusion(base, *direction, p, hint, self),
             Kind::Spline(s) => s.locate(p, hint),
         };
-        hint.map_or(uv, |h| self.near(uv, h))
+        hint.map_or(uv, |h| self.nearest_representative(uv, h))
     }
 
     /// The representative of `uv` that is nearest to `to`.
-    pub(super) fn near(&self, uv: Uv, to: Uv) -> Uv {
+    pub(super) fn nearest_representative(&self, uv: Uv, to: Uv) -> Uv {
         let shift = |d: usize| self.period[d].map_or(0.0, |p| p * ((to[d] - uv[d]) / p).round());
         uv + Uv::new(shift(0), shift(1))
     }
@@ -244,19 +244,23 @@ impl Chart {
                 sweep::cone(frame, *radius, *half_angle, domain[0], domain[1])
             }
             Kind::Torus { frame, major, minor } => sweep::torus(frame, *major, *minor, domain[0], domain[1]),
-            Kind::Revolution { frame, meridian, .. } => {
-                sweep::revolution(&spline::covering(meridian, domain[1], self.period[1]), frame, domain[0])
-            }
-            Kind::Extrusion { base, direction } => {
-                sweep::extrusion(&spline::covering(base, domain[0], self.period[0]), *direction, domain[1])
-            }
-            Kind::Spline(s) => s.covering(domain),
+            Kind::Revolution { frame, meridian, .. } => sweep::revolution(
+                &spline::extend_periodically(meridian, domain[1], self.period[1]),
+                frame,
+                domain[0],
+            ),
+            Kind::Extrusion { base, direction } => sweep::extrusion(
+                &spline::extend_periodically(base, domain[0], self.period[0]),
+                *direction,
+                domain[1],
+            ),
+            Kind::Spline(s) => s.extend_periodically(domain),
         }
     }
 
     /// The spline's parameters over `domain` at a point of the chart.
     pub(super) fn to_surface(&self, domain: [[f64; 2]; 2], uv: Uv) -> Uv {
-        let [u, v] = self.angular();
+        let [u, v] = self.angular_directions();
         let one = |d: usize, angular: bool| {
             if angular { conic::parameter_of_angle(domain[d], uv[d]) } else { uv[d] }
         };

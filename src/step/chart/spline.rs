@@ -210,7 +210,7 @@ impl SplineChart {
     }
 
     /// The surface over a rectangle that may run over the seams of closed directions.
-    pub(super) fn covering(&self, domain: [[f64; 2]; 2]) -> Surface {
+    pub(super) fn extend_periodically(&self, domain: [[f64; 2]; 2]) -> Surface {
         let base = self.surface.domain();
         let mut surface = self.surface.clone();
         for d in 0..2 {
@@ -218,7 +218,7 @@ impl SplineChart {
             let near = 1e-9 * (base[d][1] - base[d][0]);
             if a < base[d][0] - near || b > base[d][1] + near {
                 let period = self.period()[d];
-                surface = surface.map_direction(d, |c| covering(&c, [a, b], period));
+                surface = surface.map_direction(d, |c| extend_periodically(&c, [a, b], period));
             }
         }
         surface
@@ -226,7 +226,7 @@ impl SplineChart {
 }
 
 /// A curve over a range, repeated by its period as far as needed; without a period its own domain stays.
-pub(super) fn covering(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> Curve {
+pub(super) fn extend_periodically(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> Curve {
     let [t0, t1] = curve.domain();
     let Some(period) = period else { return curve.clone() };
     let near = 1e-9 * period;
@@ -239,7 +239,7 @@ pub(super) fn covering(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> 
     let copy = curve.reparametrised([start, start + period]);
     let mut whole = copy.clone();
     for _ in first..last {
-        whole = whole.followed_by(curve);
+        whole = whole.joined_with(curve);
     }
     let [w0, w1] = whole.domain();
     whole.restricted(a.clamp(w0, w1), b.clamp(w0, w1))

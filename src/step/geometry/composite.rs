@@ -1,7 +1,7 @@
 //! Bounded curves as splines: trimmed, composite, and whole curves.
 
-use super::curves::{Directed, MAX_DEPTH, Shape};
-use super::pcurves::associated;
+use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH};
+use super::pcurves::first_pcurve;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
@@ -13,38 +13,38 @@ const MAX_SEGMENTS: usize = 100_000;
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// A curve with two ends (or closed), in its own direction.
-    pub(crate) fn bounded(&self, id: u64, depth: usize) -> Outcome<Curve> {
+    pub(crate) fn bounded_curve(&self, id: u64, depth: usize) -> Outcome<Curve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
-            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+            return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
-        if let Some(trimmed) = e.own("TRIMMED_CURVE", 1) {
-            return self.trimmed(e, trimmed, depth);
+        if let Some(trimmed) = e.attributes("TRIMMED_CURVE", 1) {
+            return self.trimmed_curve(e, trimmed, depth);
         }
-        if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
-            let curve = e.own("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
-            let basis = self.follow(e, curve.or_else(|| associated(e)), "curve_3d of the surface curve")?;
-            return self.bounded(basis.id, depth + 1);
+        if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
+            let curve = e.attributes("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
+            let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
+            return self.bounded_curve(basis.id, depth + 1);
         }
-        if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {
+        if e.is_one_of(&["PCURVE", "BOUNDED_PCURVE"]) {
             return self.pcurve(e, depth);
         }
-        let Directed { shape, reversed } = self.curve(id, depth)?;
+        let DirectedCurve { shape, reversed } = self.curve(id, depth)?;
         let whole = match &shape {
-            Shape::Ellipse { .. } => shape.segment(0.0, 2.0 * PI),
-            Shape::Spline { curve, .. } => curve.clone(),
-            _ => return Err(Refusal::of(e, "an unbounded curve where a bounded one is needed")),
+            CurveShape::Ellipse { .. } => shape.segment(0.0, 2.0 * PI),
+            CurveShape::Spline { curve, .. } => curve.clone(),
+            _ => return Err(Refusal::new(e, "an unbounded curve where a bounded one is needed")),
         };
         Ok(if reversed { whole.reversed() } else { whole })
     }
 
-    fn trimmed(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
-        let basis = self.follow(e, args.id(0), "basis curve")?;
-        let Directed { shape, reversed } = self.curve(basis.id, depth + 1)?;
+    fn trimmed_curve(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        let basis = self.resolve(e, args.id(0), "basis curve")?;
+        let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         let sense = args.flag(3) != Some(false);
         let by_point = args.word(4) == Some("CARTESIAN");
         let scale = match &shape {
-            Shape::Ellipse { .. } => self.units.angle,
+            CurveShape::Ellipse { .. } => self.units.angle,
             _ => 1.0,
         };
         let limit = |list: Args<'f, 'a>| -> Option<f64> {
@@ -53,7 +53,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             if by_point { point().or_else(number) } else { number().or_else(point) }
         };
         let (Some(t1), Some(t2)) = (limit(args.list(1)), limit(args.list(2))) else {
-            return Err(Refusal::of(e, "a trimming value is missing"));
+            return Err(Refusal::new(e, "a trimming value is missing"));
         };
         let (from, mut to) = if sense { (t1, t2) } else { (t2, t1) };
         if let Some(period) = shape.period() {
@@ -63,7 +63,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             }
         }
         if !(to > from) {
-            return Err(Refusal::of(e, "trimming values are in the wrong order or equal"));
+            return Err(Refusal::new(e, "trimming values are in the wrong order or equal"));
         }
         let curve = shape.segment(from, to);
         Ok(if sense == reversed { curve.reversed() } else { curve })
@@ -73,21 +73,22 @@ impl<'f, 'a> Geometry<'f, 'a> {
     pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
         let own = ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]
             .into_iter()
-            .find_map(|n| e.own(n, 1).filter(|a| a.list(0).len() > 0));
-        let Some(own) = own else { return Err(Refusal::of(e, "composite curve without segments")) };
+            .find_map(|n| e.attributes(n, 1).filter(|a| a.list(0).len() > 0));
+        let Some(own) = own else { return Err(Refusal::new(e, "composite curve without segments")) };
         let list = own.list(0);
         if list.len() > MAX_SEGMENTS {
-            return Err(Refusal::of(e, "composite curve with too many segments"));
+            return Err(Refusal::new(e, "composite curve with too many segments"));
         }
         let mut curves: Vec<Curve> = Vec::with_capacity(list.len());
         for i in 0..list.len() {
-            let segment = self.follow(e, list.id(i), "segment")?;
-            let args = segment.own("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args());
-            let parent = self.follow(segment, args.id(2), "parent curve")?;
-            let curve = if parent.is_any(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE"]) && depth < MAX_DEPTH {
-                self.composite(parent, depth + 1)?
+            let segment = self.resolve(e, list.id(i), "segment")?;
+            let args = segment.attributes("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args());
+            let parent = self.resolve(segment, args.id(2), "parent curve")?;
+            let curve = if parent.is_one_of(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE"]) && depth < MAX_DEPTH
+            {
+                self.composite_curve(parent, depth + 1)?
             } else {
-                self.bounded(parent.id, depth + 1)?
+                self.bounded_curve(parent.id, depth + 1)?
             };
             curves.push(if args.flag(1) == Some(false) { curve.reversed() } else { curve });
         }
@@ -115,20 +116,20 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// A composite curve as one spline.
-    pub(crate) fn composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    pub(crate) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         if depth > MAX_DEPTH {
-            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+            return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
         let segments = self.segments(e, depth)?;
         let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
-        let mut parts = segments.iter().map(|c| elevated(c, degree));
-        let first = parts.next().ok_or_else(|| Refusal::of(e, "composite curve without segments"))?;
-        Ok(parts.fold(first, |whole, part| whole.followed_by(&part)))
+        let mut parts = segments.iter().map(|c| elevate_degree(c, degree));
+        let first = parts.next().ok_or_else(|| Refusal::new(e, "composite curve without segments"))?;
+        Ok(parts.fold(first, |whole, part| whole.joined_with(&part)))
     }
 }
 
 /// The same curve with a higher degree, piecewise Bézier.
-fn elevated(curve: &Curve, degree: usize) -> Curve {
+fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
     if curve.degree == degree {
         return curve.clone();
     }
@@ -153,7 +154,7 @@ fn elevated(curve: &Curve, degree: usize) -> Curve {
 }
 
 /// Whether two points are the same within the accuracy of files.
-pub(crate) fn same(a: Point, b: Point, tolerance: f64) -> bool {
+pub(crate) fn coincident(a: Point, b: Point, tolerance: f64) -> bool {
     (a - b).length() <= tolerance
 }
 
@@ -166,7 +167,7 @@ mod tests {
     #[test]
     fn elevation_keeps_the_curve() {
         let c = conic::arc(&Frame::IDENTITY, 2.0, [0.0, 5.0]);
-        let e = elevated(&c, 4);
+        let e = elevate_degree(&c, 4);
         assert_eq!(e.knots.len(), e.points.len() + 5);
         for i in 0..=40 {
             let t = 0.125 * f64::from(i);

@@ -1,6 +1,6 @@
 //! Curves of the file: closed forms where there is one, rational splines for the rest.
 
-use super::pcurves::associated;
+use super::pcurves::first_pcurve;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
@@ -12,7 +12,7 @@ pub(crate) const MAX_DEPTH: usize = 16;
 
 /// A curve, not yet cut.
 #[derive(Clone, Debug)]
-pub(crate) enum Shape {
+pub(crate) enum CurveShape {
     /// `origin + t·direction`.
     Line { origin: Point, direction: Vector },
     /// `(a cos t, b sin t)`; a circle when equal.
@@ -27,13 +27,13 @@ pub(crate) enum Shape {
 
 /// A curve with the direction in which it is run.
 #[derive(Clone, Debug)]
-pub(crate) struct Directed {
-    pub(crate) shape: Shape,
+pub(crate) struct DirectedCurve {
+    pub(crate) shape: CurveShape,
     /// Against its parameter.
     pub(crate) reversed: bool,
 }
 
-impl Shape {
+impl CurveShape {
     pub(crate) fn spline(curve: Curve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();
@@ -75,7 +75,7 @@ impl Shape {
             }
             Self::Ellipse { frame, a, b } => {
                 let unit = conic::arc(&Frame::IDENTITY, 1.0, [t0, t1]);
-                mapped(unit, |q| frame.point(Point::new(a * q.x, b * q.y, 0.0)))
+                map_points(unit, |q| frame.point(Point::new(a * q.x, b * q.y, 0.0)))
             }
             Self::Hyperbola { frame, a, b } => {
                 // Middle control point on the crossing of the tangents, weight cosh of half the range.
@@ -101,7 +101,7 @@ impl Shape {
                 if *closed && (t1 > b || t0 < a) {
                     let shift = ((t0 - a) / period).floor() * period;
                     let (s0, s1) = ((t0 - shift).clamp(a, b), (t1 - shift).clamp(a, a + 2.0 * period));
-                    return wrapped(curve, s0, s1).reparametrised([t0, t1]);
+                    return segment_over_seam(curve, s0, s1).reparametrised([t0, t1]);
                 }
                 curve.restricted(t0.clamp(a, b), t1.clamp(a, b))
             }
@@ -110,7 +110,7 @@ impl Shape {
 }
 
 /// A closed spline over a range that runs past its end.
-fn wrapped(curve: &Curve, s0: f64, s1: f64) -> Curve {
+fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     let [a, b] = curve.domain();
     let period = b - a;
     if s1 <= b {
@@ -122,11 +122,11 @@ fn wrapped(curve: &Curve, s0: f64, s1: f64) -> Curve {
     }
     let head = curve.restricted(s0, b);
     let tail = curve.restricted(a, (s1 - period).clamp(a + 1e-9 * period, b));
-    head.followed_by(&tail)
+    head.joined_with(&tail)
 }
 
 /// A spline with its control points moved by an affine map.
-pub(crate) fn mapped(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
+pub(crate) fn map_points(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(map(p.position()), p.w)).collect();
     Curve { points, ..curve }
 }
@@ -152,112 +152,117 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// A curve in space with its direction; trimming is left to the caller's vertices.
-    pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<Directed> {
+    pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<DirectedCurve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
-            return Err(Refusal::of(e, "curves refer to each other too deeply"));
+            return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
-        let ahead = |shape| Ok(Directed { shape, reversed: false });
-        if e.is_any(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
-            let own = e.own("SURFACE_CURVE", 1).or_else(|| Some(e.args()).filter(|a| a.id(1).is_some()).and(None));
+        let ahead = |shape| Ok(DirectedCurve { shape, reversed: false });
+        if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
+            let own =
+                e.attributes("SURFACE_CURVE", 1).or_else(|| Some(e.args()).filter(|a| a.id(1).is_some()).and(None));
             let curve = own.and_then(|a| a.id(0)).or_else(|| e.args().id(1));
-            let basis = self.follow(e, curve.or_else(|| associated(e)), "curve_3d of the surface curve")?;
+            let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
             return self.curve(basis.id, depth + 1);
         }
-        if e.is_any(&["PCURVE", "BOUNDED_PCURVE"]) {
-            return ahead(Shape::spline(self.pcurve(e, depth + 1)?));
+        if e.is_one_of(&["PCURVE", "BOUNDED_PCURVE"]) {
+            return ahead(CurveShape::spline(self.pcurve(e, depth + 1)?));
         }
-        if let Some(own) = e.own("OFFSET_CURVE_3D", 1) {
+        if let Some(own) = e.attributes("OFFSET_CURVE_3D", 1) {
             return self.offset_curve(e, own, depth);
         }
-        if let Some(trimmed) = e.own("TRIMMED_CURVE", 1) {
-            let basis = self.follow(e, trimmed.id(0), "basis curve")?;
+        if let Some(trimmed) = e.attributes("TRIMMED_CURVE", 1) {
+            let basis = self.resolve(e, trimmed.id(0), "basis curve")?;
             let mut curve = self.curve(basis.id, depth + 1)?;
             curve.reversed ^= trimmed.flag(3) == Some(false);
             return Ok(curve);
         }
-        if e.is_any(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]) {
-            return ahead(Shape::spline(self.composite(e, depth + 1)?));
+        if e.is_one_of(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"])
+        {
+            return ahead(CurveShape::spline(self.composite_curve(e, depth + 1)?));
         }
-        if let Some(own) = e.own("CURVE_REPLICA", 1) {
-            let parent = self.follow(e, own.id(0), "parent curve")?;
+        if let Some(own) = e.attributes("CURVE_REPLICA", 1) {
+            let parent = self.resolve(e, own.id(0), "parent curve")?;
             let frame = self.transformation(own.id(1).unwrap_or(0))?;
-            let bounded = self.bounded(parent.id, depth + 1)?;
-            return ahead(Shape::spline(mapped(bounded, |p| frame.point(p))));
+            let bounded = self.bounded_curve(parent.id, depth + 1)?;
+            return ahead(CurveShape::spline(map_points(bounded, |p| frame.point(p))));
         }
-        ahead(self.shape(e)?)
+        ahead(self.elementary_curve(e)?)
     }
 
     /// An elementary curve or a spline.
-    fn shape(&self, e: Entity<'f, 'a>) -> Outcome<Shape> {
+    fn elementary_curve(&self, e: Entity<'f, 'a>) -> Outcome<CurveShape> {
         let mm = self.units.length;
         let positive = |x: Option<f64>, what: &str| {
             x.map(|x| x * mm)
                 .filter(|x| *x > 0.0 && x.is_finite())
-                .ok_or_else(|| Refusal::of(e, format!("{what} is not positive")))
+                .ok_or_else(|| Refusal::new(e, format!("{what} is not positive")))
         };
-        if let Some(a) = e.own("LINE", 1) {
-            let origin = self.point(self.follow(e, a.id(0), "point")?.id)?;
-            let direction = self.vector(self.follow(e, a.id(1), "direction")?.id)?;
-            return Ok(Shape::Line { origin, direction });
+        if let Some(a) = e.attributes("LINE", 1) {
+            let origin = self.point(self.resolve(e, a.id(0), "point")?.id)?;
+            let direction = self.vector(self.resolve(e, a.id(1), "direction")?.id)?;
+            return Ok(CurveShape::Line { origin, direction });
         }
-        let conic =
-            |name: &str| e.own(name, 1).map(|a| (a, e.own("CONIC", 1).and_then(|c| c.id(0)).or_else(|| a.id(0))));
+        let conic = |name: &str| {
+            e.attributes(name, 1).map(|a| (a, e.attributes("CONIC", 1).and_then(|c| c.id(0)).or_else(|| a.id(0))))
+        };
         // In a complex instance the position belongs to CONIC, so the sizes come first.
         let offset = usize::from(!e.keyword().is_empty());
         if let Some((a, at)) = conic("CIRCLE") {
-            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let frame = self.placement(self.resolve(e, at, "position")?.id)?;
             let r = positive(a.real(offset), "radius")?;
-            return Ok(Shape::Ellipse { frame, a: r, b: r });
+            return Ok(CurveShape::Ellipse { frame, a: r, b: r });
         }
         if let Some((a, at)) = conic("ELLIPSE") {
-            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let frame = self.placement(self.resolve(e, at, "position")?.id)?;
             let [x, y] = [positive(a.real(offset), "semi-axis 1")?, positive(a.real(offset + 1), "semi-axis 2")?];
-            return Ok(Shape::Ellipse { frame, a: x, b: y });
+            return Ok(CurveShape::Ellipse { frame, a: x, b: y });
         }
         if let Some((a, at)) = conic("HYPERBOLA") {
-            let frame = self.placement(self.follow(e, at, "position")?.id)?;
+            let frame = self.placement(self.resolve(e, at, "position")?.id)?;
             let [x, y] =
                 [positive(a.real(offset), "semi-axis")?, positive(a.real(offset + 1), "imaginary semi-axis")?];
-            return Ok(Shape::Hyperbola { frame, a: x, b: y });
+            return Ok(CurveShape::Hyperbola { frame, a: x, b: y });
         }
         if let Some((a, at)) = conic("PARABOLA") {
-            let frame = self.placement(self.follow(e, at, "position")?.id)?;
-            return Ok(Shape::Parabola { frame, f: positive(a.real(offset), "focal distance")? });
+            let frame = self.placement(self.resolve(e, at, "position")?.id)?;
+            return Ok(CurveShape::Parabola { frame, f: positive(a.real(offset), "focal distance")? });
         }
-        if let Some(a) = e.own("POLYLINE", 1) {
+        if let Some(a) = e.attributes("POLYLINE", 1) {
             let points = a.list(0).ids().into_iter().map(|p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
-            return polyline(&points).map(Shape::spline).ok_or_else(|| Refusal::of(e, "polyline without length"));
+            return polyline(&points)
+                .map(CurveShape::spline)
+                .ok_or_else(|| Refusal::new(e, "polyline without length"));
         }
-        if e.is_any(&[
+        if e.is_one_of(&[
             "B_SPLINE_CURVE",
             "B_SPLINE_CURVE_WITH_KNOTS",
             "BEZIER_CURVE",
             "UNIFORM_CURVE",
             "QUASI_UNIFORM_CURVE",
         ]) {
-            return self.spline_curve(e).map(Shape::spline);
+            return self.spline_curve(e).map(CurveShape::spline);
         }
-        Err(Refusal::of(e, "this kind of curve is not supported"))
+        Err(Refusal::new(e, "this kind of curve is not supported"))
     }
 
     /// A B-spline curve in any of its forms.
     fn spline_curve(&self, e: Entity<'f, 'a>) -> Outcome<Curve> {
-        let base = e.own("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
+        let base = e.attributes("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
         let degree = base.count(shift).unwrap_or(0);
         let ids = base.list(shift + 1).ids();
         let points = ids.iter().map(|&p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
-        let weights = e.own("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());
+        let weights = e.attributes("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());
         let form = knot_form(e, "CURVE");
-        let knots = match e.own("B_SPLINE_CURVE_WITH_KNOTS", 6) {
+        let knots = match e.attributes("B_SPLINE_CURVE_WITH_KNOTS", 6) {
             Some(a) => explicit_knots(a.list(0), a.list(1)),
             None => form.knots(degree, points.len()),
         };
-        let knots = knots.ok_or_else(|| Refusal::of(e, "knots and multiplicities do not fit"))?;
+        let knots = knots.ok_or_else(|| Refusal::new(e, "knots and multiplicities do not fit"))?;
         sanitise::curve(degree, knots, &points, weights.as_deref())
             .map(|(c, _)| c)
-            .map_err(|d| Refusal::of(e, d.to_string()))
+            .map_err(|d| Refusal::new(e, d.to_string()))
     }
 }
 

@@ -1,14 +1,14 @@
 //! Edges: curves cut to their vertices, running from the start vertex to the end vertex.
 
-use super::composite::same;
-use super::curves::{Directed, Shape};
+use super::composite::coincident;
+use super::curves::{CurveShape, DirectedCurve};
 use super::{Geometry, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
 /// An edge before it is numbered.
 #[derive(Clone, Debug)]
-pub(crate) struct CutEdge {
+pub(crate) struct TrimmedEdge {
     /// `None` for an edge without length.
     pub(crate) curve: Option<Curve>,
     /// Distance between the curve's ends and the vertices, mm.
@@ -17,38 +17,50 @@ pub(crate) struct CutEdge {
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// An EDGE_CURVE's curve, cut.
-    pub(crate) fn edge(&self, id: u64) -> Outcome<CutEdge> {
+    pub(crate) fn edge(&self, id: u64) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
-        let Some(edge) = e.own("EDGE", 1) else {
+        let Some(edge) = e.attributes("EDGE", 1) else {
             // Simple form: name, start, end, geometry, sense.
-            let Some(args) = e.own("EDGE_CURVE", 1) else {
-                return Err(Refusal::of(e, "this kind of edge is not supported"));
+            let Some(args) = e.attributes("EDGE_CURVE", 1) else {
+                return Err(Refusal::new(e, "this kind of edge is not supported"));
             };
-            return self.cut(e.id, [args.id(0), args.id(1)], args.id(2), args.flag(3) != Some(false));
+            return self.edge_between(e.id, [args.id(0), args.id(1)], args.id(2), args.flag(3) != Some(false));
         };
-        let own = e.own("EDGE_CURVE", 3);
+        let own = e.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        self.cut(e.id, [edge.id(0), edge.id(1)], curve, sense)
+        self.edge_between(e.id, [edge.id(0), edge.id(1)], curve, sense)
     }
 
-    fn cut(&self, id: u64, vertices: [Option<u64>; 2], curve: Option<u64>, sense: bool) -> Outcome<CutEdge> {
+    fn edge_between(
+        &self,
+        id: u64,
+        vertices: [Option<u64>; 2],
+        curve: Option<u64>,
+        sense: bool,
+    ) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
-        let [Some(v0), Some(v1)] = vertices else { return Err(Refusal::of(e, "a vertex is missing")) };
+        let [Some(v0), Some(v1)] = vertices else { return Err(Refusal::new(e, "a vertex is missing")) };
         let (p, q) = (self.vertex(v0)?, self.vertex(v1)?);
         let closed = v0 == v1 || p == q;
         let Some(curve) = curve else {
             // No geometry: straight.
             let curve = (!closed).then(|| Curve::line(p, q, [0.0, (q - p).length()]));
-            return Ok(CutEdge { curve, gap: 0.0 });
+            return Ok(TrimmedEdge { curve, gap: 0.0 });
         };
         let directed = self.curve(curve, 0)?;
-        cut_between(&directed, p, q, closed, sense)
-            .ok_or_else(|| Refusal::of(e, "its vertices leave nothing of its curve"))
+        trim_to_vertices(&directed, p, q, closed, sense)
+            .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))
     }
 }
 
 /// The part of a curve between two points.
-pub(crate) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool, sense: bool) -> Option<CutEdge> {
+pub(crate) fn trim_to_vertices(
+    directed: &DirectedCurve,
+    p: Point,
+    q: Point,
+    closed: bool,
+    sense: bool,
+) -> Option<TrimmedEdge> {
     let shape = &directed.shape;
     let forward = sense != directed.reversed;
     let (a, b) = if forward { (p, q) } else { (q, p) };
@@ -57,14 +69,14 @@ pub(crate) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool,
     match shape.period() {
         Some(period) => {
             let noise = 1e-9 * period;
-            if let Shape::Spline { curve, .. } = shape {
+            if let CurveShape::Spline { curve, .. } = shape {
                 // A vertex on the seam of a closed spline may have been found at either end.
                 let [d0, d1] = curve.domain();
                 let seam = curve.evaluate(d0);
-                if same(a, seam, accuracy) || (ta - d1).abs() < noise {
+                if coincident(a, seam, accuracy) || (ta - d1).abs() < noise {
                     ta = d0;
                 }
-                if same(b, seam, accuracy) {
+                if coincident(b, seam, accuracy) {
                     tb = if closed { d0 } else { d1 };
                 }
             }
@@ -72,18 +84,22 @@ pub(crate) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool,
                 tb = ta + period;
             } else {
                 tb = ta + (tb - ta).rem_euclid(period);
-                if tb - ta < noise || period - (tb - ta) < noise && same(p, q, accuracy) {
+                if tb - ta < noise || period - (tb - ta) < noise && coincident(p, q, accuracy) {
                     // Two vertices in one place: the whole curve, or nothing of it.
-                    return if same(p, q, accuracy) { Some(CutEdge { curve: None, gap: 0.0 }) } else { None };
+                    return if coincident(p, q, accuracy) {
+                        Some(TrimmedEdge { curve: None, gap: 0.0 })
+                    } else {
+                        None
+                    };
                 }
             }
         }
         None => {
-            if let Shape::Spline { curve, .. } = shape {
+            if let CurveShape::Spline { curve, .. } = shape {
                 let [d0, d1] = curve.domain();
                 if closed {
-                    if same(p, q, accuracy) && (curve.evaluate(d0) - curve.evaluate(d1)).length() > 1e-3 {
-                        return Some(CutEdge { curve: None, gap: 0.0 });
+                    if coincident(p, q, accuracy) && (curve.evaluate(d0) - curve.evaluate(d1)).length() > 1e-3 {
+                        return Some(TrimmedEdge { curve: None, gap: 0.0 });
                     }
                     (ta, tb) = (d0, d1);
                 }
@@ -93,19 +109,19 @@ pub(crate) fn cut_between(directed: &Directed, p: Point, q: Point, closed: bool,
                 let curve = shape.segment(tb, ta);
                 return finish(curve, !forward, p, q);
             }
-            if !(tb - ta > 0.0) || (a - b).length() < 1e-12 && matches!(shape, Shape::Line { .. }) {
-                return same(p, q, 1e-3).then_some(CutEdge { curve: None, gap: 0.0 });
+            if !(tb - ta > 0.0) || (a - b).length() < 1e-12 && matches!(shape, CurveShape::Line { .. }) {
+                return coincident(p, q, 1e-3).then_some(TrimmedEdge { curve: None, gap: 0.0 });
             }
         }
     }
     let length_scale = 1e-14 * (ta.abs() + tb.abs());
     if !(tb - ta > length_scale) {
-        return same(p, q, 1e-3).then_some(CutEdge { curve: None, gap: 0.0 });
+        return coincident(p, q, 1e-3).then_some(TrimmedEdge { curve: None, gap: 0.0 });
     }
     finish(shape.segment(ta, tb), forward, p, q)
 }
 
-fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<CutEdge> {
+fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge> {
     let curve = if forward { curve } else { curve.reversed() };
     let [a, b] = curve.domain();
     if !(b > a) || curve.points.iter().any(|x| !x.is_finite()) {
@@ -114,7 +130,7 @@ fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<CutEdge> {
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
     if extent < 1e-9 {
-        return Some(CutEdge { curve: None, gap });
+        return Some(TrimmedEdge { curve: None, gap });
     }
-    Some(CutEdge { curve: Some(curve), gap })
+    Some(TrimmedEdge { curve: Some(curve), gap })
 }

@@ -1,6 +1,6 @@
 //! Profiles of surfaces of revolution that cross their axis: the part that the face lies on.
 
-use super::surfaces::Reach;
+use super::surfaces::FaceExtent;
 use crate::math::{Frame, Point, Vector};
 use crate::nurbs::Curve;
 use crate::step::chart::profile_distance;
@@ -9,8 +9,8 @@ use crate::step::chart::profile_distance;
 const SAMPLES: i32 = 256;
 
 /// A meridian that crosses the axis is cut there: the part on which the points of the face lie stays.
-pub(crate) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curve {
-    let mut parts = parts(frame, &curve);
+pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExtent<'_>) -> Curve {
+    let mut parts = split_at_axis(frame, &curve);
     // A tube bent more tightly than its own radius passes through the axis.
     parts.push(curve.clone());
     let center = [reach.center];
@@ -32,7 +32,7 @@ pub(crate) fn cut_at_axis(frame: &Frame, curve: Curve, reach: Reach<'_>) -> Curv
 
 /// The parts between crossings of the axis, that of the curve's start first; none when there is no crossing. A closed
 /// curve has no ends of its own.
-fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
+fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     let [a, b] = curve.domain();
     let at = |t: f64| frame.local_point(curve.evaluate(t));
     let sample = |i: i32| a + (b - a) * f64::from(i) / f64::from(SAMPLES);
@@ -65,7 +65,7 @@ fn parts(frame: &Frame, curve: &Curve) -> Vec<Curve> {
         let tail = curve.restricted(last, b);
         let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
         match parts.pop() {
-            Some(head) if closed => parts.push(tail.followed_by(&head)),
+            Some(head) if closed => parts.push(tail.joined_with(&head)),
             Some(head) => parts.extend([head, tail]),
             None => parts.push(tail),
         }
@@ -91,8 +91,8 @@ mod tests {
         for z in [[0.6, 3.15], [-0.6, -3.15]] {
             let points = z.map(on);
             // The middle of ring-shaped faces is on the axis and tells nothing.
-            let reach = Reach { center: Point::new(327.0, -306.0, 0.0), radius: 3.2, points: &points };
-            let part = cut_at_axis(&axis, circle.clone(), reach);
+            let reach = FaceExtent { center: Point::new(327.0, -306.0, 0.0), radius: 3.2, points: &points };
+            let part = keep_face_side_of_axis(&axis, circle.clone(), reach);
             for p in points {
                 let (_, distance) = crate::nurbs::project::nearest(&part, p);
                 let mirrored = crate::nurbs::project::nearest(&part, Point::new(p.x, p.y, -p.z)).1;

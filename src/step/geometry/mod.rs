@@ -30,7 +30,7 @@ pub(crate) struct Refusal {
 pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {
-    pub(crate) fn of(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
+    pub(crate) fn new(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
 }
@@ -53,7 +53,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// The instance that a parameter refers to.
-    pub(crate) fn follow(
+    pub(crate) fn resolve(
         &self,
         from: Entity<'f, 'a>,
         position: Option<u64>,
@@ -61,35 +61,35 @@ impl<'f, 'a> Geometry<'f, 'a> {
     ) -> Outcome<Entity<'f, 'a>> {
         match position {
             Some(id) => self.entity(id),
-            None => Err(Refusal::of(from, format!("{what} is missing"))),
+            None => Err(Refusal::new(from, format!("{what} is missing"))),
         }
     }
 
     /// A CARTESIAN_POINT, mm.
     pub(crate) fn point(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
-        let xs = e.own("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
+        let xs = e.attributes("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
         match xs.as_deref() {
             Some([x, y, z]) => Ok(self.units.length * Point::new(*x, *y, *z)),
             Some([x, y]) => Ok(self.units.length * Point::new(*x, *y, 0.0)),
-            _ => Err(Refusal::of(e, "is no point with three coordinates")),
+            _ => Err(Refusal::new(e, "is no point with three coordinates")),
         }
     }
 
     /// A VERTEX_POINT, mm.
     pub(crate) fn vertex(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
-        match e.own("VERTEX_POINT", 1).and_then(|a| a.id(0)) {
+        match e.attributes("VERTEX_POINT", 1).and_then(|a| a.id(0)) {
             Some(point) => self.point(point),
-            None if e.is("CARTESIAN_POINT") => self.point(id),
-            None => Err(Refusal::of(e, "is no vertex with a point")),
+            None if e.is_a("CARTESIAN_POINT") => self.point(id),
+            None => Err(Refusal::new(e, "is no vertex with a point")),
         }
     }
 
     /// A DIRECTION, not normalised; `None` when absent or zero.
     pub(crate) fn direction(&self, id: Option<u64>) -> Option<Vector> {
         let e = self.file.entity(id?)?;
-        let xs = e.own("DIRECTION", 1)?.list(0).reals()?;
+        let xs = e.attributes("DIRECTION", 1)?.list(0).reals()?;
         let d = match xs.as_slice() {
             [x, y, z] => Vector::new(*x, *y, *z),
             [x, y] => Vector::new(*x, *y, 0.0),
@@ -101,12 +101,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
     /// A VECTOR with its magnitude, mm.
     pub(crate) fn vector(&self, id: u64) -> Outcome<Vector> {
         let e = self.entity(id)?;
-        let args = e.own("VECTOR", 1);
+        let args = e.attributes("VECTOR", 1);
         let direction = args.and_then(|a| self.direction(a.id(0))).and_then(|d| d.try_normalize());
         let magnitude = args.and_then(|a| a.real(1)).filter(|m| *m != 0.0).unwrap_or(1.0);
         match direction {
             Some(d) => Ok(d * (magnitude * self.units.length)),
-            None => Err(Refusal::of(e, "is no vector with a direction")),
+            None => Err(Refusal::new(e, "is no vector with a direction")),
         }
     }
 
@@ -116,12 +116,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let args = ["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT", "AXIS2_PLACEMENT_2D"];
         let Some((name, args)) = args.into_iter().find_map(|n| {
             let inherited = if e.keyword().is_empty() { 0 } else { 1 };
-            Some((n, e.own(n, inherited)?))
+            Some((n, e.attributes(n, inherited)?))
         }) else {
-            return Err(Refusal::of(e, "is no placement"));
+            return Err(Refusal::new(e, "is no placement"));
         };
         // In complex form the location belongs to PLACEMENT.
-        let separate = e.own("PLACEMENT", 1).filter(|_| e.keyword().is_empty());
+        let separate = e.attributes("PLACEMENT", 1).filter(|_| e.keyword().is_empty());
         let location = separate.map_or_else(|| args.id(0), |p| p.id(0));
         let first = if separate.is_some() { 0 } else { 1 };
         let origin = match location {
@@ -140,10 +140,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
     /// A placement or CARTESIAN_TRANSFORMATION_OPERATOR_3D: the target of a mapped item.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
-        let Some(args) = e.own("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
+        let Some(args) = e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
             // The simple form has all attributes behind the name of the representation item (and its own).
             let skip = if e.args().len() >= 7 { 2 } else { 1 };
-            e.own("CARTESIAN_TRANSFORMATION_OPERATOR_3D", skip)
+            e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR_3D", skip)
         }) else {
             return self.placement(id);
         };
@@ -153,10 +153,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
         };
         let scale = args.real(3).unwrap_or(1.0);
         if !(scale > 0.0 && scale.is_finite()) {
-            return Err(Refusal::of(e, "scale is not positive"));
+            return Err(Refusal::new(e, "scale is not positive"));
         }
         let axis3 = if e.keyword().is_empty() {
-            e.own("CARTESIAN_TRANSFORMATION_OPERATOR_3D", 0).and_then(|a| a.id(0))
+            e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR_3D", 0).and_then(|a| a.id(0))
         } else {
             args.id(4)
         };

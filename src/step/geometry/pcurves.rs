@@ -1,7 +1,7 @@
 //! Curves given only in the parameter plane of a surface, offset curves, and cubic curves through what can be evaluated.
 
-use super::curves::{Directed, Shape};
-use super::surfaces::Reach;
+use super::curves::{CurveShape, DirectedCurve};
+use super::surfaces::FaceExtent;
 use super::units::Units;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Point, Uv, Vector};
@@ -14,7 +14,7 @@ const MAX_PIECES: u32 = 4096;
 
 /// The C¹ cubic through a curve given by position and derivative, its pieces doubled until the middles agree to
 /// `tolerance` mm; the error left.
-pub(crate) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
+pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
     let mut n = 8u32;
     loop {
         let t = |i: f64| a + (b - a) * i / f64::from(n);
@@ -31,42 +31,47 @@ pub(crate) fn cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), toler
 }
 
 /// The first curve in a parameter plane of a surface curve that has none in space.
-pub(crate) fn associated(e: Entity<'_, '_>) -> Option<u64> {
-    let list = e.own("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
+pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
+    let list = e.attributes("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
     let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
-    curves.find(|c| c.is_any(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
+    curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// An OFFSET_CURVE_3D: the basis moved along the reference direction × its tangent.
-    pub(crate) fn offset_curve(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>, depth: usize) -> Outcome<Directed> {
-        let basis = self.follow(e, own.id(0), "basis curve")?;
+    pub(crate) fn offset_curve(
+        &self,
+        e: Entity<'f, 'a>,
+        own: Args<'f, 'a>,
+        depth: usize,
+    ) -> Outcome<DirectedCurve> {
+        let basis = self.resolve(e, own.id(0), "basis curve")?;
         let distance = own.real(1).map(|d| d * self.units.length).filter(|d| d.is_finite());
-        let distance = distance.ok_or_else(|| Refusal::of(e, "its distance is missing"))?;
+        let distance = distance.ok_or_else(|| Refusal::new(e, "its distance is missing"))?;
         let across = self.direction(own.id(3)).and_then(|d| d.try_normalize());
-        let across = across.ok_or_else(|| Refusal::of(e, "its reference direction is missing"))?;
-        let Directed { shape, reversed } = self.curve(basis.id, depth + 1)?;
+        let across = across.ok_or_else(|| Refusal::new(e, "its reference direction is missing"))?;
+        let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         let sign = if reversed { -distance } else { distance };
         let shape = match shape {
-            Shape::Line { origin, direction } => {
+            CurveShape::Line { origin, direction } => {
                 let aside = across.cross(direction).try_normalize();
-                let aside = aside.ok_or_else(|| Refusal::of(e, "its reference direction runs along its line"))?;
-                Shape::Line { origin: origin + sign * aside, direction }
+                let aside = aside.ok_or_else(|| Refusal::new(e, "its reference direction runs along its line"))?;
+                CurveShape::Line { origin: origin + sign * aside, direction }
             }
-            Shape::Ellipse { frame, a, b } if a == b && across.cross(frame.z).length() < 1e-9 => {
+            CurveShape::Ellipse { frame, a, b } if a == b && across.cross(frame.z).length() < 1e-9 => {
                 // The tangent turned by a right angle about the axis points to the center.
                 let radius = a - sign * across.dot(frame.z).signum();
                 if !(radius > 0.0) {
-                    return Err(Refusal::of(e, "the offset leaves nothing of its circle"));
+                    return Err(Refusal::new(e, "the offset leaves nothing of its circle"));
                 }
-                Shape::Ellipse { frame, a: radius, b: radius }
+                CurveShape::Ellipse { frame, a: radius, b: radius }
             }
-            Shape::Hyperbola { .. } | Shape::Parabola { .. } => {
-                return Err(Refusal::of(e, "an offset of an unbounded conic is not supported"));
+            CurveShape::Hyperbola { .. } | CurveShape::Parabola { .. } => {
+                return Err(Refusal::new(e, "an offset of an unbounded conic is not supported"));
             }
             shape => {
                 let curve = match shape {
-                    Shape::Spline { curve, .. } => curve,
+                    CurveShape::Spline { curve, .. } => curve,
                     other => other.segment(0.0, 2.0 * std::f64::consts::PI),
                 };
                 let moved = |t: f64| {
@@ -79,33 +84,33 @@ impl<'f, 'a> Geometry<'f, 'a> {
                     let (lo, hi) = ((t - h).max(a), (t + h).min(b));
                     (moved(t), (moved(hi) - moved(lo)) / (hi - lo))
                 };
-                Shape::spline(cubic([a, b], at, 1e-6).0)
+                CurveShape::spline(fit_cubic([a, b], at, 1e-6).0)
             }
         };
-        Ok(Directed { shape, reversed })
+        Ok(DirectedCurve { shape, reversed })
     }
 
     /// A PCURVE as a curve in space.
     pub(crate) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
-        let own = e.own("PCURVE", 1).unwrap_or_else(|| e.args());
-        let basis = self.follow(e, own.id(0), "basis surface")?;
-        let definition = self.follow(e, own.id(1), "curve in the parameter plane")?;
-        let representation = definition.own("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
+        let own = e.attributes("PCURVE", 1).unwrap_or_else(|| e.args());
+        let basis = self.resolve(e, own.id(0), "basis surface")?;
+        let definition = self.resolve(e, own.id(1), "curve in the parameter plane")?;
+        let representation = definition.attributes("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
         let item = representation.list(1).ids().first().copied();
-        let item = self.follow(definition, item, "curve in the parameter plane")?;
-        let chart = self.chart(basis.id, Reach::UNKNOWN, depth + 1)?;
+        let item = self.resolve(definition, item, "curve in the parameter plane")?;
+        let chart = self.chart(basis.id, FaceExtent::UNKNOWN, depth + 1)?;
         let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
-            return Err(Refusal::of(e, "its parameters cannot be taken over to the swept conic"));
+            return Err(Refusal::new(e, "its parameters cannot be taken over to the swept conic"));
         };
         // Parameters are pure numbers; only angles of conics keep their unit.
         let plane = Geometry { file: self.file, units: Units { length: 1.0, ..self.units } };
-        let curve = plane.bounded(item.id, depth + 1)?;
-        Ok(lifted(&chart, &curve, scale))
+        let curve = plane.bounded_curve(item.id, depth + 1)?;
+        Ok(lift_to_surface(&chart, &curve, scale))
     }
 }
 
 /// A curve of the parameter plane, in space.
-fn lifted(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
+fn lift_to_surface(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
     let at = |t: f64| {
         let c = curve.derivatives(t);
         let d = chart.derivatives(Uv::new(c.point.x * scale[0], c.point.y * scale[1]));
@@ -114,7 +119,7 @@ fn lifted(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
     // Corners stay corners: one cubic between each pair of knots of full multiplicity would do, all knots are simpler.
     let breaks = curve.breakpoints();
     if curve.degree > 1 || breaks.len() == 2 {
-        return cubic(curve.domain(), at, 1e-6).0;
+        return fit_cubic(curve.domain(), at, 1e-6).0;
     }
     let parts = breaks.windows(2).map(|w| {
         let middle = 0.5 * (w[0] + w[1]);
@@ -124,7 +129,7 @@ fn lifted(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
             let d = chart.derivatives(Uv::new(p.x * scale[0], p.y * scale[1]));
             (d.point, d.du * (slope.x * scale[0]) + d.dv * (slope.y * scale[1]))
         };
-        cubic([w[0], w[1]], line, 1e-6).0
+        fit_cubic([w[0], w[1]], line, 1e-6).0
     });
-    parts.reduce(|a, b| a.followed_by(&b)).unwrap_or_else(|| curve.clone())
+    parts.reduce(|a, b| a.joined_with(&b)).unwrap_or_else(|| curve.clone())
 }

@@ -31,13 +31,13 @@ pub(crate) struct Assigned {
 }
 
 /// Reads the units of a representation context; what it does not assign is mm and radians.
-pub(crate) fn of_context(context: Entity<'_, '_>) -> Assigned {
+pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
     let mut assigned = Assigned { units: Units::DEFAULT, length_name: None, angle_name: None };
-    if let Some(args) = context.own("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
+    if let Some(args) = context.attributes("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
         let units = args.list(0);
         for i in 0..units.len() {
             let Some(unit) = units.entity(i) else { continue };
-            match measure(unit, 0) {
+            match unit_factor(unit, 0) {
                 Some((Kind::Length, factor, name)) if assigned.length_name.is_none() => {
                     assigned.units.length = factor;
                     assigned.length_name = Some(name);
@@ -50,7 +50,7 @@ pub(crate) fn of_context(context: Entity<'_, '_>) -> Assigned {
             }
         }
     }
-    if let Some(args) = context.own("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", 2) {
+    if let Some(args) = context.attributes("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", 2) {
         let list = args.list(0);
         let values = (0..list.len()).filter_map(|i| list.entity(i));
         let lengths = values.filter_map(|m| m.all_args().find_map(|a| a.real(0))).filter(|&x| x > 0.0);
@@ -66,18 +66,18 @@ enum Kind {
 }
 
 /// Kind, factor and name of a unit.
-fn measure(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)> {
+fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)> {
     if depth > MAX_DEPTH {
         return None;
     }
-    if let Some(si) = unit.own("SI_UNIT", 1) {
+    if let Some(si) = unit.attributes("SI_UNIT", 1) {
         return si_unit(si);
     }
-    let conversion = unit.own("CONVERSION_BASED_UNIT", 1)?;
+    let conversion = unit.attributes("CONVERSION_BASED_UNIT", 1)?;
     let name = conversion.text(0).unwrap_or_default();
-    let declared = if unit.is("LENGTH_UNIT") {
+    let declared = if unit.is_a("LENGTH_UNIT") {
         Some(Kind::Length)
-    } else if unit.is("PLANE_ANGLE_UNIT") {
+    } else if unit.is_a("PLANE_ANGLE_UNIT") {
         Some(Kind::Angle)
     } else {
         None
@@ -85,14 +85,14 @@ fn measure(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)> {
     let by_measure = || {
         let with_unit = conversion.entity(1)?;
         let args = with_unit
-            .own("MEASURE_WITH_UNIT", 0)
+            .attributes("MEASURE_WITH_UNIT", 0)
             .or_else(|| Some(with_unit.args()))
             .filter(|a| a.real(0).is_some())?;
         let value = args.real(0).filter(|x| *x > 0.0)?;
-        let (kind, factor, _) = measure(args.entity(1)?, depth + 1)?;
+        let (kind, factor, _) = unit_factor(args.entity(1)?, depth + 1)?;
         Some((kind, value * factor))
     };
-    let by_name = || known(&name);
+    let by_name = || conventional_unit(&name);
     let (kind, factor) = by_measure().or_else(by_name)?;
     (declared.is_none_or(|d| d == kind)).then_some((kind, factor, name))
 }
@@ -110,7 +110,7 @@ fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
 }
 
 /// Units whose definition is missing or broken, by their usual names.
-fn known(name: &str) -> Option<(Kind, f64)> {
+fn conventional_unit(name: &str) -> Option<(Kind, f64)> {
     Some(match name.to_ascii_uppercase().trim_end_matches('S') {
         "INCH" | "INCHE" => (Kind::Length, INCH),
         "FOOT" | "FEET" => (Kind::Length, 12.0 * INCH),
@@ -125,5 +125,5 @@ fn known(name: &str) -> Option<(Kind, f64)> {
 
 /// All contexts of a file that assign units.
 pub(crate) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
-    file.entities().filter(|e| e.is("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, of_context(e)))
+    file.entities().filter(|e| e.is_a("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, read_context(e)))
 }

@@ -112,17 +112,17 @@ impl<'a> File<'a> {
             Index::Dense(table) => table.get(usize::try_from(id).ok()?).copied()?.checked_sub(1)?,
             Index::Sparse(map) => *map.get(&id)?,
         };
-        Some(self.at(position as usize))
+        Some(self.instance(position as usize))
     }
 
-    fn at(&self, position: usize) -> Entity<'_, 'a> {
+    fn instance(&self, position: usize) -> Entity<'_, 'a> {
         let i = self.instances[position];
         Entity { file: self, id: i.id, records: &self.records[i.first as usize..(i.first + i.count) as usize] }
     }
 
     /// All instances in the order of the file.
     pub(super) fn entities(&self) -> impl Iterator<Item = Entity<'_, 'a>> {
-        (0..self.instances.len()).map(|i| self.at(i))
+        (0..self.instances.len()).map(|i| self.instance(i))
     }
 
     /// Parameters of a header record such as `FILE_SCHEMA`.
@@ -167,18 +167,18 @@ impl<'f, 'a> Entity<'f, 'a> {
     }
 
     /// Whether one of the records has this name.
-    pub(super) fn is(&self, name: &str) -> bool {
+    pub(super) fn is_a(&self, name: &str) -> bool {
         self.records.iter().any(|r| self.file.bytes(r.name) == name.as_bytes())
     }
 
     /// Whether one of the records has one of these names.
-    pub(super) fn is_any(&self, names: &[&str]) -> bool {
+    pub(super) fn is_one_of(&self, names: &[&str]) -> bool {
         self.keywords().any(|k| names.contains(&k))
     }
 
     /// The parameters that the record `name` adds: all of them in a complex instance, those after the `inherited`
     /// first ones in a simple instance.
-    pub(super) fn own(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
+    pub(super) fn attributes(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
         let record = self.records.iter().find(|r| self.file.bytes(r.name) == name.as_bytes())?;
         let args = self.file.args(record.values);
         let skip = if self.records.len() == 1 { inherited } else { 0 };

@@ -17,7 +17,7 @@ const MAX_PLACED: usize = 1 << 20;
 
 /// A representation where it stands.
 #[derive(Clone, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedRepresentation {
     pub(crate) representation: u64,
     pub(crate) placement: Frame,
     /// Name of the occurrence, empty when it had none.
@@ -59,7 +59,7 @@ pub(crate) struct Assembly<'f, 'a> {
     links: FxHashMap<u64, Vec<Link>>,
     /// Things that could not be placed.
     pub(crate) problems: Vec<String>,
-    placed: Vec<Placed>,
+    placed: Vec<PlacedRepresentation>,
     reached: FxHashSet<u64>,
     in_orphans: bool,
     /// What products reach; orphans do not place it again.
@@ -87,26 +87,26 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let mut contextual = Vec::new();
         let mut relations = Vec::new();
         for e in file.entities() {
-            if let Some(args) = e.own("SHAPE_DEFINITION_REPRESENTATION", 0) {
-                a.shape_definition(args.entity(0), args.id(1));
-            } else if let Some(args) = e.own("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
+            if let Some(args) = e.attributes("SHAPE_DEFINITION_REPRESENTATION", 0) {
+                a.read_shape_definition(args.entity(0), args.id(1));
+            } else if let Some(args) = e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
                 if let (Some(parent), Some(child)) = (args.id(3), args.id(4)) {
                     let name = args.text(1).filter(|n| !n.is_empty()).or_else(|| args.text(0)).unwrap_or_default();
                     a.usages.entry(parent).or_default().push(Usage { child, name, id: e.id });
                 }
-            } else if e.is("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
+            } else if e.is_a("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
                 contextual.push(e);
-            } else if e.is_any(&["SHAPE_REPRESENTATION_RELATIONSHIP", "REPRESENTATION_RELATIONSHIP"]) {
+            } else if e.is_one_of(&["SHAPE_REPRESENTATION_RELATIONSHIP", "REPRESENTATION_RELATIONSHIP"]) {
                 relations.push(e);
             }
         }
         let mut used = FxHashSet::default();
         for e in contextual {
-            a.contextual(e, &mut used);
+            a.read_contextual(e, &mut used);
         }
         for e in relations {
             if !used.contains(&e.id) {
-                a.relation(e);
+                a.read_relationship(e);
             }
         }
         a
@@ -117,7 +117,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let context = self
             .file
             .entity(representation)
-            .and_then(|e| e.own("REPRESENTATION", 0).and_then(|a| a.id(2)).or_else(|| e.args().id(2)));
+            .and_then(|e| e.attributes("REPRESENTATION", 0).and_then(|a| a.id(2)).or_else(|| e.args().id(2)));
         context.and_then(|c| self.units.get(&c)).copied().unwrap_or(self.fallback)
     }
 
@@ -125,17 +125,18 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Geometry { file: self.file, units: self.units_of(representation) }
     }
 
-    /// Items of a representation.
+    /// ShapeItems of a representation.
     pub(crate) fn items(&self, representation: u64) -> Vec<u64> {
         let Some(e) = self.file.entity(representation) else { return Vec::new() };
-        let args = e.own("REPRESENTATION", 0).unwrap_or_else(|| e.args());
+        let args = e.attributes("REPRESENTATION", 0).unwrap_or_else(|| e.args());
         args.list(1).ids()
     }
 
-    fn shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
+    fn read_shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
         let (Some(definition), Some(representation)) = (definition, representation) else { return };
         // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
-        let Some(owner) = definition.own("PROPERTY_DEFINITION", 2).or_else(|| Some(definition.args())) else {
+        let Some(owner) = definition.attributes("PROPERTY_DEFINITION", 2).or_else(|| Some(definition.args()))
+        else {
             return;
         };
         let target = owner.entity(if definition.keyword().is_empty() { 0 } else { 2 });
@@ -150,15 +151,15 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// The two representations of a relationship and the placement of the first in the second, if it has one.
-    fn related(&self, e: Entity<'f, 'a>) -> Option<(u64, u64, Option<Frame>)> {
-        let base = e.own("REPRESENTATION_RELATIONSHIP", 0).unwrap_or_else(|| e.args());
+    fn related_representations(&self, e: Entity<'f, 'a>) -> Option<(u64, u64, Option<Frame>)> {
+        let base = e.attributes("REPRESENTATION_RELATIONSHIP", 0).unwrap_or_else(|| e.args());
         let (first, second) = (base.id(2)?, base.id(3)?);
         let simple = e.keyword() == "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
-        let operator = e.own("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION", 4);
+        let operator = e.attributes("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION", 4);
         let operator =
             operator.and_then(|a| a.entity(0)).or_else(|| if simple { e.args().entity(4) } else { None });
         let placement = operator.and_then(|t| {
-            let args = t.own("ITEM_DEFINED_TRANSFORMATION", 0)?;
+            let args = t.attributes("ITEM_DEFINED_TRANSFORMATION", 0)?;
             let (from, to) = (args.id(2)?, args.id(3)?);
             // Each placement is in the units of the representation that holds it.
             let (mut holder_from, mut holder_to) = (first, second);
@@ -173,16 +174,16 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Some((first, second, placement))
     }
 
-    fn contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
+    fn read_contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
         let args = e.args();
         let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
         used.insert(relation.id);
-        let usage = shape.own("PROPERTY_DEFINITION", 2).unwrap_or_else(|| shape.args());
+        let usage = shape.attributes("PROPERTY_DEFINITION", 2).unwrap_or_else(|| shape.args());
         let Some(usage) = usage.id(if shape.keyword().is_empty() { 0 } else { 2 }) else { return };
-        let Some((first, second, placement)) = self.related(relation) else { return };
+        let Some((first, second, placement)) = self.related_representations(relation) else { return };
         let Some(mut placement) = placement else { return };
         // The first representation is the child's; some writers swap them.
-        let ends = self.file.entity(usage).and_then(|u| u.own("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
+        let ends = self.file.entity(usage).and_then(|u| u.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
         if let Some((parent, child)) = ends.and_then(|a| Some((a.id(3)?, a.id(4)?))) {
             let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
             if has(parent, first) && has(child, second) && !has(child, first) {
@@ -192,8 +193,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.placements.entry(usage).or_insert(placement);
     }
 
-    fn relation(&mut self, e: Entity<'f, 'a>) {
-        let Some((first, second, placement)) = self.related(e) else { return };
+    fn read_relationship(&mut self, e: Entity<'f, 'a>) {
+        let Some((first, second, placement)) = self.related_representations(e) else { return };
         match placement {
             Some(placement) => self.links.entry(second).or_default().push(Link { to: first, placement }),
             None => {
@@ -205,28 +206,28 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Every placed representation, in the order of the file.
-    pub(crate) fn walk(mut self) -> (Vec<Placed>, Self) {
+    pub(crate) fn walk(mut self) -> (Vec<PlacedRepresentation>, Self) {
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
         let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
         products.sort_unstable();
         products.dedup();
         let roots: Vec<u64> = products.iter().copied().filter(|p| !children.contains(p)).collect();
         for root in roots {
-            self.product(root, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+            self.place_product(root, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
         }
         // Products in a cycle, and shapes without a product.
         for product in products {
             let seen = self.shapes.get(&product).is_some_and(|s| s.iter().any(|r| self.reached.contains(r)));
             if !seen && self.shapes.contains_key(&product) {
-                self.product(product, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+                self.place_product(product, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
             }
         }
-        self.orphans();
+        self.place_orphans();
         (std::mem::take(&mut self.placed), self)
     }
 
     /// Representations with shapes that no product reaches.
-    fn orphans(&mut self) {
+    fn place_orphans(&mut self) {
         self.in_orphans = true;
         self.by_products = self.reached.clone();
         let candidates: Vec<u64> = self
@@ -237,25 +238,32 @@ impl<'f, 'a> Assembly<'f, 'a> {
             .map(|e| e.id)
             .collect();
         let mapped: FxHashSet<u64> =
-            self.file.entities().filter_map(|e| e.own("REPRESENTATION_MAP", 0)?.id(1)).collect();
+            self.file.entities().filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
         for id in candidates {
             if !self.reached.contains(&id) && !mapped.contains(&id) {
-                self.representation(id, Frame::IDENTITY, ("", ""), &mut Vec::new(), &[]);
+                self.place_representation(id, Frame::IDENTITY, ("", ""), &mut Vec::new(), &[]);
             }
         }
     }
 
     fn product_name(&self, definition: u64) -> String {
         let product = || {
-            let formation = self.file.entity(definition)?.own("PRODUCT_DEFINITION", 0)?.entity(2)?;
+            let formation = self.file.entity(definition)?.attributes("PRODUCT_DEFINITION", 0)?.entity(2)?;
             let product = formation.args().entity(2)?;
-            let args = product.own("PRODUCT", 0)?;
+            let args = product.attributes("PRODUCT", 0)?;
             args.text(1).filter(|n| !n.trim().is_empty()).or_else(|| args.text(0))
         };
         product().unwrap_or_default()
     }
 
-    fn product(&mut self, definition: u64, placement: Frame, name: String, path: &mut Vec<u64>, owners: &[u64]) {
+    fn place_product(
+        &mut self,
+        definition: u64,
+        placement: Frame,
+        name: String,
+        path: &mut Vec<u64>,
+        owners: &[u64],
+    ) {
         if path.len() >= MAX_DEPTH || path.contains(&definition) {
             self.problems.push(format!("#{definition}: products contain each other"));
             return;
@@ -263,7 +271,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path.push(definition);
         let product = self.product_name(definition);
         for representation in self.shapes.get(&definition).cloned().unwrap_or_default() {
-            self.representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
+            self.place_representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
         }
         let usages = self.usages.remove(&definition).unwrap_or_default();
         for usage in &usages {
@@ -273,13 +281,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
             };
             let mut inner = owners.to_vec();
             inner.push(usage.id);
-            self.product(usage.child, placement.compose(&at), usage.name.clone(), path, &inner);
+            self.place_product(usage.child, placement.compose(&at), usage.name.clone(), path, &inner);
         }
         self.usages.insert(definition, usages);
         path.pop();
     }
 
-    fn representation(
+    fn place_representation(
         &mut self,
         id: u64,
         placement: Frame,
@@ -293,7 +301,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         path.push(id);
         self.reached.insert(id);
-        self.placed.push(Placed {
+        self.placed.push(PlacedRepresentation {
             representation: id,
             placement,
             name: name.to_string(),
@@ -303,8 +311,10 @@ impl<'f, 'a> Assembly<'f, 'a> {
         });
         let geometry = self.geometry(id);
         for item in self.items(id) {
-            let Some(mapped) = self.file.entity(item).and_then(|e| e.own("MAPPED_ITEM", 1)) else { continue };
-            let Some(map) = mapped.entity(0).and_then(|m| m.own("REPRESENTATION_MAP", 0)) else { continue };
+            let Some(mapped) = self.file.entity(item).and_then(|e| e.attributes("MAPPED_ITEM", 1)) else {
+                continue;
+            };
+            let Some(map) = mapped.entity(0).and_then(|m| m.attributes("REPRESENTATION_MAP", 0)) else { continue };
             let (Some(origin), Some(to), Some(target)) = (map.id(0), map.id(1), mapped.id(1)) else { continue };
             let origin = self.geometry(to).placement(origin);
             let target = geometry.transformation(target);
@@ -314,13 +324,19 @@ impl<'f, 'a> Assembly<'f, 'a> {
             };
             let inner = [owners, &[item]].concat();
             let at = placement.compose(&target.compose(&origin.inverse()));
-            self.representation(to, at, (name, product), path, &inner);
+            self.place_representation(to, at, (name, product), path, &inner);
         }
         for link in self.links.get(&id).cloned().unwrap_or_default() {
             // A representation of another product is placed by its own usage.
             let elsewhere = self.owned.contains(&link.to) && link.placement.is_identity();
             if !path.contains(&link.to) && !elsewhere {
-                self.representation(link.to, placement.compose(&link.placement), (name, product), path, owners);
+                self.place_representation(
+                    link.to,
+                    placement.compose(&link.placement),
+                    (name, product),
+                    path,
+                    owners,
+                );
             }
         }
         path.pop();

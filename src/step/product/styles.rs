@@ -17,9 +17,9 @@ impl Styles {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();
         for e in file.entities() {
-            let (args, overriding) = match e.own("OVER_RIDING_STYLED_ITEM", 1) {
+            let (args, overriding) = match e.attributes("OVER_RIDING_STYLED_ITEM", 1) {
                 Some(a) if !e.keyword().is_empty() => (Some(a), true),
-                found => (e.own("STYLED_ITEM", 1), found.is_some()),
+                found => (e.attributes("STYLED_ITEM", 1), found.is_some()),
             };
             let Some(args) = args else { continue };
             let Some(item) = args.id(1) else { continue };
@@ -50,7 +50,7 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
             return Some(found);
         }
         // Curve and point styles colour lines, not surfaces.
-        if e.is_any(&["CURVE_STYLE", "POINT_STYLE", "TEXT_STYLE"]) {
+        if e.is_one_of(&["CURVE_STYLE", "POINT_STYLE", "TEXT_STYLE"]) {
             continue;
         }
         for args in e.all_args() {
@@ -64,10 +64,10 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
 }
 
 fn rgb(e: Entity<'_, '_>) -> Option<Colour> {
-    if let Some(a) = e.own("COLOUR_RGB", 1) {
+    if let Some(a) = e.attributes("COLOUR_RGB", 1) {
         return Some(Colour([a.real(0)?, a.real(1)?, a.real(2)?]));
     }
-    let a = e.own("DRAUGHTING_PRE_DEFINED_COLOUR", 0)?;
+    let a = e.attributes("DRAUGHTING_PRE_DEFINED_COLOUR", 0)?;
     Some(Colour(match a.text(0)?.to_ascii_lowercase().as_str() {
         "red" => [1.0, 0.0, 0.0],
         "green" => [0.0, 1.0, 0.0],

@@ -11,7 +11,7 @@ const MAX_DEPTH: usize = 8;
 
 /// What the leaves of a tessellated item gave.
 #[derive(Default)]
-pub(crate) struct Leaves {
+pub(crate) struct TessellatedItems {
     pub(crate) faces: Vec<TessellatedFace>,
     pub(crate) refused: Vec<Refusal>,
 }
@@ -35,7 +35,7 @@ fn layout(keyword: &str) -> Option<Layout> {
 impl<'f, 'a> Geometry<'f, 'a> {
     /// Collects the triangulated faces of a tessellated item. A solid or shell that is linked to an exact shape is only
     /// its picture and gives nothing.
-    pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut Leaves) {
+    pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
         let Ok(e) = self.entity(id) else { return };
         if let Some(layout) = layout(e.keyword()) {
             match self.triangles(e, &layout) {
@@ -46,7 +46,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 Err(refusal) => into.refused.push(refusal),
             }
         } else if depth < MAX_DEPTH
-            && e.is_any(&["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_GEOMETRIC_SET"])
+            && e.is_one_of(&["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_GEOMETRIC_SET"])
         {
             let linked = e.args().id(2).is_some_and(|link| self.file.entity(link).is_some());
             if !linked {
@@ -59,9 +59,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
 
     fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
         let args = e.args();
-        let list = self.follow(e, args.id(1), "list of coordinates")?;
-        let rows = list.own("COORDINATES_LIST", 1).map(|a| a.list(1));
-        let Some(rows) = rows else { return Err(Refusal::of(list, "is no list of coordinates")) };
+        let list = self.resolve(e, args.id(1), "list of coordinates")?;
+        let rows = list.attributes("COORDINATES_LIST", 1).map(|a| a.list(1));
+        let Some(rows) = rows else { return Err(Refusal::new(list, "is no list of coordinates")) };
         let triple = |rows: Args<'f, 'a>, i: usize| -> Option<Vector> {
             let row = rows.list(i);
             Some(Vector::new(row.real(0)?, row.real(1)?, row.real(2)?)).filter(|v| v.is_finite())
@@ -86,7 +86,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 *slot = row_of(local).and_then(|row| Some((row, triple(rows, row)? * self.units.length)));
             }
             let [Some(a), Some(b), Some(c)] = found else {
-                return Err(Refusal::of(e, "a triangle refers to a point that is not in the list"));
+                return Err(Refusal::new(e, "a triangle refers to a point that is not in the list"));
             };
             let Some(flat) = (b.1 - a.1).cross(c.1 - a.1).try_normalize() else { continue };
             let first = mesh.vertices.len() as u32;
@@ -101,7 +101,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             mesh.facets.push(Facet { vertices: [first, first + 1, first + 2, first + 2], face: FaceId(0) });
         }
         if mesh.facets.is_empty() {
-            return Err(Refusal::of(e, "holds no triangle with an area"));
+            return Err(Refusal::new(e, "holds no triangle with an area"));
         }
         Ok(mesh)
     }

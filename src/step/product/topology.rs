@@ -57,7 +57,7 @@ pub(crate) struct FacePlan {
 
 /// What the items of a representation amount to.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Items {
+pub(crate) struct ShapeItems {
     pub(crate) shells: Vec<ShellPlan>,
     /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
     pub(crate) surfaces: Vec<u64>,
@@ -66,7 +66,7 @@ pub(crate) struct Items {
     pub(crate) refused: Vec<Refusal>,
 }
 
-impl Items {
+impl ShapeItems {
     /// Whether there is nothing to convert or to refuse.
     pub(crate) fn is_empty(&self) -> bool {
         self.shells.is_empty() && self.surfaces.is_empty() && self.tessellated.is_empty() && self.refused.is_empty()
@@ -75,30 +75,30 @@ impl Items {
     /// Sorts one item in; what is no shape is left out.
     pub(crate) fn add(&mut self, file: &File<'_>, id: u64) {
         let Some(e) = file.entity(id) else { return };
-        let name = e.own("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).text(0).unwrap_or_default();
-        if let Some(a) = e.own("MANIFOLD_SOLID_BREP", 1).or_else(|| e.own("FACETED_BREP", 1)) {
-            self.shell(file, a.id(0), &name, &[id], true, e);
-            if let Some(v) = e.own("BREP_WITH_VOIDS", 2) {
-                self.voids(file, e, v.list(0).ids(), &name);
+        let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).text(0).unwrap_or_default();
+        if let Some(a) = e.attributes("MANIFOLD_SOLID_BREP", 1).or_else(|| e.attributes("FACETED_BREP", 1)) {
+            self.add_shell(file, a.id(0), &name, &[id], true, e);
+            if let Some(v) = e.attributes("BREP_WITH_VOIDS", 2) {
+                self.add_voids(file, e, v.list(0).ids(), &name);
             }
-        } else if let Some(a) = e.own("BREP_WITH_VOIDS", 1) {
-            self.shell(file, a.id(0), &name, &[id], true, e);
-            self.voids(file, e, a.list(1).ids(), &name);
+        } else if let Some(a) = e.attributes("BREP_WITH_VOIDS", 1) {
+            self.add_shell(file, a.id(0), &name, &[id], true, e);
+            self.add_voids(file, e, a.list(1).ids(), &name);
         } else if let Some(a) =
-            e.own("SHELL_BASED_SURFACE_MODEL", 1).or_else(|| e.own("FACE_BASED_SURFACE_MODEL", 1))
+            e.attributes("SHELL_BASED_SURFACE_MODEL", 1).or_else(|| e.attributes("FACE_BASED_SURFACE_MODEL", 1))
         {
             for shell in a.list(0).ids() {
-                self.shell(file, Some(shell), &name, &[id], false, e);
+                self.add_shell(file, Some(shell), &name, &[id], false, e);
             }
-        } else if e.is_any(&[
+        } else if e.is_one_of(&[
             "OPEN_SHELL",
             "CLOSED_SHELL",
             "CONNECTED_FACE_SET",
             "ORIENTED_OPEN_SHELL",
             "ORIENTED_CLOSED_SHELL",
         ]) {
-            self.shell(file, Some(id), &name, &[], false, e);
-        } else if e.is_any(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+            self.add_shell(file, Some(id), &name, &[], false, e);
+        } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
             self.shells.push(ShellPlan {
                 name,
                 closed: false,
@@ -106,34 +106,34 @@ impl Items {
                 faces: vec![(id, false)],
                 owners: vec![],
             });
-        } else if let Some(a) = e.own("GEOMETRIC_SET", 1) {
+        } else if let Some(a) = e.attributes("GEOMETRIC_SET", 1) {
             for element in a.list(0).ids() {
-                self.element(file, element);
+                self.add_set_element(file, element);
             }
         } else if e.keywords().any(is_tessellated) {
             self.tessellated.push(id);
-        } else if e.is_any(&RECIPES) {
-            self.refused.push(Refusal::of(e, "solids given as a recipe (CSG, sweeps of areas) are not converted; export them as a boundary representation"));
+        } else if e.is_one_of(&RECIPES) {
+            self.refused.push(Refusal::new(e, "solids given as a recipe (CSG, sweeps of areas) are not converted; export them as a boundary representation"));
         } else if is_surface(e) && !self.surfaces.contains(&id) {
             self.surfaces.push(id);
         }
     }
 
-    fn element(&mut self, file: &File<'_>, id: u64) {
+    fn add_set_element(&mut self, file: &File<'_>, id: u64) {
         if !self.surfaces.contains(&id) && file.entity(id).is_some_and(is_surface) {
             self.surfaces.push(id);
         }
     }
 
-    fn voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
+    fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
         for shell in shells {
             let before = self.shells.len();
-            self.shell(file, Some(shell), name, &[e.id], true, e);
+            self.add_shell(file, Some(shell), name, &[e.id], true, e);
             self.shells.iter_mut().skip(before).for_each(|s| s.outer = false);
         }
     }
 
-    fn shell(
+    fn add_shell(
         &mut self,
         file: &File<'_>,
         id: Option<u64>,
@@ -143,14 +143,16 @@ impl Items {
         owner: Entity<'_, '_>,
     ) {
         let Some(mut e) = id.and_then(|id| file.entity(id)) else {
-            self.refused.push(Refusal::of(owner, "its shell is missing"));
+            self.refused.push(Refusal::new(owner, "its shell is missing"));
             return;
         };
         let mut owners = [&[e.id], owners].concat();
         let mut flip = false;
         // Oriented shells refer to a shell; a chain of them must end.
         for _ in 0..4 {
-            let Some(a) = e.own("ORIENTED_CLOSED_SHELL", 2).or_else(|| e.own("ORIENTED_OPEN_SHELL", 2)) else {
+            let Some(a) =
+                e.attributes("ORIENTED_CLOSED_SHELL", 2).or_else(|| e.attributes("ORIENTED_OPEN_SHELL", 2))
+            else {
                 break;
             };
             flip ^= a.flag(1) == Some(false);
@@ -159,7 +161,7 @@ impl Items {
             owners.insert(0, e.id);
         }
         let own = e
-            .own("CONNECTED_FACE_SET", 1)
+            .attributes("CONNECTED_FACE_SET", 1)
             .or_else(|| Some(e.args()).filter(|_| e.keyword() != ""))
             .map(|a| if e.keyword().is_empty() { a.list(0) } else { e.args().list(1) });
         let mut faces = Vec::new();
@@ -167,14 +169,14 @@ impl Items {
             let mut turned = flip;
             let mut face = face;
             for _ in 0..4 {
-                let Some(a) = file.entity(face).and_then(|f| f.own("ORIENTED_FACE", 2)) else { break };
+                let Some(a) = file.entity(face).and_then(|f| f.attributes("ORIENTED_FACE", 2)) else { break };
                 turned ^= a.flag(1) == Some(false);
                 let Some(inner) = a.id(0) else { break };
                 face = inner;
             }
             faces.push((face, turned));
         }
-        let closed = solid || e.is("CLOSED_SHELL");
+        let closed = solid || e.is_a("CLOSED_SHELL");
         self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, faces, owners });
     }
 }
@@ -203,7 +205,7 @@ pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
 }
 
 /// Reads the bounds of a face.
-pub(crate) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
+pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     let Some(e) = file.entity(id) else {
         return Err(Refusal {
             id,
@@ -213,21 +215,23 @@ pub(crate) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     };
     let complex = e.keyword().is_empty();
     let (bounds, surface, sense) = if complex {
-        let bounds = e.own("FACE", 0).map(|a| a.list(0));
-        let own = e.own("FACE_SURFACE", 0);
+        let bounds = e.attributes("FACE", 0).map(|a| a.list(0));
+        let own = e.attributes("FACE_SURFACE", 0);
         (bounds, own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))
-    } else if e.is_any(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+    } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
         let a = e.args();
         (Some(a.list(1)), a.id(2), a.flag(3))
     } else {
-        return Err(Refusal::of(e, "this kind of face is not supported"));
+        return Err(Refusal::new(e, "this kind of face is not supported"));
     };
-    let Some(surface) = surface else { return Err(Refusal::of(e, "its surface is missing")) };
+    let Some(surface) = surface else { return Err(Refusal::new(e, "its surface is missing")) };
     let mut loops = Vec::new();
     for bound in bounds.map(|b| b.ids()).unwrap_or_default() {
         let Some(bound) = file.entity(bound) else { continue };
-        let a =
-            bound.own("FACE_BOUND", 1).or_else(|| bound.own("FACE_OUTER_BOUND", 1)).unwrap_or_else(|| bound.args());
+        let a = bound
+            .attributes("FACE_BOUND", 1)
+            .or_else(|| bound.attributes("FACE_OUTER_BOUND", 1))
+            .unwrap_or_else(|| bound.args());
         let Some(edges) = a.entity(0).map(|l| edge_loop(l)).transpose()? else { continue };
         let mut edges = edges;
         if a.flag(1) == Some(false) {
@@ -244,10 +248,10 @@ pub(crate) fn face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
 
 /// Edges of a loop in its order; none for a VERTEX_LOOP.
 fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
-    if e.is("VERTEX_LOOP") {
+    if e.is_a("VERTEX_LOOP") {
         return Ok(Vec::new());
     }
-    if let Some(a) = e.own("POLY_LOOP", 1) {
+    if let Some(a) = e.attributes("POLY_LOOP", 1) {
         let points = a.list(0).ids();
         let n = points.len();
         return Ok((0..n)
@@ -256,16 +260,16 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
             .map(|(a, b)| (EdgeKey::Straight(a.min(b), a.max(b)), a > b))
             .collect());
     }
-    let list = e.own("EDGE_LOOP", 1).or_else(|| e.own("PATH", 1)).map(|a| a.list(0));
-    let Some(list) = list else { return Err(Refusal::of(e, "this kind of loop is not supported")) };
+    let list = e.attributes("EDGE_LOOP", 1).or_else(|| e.attributes("PATH", 1)).map(|a| a.list(0));
+    let Some(list) = list else { return Err(Refusal::new(e, "this kind of loop is not supported")) };
     let mut edges = Vec::with_capacity(list.len());
     for i in 0..list.len() {
-        let Some(mut edge) = list.entity(i) else { return Err(Refusal::of(e, "an edge of the loop is missing")) };
+        let Some(mut edge) = list.entity(i) else { return Err(Refusal::new(e, "an edge of the loop is missing")) };
         let mut reversed = false;
         for _ in 0..4 {
-            let Some(a) = edge.own("ORIENTED_EDGE", 3) else { break };
+            let Some(a) = edge.attributes("ORIENTED_EDGE", 3) else { break };
             reversed ^= a.flag(1) == Some(false);
-            let Some(inner) = a.entity(0) else { return Err(Refusal::of(edge, "its edge is missing")) };
+            let Some(inner) = a.entity(0) else { return Err(Refusal::new(edge, "its edge is missing")) };
             edge = inner;
         }
         edges.push((EdgeKey::Entity(edge.id), reversed));

@@ -1,8 +1,8 @@
 //! One face: chart, loops in its plane, spline, and edges' uv curves.
 
-use super::arrange::{Arranged, arrange};
+use super::boundary::{Boundary, bound_region};
 use super::fit::{Budget, Fit, Overrun, Target, project};
-use super::loops::{Chain, Piece, Source, chain};
+use super::loops::{Chain, Piece, Source, close_loop};
 use super::seams::{Seam, Seams};
 use crate::math::{Uv, Vector};
 use crate::model::{Analytic, EdgeUse, TrimLoop};
@@ -20,7 +20,7 @@ pub(crate) struct EdgeShape<'e> {
 }
 
 /// A face to be built.
-pub(crate) struct Task<'e> {
+pub(crate) struct FaceTask<'e> {
     pub(crate) chart: Chart,
     /// Whether the face's normal is `Su × Sv`.
     pub(crate) same_sense: bool,
@@ -38,24 +38,24 @@ pub(crate) struct Task<'e> {
 }
 
 /// A built face; seams are numbered from 0, edges as in the task.
-pub(crate) struct Built {
+pub(crate) struct BuiltFace {
     pub(crate) surface: Surface,
     pub(crate) analytic: Analytic,
     pub(crate) reversed: bool,
-    pub(crate) loops: Vec<Vec<BuiltUse>>,
+    pub(crate) loops: Vec<Vec<FaceUse>>,
     pub(crate) seams: Vec<Seam>,
     pub(crate) gap: f64,
     pub(crate) repairs: Vec<String>,
 }
 
 /// An edge use whose edge is not numbered yet.
-pub(crate) struct BuiltUse {
+pub(crate) struct FaceUse {
     pub(crate) source: Source,
     pub(crate) reversed: bool,
     pub(crate) uv: crate::nurbs::UvCurve,
 }
 
-impl BuiltUse {
+impl FaceUse {
     /// The use with its edge's number.
     pub(crate) fn numbered(self, id: impl Fn(Source) -> Option<crate::model::EdgeId>) -> EdgeUse {
         EdgeUse { edge: id(self.source), reversed: self.reversed, uv: self.uv }
@@ -69,7 +69,7 @@ impl From<Overrun> for &'static str {
 }
 
 /// Builds a face, or says why not.
-pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
+pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static str> {
     let budget = Budget::new(task.budget);
     turn_sphere(&mut task);
     let chart = &task.chart;
@@ -105,14 +105,14 @@ pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
                 pieces.reverse();
                 pieces.iter_mut().for_each(|p| p.reversed = !p.reversed);
             }
-            chain(pieces, chart, tolerance)
+            close_loop(pieces, chart, tolerance)
         })
         .collect();
     let bridged = chains.iter().fold(0f64, |b, c| b.max(c.bridged));
     if bridged > 0.0 {
         repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
     }
-    let Arranged { mut loops, seams, repairs: turned } = arrange(chains, chart, task.implicit_outer)?;
+    let Boundary { mut loops, seams, repairs: turned } = bound_region(chains, chart, task.implicit_outer)?;
     repairs.extend(turned.into_iter().map(String::from));
     let (domain, shift) = domain_of(&loops, chart).ok_or("its loops enclose nothing")?;
     loops.iter_mut().for_each(|l| l.shift(shift));
@@ -125,7 +125,7 @@ pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
             let uv = match piece.source {
                 Source::Nothing => mapped_line(chart, domain, &piece),
                 Source::Seam(k) => seams.uv(k, &piece, &task, &budget)?,
-                Source::Edge(edge) if chart.angular() == [false, false] => {
+                Source::Edge(edge) if chart.angular_directions() == [false, false] => {
                     let _ = edge;
                     piece.curve
                 }
@@ -135,7 +135,7 @@ pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
                     fit.curve
                 }
             };
-            uses.push(BuiltUse {
+            uses.push(FaceUse {
                 source: piece.source,
                 reversed: piece.reversed != seams.is_turned(piece.source),
                 uv,
@@ -144,7 +144,7 @@ pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
         gap = gap.max(snap(&mut uses, &surface));
         built.push(uses);
     }
-    Ok(Built {
+    Ok(BuiltFace {
         analytic: chart.analytic,
         reversed: !same_sense,
         loops: built,
@@ -156,14 +156,14 @@ pub(crate) fn build(mut task: Task<'_>) -> Result<Built, &'static str> {
 }
 
 /// Size of the face by its edges, or of its surface.
-fn chart_extent(task: &Task<'_>) -> f64 {
+fn chart_extent(task: &FaceTask<'_>) -> f64 {
     let edges = task.edges.values().map(|e| e.curve.bounds());
     let all = edges.reduce(|a, b| a.union(b));
     all.map_or(task.chart.size, |b| b.diagonal()).max(1e-6)
 }
 
 /// Turns the poles of a sphere away from the edges, unless the file cut it open itself.
-fn turn_sphere(task: &mut Task<'_>) {
+fn turn_sphere(task: &mut FaceTask<'_>) {
     let Kind::Torus { frame, major: 0.0, minor } = task.chart.kind else { return };
     let mut count: FxHashMap<usize, usize> = FxHashMap::default();
     for &(edge, _) in task.loops.iter().flatten() {
@@ -205,7 +205,7 @@ fn turn_sphere(task: &mut Task<'_>) {
 }
 
 /// The edge in the chart's own parameters.
-fn fit_edge(chart: &Chart, curve: &Curve, task: &Task<'_>, budget: &Budget) -> Result<Fit, Overrun> {
+fn fit_edge(chart: &Chart, curve: &Curve, task: &FaceTask<'_>, budget: &Budget) -> Result<Fit, Overrun> {
     if let Kind::Plane { frame } = &chart.kind {
         return Ok(project(curve, |p| {
             let q = frame.local_point(p);
@@ -246,7 +246,7 @@ pub(crate) fn refit(
     domain: [[f64; 2]; 2],
     piece: &Piece,
     curve: &Curve,
-    task: &Task<'_>,
+    task: &FaceTask<'_>,
     budget: &Budget,
 ) -> Result<Fit, Overrun> {
     let poles: Vec<Pole> = chart
@@ -308,7 +308,7 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
             None => {
                 a = a.clamp(natural[0], natural[1]);
                 b = b.clamp(natural[0], natural[1]);
-                if natural.iter().all(|x| x.is_finite()) && !chart.angular()[d] {
+                if natural.iter().all(|x| x.is_finite()) && !chart.angular_directions()[d] {
                     [a, b] = natural;
                 }
             }
@@ -322,10 +322,10 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
 }
 
 /// Lets each use begin exactly where the one before ends; the largest move of an end, mm.
-fn snap(uses: &mut [BuiltUse], surface: &Surface) -> f64 {
+fn snap(uses: &mut [FaceUse], surface: &Surface) -> f64 {
     let mut moved = 0f64;
     let n = uses.len();
-    let end_index = |u: &BuiltUse, end: bool| if end != u.reversed { u.uv.points.len() - 1 } else { 0 };
+    let end_index = |u: &FaceUse, end: bool| if end != u.reversed { u.uv.points.len() - 1 } else { 0 };
     for i in 0..n {
         let j = (i + 1) % n;
         let (a, b) = (end_index(&uses[i], true), end_index(&uses[j], false));
@@ -351,7 +351,7 @@ fn snap(uses: &mut [BuiltUse], surface: &Surface) -> f64 {
 
 /// Loops of numbered uses.
 pub(crate) fn trim_loops(
-    loops: Vec<Vec<BuiltUse>>,
+    loops: Vec<Vec<FaceUse>>,
     id: impl Fn(Source) -> Option<crate::model::EdgeId>,
 ) -> Vec<TrimLoop> {
     loops.into_iter().map(|l| TrimLoop { uses: l.into_iter().map(|u| u.numbered(&id)).collect() }).collect()

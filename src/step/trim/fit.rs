@@ -13,7 +13,7 @@ use std::cell::Cell;
 const MAX_DEPTH: u32 = 12;
 
 /// How far a curve may swing over the border, as a fraction of the surface's range.
-const BEYOND: f64 = 1e-7;
+const MAX_OVERSHOOT: f64 = 1e-7;
 
 /// Counts work, so that no face takes for ever.
 #[derive(Debug)]
@@ -108,7 +108,7 @@ impl Target<'_> {
     }
 
     /// How far a point lies beyond the border, as a fraction of the range.
-    fn beyond(&self, uv: Uv) -> f64 {
+    fn overshoot(&self, uv: Uv) -> f64 {
         let over = |d: usize| {
             let [lo, hi] = self.range[d];
             if hi - lo < f64::INFINITY { (lo - uv[d]).max(uv[d] - hi) / (hi - lo) } else { 0.0 }
@@ -117,7 +117,7 @@ impl Target<'_> {
     }
 
     /// The slope of a node on the border without what leads out of it: ahead (1), behind (-1) or to both sides (0).
-    fn held(&self, mut node: Node, ahead: f64) -> Node {
+    fn slope_inside(&self, mut node: Node, ahead: f64) -> Node {
         for d in 0..2 {
             let [lo, hi] = self.range[d];
             let near = 1e-12 * (hi - lo);
@@ -132,7 +132,7 @@ impl Target<'_> {
     }
 
     /// The same ends with control points inside the border.
-    fn inside(&self, mut a: Node, mut b: Node) -> (Node, Node) {
+    fn controls_inside(&self, mut a: Node, mut b: Node) -> (Node, Node) {
         let third = (b.t - a.t) / 3.0;
         if !(third > 0.0) {
             return (a, b);
@@ -148,7 +148,7 @@ impl Target<'_> {
     /// Whether the cubic between two nodes is good enough; and the gap seen.
     fn accepts(&self, piece: &Curve, a: Node, b: Node, gap: &mut f64) -> Result<bool, Overrun> {
         // Where an edge runs along the border beside the surface, its foot points follow the border with corners.
-        if (1..10).any(|k| self.beyond(hermite(a, b, 0.1 * f64::from(k))) > BEYOND) {
+        if (1..10).any(|k| self.overshoot(hermite(a, b, 0.1 * f64::from(k))) > MAX_OVERSHOOT) {
             return Ok(false);
         }
         for s in [0.5, 0.13, 0.87, 0.32] {
@@ -212,15 +212,15 @@ impl Target<'_> {
         gap: &mut f64,
     ) -> Result<(), Overrun> {
         let mut seen = *gap;
-        let (a, b) = (self.held(a, 1.0), self.held(b, -1.0));
+        let (a, b) = (self.slope_inside(a, 1.0), self.slope_inside(b, -1.0));
         if depth >= MAX_DEPTH || self.accepts(piece, a, b, &mut seen)? {
             *gap = seen.max(a.miss).max(b.miss);
-            nodes.push(if depth >= MAX_DEPTH { self.inside(a, b) } else { (a, b) });
+            nodes.push(if depth >= MAX_DEPTH { self.controls_inside(a, b) } else { (a, b) });
             return Ok(());
         }
         let t = 0.5 * (a.t + b.t);
         let middle = self.node(piece, t, 1.0, Some(hermite(a, b, 0.5)))?;
-        let middle = self.held(middle, 0.0);
+        let middle = self.slope_inside(middle, 0.0);
         self.halve(piece, a, middle, depth + 1, nodes, gap)?;
         self.halve(piece, middle, b, depth + 1, nodes, gap)
     }

@@ -25,17 +25,17 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
-    fn at(&self, end: bool) -> Uv {
+    fn end_point(&self, end: bool) -> Uv {
         let n = self.curve.points.len() - 1;
         self.curve.points[if end { n } else { 0 }].position()
     }
 
     pub(crate) fn start(&self) -> Uv {
-        self.at(self.reversed)
+        self.end_point(self.reversed)
     }
 
     pub(crate) fn end(&self) -> Uv {
-        self.at(!self.reversed)
+        self.end_point(!self.reversed)
     }
 
     fn middle(&self) -> Uv {
@@ -54,7 +54,7 @@ impl Piece {
     }
 
     /// A straight step.
-    pub(crate) fn step(from: Uv, to: Uv) -> Self {
+    pub(crate) fn straight(from: Uv, to: Uv) -> Self {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
@@ -68,7 +68,7 @@ impl Piece {
                 into.push(self.curve.evaluate(pair[0] + (pair[1] - pair[0]) * k as f64 / per_span as f64));
             }
         }
-        into.push(self.at(true));
+        into.push(self.end_point(true));
         if self.reversed {
             into[start..].reverse();
         }
@@ -155,15 +155,15 @@ pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
 ///
 /// Loops whose sides at a pole do not fit the sense in which they wind are tried with the sides run the other way: such
 /// loops run against their face's orientation.
-pub(crate) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
-    let first = chained(uses.clone(), chart, tolerance, false);
+pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
+    let first = chain_uses(uses.clone(), chart, tolerance, false);
     // On a surface with one pole nothing could close a loop that touches it and winds around it all the same.
     let lone = chart.poles.len() == 1 && first.pieces.iter().any(|p| p.source == Source::Nothing);
     let allowed = if lone { 0 } else { 1 };
     if first.winding.iter().all(|w| w.abs() <= allowed) {
         return first;
     }
-    let mut second = chained(uses, chart, tolerance, true);
+    let mut second = chain_uses(uses, chart, tolerance, true);
     if second.is_winding() {
         return first;
     }
@@ -171,7 +171,7 @@ pub(crate) fn chain(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
     second
 }
 
-fn chained(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
+fn chain_uses(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
     let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
     for (i, next) in uses.into_iter().enumerate() {
         if i == 0 {
@@ -194,7 +194,7 @@ fn chained(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Cha
 fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turned: bool) -> Uv {
     let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
     let (from, start) = (last.end(), next.start());
-    let near = chart.near(start, from);
+    let near = chart.nearest_representative(start, from);
     let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
     let pole = chart.poles.iter().find(|pole| {
         (pole.point - p).length() <= tolerance.max(1e-9) * 4.0
@@ -204,14 +204,14 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
         let distance = (p - q).length();
         if distance > 10.0 * tolerance {
             chain.bridged = chain.bridged.max(distance);
-            chain.pieces.push(Piece::step(from, near));
+            chain.pieces.push(Piece::straight(from, near));
         }
         return near - start;
     };
     let free = 1 - pole.fixed;
     let same_edge = last.source == next.source;
     let low = (last.middle()[pole.fixed] > pole.at) != turned;
-    let amount = around_pole(pole, chart, low, start[free] - from[free], same_edge);
+    let amount = run_along_pole(pole, chart, low, start[free] - from[free], same_edge);
     let target = from[free] + amount;
     // Down to the pole, along it, and back: the first and last step are usually empty.
     let mut corner = from;
@@ -219,7 +219,7 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
         let mut to = corner;
         to[d] = value;
         if (to[d] - corner[d]).abs() > 1e-9 * (1.0 + value.abs()) {
-            chain.pieces.push(Piece::step(corner, to));
+            chain.pieces.push(Piece::straight(corner, to));
             corner = to;
         }
     }
@@ -229,7 +229,7 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
 }
 
 /// How far the loop runs along a pole, with the material on its left.
-fn around_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_edge: bool) -> f64 {
+fn run_along_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_edge: bool) -> f64 {
     let free = 1 - pole.fixed;
     let Some(period) = chart.period[free] else { return difference };
     // Along v = low run to +u, along v = high to -u; along u = high to +v, along u = low to -v.

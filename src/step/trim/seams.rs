@@ -1,12 +1,12 @@
 //! Seams that were added to a face: curves in space for straight lines in its parameter plane.
 
-use super::face::{Task, refit};
+use super::face::{FaceTask, refit};
 use super::fit::{Budget, Overrun};
 use super::loops::{Piece, Source};
 use crate::math::{Point, Uv};
 use crate::nurbs::{Curve, Surface, UvCurve};
 use crate::step::chart::Chart;
-use crate::step::geometry::pcurves::cubic;
+use crate::step::geometry::pcurves::fit_cubic;
 
 /// A seam in space.
 #[derive(Clone, Debug)]
@@ -21,10 +21,10 @@ pub(crate) struct Seams<'s> {
     surface: &'s Surface,
     chart: &'s Chart,
     domain: [[f64; 2]; 2],
-    made: Vec<Made>,
+    made: Vec<SeamCurve>,
 }
 
-struct Made {
+struct SeamCurve {
     curve: Curve,
     /// The parameter that varies, when the seam is an isoline.
     varies: Option<usize>,
@@ -34,7 +34,7 @@ struct Made {
 
 impl<'s> Seams<'s> {
     pub(crate) fn new(surface: &'s Surface, chart: &'s Chart, domain: [[f64; 2]; 2], lines: Vec<[Uv; 2]>) -> Self {
-        let made = lines.into_iter().map(|line| make(surface, chart, domain, line)).collect();
+        let made = lines.into_iter().map(|line| seam_curve(surface, chart, domain, line)).collect();
         Self { surface, chart, domain, made }
     }
 
@@ -48,7 +48,7 @@ impl<'s> Seams<'s> {
         &mut self,
         k: usize,
         piece: &Piece,
-        task: &Task<'_>,
+        task: &FaceTask<'_>,
         budget: &Budget,
     ) -> Result<UvCurve, Overrun> {
         let made = &self.made[k];
@@ -59,7 +59,9 @@ impl<'s> Seams<'s> {
                 let [a, b] = if made.turned { [mapped[1], mapped[0]] } else { mapped };
                 Ok(UvCurve::line(a, b, made.curve.domain()))
             }
-            None if self.chart.angular() == [false, false] => Ok(UvCurve::line(mapped[0], mapped[1], [0.0, 1.0])),
+            None if self.chart.angular_directions() == [false, false] => {
+                Ok(UvCurve::line(mapped[0], mapped[1], [0.0, 1.0]))
+            }
             None => {
                 refit(self.chart, self.surface, self.domain, piece, &made.curve, task, budget).map(|fit| fit.curve)
             }
@@ -77,7 +79,7 @@ impl<'s> Seams<'s> {
     }
 }
 
-fn make(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]) -> Made {
+fn seam_curve(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]) -> SeamCurve {
     let (p, q) = (chart.to_surface(domain, a), chart.to_surface(domain, b));
     let extent = [0, 1].map(|d| (domain[d][1] - domain[d][0]).abs());
     for fixed in 0..2 {
@@ -90,7 +92,11 @@ fn make(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]
         let [l0, l1] = line.domain();
         let (lo, hi) = (lo.clamp(l0, l1), hi.clamp(l0, l1));
         if hi - lo > 1e-9 * extent[varies] {
-            return Made { curve: line.restricted(lo, hi), varies: Some(varies), turned: p[varies] > q[varies] };
+            return SeamCurve {
+                curve: line.restricted(lo, hi),
+                varies: Some(varies),
+                turned: p[varies] > q[varies],
+            };
         }
     }
     // Oblique: a cubic that follows the surface to 1e-7 mm.
@@ -99,5 +105,5 @@ fn make(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]
         let d = chart.derivatives(a + step * t);
         (d.point, d.du * step.x + d.dv * step.y)
     };
-    Made { curve: cubic([0.0, 1.0], at, 1e-7).0, varies: None, turned: false }
+    SeamCurve { curve: fit_cubic([0.0, 1.0], at, 1e-7).0, varies: None, turned: false }
 }

@@ -91,7 +91,7 @@ impl Survey {
             let i = h.face.index();
             let (Some(&Some(face)), Some(p)) = (survey.of.get(i), placed.get(i)) else { continue };
             let Some(forms) = p.face.and_then(|f| f.surface.forms(h.uv)) else { continue };
-            let radius = p.placement.scale / forms.sharpest();
+            let radius = p.placement.scale / forms.largest_curvature();
             let cos = h.normal.dot(ray.direction).abs().clamp(GRAZING, 1.0);
             if radius > 0.0 {
                 survey.pilots.push(PilotHit { face, radius, tilt: 2.0 * (1.0 - cos * cos).sqrt() / cos });

@@ -43,8 +43,8 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
     let ([e, f, g], det) = (forms.first, forms.first[0] * forms.first[2] - forms.first[1] * forms.first[1]);
     let (x, y) = (across.dot(d.du), across.dot(d.dv));
     let direction = Uv::new((g * x - f * y) / det, (e * y - f * x) / det);
-    let sag = forms.along(direction).abs() * (FACET_REACH * surface.size).powi(2) / 8.0;
-    let xi = xi.min(surface.field.turning(forms.sharpest()));
+    let sag = forms.normal_curvature(direction).abs() * (FACET_REACH * surface.size).powi(2) / 8.0;
+    let xi = xi.min(surface.field.turning(forms.largest_curvature()));
     xi * (1.0 - (sag / xi).min(0.5))
 }
 

@@ -128,9 +128,9 @@ fn density(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
             let mut across = Uv::ZERO;
             along[d] = 1.0;
             across[other] = 1.0;
-            let (k, c) = (forms.along(along), forms.along(across));
+            let (k, c) = (forms.normal_curvature(along), forms.normal_curvature(across));
             let width = if d == 0 { der.dv } else { der.du }.length() * (root.hi[other] - root.lo[other]);
-            let xi = surface.field.tolerance_at(forms.sharpest());
+            let xi = surface.field.tolerance_at(forms.largest_curvature());
             // Where the surface bends the same way across, that takes a share of the tolerance.
             let sag_across = c.abs() * width * width / (8.0 * xi);
             let left = if k * c > 0.0 { 1.0 - sag_across.min(MAX_SHARE_ACROSS) } else { 1.0 };

@@ -27,9 +27,7 @@ pub(crate) fn face(surface: Surface, loops: &[Vec<Vec<Uv>>]) -> Model {
         }
         trims.push(TrimLoop { uses });
     }
-    let (name, analytic) = (String::new(), Analytic::Other);
-    let face =
-        Face { name, entity: None, colour: None, surface, analytic, reversed: false, loops: trims, gap: 0.0 };
+    let face = Face { loops: trims, ..Face::whole(surface) };
     part.shells = vec![Shell { faces: vec![face], ..Shell::default() }];
     Model::from_part(part)
 }

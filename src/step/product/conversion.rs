@@ -1,26 +1,26 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::order::{Ends, follow};
-use super::outward::is_inside_out;
+use super::loop_order::{DirectedUse, put_in_order};
+use super::orientation::is_inside_out;
 use super::styles::Styles;
-use super::topology::{EdgeKey, FacePlan, Items, face, number_edges};
+use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
-use crate::step::geometry::edges::CutEdge;
-use crate::step::geometry::surfaces::Reach;
+use crate::step::geometry::edges::TrimmedEdge;
+use crate::step::geometry::surfaces::FaceExtent;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{Built, EdgeShape, Task, build, trim_loops};
+use crate::step::trim::face::{BuiltFace, EdgeShape, FaceTask, build_face, trim_loops};
 use crate::step::trim::loops::Source;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A part with the account of its conversion.
 #[derive(Debug, Default)]
-pub(crate) struct Converted {
+pub(crate) struct ConvertedPart {
     pub(crate) part: Part,
     /// Faces the file has, distinct.
     pub(crate) found: usize,
@@ -33,30 +33,30 @@ pub(crate) struct Converted {
 pub(crate) fn convert(
     file: &File<'_>,
     units: Units,
-    items: &Items,
+    items: &ShapeItems,
     styles: &Styles,
     settings: &Settings,
-) -> Converted {
+) -> ConvertedPart {
     let geometry = Geometry { file, units };
-    let mut out = Converted { refused: items.refused.clone(), ..Converted::default() };
+    let mut out = ConvertedPart { refused: items.refused.clone(), ..ConvertedPart::default() };
     out.found += items.refused.len();
     // A face that occurs in several shells is converted once.
     let mut seen = FxHashSet::default();
     let ids: Vec<u64> =
         items.shells.iter().flat_map(|s| &s.faces).map(|f| f.0).filter(|f| seen.insert(*f)).collect();
     out.found += ids.len();
-    let plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, face(file, id))).collect();
+    let plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, read_face(file, id))).collect();
     let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
     let (keys, index) = number_edges(in_order);
-    let edges: Vec<Outcome<CutEdge>> = keys.par_iter().map(|&key| cut(&geometry, key)).collect();
-    let built: Vec<(u64, Outcome<Built>)> = ids
+    let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
+    let built: Vec<(u64, Outcome<BuiltFace>)> = ids
         .par_iter()
         .map(|id| {
             let plan = match &plans[id] {
                 Ok(plan) => plan,
                 Err(refusal) => return (*id, Err(refusal.clone())),
             };
-            (*id, build_face(&geometry, *id, plan, &edges, &index, settings))
+            (*id, convert_face(&geometry, *id, plan, &edges, &index, settings))
         })
         .collect();
     // Edges move into the part only now: a second copy of them, and of the faces below, took the peak of a 30 MB file
@@ -66,7 +66,7 @@ pub(crate) fn convert(
     // Positions of edges in the part; edges without length or that failed have none.
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
-        let Ok(CutEdge { curve: Some(curve), .. }) = edge else {
+        let Ok(TrimmedEdge { curve: Some(curve), .. }) = edge else {
             numbers.push(None);
             continue;
         };
@@ -91,7 +91,7 @@ pub(crate) fn convert(
                     out.repaired.push(Refusal { id, entity, reason: built.repairs.join("; ") });
                 }
                 let name = plans[&id].as_ref().map(|p| p.name.clone()).unwrap_or_default();
-                faces.insert(id, place(built, id, name, &mut part, &numbers, styles));
+                faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
             }
             Err(refusal) => out.refused.push(refusal),
         }
@@ -123,7 +123,7 @@ pub(crate) fn convert(
             part.shells.push(shell);
         }
     }
-    super::loose::convert(&geometry, items, styles, settings, &mut part, &mut out);
+    super::free_surfaces::convert_free_surfaces(&geometry, items, styles, settings, &mut part, &mut out);
     out.part = part;
     out
 }
@@ -133,31 +133,32 @@ fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [u64; 2] {
     match key {
         EdgeKey::Straight(a, b) => [a, b],
         EdgeKey::Entity(id) => {
-            let args = file.entity(id).and_then(|e| e.own("EDGE", 1).or_else(|| e.own("EDGE_CURVE", 1)));
+            let args =
+                file.entity(id).and_then(|e| e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1)));
             [0, 1].map(|i| args.and_then(|a| a.id(i)).unwrap_or(0))
         }
     }
 }
 
-fn cut(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<CutEdge> {
+fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge> {
     match key {
         EdgeKey::Entity(id) => geometry.edge(id),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();
-            Ok(CutEdge { curve: (length > 1e-9).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
+            Ok(TrimmedEdge { curve: (length > 1e-9).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
         }
     }
 }
 
-fn build_face(
+fn convert_face(
     geometry: &Geometry<'_, '_>,
     id: u64,
     plan: &FacePlan,
-    edges: &[Outcome<CutEdge>],
+    edges: &[Outcome<TrimmedEdge>],
     index: &FxHashMap<EdgeKey, usize>,
     settings: &Settings,
-) -> Outcome<Built> {
+) -> Outcome<BuiltFace> {
     let entity = geometry.entity(id)?;
     let mut shapes: FxHashMap<usize, EdgeShape<'_>> = FxHashMap::default();
     let mut loops = Vec::with_capacity(plan.loops.len());
@@ -165,7 +166,7 @@ fn build_face(
     let mut edge_gap = 0f64;
     let mut repairs = Vec::new();
     for uses in &plan.loops {
-        let mut kept: Vec<Ends<usize>> = Vec::with_capacity(uses.len());
+        let mut kept: Vec<DirectedUse<usize>> = Vec::with_capacity(uses.len());
         for (key, reversed) in uses {
             let k = index[key];
             let edge = edges[k].as_ref().map_err(|r| Refusal {
@@ -179,11 +180,11 @@ fn build_face(
             shapes.entry(k).or_insert(EdgeShape { curve });
             let [a, b] = curve.domain().map(|t| curve.evaluate(t));
             let (from, to) = if *reversed { (b, a) } else { (a, b) };
-            kept.push(Ends { edge: k, reversed: *reversed, from, to });
+            kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
         }
         // Far above the gaps of real files, far below the length of an edge that is run the wrong way.
         let shortest = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > 1e-9).fold(1.0, f64::min);
-        repairs.extend(follow(&mut kept, (0.1 * shortest).max(1e-6)));
+        repairs.extend(put_in_order(&mut kept, (0.1 * shortest).max(1e-6)));
         if !kept.is_empty() {
             loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
         }
@@ -196,14 +197,14 @@ fn build_face(
         [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| s.curve.evaluate(a + f * (b - a)))
     };
     let points: Vec<Point> = shapes.values().take(if asks { 64 } else { 0 }).flat_map(along).collect();
-    let reach = Reach::around(bounds, &points);
+    let reach = FaceExtent::from_bounds(bounds, &points);
     let chart = geometry.chart(plan.surface, reach, 0).map_err(|r| Refusal {
         id,
         entity: entity.name(),
         reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
     })?;
     let stated = geometry.units.accuracy.unwrap_or(1e-6).clamp(1e-6, 1e-2);
-    let task = Task {
+    let task = FaceTask {
         chart,
         same_sense: plan.same_sense,
         loops,
@@ -213,7 +214,7 @@ fn build_face(
         budget: settings.face_budget,
         implicit_outer: false,
     };
-    let mut built = build(task).map_err(|reason| {
+    let mut built = build_face(task).map_err(|reason| {
         let surface = geometry.file.entity(plan.surface).map(|s| s.name()).unwrap_or_default();
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
     })?;
@@ -222,8 +223,8 @@ fn build_face(
 }
 
 /// Numbers a built face's seams and vertices into the part.
-pub(crate) fn place(
-    built: Built,
+pub(crate) fn add_face(
+    built: BuiltFace,
     id: u64,
     name: String,
     part: &mut Part,

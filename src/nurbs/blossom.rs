@@ -1,7 +1,7 @@
 //! Parts of curves by blossoms: knot insertion, clamping and cutting in one; and parts put together.
 
 use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, find_span};
-use super::spline::{ControlPoint, Curve, Spline};
+use super::curve::{ControlPoint, Curve, Spline};
 use smallvec::SmallVec;
 
 impl<P: ControlPoint> Spline<P> {
@@ -102,7 +102,7 @@ impl<P: ControlPoint> Spline<P> {
 
 impl Curve {
     /// This curve and behind it another of its degree that starts where it ends; the parameter follows on at the joint.
-    pub fn followed_by(&self, tail: &Self) -> Self {
+    pub fn joined_with(&self, tail: &Self) -> Self {
         let p = self.degree;
         let (end, start) = (self.domain()[1], tail.domain()[0]);
         // One control point at the joint: weights are scaled to agree there.
@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn two_arcs_put_together_are_one_circle() {
         let arc = |a: f64, b: f64| conic::arc(&Frame::IDENTITY, 2.0, [a, b]);
-        let whole = arc(0.0, 2.0).followed_by(&arc(2.0, 5.0).reparametrised([7.0, 8.0]));
+        let whole = arc(0.0, 2.0).joined_with(&arc(2.0, 5.0).reparametrised([7.0, 8.0]));
         assert_eq!(whole.domain(), [0.0, 3.0]);
         for k in 0..=30 {
             let t = 0.1 * f64::from(k);

@@ -4,14 +4,14 @@ use crate::math::Point;
 
 /// An edge use with the points between which it runs.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ends<T> {
+pub(crate) struct DirectedUse<T> {
     pub(crate) edge: T,
     pub(crate) reversed: bool,
     pub(crate) from: Point,
     pub(crate) to: Point,
 }
 
-impl<T> Ends<T> {
+impl<T> DirectedUse<T> {
     fn turn(&mut self) {
         self.reversed = !self.reversed;
         std::mem::swap(&mut self.from, &mut self.to);
@@ -19,20 +19,20 @@ impl<T> Ends<T> {
 }
 
 /// Largest step from one use to the next, mm.
-fn open<T>(uses: &[Ends<T>]) -> f64 {
+fn largest_gap<T>(uses: &[DirectedUse<T>]) -> f64 {
     let n = uses.len();
     (0..n).map(|i| (uses[(i + 1) % n].from - uses[i].to).length()).fold(0.0, f64::max)
 }
 
 /// Makes each use begin where the one before ends, within `tolerance` mm; says what was changed. A loop that cannot be
 /// closed this way stays as it was.
-pub(crate) fn follow<T: Copy>(uses: &mut Vec<Ends<T>>, tolerance: f64) -> Option<&'static str> {
-    if open(uses) <= tolerance {
+pub(crate) fn put_in_order<T: Copy>(uses: &mut Vec<DirectedUse<T>>, tolerance: f64) -> Option<&'static str> {
+    if largest_gap(uses) <= tolerance {
         return None;
     }
     for (mut tried, what) in [
-        (turned(uses, tolerance), "an edge of a loop ran against its neighbours"),
-        (sorted(uses, tolerance), "the edges of a loop were not in order"),
+        (turn_misfits(uses, tolerance), "an edge of a loop ran against its neighbours"),
+        (chain_from_first(uses, tolerance), "the edges of a loop were not in order"),
     ] {
         if let Some(found) = tried.take() {
             *uses = found;
@@ -43,7 +43,7 @@ pub(crate) fn follow<T: Copy>(uses: &mut Vec<Ends<T>>, tolerance: f64) -> Option
 }
 
 /// Single uses turned around between neighbours that both fit the other way.
-fn turned<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
+fn turn_misfits<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<DirectedUse<T>>> {
     let n = uses.len();
     let mut out = uses.to_vec();
     for i in 0..n {
@@ -56,11 +56,11 @@ fn turned<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
             }
         }
     }
-    (open(&out) <= tolerance).then_some(out)
+    (largest_gap(&out) <= tolerance).then_some(out)
 }
 
 /// The uses chained anew from the first, turned where only their far end fits.
-fn sorted<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
+fn chain_from_first<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<DirectedUse<T>>> {
     // Quadratic in the length: longer loops than this are left alone.
     if uses.len() > 2000 {
         return None;
@@ -77,22 +77,24 @@ fn sorted<T: Copy>(uses: &[Ends<T>], tolerance: f64) -> Option<Vec<Ends<T>>> {
         }
         out.push(found);
     }
-    (open(&out) <= tolerance).then_some(out)
+    (largest_gap(&out) <= tolerance).then_some(out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn square() -> Vec<Ends<usize>> {
+    fn square() -> Vec<DirectedUse<usize>> {
         let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Point::new(x, y, 0.0));
-        (0..4).map(|i| Ends { edge: i, reversed: false, from: corners[i], to: corners[(i + 1) % 4] }).collect()
+        (0..4)
+            .map(|i| DirectedUse { edge: i, reversed: false, from: corners[i], to: corners[(i + 1) % 4] })
+            .collect()
     }
 
     #[test]
     fn a_closed_loop_stays() {
         let mut uses = square();
-        assert_eq!(follow(&mut uses, 1e-6), None);
+        assert_eq!(put_in_order(&mut uses, 1e-6), None);
     }
 
     #[test]
@@ -100,8 +102,8 @@ mod tests {
         for wrong in [vec![1], vec![0], vec![1, 2], vec![0, 3], vec![0, 2]] {
             let mut uses = square();
             wrong.iter().for_each(|&i| uses[i].turn());
-            assert!(follow(&mut uses, 1e-6).is_some(), "{wrong:?}");
-            assert_eq!(open(&uses), 0.0);
+            assert!(put_in_order(&mut uses, 1e-6).is_some(), "{wrong:?}");
+            assert_eq!(largest_gap(&uses), 0.0);
         }
     }
 
@@ -109,7 +111,7 @@ mod tests {
     fn shuffled_edges_are_sorted() {
         let mut uses = square();
         uses.swap(1, 2);
-        assert!(follow(&mut uses, 1e-6).is_some());
+        assert!(put_in_order(&mut uses, 1e-6).is_some());
         assert_eq!(uses.iter().map(|u| u.edge).collect::<Vec<_>>(), [0, 1, 2, 3]);
     }
 
@@ -117,7 +119,7 @@ mod tests {
     fn what_cannot_close_is_left_alone() {
         let mut uses = square();
         uses.remove(2);
-        assert_eq!(follow(&mut uses, 1e-6), None);
+        assert_eq!(put_in_order(&mut uses, 1e-6), None);
         assert_eq!(uses.iter().map(|u| u.edge).collect::<Vec<_>>(), [0, 1, 3]);
     }
 }

@@ -1,4 +1,4 @@
-use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span, functions};
+use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, basis_functions, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use std::ops::{Add, Mul, Sub};
@@ -148,7 +148,7 @@ impl<P: ControlPoint> Spline<P> {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
         let span = find_span(&self.knots, self.degree, t);
-        let b = functions::<W>(&self.knots, self.degree, span, t);
+        let b = basis_functions::<W>(&self.knots, self.degree, span, t);
         let active = &self.points[span - self.degree..=span];
         active.iter().zip(&b).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
     }

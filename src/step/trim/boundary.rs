@@ -7,7 +7,7 @@ use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
 
 /// What the arrangement gives.
-pub(crate) struct Arranged {
+pub(crate) struct Boundary {
     /// Closed loops, material on the left.
     pub(crate) loops: Vec<Chain>,
     /// Straight seams in the parameter plane, by their number in [`Source::Seam`].
@@ -17,35 +17,37 @@ pub(crate) struct Arranged {
 }
 
 /// Arranges the chains of a face, given with the material on their left.
-pub(crate) fn arrange(
+pub(crate) fn bound_region(
     mut chains: Vec<Chain>,
     chart: &Chart,
     implicit_outer: bool,
-) -> Result<Arranged, &'static str> {
+) -> Result<Boundary, &'static str> {
     chains.retain(|c| !c.pieces.is_empty());
-    let mut out = Arranged { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
+    let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // Loops without extent: a vertex, or an edge run forth and back.
     let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
     plain.retain(|c| signed_area(&c.polygon()).abs() > 1e-12 * scale);
     if winding.is_empty() {
         if plain.is_empty() {
-            out.loops.push(whole(chart, &[], &mut out.seams)?);
+            out.loops.push(natural_boundary(chart, &[], &mut out.seams)?);
             return Ok(out);
         }
-        orient(&mut plain, chart, &mut out, implicit_outer)?;
+        bound_without_winding(&mut plain, chart, &mut out, implicit_outer)?;
         return Ok(out);
     }
     let obstacles: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
     let mut outer = match winding.len() {
-        1 => to_border(winding.into_iter().next().ok_or("no loop")?, chart, &obstacles, &mut out.seams, true)?,
+        1 => {
+            extend_to_border(winding.into_iter().next().ok_or("no loop")?, chart, &obstacles, &mut out.seams, true)?
+        }
         2 => {
             let mut two = winding.into_iter();
             let (Some(a), Some(b)) = (two.next(), two.next()) else { return Err("no loop") };
             if a.winding != b.winding.map(|w| -w) {
                 return Err("two loops wind around the surface in the same sense");
             }
-            join(a, b, chart, &obstacles, &mut out.seams)?
+            join_winding_pair(a, b, chart, &obstacles, &mut out.seams)?
         }
         _ => return Err("more than two loops wind around the surface"),
     };
@@ -56,13 +58,13 @@ pub(crate) fn arrange(
     }
     out.loops.push(outer);
     for hole in plain {
-        out.loops.push(inside(hole, &border, chart, &mut out.repairs));
+        out.loops.push(place_hole(hole, &border, chart, &mut out.repairs));
     }
     Ok(out)
 }
 
 /// Moves a hole by periods into the border and turns it clockwise.
-fn inside(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
+fn place_hole(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
     let polygon = hole.polygon();
     let options = |d: usize| if chart.period[d].is_some() { vec![0, -1, 1, -2, 2] } else { vec![0] };
     let shift_of = |i: i32, j: i32| {
@@ -98,10 +100,10 @@ fn inside(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'sta
 
 /// Loops that wind around nothing: the largest is the outer one, except on a closed surface, where loops that all run
 /// clockwise leave the rest of the surface as the face.
-fn orient(
+fn bound_without_winding(
     plain: &mut Vec<Chain>,
     chart: &Chart,
-    out: &mut Arranged,
+    out: &mut Boundary,
     implicit_outer: bool,
 ) -> Result<(), &'static str> {
     let areas: Vec<f64> = plain.iter().map(|c| signed_area(&c.polygon())).collect();
@@ -109,11 +111,11 @@ fn orient(
     let all_holes = areas.iter().all(|&a| a < 0.0) && !plain.iter().any(Chain::is_cut_open);
     if implicit_outer || all_holes && is_closed(chart) {
         let polygons: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
-        let outer = whole(chart, &polygons, &mut out.seams)?;
+        let outer = natural_boundary(chart, &polygons, &mut out.seams)?;
         let border = outer.polygon();
         out.loops.push(outer);
         for hole in plain.drain(..) {
-            out.loops.push(inside(hole, &border, chart, &mut out.repairs));
+            out.loops.push(place_hole(hole, &border, chart, &mut out.repairs));
         }
         return Ok(());
     }
@@ -126,7 +128,7 @@ fn orient(
     let border = outer.polygon();
     out.loops.push(outer);
     for hole in plain.drain(..) {
-        let turned = inside(hole, &border, chart, &mut out.repairs);
+        let turned = place_hole(hole, &border, chart, &mut out.repairs);
         out.loops.push(turned);
     }
     Ok(())
@@ -141,7 +143,7 @@ fn is_closed(chart: &Chart) -> bool {
 }
 
 /// The whole surface: its natural borders, seams and poles, cut where no hole is.
-fn whole(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) -> Result<Chain, &'static str> {
+fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) -> Result<Chain, &'static str> {
     let mut range = [[0.0; 2]; 2];
     for d in 0..2 {
         range[d] = match chart.period[d] {
@@ -208,7 +210,7 @@ fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64
 }
 
 /// One loop that winds around: to the pole or natural border on its left.
-fn to_border(
+fn extend_to_border(
     chain: Chain,
     chart: &Chart,
     holes: &[Vec<Uv>],
@@ -237,22 +239,22 @@ fn to_border(
         None if chart.period[across].is_none() && may_turn && !chart.poles.is_empty() => {
             let mut turned = chain;
             turned.reverse();
-            return to_border(turned, chart, holes, seams, false);
+            return extend_to_border(turned, chart, holes, seams, false);
         }
         None => return Err("a loop winds around an unbounded surface and nothing closes it"),
     };
     let displacement = chain.displacement(chart);
     // Straight across from a vertex that sees the border.
     let starts: Vec<Uv> = chain.pieces.iter().map(Piece::start).collect();
-    let own = closed_up(&polygon, displacement);
+    let own = unrolled_polygon(&polygon, displacement);
     let sees = |&i: &usize| {
         let mut to = starts[i];
         to[across] = at;
-        !holes.iter().any(|h| crosses(h, true, starts[i], to, displacement))
-            && !crosses(&own, false, starts[i], to, displacement)
+        !holes.iter().any(|h| segment_crosses(h, true, starts[i], to, displacement))
+            && !segment_crosses(&own, false, starts[i], to, displacement)
     };
     let first = (0..starts.len()).find(sees).ok_or("no vertex sees the pole past the holes")?;
-    let chain = rotated(chain, first, displacement);
+    let chain = started_at(chain, first, displacement);
     let from = chain.pieces[0].start();
     let mut foot = from;
     foot[across] = at;
@@ -261,7 +263,7 @@ fn to_border(
     let up = UvCurve::line(from, foot, [0.0, 1.0]);
     let far = Piece { source: seam, reversed: false, curve: up.clone() }.shifted(displacement);
     let border = if pole.is_some() {
-        Piece::step(foot + displacement, foot)
+        Piece::straight(foot + displacement, foot)
     } else {
         seams.push([foot, foot + displacement]);
         let curve = UvCurve::line(foot, foot + displacement, [0.0, 1.0]);
@@ -273,21 +275,21 @@ fn to_border(
 }
 
 /// The polygon with its end point, for a chain that winds.
-fn closed_up(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
+fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
     let mut open = polygon.to_vec();
     open.push(polygon[0] + displacement);
     open
 }
 
 /// The chain starting with another piece.
-fn rotated(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
+fn started_at(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
     let head: Vec<Piece> = chain.pieces.drain(..first).map(|p| p.shifted(displacement)).collect();
     chain.pieces.extend(head);
     chain
 }
 
 /// Whether a segment properly meets a polygon, or one of its copies by `period`.
-fn crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
+fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
     let n = polygon.len();
     let sides = if closed { n } else { n - 1 };
     [-2.0, -1.0, 0.0, 1.0, 2.0].iter().any(|&k| {
@@ -309,7 +311,7 @@ fn crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
 }
 
 /// Two loops that wind in opposite senses, joined by a seam run twice.
-fn join(
+fn join_winding_pair(
     a: Chain,
     b: Chain,
     chart: &Chart,
@@ -317,7 +319,8 @@ fn join(
     seams: &mut Vec<[Uv; 2]>,
 ) -> Result<Chain, &'static str> {
     let displacement = a.displacement(chart);
-    let (border_a, border_b) = (closed_up(&a.polygon(), displacement), closed_up(&b.polygon(), -displacement));
+    let (border_a, border_b) =
+        (unrolled_polygon(&a.polygon(), displacement), unrolled_polygon(&b.polygon(), -displacement));
     let starts_a: Vec<Uv> = a.pieces.iter().map(Piece::start).collect();
     let starts_b: Vec<Uv> = b.pieces.iter().map(Piece::start).collect();
     let along = usize::from(a.winding[0] == 0);
@@ -325,7 +328,7 @@ fn join(
     for (i, &p) in starts_a.iter().enumerate() {
         let d = chart.derivatives(p);
         for (j, &q) in starts_b.iter().enumerate() {
-            let mut q = chart.near(q, p);
+            let mut q = chart.nearest_representative(q, p);
             // On a torus the second loop is the one on the left of the first.
             if let Some(period) = chart.period[1 - along] {
                 let left = if along == 0 { a.winding[0] > 0 } else { a.winding[1] < 0 };
@@ -347,13 +350,13 @@ fn join(
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0));
     pairs.truncate(4096);
     let clear = |from: Uv, to: Uv| {
-        !holes.iter().any(|h| crosses(h, true, from, to, displacement))
-            && ![&border_a, &border_b].into_iter().any(|h| crosses(h, false, from, to, displacement))
+        !holes.iter().any(|h| segment_crosses(h, true, from, to, displacement))
+            && ![&border_a, &border_b].into_iter().any(|h| segment_crosses(h, false, from, to, displacement))
     };
     let found = pairs.iter().find(|(_, i, _, q)| clear(starts_a[*i], *q));
     let Some(&(_, i, j, q)) = found else { return Err("no straight seam between the two loops misses the holes") };
-    let a = rotated(a, i, displacement);
-    let mut b = rotated(b, j, -displacement);
+    let a = started_at(a, i, displacement);
+    let mut b = started_at(b, j, -displacement);
     b.shift(q - b.pieces[0].start());
     let p = a.pieces[0].start();
     seams.push([p, q]);

@@ -1,48 +1,48 @@
 //! Surfaces without a face (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
 
-use super::part::{Converted, place};
+use super::conversion::{ConvertedPart, add_face};
 use super::styles::Styles;
-use super::tessellated::Leaves;
-use super::topology::Items;
+use super::tessellated::TessellatedItems;
+use super::topology::ShapeItems;
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::chart::{Chart, Kind};
-use crate::step::geometry::surfaces::Reach;
+use crate::step::geometry::surfaces::FaceExtent;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::Entity;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{Built, EdgeShape, Task, build};
+use crate::step::trim::face::{BuiltFace, EdgeShape, FaceTask, build_face};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// A built face with its boundary curves.
-type Bounded = (Built, Vec<Vec<Curve>>);
+type Bounded = (BuiltFace, Vec<Vec<Curve>>);
 
 /// Converts what is not a face of a shell: each surface becomes a shell of one face.
-pub(crate) fn convert(
+pub(crate) fn convert_free_surfaces(
     geometry: &Geometry<'_, '_>,
-    items: &Items,
+    items: &ShapeItems,
     styles: &Styles,
     settings: &Settings,
     part: &mut Part,
-    out: &mut Converted,
+    out: &mut ConvertedPart,
 ) {
     out.found += items.surfaces.len();
     let built: Vec<(u64, Outcome<Bounded>)> =
-        items.surfaces.par_iter().map(|&id| (id, surface(geometry, id, settings))).collect();
+        items.surfaces.par_iter().map(|&id| (id, convert_surface(geometry, id, settings))).collect();
     for (id, outcome) in built {
         match outcome {
             Ok((built, boundaries)) => {
-                let numbers = number(boundaries, part);
+                let numbers = number_boundaries(boundaries, part);
                 let name = geometry.file.entity(id).and_then(|e| e.args().text(0)).unwrap_or_default();
-                let face = place(built, id, name, part, &numbers, styles);
+                let face = add_face(built, id, name, part, &numbers, styles);
                 part.shells.push(Shell { faces: vec![face], ..Shell::default() });
             }
             Err(refusal) => out.refused.push(refusal),
         }
     }
-    let mut leaves = Leaves::default();
+    let mut leaves = TessellatedItems::default();
     for &id in &items.tessellated {
         geometry.tessellated(id, 0, &mut leaves);
     }
@@ -55,7 +55,7 @@ pub(crate) fn convert(
 }
 
 /// Adds boundary curves as edges; ends that follow on each other share a vertex.
-fn number(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
+fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
     let mut numbers = Vec::new();
     for boundary in boundaries {
         let first = part.vertices.len() as u32;
@@ -72,23 +72,23 @@ fn number(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
 }
 
 /// One surface with its boundaries, if it has any.
-fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
+fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
     let e = geometry.entity(id)?;
     let (mut boundaries, mut implicit) = (Vec::new(), false);
-    let mut task = if let Some(a) = e.own("CURVE_BOUNDED_SURFACE", 1) {
+    let mut task = if let Some(a) = e.attributes("CURVE_BOUNDED_SURFACE", 1) {
         for boundary in a.list(1).ids() {
             boundaries.push(geometry.segments(geometry.entity(boundary)?, 0)?);
         }
         implicit = a.flag(2) == Some(true);
-        let basis = geometry.follow(e, a.id(0), "basis surface")?;
+        let basis = geometry.resolve(e, a.id(0), "basis surface")?;
         let hull = boundaries.iter().flatten().fold(Aabb::EMPTY, |b, c: &Curve| b.union(c.bounds()));
         let points: Vec<Point> = boundaries.iter().flatten().map(|c| c.evaluate(c.domain()[0])).collect();
-        let reach = Reach::around(hull, &points);
-        task(geometry.chart(basis.id, reach, 0)?, &boundaries, settings)
+        let reach = FaceExtent::from_bounds(hull, &points);
+        face_task(geometry.chart(basis.id, reach, 0)?, &boundaries, settings)
     } else {
-        let mut chart = geometry.chart(id, Reach::UNKNOWN, 0)?;
-        if let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1) {
-            let range = rectangle(geometry, e, &chart)?;
+        let mut chart = geometry.chart(id, FaceExtent::UNKNOWN, 0)?;
+        if let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) {
+            let range = trim_rectangle(geometry, e, &chart)?;
             for d in 0..2 {
                 let [a, b] = range[d];
                 if chart.period[d].is_none_or(|p| b - a < p * (1.0 - 1e-9)) {
@@ -98,17 +98,17 @@ fn surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome
                 }
             }
             if a.flag(5) == Some(false) && a.flag(6) == Some(false) {
-                return Err(Refusal::of(e, "a rectangle trimmed against both parameters is not supported"));
+                return Err(Refusal::new(e, "a rectangle trimmed against both parameters is not supported"));
             }
         }
-        task(chart, &boundaries, settings)
+        face_task(chart, &boundaries, settings)
     };
     task.implicit_outer = implicit;
-    let built = build(task).map_err(|reason| Refusal::of(e, reason))?;
+    let built = build_face(task).map_err(|reason| Refusal::new(e, reason))?;
     Ok((built, boundaries))
 }
 
-fn task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> Task<'e> {
+fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> FaceTask<'e> {
     let mut edges = FxHashMap::default();
     let mut loops = Vec::new();
     for boundary in boundaries {
@@ -120,7 +120,7 @@ fn task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> 
         }
         loops.push(uses);
     }
-    Task {
+    FaceTask {
         chart,
         same_sense: true,
         loops,
@@ -134,16 +134,18 @@ fn task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> 
 }
 
 /// The parameter rectangle of a RECTANGULAR_TRIMMED_SURFACE in the chart's parameters.
-fn rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
-    let Some(a) = e.own("RECTANGULAR_TRIMMED_SURFACE", 1) else { return Err(Refusal::of(e, "is not trimmed")) };
+fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
+    let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) else {
+        return Err(Refusal::new(e, "is not trimmed"));
+    };
     let scale = chart.parameter_scale(geometry.units.length, geometry.units.angle);
     let Some(scale) = scale else {
-        return Err(Refusal::of(e, "its parameters cannot be taken over to the swept conic"));
+        return Err(Refusal::new(e, "its parameters cannot be taken over to the swept conic"));
     };
     let mut range = [[0.0; 2]; 2];
     for d in 0..2 {
         let (Some(lo), Some(hi)) = (a.real(1 + 2 * d), a.real(2 + 2 * d)) else {
-            return Err(Refusal::of(e, "a trimming parameter is missing"));
+            return Err(Refusal::new(e, "a trimming parameter is missing"));
         };
         let (mut lo, mut hi) = (lo * scale[d], hi * scale[d]);
         if a.flag(5 + d) == Some(false) {
@@ -157,7 +159,7 @@ fn rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> O
         range[d] = [lo, hi];
     }
     if matches!(chart.kind, Kind::Spline(_)) && range.iter().flatten().any(|x| !x.is_finite()) {
-        return Err(Refusal::of(e, "a trimming parameter is no number"));
+        return Err(Refusal::new(e, "a trimming parameter is no number"));
     }
     Ok(range)
 }
