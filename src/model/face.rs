@@ -1,11 +1,24 @@
+//! Faces: a surface with trimming loops, or a ready mesh.
+
 use super::EdgeId;
 use crate::math::{Frame, Uv};
 use crate::mesh::FacetMesh;
 use crate::nurbs::{Surface, UvCurve};
+use serde::Serialize;
+use std::fmt;
+use std::sync::Arc;
 
 /// Red, green, blue in `[0, 1]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colour(pub [f64; 3]);
+
+/// As `#rrggbb`, 255 steps a channel.
+impl fmt::Display for Colour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [r, g, b] = self.0.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
+        write!(f, "#{r:02x}{g:02x}{b:02x}")
+    }
+}
 
 /// What a surface was before it became a spline, kept for closed-form inversion and for users.
 ///
@@ -64,6 +77,96 @@ pub enum Analytic {
     Other,
 }
 
+/// The kind of a face's surface, as the file had it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+#[non_exhaustive]
+pub enum SurfaceKind {
+    Plane,
+    Cylinder,
+    Cone,
+    Sphere,
+    Torus,
+    Revolution,
+    Extrusion,
+    Offset,
+    Bspline,
+    Rational,
+    Tessellated,
+    Other,
+}
+
+impl SurfaceKind {
+    /// All kinds, in the order in which reports list them.
+    pub const ALL: [Self; 12] = [
+        Self::Plane,
+        Self::Cylinder,
+        Self::Cone,
+        Self::Sphere,
+        Self::Torus,
+        Self::Revolution,
+        Self::Extrusion,
+        Self::Offset,
+        Self::Bspline,
+        Self::Rational,
+        Self::Tessellated,
+        Self::Other,
+    ];
+
+    /// The word for it in reports and selectors.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Plane => "plane",
+            Self::Cylinder => "cylinder",
+            Self::Cone => "cone",
+            Self::Sphere => "sphere",
+            Self::Torus => "torus",
+            Self::Revolution => "revolution",
+            Self::Extrusion => "extrusion",
+            Self::Offset => "offset",
+            Self::Bspline => "bspline",
+            Self::Rational => "rational",
+            Self::Tessellated => "tessellated",
+            Self::Other => "other",
+        }
+    }
+}
+
+impl fmt::Display for SurfaceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.word())
+    }
+}
+
+impl Analytic {
+    /// Its kind without its figures.
+    pub fn kind(&self) -> SurfaceKind {
+        match self {
+            Self::Plane { .. } => SurfaceKind::Plane,
+            Self::Cylinder { .. } => SurfaceKind::Cylinder,
+            Self::Cone { .. } => SurfaceKind::Cone,
+            Self::Sphere { .. } => SurfaceKind::Sphere,
+            Self::Torus { .. } => SurfaceKind::Torus,
+            Self::Revolution => SurfaceKind::Revolution,
+            Self::Extrusion => SurfaceKind::Extrusion,
+            Self::Offset => SurfaceKind::Offset,
+            Self::Bspline => SurfaceKind::Bspline,
+            Self::Rational => SurfaceKind::Rational,
+            Self::Other => SurfaceKind::Other,
+        }
+    }
+
+    /// Radius of a cylinder or sphere, or of a torus' tube, mm; a cone has many.
+    pub fn radius(&self) -> Option<f64> {
+        match *self {
+            Self::Cylinder { radius, .. } | Self::Sphere { radius, .. } => Some(radius),
+            Self::Torus { minor, .. } => Some(minor),
+            _ => None,
+        }
+    }
+}
+
 /// A trimmed surface.
 #[derive(Clone, Debug)]
 pub struct Face {
@@ -73,6 +176,8 @@ pub struct Face {
     pub entity: Option<u64>,
     /// Colour of the face itself; parts have one too.
     pub colour: Option<Colour>,
+    /// Layer of the face, or of the solid that it belongs to.
+    pub layer: Option<Arc<str>>,
     /// The surface as a rational B-spline.
     pub surface: Surface,
     /// What it was in the file.
@@ -92,6 +197,7 @@ impl Face {
             name: String::new(),
             entity: None,
             colour: None,
+            layer: None,
             surface,
             analytic: Analytic::Other,
             reversed: false,
@@ -142,6 +248,8 @@ pub struct TessellatedFace {
     pub entity: Option<u64>,
     /// Colour of the face itself.
     pub colour: Option<Colour>,
+    /// Layer of the face.
+    pub layer: Option<Arc<str>>,
     /// The facets, all of face 0.
     pub mesh: FacetMesh,
 }

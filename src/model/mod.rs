@@ -9,10 +9,14 @@
 //! * an edge's uv curve has the edge's own parameter: `surface(uv(t)) ≈ curve(t)` within [`Face::gap`];
 //! * `Su × Sv`, turned around when [`Face::reversed`], points out of the solid.
 
+mod account;
+mod bounds;
 mod face;
+mod outline;
 mod part;
 mod placed;
 
-pub use face::{Analytic, Colour, EdgeUse, Face, TessellatedFace, TrimLoop};
+pub use account::{FaceAccount, PartAccount, SolidAccount};
+pub use face::{Analytic, Colour, EdgeUse, Face, SurfaceKind, TessellatedFace, TrimLoop};
 pub use part::{Edge, EdgeId, Part, PartId, Shell, VertexId};
 pub use placed::{Instance, Model, PlacedFace};

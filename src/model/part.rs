@@ -1,6 +1,9 @@
+//! Parts: shells of faces over common edges and vertices.
+
 use super::{Colour, Face, TessellatedFace};
 use crate::math::Point;
 use crate::nurbs::Curve;
+use std::ops::Range;
 
 /// Index into [`Part::edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,6 +52,8 @@ pub struct Shell {
     pub faces: Vec<Face>,
     /// Whether the file says that the shell is closed (bounds a solid or a void).
     pub closed: bool,
+    /// Whether it bounds a void of the solid whose shell comes before it.
+    pub void: bool,
     /// Colour of the shell or solid.
     pub colour: Option<Colour>,
     /// Name of the shell or solid, empty when it had none.
@@ -56,6 +61,19 @@ pub struct Shell {
 }
 
 impl Part {
+    /// Ranges of [`Part::shells`], one a solid (its shell and those of its voids) or sheet. Ready meshes are one more solid behind
+    /// these.
+    pub fn solids(&self) -> Vec<Range<usize>> {
+        let mut solids: Vec<Range<usize>> = Vec::new();
+        for (i, shell) in self.shells.iter().enumerate() {
+            match solids.last_mut() {
+                Some(solid) if shell.void => solid.end = i + 1,
+                _ => solids.push(i..i + 1),
+            }
+        }
+        solids
+    }
+
     /// Number of faces, tessellated ones included.
     pub fn face_count(&self) -> usize {
         self.shells.iter().map(|s| s.faces.len()).sum::<usize>() + self.tessellated.len()

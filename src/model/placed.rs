@@ -1,4 +1,6 @@
-use super::{Colour, Face, Part, PartId, TessellatedFace};
+//! The model: parts where they stand, and their faces in the order of their ids.
+
+use super::{Colour, Face, Part, PartId, SurfaceKind, TessellatedFace};
 use crate::math::{FaceId, Frame};
 
 /// A CAD model: distinct parts, and where they stand.
@@ -34,6 +36,8 @@ pub struct PlacedFace<'a> {
     pub instance: usize,
     /// The part.
     pub part: PartId,
+    /// Number of its solid or sheet in the part, as in [`Part::solids`].
+    pub solid: usize,
     /// Index into [`Part::shells`]; `None` for a tessellated face.
     pub shell: Option<usize>,
     /// The trimmed surface, in the part's coordinates.
@@ -72,29 +76,33 @@ impl Model {
     /// Every placed face in the order that defines [`FaceId`]: instance by instance, in each the faces shell by shell,
     /// then the tessellated faces.
     pub fn placed_faces(&self) -> impl Iterator<Item = PlacedFace<'_>> {
-        self.instances
-            .iter()
-            .enumerate()
-            .flat_map(move |(i, instance)| {
-                let part = self.part(instance.part);
-                let surfaces = part
-                    .shells
-                    .iter()
-                    .enumerate()
-                    .flat_map(|(s, shell)| shell.faces.iter().map(move |f| (Some(s), Some(f), None)));
-                let ready = part.tessellated.iter().map(|t| (None, None, Some(t)));
-                surfaces.chain(ready).map(move |(shell, face, tessellated)| (i, instance, shell, face, tessellated))
-            })
-            .enumerate()
-            .map(|(id, (i, instance, shell, face, tessellated))| PlacedFace {
-                id: FaceId(id as u32),
+        let instances = self.instances.iter().enumerate();
+        let faces = instances.flat_map(move |(i, instance)| {
+            let part = self.part(instance.part);
+            let placed = PlacedFace {
+                id: FaceId(0),
                 instance: i,
                 part: instance.part,
-                shell,
-                face,
-                tessellated,
+                solid: 0,
+                shell: None,
+                face: None,
+                tessellated: None,
                 placement: &instance.placement,
-            })
+            };
+            // Every shell but that of a void begins a solid; ready meshes are one more behind them.
+            let mut solids = 0;
+            let mut surfaces = Vec::with_capacity(part.shells.len());
+            for (s, shell) in part.shells.iter().enumerate() {
+                solids += usize::from(!shell.void || s == 0);
+                surfaces.push(PlacedFace { solid: solids - 1, shell: Some(s), ..placed });
+            }
+            let surfaces = surfaces.into_iter().zip(&part.shells);
+            let surfaces =
+                surfaces.flat_map(|(p, shell)| shell.faces.iter().map(move |f| PlacedFace { face: Some(f), ..p }));
+            let ready = part.tessellated.iter();
+            surfaces.chain(ready.map(move |t| PlacedFace { solid: solids, tessellated: Some(t), ..placed }))
+        });
+        faces.enumerate().map(|(id, placed)| PlacedFace { id: FaceId(id as u32), ..placed })
     }
 
     /// Number of placed faces.
@@ -102,7 +110,19 @@ impl Model {
         self.instances.iter().map(|i| self.part(i.part).face_count()).sum()
     }
 
-    /// The id of the first face of an instance.
+    /// The id of the first face of every instance.
+    pub fn first_faces(&self) -> Vec<FaceId> {
+        let counts: Vec<u32> = self.parts.iter().map(|p| p.face_count() as u32).collect();
+        let mut next = 0;
+        let step = |i: &Instance| {
+            let first = next;
+            next += counts[i.part.0 as usize];
+            FaceId(first)
+        };
+        self.instances.iter().map(step).collect()
+    }
+
+    /// The id of the first face of one instance; of all of them [`Model::first_faces`] tells at once.
     pub fn first_face(&self, instance: usize) -> FaceId {
         FaceId(self.instances[..instance].iter().map(|i| self.part(i.part).face_count()).sum::<usize>() as u32)
     }
@@ -117,6 +137,21 @@ impl PlacedFace<'_> {
     /// The `#id` of the face in its file.
     pub fn entity(&self) -> Option<u64> {
         self.face.and_then(|f| f.entity).or(self.tessellated.and_then(|t| t.entity))
+    }
+
+    /// Layer of the face, if it has one.
+    pub fn layer(&self) -> Option<&str> {
+        self.face.and_then(|f| f.layer.as_deref()).or(self.tessellated.and_then(|t| t.layer.as_deref()))
+    }
+
+    /// The kind of its surface.
+    pub fn kind(&self) -> SurfaceKind {
+        self.face.map_or(SurfaceKind::Tessellated, |f| f.analytic.kind())
+    }
+
+    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm.
+    pub fn radius(&self) -> Option<f64> {
+        Some(self.face?.analytic.radius()? * self.placement.scale)
     }
 
     /// The colour that shows: of the face, the shell, the instance or the part, the first that is given.
@@ -160,5 +195,6 @@ mod tests {
         assert_eq!(faces[3].placement.point(Point::ZERO), Point::Z);
         assert_eq!(faces[3].colour(&model), Some(Colour([1.0, 0.0, 0.0])));
         assert_eq!(model.first_face(1), FaceId(2));
+        assert_eq!(model.first_faces(), [FaceId(0), FaceId(2)]);
     }
 }

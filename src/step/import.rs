@@ -5,7 +5,7 @@ use super::product::conversion::{ConvertedPart, convert};
 use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, SurfaceCounts};
-use super::{Error, ErrorKind, Settings, bounds};
+use super::{Error, ErrorKind, Settings};
 use crate::math::Frame;
 use crate::model::{Analytic, Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -51,11 +51,9 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
     let model = assemble(&file, name, settings, &mut report);
-    if let (false, b) = {
-        let b = bounds::model_bounds(&model);
-        (b.is_empty(), b)
-    } {
-        report.bbox_mm = Some([b.min.to_array(), b.max.to_array()]);
+    let bounds = model.bounds();
+    if !bounds.is_empty() {
+        report.bbox_mm = Some([bounds.min.to_array(), bounds.max.to_array()]);
     }
     report.seconds.parse = parsed;
     report.seconds.convert = start.elapsed().as_secs_f64() - parsed;

@@ -21,7 +21,6 @@
 // Negated comparisons refuse NaN together with what is out of range.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
-mod bounds;
 mod chart;
 mod error;
 mod geometry;

@@ -98,12 +98,16 @@ pub(crate) fn convert(
     }
     let mut left: FxHashMap<u64, usize> = FxHashMap::default();
     items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
+    // A void without the shell around it stands alone.
+    let mut enclosed = false;
     for plan in &items.shells {
+        let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
         let own = plan.faces.iter().filter_map(|(id, flip)| {
             let uses = left.entry(*id).or_default();
             *uses = uses.saturating_sub(1);
             let mut face = if *uses == 0 { faces.remove(id)? } else { faces.get(id)?.clone() };
             face.reversed ^= flip;
+            face.layer = face.layer.or_else(|| layer.clone());
             Some(face)
         });
         let mut own: Vec<Face> = own.collect();
@@ -116,9 +120,11 @@ pub(crate) fn convert(
         let shell = Shell {
             faces: own,
             closed: plan.closed,
+            void: plan.void && enclosed,
             colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
             name: plan.name.clone(),
         };
+        enclosed = if plan.void { enclosed } else { !shell.faces.is_empty() };
         if !shell.faces.is_empty() {
             part.shells.push(shell);
         }
@@ -268,6 +274,7 @@ pub(crate) fn add_face(
         name,
         entity: Some(id),
         colour: styles.colour(id),
+        layer: styles.layer(id),
         surface: built.surface,
         analytic: built.analytic,
         reversed: built.reversed,

@@ -50,6 +50,7 @@ pub(crate) fn convert_free_surfaces(
     out.refused.extend(leaves.refused);
     part.tessellated.extend(leaves.faces.into_iter().map(|mut face| {
         face.colour = face.entity.and_then(|e| styles.colour(e));
+        face.layer = face.entity.and_then(|e| styles.layer(e));
         face
     }));
 }

@@ -1,22 +1,32 @@
-//! Colours: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB.
+//! Colours and layers: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB, and PRESENTATION_LAYER_ASSIGNMENT.
 
 use crate::model::Colour;
 use crate::step::part21::{Entity, File};
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// Most entities looked at for one style.
 const MAX_STEPS: usize = 64;
 
-/// Colours by the item that is styled.
+/// Colours and layers by the item that has them.
 #[derive(Debug, Default)]
-pub(crate) struct Styles(FxHashMap<u64, Colour>);
+pub(crate) struct Styles {
+    colours: FxHashMap<u64, Colour>,
+    layers: FxHashMap<u64, Arc<str>>,
+}
 
 impl Styles {
     /// Collects all styles of a file.
     pub(crate) fn read(file: &File<'_>) -> Self {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();
+        let mut layers = FxHashMap::default();
         for e in file.entities() {
+            if let Some(args) = e.attributes("PRESENTATION_LAYER_ASSIGNMENT", 0) {
+                let name: Arc<str> = args.text(0).unwrap_or_default().into();
+                layers.extend(args.list(2).ids().into_iter().map(|item| (item, name.clone())));
+                continue;
+            }
             let (args, overriding) = match e.attributes("OVER_RIDING_STYLED_ITEM", 1) {
                 Some(a) if !e.keyword().is_empty() => (Some(a), true),
                 found => (e.attributes("STYLED_ITEM", 1), found.is_some()),
@@ -30,12 +40,17 @@ impl Styles {
             }
         }
         plain.extend(over);
-        Self(plain)
+        Self { colours: plain, layers }
     }
 
     /// The colour given to an item itself.
     pub(crate) fn colour(&self, item: u64) -> Option<Colour> {
-        self.0.get(&item).copied()
+        self.colours.get(&item).copied()
+    }
+
+    /// The layer on which an item is put itself.
+    pub(crate) fn layer(&self, item: u64) -> Option<Arc<str>> {
+        self.layers.get(&item).cloned()
     }
 }
 

@@ -41,7 +41,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             match self.triangles(e, &layout) {
                 Ok(mesh) => {
                     let name = e.args().text(0).unwrap_or_default();
-                    into.faces.push(TessellatedFace { name, entity: Some(id), colour: None, mesh });
+                    into.faces.push(TessellatedFace { name, entity: Some(id), colour: None, layer: None, mesh });
                 }
                 Err(refusal) => into.refused.push(refusal),
             }

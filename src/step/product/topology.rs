@@ -31,6 +31,8 @@ pub(crate) struct ShellPlan {
     pub(crate) closed: bool,
     /// Whether a solid lies inside of it, and no void.
     pub(crate) outer: bool,
+    /// Whether it bounds a void of the solid whose shell comes before it.
+    pub(crate) void: bool,
     /// Faces, and whether the shell turns them around.
     pub(crate) faces: Vec<(u64, bool)>,
     /// Entities whose style the shell inherits, the nearest first.
@@ -103,6 +105,7 @@ impl ShapeItems {
                 name,
                 closed: false,
                 outer: false,
+                void: false,
                 faces: vec![(id, false)],
                 owners: vec![],
             });
@@ -129,7 +132,10 @@ impl ShapeItems {
         for shell in shells {
             let before = self.shells.len();
             self.add_shell(file, Some(shell), name, &[e.id], true, e);
-            self.shells.iter_mut().skip(before).for_each(|s| s.outer = false);
+            for shell in self.shells.iter_mut().skip(before) {
+                shell.outer = false;
+                shell.void = true;
+            }
         }
     }
 
@@ -177,7 +183,7 @@ impl ShapeItems {
             faces.push((face, turned));
         }
         let closed = solid || e.is_a("CLOSED_SHELL");
-        self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, faces, owners });
+        self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, void: false, faces, owners });
     }
 }
 

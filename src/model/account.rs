@@ -1,0 +1,275 @@
+//! What a model holds, face by face: the figures by which a person or a selector tells faces apart.
+
+use super::outline::Outline;
+use super::{Colour, Face, Instance, Model, Part, Shell, SurfaceKind, TessellatedFace};
+use crate::math::{Aabb, Frame, Uv};
+use crate::nurbs::UvCurve;
+use serde::{Serialize, Serializer};
+
+/// A part with its solids: an element of `info --faces --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct PartAccount {
+    /// Name of the product, empty when it had none.
+    pub name: String,
+    /// How often it is placed.
+    pub instances: usize,
+    /// Its solids and sheets.
+    pub solids: Vec<SolidAccount>,
+}
+
+/// A solid with its voids, or a sheet.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolidAccount {
+    /// Number in the part, from 0; what selectors call `solid`.
+    pub index: usize,
+    /// Name, empty when it had none.
+    pub name: String,
+    /// Whether the file says that it is closed.
+    pub closed: bool,
+    /// Its faces in the file's order.
+    pub faces: Vec<FaceAccount>,
+}
+
+/// A face. Lengths are mm, and places are where the part's first instance stands (the part's own coordinates without one).
+#[derive(Clone, Debug, Serialize)]
+pub struct FaceAccount {
+    /// The `#id` in its file.
+    pub id: Option<u64>,
+    /// Name, empty when it had none.
+    pub name: String,
+    /// The colour that shows, as `#rrggbb`.
+    #[serde(serialize_with = "hex_colour")]
+    pub colour: Option<Colour>,
+    /// The layer.
+    pub layer: Option<String>,
+    /// The kind of surface.
+    pub kind: SurfaceKind,
+    /// Radius of a cylinder or sphere, or of a torus' tube, mm.
+    pub radius_mm: Option<f64>,
+    /// Area inside the trims, mm².
+    pub area_mm2: f64,
+    /// Lower and upper corner.
+    pub bbox_mm: [[f64; 3]; 2],
+    /// A point on the face, away from its edges.
+    pub at: [f64; 3],
+}
+
+fn hex_colour<S: Serializer>(colour: &Option<Colour>, serializer: S) -> Result<S::Ok, S::Error> {
+    colour.map(|c| c.to_string()).serialize(serializer)
+}
+
+/// Gauss–Legendre nodes and weights on `[0, 1]`, exact for polynomials of degree 9.
+const GAUSS: [(f64, f64); 5] = [
+    (0.046_910_077_030_668, 0.118_463_442_528_094_5),
+    (0.230_765_344_947_158_5, 0.239_314_335_249_683_2),
+    (0.5, 0.284_444_444_444_444_4),
+    (0.769_234_655_052_841_5, 0.239_314_335_249_683_2),
+    (0.953_089_922_969_332, 0.118_463_442_528_094_5),
+];
+/// Pieces into which a span of an edge, and of the surface across it, is divided: of a circular hole in a cylinder half as wide as its
+/// radius, 1e-6 of the area is then missed.
+const PIECES: usize = 2;
+
+impl Model {
+    /// Every part with its solids and faces; parts without faces are left out.
+    pub fn account(&self) -> Vec<PartAccount> {
+        let mut first: Vec<Option<&Instance>> = vec![None; self.parts.len()];
+        let mut count = vec![0; self.parts.len()];
+        for instance in &self.instances {
+            let part = instance.part.0 as usize;
+            first[part].get_or_insert(instance);
+            count[part] += 1;
+        }
+        let parts = self.parts.iter().zip(first).zip(count).filter(|((part, _), _)| part.face_count() > 0);
+        parts
+            .map(|((part, instance), instances)| PartAccount {
+                name: part.name.clone(),
+                instances,
+                solids: part.account(instance),
+            })
+            .collect()
+    }
+}
+
+impl Part {
+    /// Its solids and sheets where an instance stands.
+    fn account(&self, instance: Option<&Instance>) -> Vec<SolidAccount> {
+        let placement = instance.map_or(Frame::IDENTITY, |i| i.placement);
+        let inherited = instance.and_then(|i| i.colour).or(self.colour);
+        let mut solids: Vec<SolidAccount> = Vec::new();
+        for (index, shells) in self.solids().into_iter().enumerate() {
+            let shells: &[Shell] = &self.shells[shells];
+            let face = |shell: &Shell, face: &Face| face.account(&placement, shell.colour.or(inherited));
+            solids.push(SolidAccount {
+                index,
+                name: shells[0].name.clone(),
+                closed: shells[0].closed,
+                faces: shells.iter().flat_map(|s| s.faces.iter().map(move |f| face(s, f))).collect(),
+            });
+        }
+        if !self.tessellated.is_empty() {
+            solids.push(SolidAccount {
+                index: solids.len(),
+                name: String::new(),
+                closed: false,
+                faces: self.tessellated.iter().map(|t| t.account(&placement, inherited)).collect(),
+            });
+        }
+        solids
+    }
+}
+
+impl Face {
+    /// Its figures in a place; `inherited` is the colour that shows where it has none of its own.
+    fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
+        FaceAccount {
+            id: self.entity,
+            name: self.name.clone(),
+            colour: self.colour.or(inherited),
+            layer: self.layer.as_deref().map(str::to_owned),
+            kind: self.analytic.kind(),
+            radius_mm: self.analytic.radius().map(|r| r * placement.scale),
+            area_mm2: self.area() * placement.scale * placement.scale,
+            bbox_mm: corners(self.bounds(placement)),
+            at: placement.point(self.surface.evaluate(self.inner_parameters())).to_array(),
+        }
+    }
+
+    /// Parameters of a point inside the trims, well away from them where the face is wide.
+    pub fn inner_parameters(&self) -> Uv {
+        let outline = Outline::new(self);
+        // A loop that crosses none of the rows has no extent that could hold a point: its corner is on it then.
+        outline.inner_point().unwrap_or(outline.corners()[0])
+    }
+
+    /// Area inside the trims in the part's coordinates, mm²: by Green's theorem along the loops, relatively within about 1e-5.
+    pub fn area(&self) -> f64 {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+        let mut breaks = self.surface.knots[0].clone();
+        breaks.dedup();
+        let sweep = Sweep { face: self, breaks };
+        if self.loops.is_empty() {
+            let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
+            return sides.map(|side| sweep.along(&side)).sum::<f64>().abs();
+        }
+        let uses = self.loops.iter().flat_map(|l| &l.uses);
+        uses.map(|u| if u.reversed { -sweep.along(&u.uv) } else { sweep.along(&u.uv) }).sum::<f64>().abs()
+    }
+}
+
+/// The area between a curve of the parameter plane and the lower end of u.
+struct Sweep<'f> {
+    face: &'f Face,
+    /// Distinct knots in u.
+    breaks: Vec<f64>,
+}
+
+impl Sweep<'_> {
+    /// Signed area to the left of a curve: the integral of the row areas over dv.
+    fn along(&self, curve: &UvCurve) -> f64 {
+        let mut sum = 0.0;
+        for span in curve.breakpoints().windows(2) {
+            let width = (span[1] - span[0]) / PIECES as f64;
+            for piece in 0..PIECES {
+                for (x, weight) in GAUSS {
+                    let d = curve.derivatives(span[0] + (piece as f64 + x) * width);
+                    if d.first.y != 0.0 {
+                        sum += weight * width * d.first.y * self.row(d.point);
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    /// Integral of the surface's density of area from the lower end of u to a point.
+    fn row(&self, end: Uv) -> f64 {
+        let mut sum = 0.0;
+        for span in self.breaks.windows(2).filter(|s| s[0] < end.x) {
+            let width = (span[1].min(end.x) - span[0]) / PIECES as f64;
+            for piece in 0..PIECES {
+                for (x, weight) in GAUSS {
+                    let u = span[0] + (piece as f64 + x) * width;
+                    let d = self.face.surface.derivatives(Uv::new(u, end.y));
+                    sum += weight * width * d.du.cross(d.dv).length();
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl TessellatedFace {
+    fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
+        let corner = |k: usize| self.mesh.positions[self.mesh.vertices[k].position as usize];
+        // The middle of the first facet.
+        let middle = self.mesh.facets.first().map(|f| {
+            let [a, b, c, _] = f.vertices.map(|v| corner(v as usize));
+            (a + b + c) / 3.0
+        });
+        let points = self.mesh.positions.iter().map(|&p| placement.point(p));
+        FaceAccount {
+            id: self.entity,
+            name: self.name.clone(),
+            colour: self.colour.or(inherited),
+            layer: self.layer.as_deref().map(str::to_owned),
+            kind: SurfaceKind::Tessellated,
+            radius_mm: None,
+            area_mm2: self.mesh.area() * placement.scale * placement.scale,
+            bbox_mm: corners(Aabb::around(points)),
+            at: middle.map_or(placement.origin, |p| placement.point(p)).to_array(),
+        }
+    }
+}
+
+fn corners(b: Aabb) -> [[f64; 3]; 2] {
+    [b.min.to_array(), b.max.to_array()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Analytic, EdgeUse, TrimLoop};
+    use crate::nurbs::{ControlPoint, sweep};
+    use std::f64::consts::PI;
+
+    const TURN: [f64; 2] = [0.0, 2.0 * PI];
+
+    #[test]
+    fn areas_of_whole_surfaces_are_those_of_their_formulas() {
+        let f = Frame::IDENTITY;
+        let sphere = Face::whole(sweep::sphere(&f, 3.0, TURN, [-PI / 2.0, PI / 2.0]));
+        let torus = Face::whole(sweep::torus(&f, 5.0, 2.0, TURN, TURN));
+        let cone = Face::whole(sweep::cone(&f, 1.0, 0.5, TURN, [0.0, 4.0]));
+        let (r, slope) = (1.0 + 4.0 * 0.5f64.tan(), 4.0 / 0.5f64.cos());
+        for (face, area) in [(sphere, 36.0 * PI), (torus, 40.0 * PI * PI), (cone, PI * (1.0 + r) * slope)] {
+            assert!((face.area() / area - 1.0).abs() < 1e-5, "{} {area}", face.area());
+        }
+    }
+
+    #[test]
+    fn a_round_hole_is_left_out_of_area_and_point() {
+        let line = |a: Uv, b: Uv| EdgeUse { edge: None, reversed: false, uv: UvCurve::line(a, b, [0.0, 1.0]) };
+        let c = [Uv::new(0.0, 0.0), Uv::new(10.0, 0.0), Uv::new(10.0, 10.0), Uv::new(0.0, 10.0)];
+        let outer = TrimLoop { uses: (0..4).map(|k| line(c[k], c[(k + 1) % 4])).collect() };
+        let circle =
+            crate::nurbs::conic::arc(&Frame::translation(crate::math::Vector::new(5.0, 5.0, 0.0)), 2.0, TURN);
+        let points = circle.points.iter().map(|p| glam::DVec3::new(p.x, p.y, p.weight())).collect();
+        let uv = UvCurve { degree: 2, knots: circle.knots.clone(), points };
+        let hole = TrimLoop { uses: vec![EdgeUse { edge: None, reversed: true, uv }] };
+        let plane = sweep::plane(&Frame::IDENTITY, [[0.0, 10.0], [0.0, 10.0]]);
+        let face = Face {
+            loops: vec![outer, hole],
+            analytic: Analytic::Plane { frame: Frame::IDENTITY },
+            ..Face::whole(plane)
+        };
+        assert!((face.area() - (100.0 - 4.0 * PI)).abs() < 1e-6, "{}", face.area());
+        let p = face.inner_parameters();
+        assert!((p - Uv::splat(5.0)).length() > 2.5, "{p}");
+        assert_eq!(
+            face.account(&Frame::IDENTITY, Some(Colour([1.0, 0.5, 0.0]))).colour.map(|c| c.to_string()),
+            Some("#ff8000".into())
+        );
+    }
+}

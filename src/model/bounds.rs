@@ -1,0 +1,200 @@
+//! The box of the trimmed faces: edges and interior extremes, not control points.
+//!
+//! A face is sampled, and its samples are followed uphill, only where its control points reach beyond what is known already. Parts
+//! and faces that reach farthest come first, so that of ten thousand placed parts a few dozen are sampled.
+
+use super::outline::Outline;
+use super::{Face, Model, TessellatedFace};
+use crate::math::{Aabb, Frame, Point, Uv};
+use crate::nurbs::ControlPoint;
+
+/// Fewest and most samples per direction that seed the search for extremes; between them two per span of the spline.
+/// A terrain of 77 × 80 spans has its lowest point 0.09 mm below the best of 13 × 13 samples.
+const GRID: [usize; 2] = [12, 256];
+/// Samples per direction that are followed uphill.
+const STARTS: usize = 3;
+/// Rounds of the climb; a round without progress halves its stride, so that it ends below 1e-7 of a cell.
+const ROUNDS: usize = 24;
+
+/// One of the six sides of a box.
+#[derive(Clone, Copy)]
+struct Side {
+    axis: usize,
+    sign: f64,
+}
+
+const SIDES: [Side; 6] = [
+    Side { axis: 0, sign: -1.0 },
+    Side { axis: 0, sign: 1.0 },
+    Side { axis: 1, sign: -1.0 },
+    Side { axis: 1, sign: 1.0 },
+    Side { axis: 2, sign: -1.0 },
+    Side { axis: 2, sign: 1.0 },
+];
+
+impl Side {
+    /// How far a point lies towards this side.
+    fn height(self, p: Point) -> f64 {
+        self.sign * p[self.axis]
+    }
+
+    /// How far a box reaches towards this side.
+    fn reach(self, b: &Aabb) -> f64 {
+        if self.sign > 0.0 { b.max[self.axis] } else { -b.min[self.axis] }
+    }
+}
+
+/// What is placed: a trimmed surface or a ready mesh.
+#[derive(Clone, Copy)]
+enum Shape<'m> {
+    Face(&'m Face),
+    Mesh(&'m TessellatedFace),
+}
+
+/// The shapes of a part, each with a box around its control points in the part's coordinates.
+struct PartHulls<'m> {
+    shapes: Vec<(Shape<'m>, Aabb)>,
+    whole: Aabb,
+}
+
+impl Model {
+    /// A box around all placed faces, mm; within about 1e-3 of a face's size. Empty without faces.
+    pub fn bounds(&self) -> Aabb {
+        let hulls: Vec<PartHulls<'_>> = self.parts.iter().map(PartHulls::new).collect();
+        let mut bounds = Aabb::EMPTY;
+        for side in SIDES {
+            let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.instances.len());
+            for (i, instance) in self.instances.iter().enumerate() {
+                let whole = &hulls[instance.part.0 as usize].whole;
+                if !whole.is_empty() {
+                    reaches.push((side.reach(&placed(whole, &instance.placement)), i));
+                }
+            }
+            reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
+            for (reach, i) in reaches {
+                if reach <= side.reach(&bounds) {
+                    break;
+                }
+                let instance = &self.instances[i];
+                bounds = hulls[instance.part.0 as usize].grow(bounds, side, &instance.placement);
+            }
+        }
+        bounds
+    }
+}
+
+impl Face {
+    /// A box around the face where a placement puts it, mm; within about 1e-3 of its size.
+    pub fn bounds(&self, placement: &Frame) -> Aabb {
+        grow_by_face(self, placement, Aabb::EMPTY)
+    }
+}
+
+impl<'m> PartHulls<'m> {
+    fn new(part: &'m super::Part) -> Self {
+        let faces = part.shells.iter().flat_map(|s| &s.faces).map(|f| (Shape::Face(f), f.surface.bounds()));
+        let meshes =
+            part.tessellated.iter().map(|t| (Shape::Mesh(t), Aabb::around(t.mesh.positions.iter().copied())));
+        let shapes: Vec<(Shape<'m>, Aabb)> = faces.chain(meshes).collect();
+        let whole = shapes.iter().fold(Aabb::EMPTY, |b, (_, hull)| b.union(*hull));
+        Self { shapes, whole }
+    }
+
+    /// Grows a box by all shapes that reach beyond it towards one side, the farthest first.
+    fn grow(&self, mut bounds: Aabb, side: Side, placement: &Frame) -> Aabb {
+        let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.shapes.len());
+        for (k, (_, hull)) in self.shapes.iter().enumerate() {
+            reaches.push((side.reach(&placed(hull, placement)), k));
+        }
+        reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (reach, k) in reaches {
+            if reach <= side.reach(&bounds) {
+                break;
+            }
+            bounds = match self.shapes[k].0 {
+                Shape::Face(face) => grow_by_face(face, placement, bounds),
+                Shape::Mesh(ready) => {
+                    let points = ready.mesh.positions.iter().map(|&p| placement.point(p));
+                    bounds.union(Aabb::around(points))
+                }
+            };
+        }
+        bounds
+    }
+}
+
+/// A box around a box in its place.
+fn placed(local: &Aabb, placement: &Frame) -> Aabb {
+    Aabb::around(local.corners().map(|p| placement.point(p)))
+}
+
+fn covers(bounds: &Aabb, hull: &Aabb) -> bool {
+    bounds.contains(hull.min) && bounds.contains(hull.max)
+}
+
+/// Grows a box by a face.
+fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
+    let position = |uv: Uv| placement.point(face.surface.evaluate(uv));
+    let hull = Aabb::around(face.surface.points.iter().map(|p| placement.point(p.position())));
+    if covers(&bounds, &hull) {
+        return bounds;
+    }
+    let outline = Outline::new(face);
+    let border = outline.polygons.iter().flatten().map(|uv| position(*uv));
+    bounds = bounds.union(Aabb::around(border));
+    if covers(&bounds, &hull) {
+        return bounds;
+    }
+    // A grid over the face, whose points inside the trims are where the climbs start.
+    let [lo, hi] = outline.corners();
+    let cells = [0, 1].map(|d| {
+        let mut breaks = face.surface.knots[d].clone();
+        breaks.dedup();
+        (2 * breaks.len()).clamp(GRID[0], GRID[1])
+    });
+    let cell = (hi - lo) / Uv::new(cells[0] as f64, cells[1] as f64);
+    let mut samples: Vec<(Uv, Point)> = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
+    for i in 0..=cells[0] {
+        for j in 0..=cells[1] {
+            let uv = lo + cell * Uv::new(i as f64, j as f64);
+            samples.push((uv, position(uv)));
+        }
+    }
+    for side in SIDES {
+        if side.reach(&hull) <= side.reach(&bounds) {
+            continue;
+        }
+        samples.sort_unstable_by(|a, b| side.height(b.1).total_cmp(&side.height(a.1)));
+        let starts = samples.iter().filter(|s| outline.contains(s.0)).take(STARTS);
+        let summits: Vec<Point> =
+            starts.map(|s| position(climb(s.0, cell, |uv| side.height(position(uv)), &outline))).collect();
+        bounds = bounds.union(Aabb::around(summits));
+    }
+    bounds
+}
+
+/// Follows a height uphill inside the trims, first in strides of half a cell.
+fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> Uv {
+    let mut uv = start;
+    let mut best = height(uv);
+    let mut stride = 0.5 * cell;
+    for _ in 0..ROUNDS {
+        let mut moved = false;
+        for direction in [Uv::X, -Uv::X, Uv::Y, -Uv::Y] {
+            let next = uv + stride * direction;
+            if !outline.contains(next) {
+                continue;
+            }
+            let reached = height(next);
+            if reached > best {
+                uv = next;
+                best = reached;
+                moved = true;
+            }
+        }
+        if !moved {
+            stride *= 0.5;
+        }
+    }
+    uv
+}

@@ -1,0 +1,91 @@
+//! The loops of a face as polygons of its parameter plane: what is inside, for boxes and for points on the face.
+
+use super::Face;
+use crate::math::Uv;
+
+/// Points on a curved edge use at least; a span of its spline has four at least.
+const POINTS_PER_USE: usize = 24;
+/// See [`POINTS_PER_USE`].
+const POINTS_PER_SPAN: usize = 4;
+/// Rows, as shares of the height of the outline, on which a point inside is looked for; the first that holds one serves.
+const ROWS: [f64; 7] = [0.5, 0.37, 0.63, 0.21, 0.79, 0.09, 0.91];
+
+/// A face in its parameter plane. Without polygons it is the whole domain of its surface.
+pub(super) struct Outline {
+    pub(super) polygons: Vec<Vec<Uv>>,
+    domain: [[f64; 2]; 2],
+}
+
+impl Outline {
+    pub(super) fn new(face: &Face) -> Self {
+        let polygon = |l: &super::TrimLoop| {
+            let mut points = Vec::new();
+            for u in &l.uses {
+                let breaks = u.uv.breakpoints();
+                let spans = breaks.len() - 1;
+                let per_span =
+                    if u.uv.degree == 1 { 1 } else { POINTS_PER_USE.div_ceil(spans).max(POINTS_PER_SPAN) };
+                let start = points.len();
+                for w in breaks.windows(2) {
+                    let share = |k: usize| k as f64 / per_span as f64;
+                    points.extend((0..per_span).map(|k| u.uv.evaluate(w[0] + (w[1] - w[0]) * share(k))));
+                }
+                points.push(u.uv.evaluate(breaks[spans]));
+                if u.reversed {
+                    points[start..].reverse();
+                }
+                // The next use begins with this point.
+                points.pop();
+            }
+            points
+        };
+        Self { polygons: face.loops.iter().map(polygon).collect(), domain: face.surface.domain() }
+    }
+
+    /// Lower and upper corner.
+    pub(super) fn corners(&self) -> [Uv; 2] {
+        if self.polygons.is_empty() {
+            let [[u0, u1], [v0, v1]] = self.domain;
+            return [Uv::new(u0, v0), Uv::new(u1, v1)];
+        }
+        let points = self.polygons.iter().flatten();
+        points.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
+    }
+
+    /// Whether a point is on the face, by the number of polygons around it.
+    pub(super) fn contains(&self, p: Uv) -> bool {
+        self.polygons.is_empty() || self.polygons.iter().filter(|q| surrounds(q, p)).count() % 2 == 1
+    }
+
+    /// A point well inside: the middle of the longest stretch of one of a few rows; `None` when none is crossed.
+    pub(super) fn inner_point(&self) -> Option<Uv> {
+        let [lo, hi] = self.corners();
+        if self.polygons.is_empty() {
+            return Some(0.5 * (lo + hi));
+        }
+        ROWS.iter().find_map(|share| {
+            let v = lo.y + share * (hi.y - lo.y);
+            let mut crossings: Vec<f64> = Vec::new();
+            for polygon in &self.polygons {
+                crossings.extend(sides(polygon).filter(|(a, b)| (a.y > v) != (b.y > v)).map(|s| abscissa(s, v)));
+            }
+            crossings.sort_by(f64::total_cmp);
+            let stretches = crossings.chunks_exact(2).filter(|s| s[1] > s[0]);
+            let longest = stretches.max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+            Some(Uv::new(0.5 * (longest[0] + longest[1]), v))
+        })
+    }
+}
+
+fn sides(polygon: &[Uv]) -> impl Iterator<Item = (Uv, Uv)> {
+    (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
+}
+
+/// Where a side crosses the row `v`.
+fn abscissa((a, b): (Uv, Uv), v: f64) -> f64 {
+    a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)
+}
+
+fn surrounds(polygon: &[Uv], p: Uv) -> bool {
+    sides(polygon).filter(|&(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < abscissa((a, b), p.y)).count() % 2 == 1
+}
