@@ -13,8 +13,10 @@ use crate::step::geometry::units::Units;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{BuiltFace, EdgeShape, FaceTask, build_face, trim_loops};
+use crate::step::trim::face::{BuiltFace, build_face, trim_loops};
+use crate::step::trim::fit::Budget;
 use crate::step::trim::loops::Source;
+use crate::step::trim::task::FaceTask;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -166,7 +168,7 @@ fn convert_face(
     settings: &Settings,
 ) -> Outcome<BuiltFace> {
     let entity = geometry.entity(id)?;
-    let mut shapes: FxHashMap<usize, EdgeShape<'_>> = FxHashMap::default();
+    let mut shapes: FxHashMap<usize, &Curve> = FxHashMap::default();
     let mut loops = Vec::with_capacity(plan.loops.len());
     let mut bounds = Aabb::EMPTY;
     let mut edge_gap = 0f64;
@@ -183,7 +185,7 @@ fn convert_face(
             edge_gap = edge_gap.max(edge.gap);
             let Some(curve) = &edge.curve else { continue };
             bounds = bounds.union(curve.bounds());
-            shapes.entry(k).or_insert(EdgeShape { curve });
+            shapes.entry(k).or_insert(curve);
             let [a, b] = curve.domain().map(|t| curve.evaluate(t));
             let (from, to) = if *reversed { (b, a) } else { (a, b) };
             kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
@@ -198,9 +200,9 @@ fn convert_face(
     // Only what may touch its own axis asks where the edges run.
     let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
     let asks = !geometry.entity(plan.surface)?.keywords().any(|k| simple.iter().any(|s| k.starts_with(s)));
-    let along = |s: &EdgeShape<'_>| {
-        let [a, b] = s.curve.domain();
-        [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| s.curve.evaluate(a + f * (b - a)))
+    let along = |curve: &&Curve| {
+        let [a, b] = curve.domain();
+        [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| curve.evaluate(a + f * (b - a)))
     };
     let points: Vec<Point> = shapes.values().take(if asks { 64 } else { 0 }).flat_map(along).collect();
     let reach = FaceExtent::from_bounds(bounds, &points);
@@ -217,7 +219,7 @@ fn convert_face(
         edges: shapes,
         tolerance: settings.uv_tolerance,
         accuracy: stated.min(1e-3 * bounds.diagonal().max(1e-3)).max(1e-6).max(2.0 * edge_gap.min(0.05)),
-        budget: settings.face_budget,
+        budget: Budget::new(settings.face_budget),
         implicit_outer: false,
     };
     let mut built = build_face(task).map_err(|reason| {

@@ -12,7 +12,9 @@ use crate::step::geometry::surfaces::FaceExtent;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::Entity;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{BuiltFace, EdgeShape, FaceTask, build_face};
+use crate::step::trim::face::{BuiltFace, build_face};
+use crate::step::trim::fit::Budget;
+use crate::step::trim::task::FaceTask;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -116,7 +118,7 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
         let mut uses = Vec::with_capacity(boundary.len());
         for curve in boundary {
             let k = edges.len();
-            edges.insert(k, EdgeShape { curve });
+            edges.insert(k, curve);
             uses.push((k, false));
         }
         loops.push(uses);
@@ -129,7 +131,7 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
         tolerance: settings.uv_tolerance,
         // Boundaries of geometric sets meet loosely: real files leave 1e-3 mm.
         accuracy: 1e-3,
-        budget: settings.face_budget,
+        budget: Budget::new(settings.face_budget),
         implicit_outer: false,
     }
 }

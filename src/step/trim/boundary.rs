@@ -2,6 +2,7 @@
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
 use super::loops::{Chain, Piece, Source, contains, signed_area};
+use super::tolerances::{CROSSING_NOISE, EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use crate::math::Uv;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
@@ -27,7 +28,7 @@ pub(crate) fn bound_region(
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // Loops without extent: a vertex, or an edge run forth and back.
     let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
-    plain.retain(|c| signed_area(&c.polygon()).abs() > 1e-12 * scale);
+    plain.retain(|c| signed_area(&c.polygon()).abs() > EMPTY_LOOP_SHARE * scale);
     if winding.is_empty() {
         if plain.is_empty() {
             out.loops.push(natural_boundary(chart, &[], &mut out.seams)?);
@@ -304,8 +305,9 @@ fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bo
             let (p, q) = (p + by, q + by);
             let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
             let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
-            let eps = 1e-9 * (b - a).length() * (q - p).length();
-            (s1 > eps && s2 < -eps || s1 < -eps && s2 > eps) && (s3 > eps && s4 < -eps || s3 < -eps && s4 > eps)
+            let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
+            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise)
+                && (s3 > noise && s4 < -noise || s3 < -noise && s4 > noise)
         })
     })
 }
@@ -343,8 +345,8 @@ fn join_winding_pair(
             let length = (d.du * step.x + d.dv * step.y).length();
             // Straight across beats short: the seam is then an isoline and the domain one period wide.
             let slant = (step[along] / chart.period[along].unwrap_or(1.0)).abs();
-            let slant = if slant < 1e-9 { 0.0 } else { slant + 0.01 };
-            pairs.push((slant * chart.size + 1e-3 * length, i, j, q));
+            let slant = if slant < STRAIGHT_SEAM_SHARE { 0.0 } else { slant + 0.01 };
+            pairs.push((slant * chart.size + SEAM_LENGTH_WEIGHT * length, i, j, q));
         }
     }
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0));

@@ -4,6 +4,10 @@
 //! `curve(t)`. Known weakness: what happens between those points is not bounded, only unlikely: the error of a cubic
 //! piece is symmetric, and pieces are halved until it is met.
 
+use super::tolerances::{
+    DIFFERENCE_STEP, LAST_POLE_STEP, MAX_OVERSHOOT, ON_BORDER, PARALLEL_DERIVATIVES, POLE_DISTANCE_RATIO,
+    POLE_STEPS, SAME_JOINT, SHARE_OF_GAP, SMOOTH_SLOPE, STRAIGHT_SHARE, STRAIGHT_SIZE,
+};
 use crate::math::{Point, Uv};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, UvCurve};
 use crate::step::chart::Pole;
@@ -11,9 +15,6 @@ use std::cell::Cell;
 
 /// Deepest halving of a Bézier span of the edge.
 const MAX_DEPTH: u32 = 12;
-
-/// How far a curve may swing over the border, as a fraction of the surface's range.
-const MAX_OVERSHOOT: f64 = 1e-7;
 
 /// Counts work, so that no face takes for ever.
 #[derive(Debug)]
@@ -79,8 +80,10 @@ impl Target<'_> {
         if let Some(pole) = self.poles.iter().find(near) {
             // So far in that what the file's edge misses the pole by no longer turns the azimuth.
             let miss = (pole.point - d.point).length();
-            let far = |s: &&f64| (piece.evaluate(t + **s * (b - a) * inward) - pole.point).length() > 1e4 * miss;
-            let fraction = [1e-4, 1e-3, 1e-2].iter().find(far).copied().unwrap_or(0.03);
+            let far = |s: &&f64| {
+                (piece.evaluate(t + **s * (b - a) * inward) - pole.point).length() > POLE_DISTANCE_RATIO * miss
+            };
+            let fraction = POLE_STEPS.iter().find(far).copied().unwrap_or(LAST_POLE_STEP);
             let step = fraction * (b - a) * inward;
             let (t1, t2) = (t + step, t + 2.0 * step);
             let second = (self.locate)(t2, piece.evaluate(t2), hint);
@@ -98,11 +101,11 @@ impl Target<'_> {
         let (e, f, g) = (s.du.length_squared(), s.du.dot(s.dv), s.dv.length_squared());
         let miss = (s.point - d.point).length();
         let det = e * g - f * f;
-        if det > 1e-14 * e * g && det.is_normal() {
+        if det > PARALLEL_DERIVATIVES * e * g && det.is_normal() {
             let (x, y) = (s.du.dot(d.first), s.dv.dot(d.first));
             return Ok(Node { t, uv, slope: Uv::new((x * g - y * f) / det, (y * e - x * f) / det), miss });
         }
-        let step = 1e-5 * (b - a) * inward;
+        let step = DIFFERENCE_STEP * (b - a) * inward;
         let beside = (self.locate)(t + step, piece.evaluate(t + step), Some(uv));
         Ok(Node { t, uv, slope: (beside - uv) / step, miss })
     }
@@ -120,7 +123,7 @@ impl Target<'_> {
     fn slope_inside(&self, mut node: Node, ahead: f64) -> Node {
         for d in 0..2 {
             let [lo, hi] = self.range[d];
-            let near = 1e-12 * (hi - lo);
+            let near = ON_BORDER * (hi - lo);
             let out = ahead * node.slope[d];
             let low = node.uv[d] <= lo + near && (ahead == 0.0 || out < 0.0);
             let high = node.uv[d] >= hi - near && (ahead == 0.0 || out > 0.0);
@@ -167,7 +170,7 @@ impl Target<'_> {
             let d = guess - foot;
             let error = at.du * d.x + at.dv * d.y;
             // Where the file itself leaves a gap, a twentieth of it is accurate enough.
-            let own = 0.05 * ((self.derivatives)(foot).point - p).length();
+            let own = SHARE_OF_GAP * ((self.derivatives)(foot).point - p).length();
             if !(error.length() <= self.tolerance.max(own)) {
                 return Ok(false);
             }
@@ -242,7 +245,7 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
     let straight = pieces.iter().all(|(a, b)| {
         [0.0, 0.3, 0.7, 1.0].iter().all(|&s| {
             let t = a.t + s * (b.t - a.t);
-            (hermite(*a, *b, s) - line.evaluate(t)).abs().max_element() <= 1e-13 * size.max(1e-3)
+            (hermite(*a, *b, s) - line.evaluate(t)).abs().max_element() <= STRAIGHT_SHARE * size.max(STRAIGHT_SIZE)
         })
     });
     if straight {
@@ -260,8 +263,9 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
                 knots.extend([b.t; 4]);
             }
             Some((next, _)) => {
-                let smooth = (b.slope - next.slope).length() <= 1e-9 * (b.slope.length() + next.slope.length())
-                    && (b.uv - next.uv).abs().max_element() <= 1e-15 * size;
+                let smooth = (b.slope - next.slope).length()
+                    <= SMOOTH_SLOPE * (b.slope.length() + next.slope.length())
+                    && (b.uv - next.uv).abs().max_element() <= SAME_JOINT * size;
                 if !smooth {
                     points.push(b.uv.extend(1.0));
                 }

@@ -1,5 +1,6 @@
 //! Loops in the unwrapped parameter plane: edge uses chained end to end, poles closed by their sides.
 
+use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK};
 use crate::math::Uv;
 use crate::nurbs::{ControlPoint, UvCurve};
 use crate::step::chart::{Chart, Pole};
@@ -197,8 +198,8 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
     let near = chart.nearest_representative(start, from);
     let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
     let pole = chart.poles.iter().find(|pole| {
-        (pole.point - p).length() <= tolerance.max(1e-9) * 4.0
-            && (pole.point - q).length() <= tolerance.max(1e-9) * 4.0
+        (pole.point - p).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
+            && (pole.point - q).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
     });
     let Some(pole) = pole else {
         let distance = (p - q).length();
@@ -218,7 +219,7 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
     for (d, value) in [(pole.fixed, pole.at), (free, target), (pole.fixed, start[pole.fixed])] {
         let mut to = corner;
         to[d] = value;
-        if (to[d] - corner[d]).abs() > 1e-9 * (1.0 + value.abs()) {
+        if (to[d] - corner[d]).abs() > EMPTY_STEP * (1.0 + value.abs()) {
             chain.pieces.push(Piece::straight(corner, to));
             corner = to;
         }
@@ -235,7 +236,7 @@ fn run_along_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_e
     // Along v = low run to +u, along v = high to -u; along u = high to +v, along u = low to -v.
     let forward = if pole.fixed == 1 { low } else { !low };
     let amount = if forward { difference.rem_euclid(period) } else { (-difference).rem_euclid(period) };
-    let noise = 1e-5 * period;
+    let noise = POLE_TURN_SLACK * period;
     let amount =
         if amount < noise || amount > period - noise { if same_edge { period } else { 0.0 } } else { amount };
     if forward { amount } else { -amount }

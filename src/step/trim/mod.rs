@@ -1,10 +1,15 @@
 //! From the loops of a face to one trimmed spline.
 //!
-//! Every edge is located in the parameters of the face's surface (`fit`); the loops are chained and unwrapped (`loops`), joined and
-//! closed over seams and poles (`boundary`, `seams`); the rectangle that they cover becomes one rational B-spline (`face`).
+//! Every edge is located in the parameters of the face's surface (`fit`, `task`); the loops are chained and unwrapped (`loops`), joined
+//! and closed over poles and by seams (`boundary`); the rectangle that they cover becomes one rational B-spline (`region`), in whose
+//! parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`, `boundary`, `region`,
+//! `seams` and `face` each sees only those before it.
 
 mod boundary;
 pub(super) mod face;
-mod fit;
+pub(super) mod fit;
 pub(super) mod loops;
+mod region;
 mod seams;
+pub(super) mod task;
+mod tolerances;

@@ -1,11 +1,11 @@
 //! Seams that were added to a face: curves in space for straight lines in its parameter plane.
 
-use super::face::{FaceTask, refit};
-use super::fit::{Budget, Overrun};
+use super::fit::Overrun;
 use super::loops::{Piece, Source};
+use super::region::Region;
+use super::tolerances::{ISOLINE_SLACK, SEAM_ERROR_MM};
 use crate::math::{Point, Uv};
-use crate::nurbs::{Curve, Surface, UvCurve};
-use crate::step::chart::Chart;
+use crate::nurbs::{Curve, UvCurve};
 use crate::step::geometry::pcurves::fit_cubic;
 
 /// A seam in space.
@@ -17,11 +17,9 @@ pub(crate) struct Seam {
 }
 
 /// The seams of a face under construction.
-pub(crate) struct Seams<'s> {
-    surface: &'s Surface,
-    chart: &'s Chart,
-    domain: [[f64; 2]; 2],
-    made: Vec<SeamCurve>,
+pub(super) struct Seams<'r, 't, 'e> {
+    region: &'r Region<'t, 'e>,
+    curves: Vec<SeamCurve>,
 }
 
 struct SeamCurve {
@@ -32,44 +30,34 @@ struct SeamCurve {
     turned: bool,
 }
 
-impl<'s> Seams<'s> {
-    pub(crate) fn new(surface: &'s Surface, chart: &'s Chart, domain: [[f64; 2]; 2], lines: Vec<[Uv; 2]>) -> Self {
-        let made = lines.into_iter().map(|line| seam_curve(surface, chart, domain, line)).collect();
-        Self { surface, chart, domain, made }
+impl<'r, 't, 'e> Seams<'r, 't, 'e> {
+    pub(super) fn new(region: &'r Region<'t, 'e>, lines: Vec<[Uv; 2]>) -> Self {
+        Self { region, curves: lines.into_iter().map(|line| seam_curve(region, line)).collect() }
     }
 
     /// Whether the curve of a source runs against the line it was made of.
-    pub(crate) fn is_turned(&self, source: Source) -> bool {
-        matches!(source, Source::Seam(k) if self.made[k].turned)
+    pub(super) fn is_turned(&self, source: Source) -> bool {
+        matches!(source, Source::Seam(k) if self.curves[k].turned)
     }
 
     /// The uv curve of a use of a seam, over the seam's own parameter.
-    pub(crate) fn uv(
-        &mut self,
-        k: usize,
-        piece: &Piece,
-        task: &FaceTask<'_>,
-        budget: &Budget,
-    ) -> Result<UvCurve, Overrun> {
-        let made = &self.made[k];
+    pub(super) fn uv(&mut self, k: usize, piece: &Piece) -> Result<UvCurve, Overrun> {
+        let seam = &self.curves[k];
         let ends = [0, piece.curve.points.len() - 1].map(|i| piece.curve.points[i].truncate());
-        let mapped = ends.map(|p| self.chart.to_surface(self.domain, p));
-        match made.varies {
-            Some(_) => {
-                let [a, b] = if made.turned { [mapped[1], mapped[0]] } else { mapped };
-                Ok(UvCurve::line(a, b, made.curve.domain()))
-            }
-            None if self.chart.angular_directions() == [false, false] => {
-                Ok(UvCurve::line(mapped[0], mapped[1], [0.0, 1.0]))
-            }
-            None => {
-                refit(self.chart, self.surface, self.domain, piece, &made.curve, task, budget).map(|fit| fit.curve)
-            }
+        let [a, b] = ends.map(|p| self.region.parameters(p));
+        if seam.varies.is_some() {
+            let [a, b] = if seam.turned { [b, a] } else { [a, b] };
+            return Ok(UvCurve::line(a, b, seam.curve.domain()));
         }
+        // An oblique line stays a line only where the spline has the chart's parameters.
+        if self.region.task.chart.angular_directions() == [false, false] {
+            return Ok(UvCurve::line(a, b, [0.0, 1.0]));
+        }
+        self.region.refit(piece, &seam.curve).map(|fit| fit.curve)
     }
 
-    pub(crate) fn finish(self) -> Vec<Seam> {
-        self.made
+    pub(super) fn finish(self) -> Vec<Seam> {
+        self.curves
             .into_iter()
             .map(|m| {
                 let [a, b] = m.curve.domain();
@@ -79,11 +67,13 @@ impl<'s> Seams<'s> {
     }
 }
 
-fn seam_curve(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [Uv; 2]) -> SeamCurve {
-    let (p, q) = (chart.to_surface(domain, a), chart.to_surface(domain, b));
+fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
+    let Region { task, domain, surface } = region;
+    let p = region.parameters(a);
+    let q = region.parameters(b);
     let extent = [0, 1].map(|d| (domain[d][1] - domain[d][0]).abs());
     for fixed in 0..2 {
-        if (p[fixed] - q[fixed]).abs() > 1e-9 * extent[fixed] {
+        if (p[fixed] - q[fixed]).abs() > ISOLINE_SLACK * extent[fixed] {
             continue;
         }
         let varies = 1 - fixed;
@@ -91,7 +81,7 @@ fn seam_curve(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [
         let line = surface.isoline(fixed, p[fixed]);
         let [l0, l1] = line.domain();
         let (lo, hi) = (lo.clamp(l0, l1), hi.clamp(l0, l1));
-        if hi - lo > 1e-9 * extent[varies] {
+        if hi - lo > ISOLINE_SLACK * extent[varies] {
             return SeamCurve {
                 curve: line.restricted(lo, hi),
                 varies: Some(varies),
@@ -99,11 +89,11 @@ fn seam_curve(surface: &Surface, chart: &Chart, domain: [[f64; 2]; 2], [a, b]: [
             };
         }
     }
-    // Oblique: a cubic that follows the surface to 1e-7 mm.
+    // Oblique: a cubic that follows the surface.
     let step = b - a;
     let at = |t: f64| {
-        let d = chart.derivatives(a + step * t);
+        let d = task.chart.derivatives(a + step * t);
         (d.point, d.du * step.x + d.dv * step.y)
     };
-    SeamCurve { curve: fit_cubic([0.0, 1.0], at, 1e-7).0, varies: None, turned: false }
+    SeamCurve { curve: fit_cubic([0.0, 1.0], at, SEAM_ERROR_MM).0, varies: None, turned: false }
 }

@@ -1,0 +1,126 @@
+//! A face to be built, and its edges in the parameters of its chart.
+
+use super::fit::{Budget, Fit, Overrun, Target, project};
+use super::tolerances::{BORDER_SLACK, POLE_CLEARANCE, SCORE_NOISE, SMALLEST_EXTENT};
+use crate::math::{Uv, Vector};
+use crate::nurbs::Curve;
+use crate::step::chart::{Chart, Kind};
+use rustc_hash::FxHashMap;
+
+/// A face to be built.
+pub(crate) struct FaceTask<'e> {
+    pub(crate) chart: Chart,
+    /// Whether the face's normal is `Su × Sv`.
+    pub(crate) same_sense: bool,
+    /// Loops as the file runs them: edge and whether it is run against its parameter.
+    pub(crate) loops: Vec<Vec<(usize, bool)>>,
+    /// The edges in space, by the numbers of the loops.
+    pub(crate) edges: FxHashMap<usize, &'e Curve>,
+    /// Allowed error of uv curves, mm.
+    pub(crate) tolerance: f64,
+    /// Distance below which points of the file are the same, mm.
+    pub(crate) accuracy: f64,
+    /// Work that the face may take.
+    pub(crate) budget: Budget,
+    /// Whether the natural border of the surface is the outer loop.
+    pub(crate) implicit_outer: bool,
+}
+
+impl FaceTask<'_> {
+    /// Size of the face by its edges, or of its surface, mm.
+    pub(super) fn extent(&self) -> f64 {
+        let edges = self.edges.values().map(|curve| curve.bounds());
+        let all = edges.reduce(|a, b| a.union(b));
+        all.map_or(self.chart.size, |b| b.diagonal()).max(SMALLEST_EXTENT)
+    }
+
+    /// Every edge of the loops in the chart's own parameters.
+    pub(super) fn fit_edges(&self) -> Result<FxHashMap<usize, Fit>, Overrun> {
+        let mut fits: FxHashMap<usize, Fit> = FxHashMap::default();
+        for &(edge, _) in self.loops.iter().flatten() {
+            // An edge that is run twice, along a seam, is fitted once.
+            if !fits.contains_key(&edge) {
+                fits.insert(edge, self.fit_edge(self.edges[&edge])?);
+            }
+        }
+        Ok(fits)
+    }
+
+    /// The edge in the chart's own parameters.
+    fn fit_edge(&self, curve: &Curve) -> Result<Fit, Overrun> {
+        let chart = &self.chart;
+        if let Kind::Plane { frame } = &chart.kind {
+            return Ok(project(curve, |p| {
+                let q = frame.local_point(p);
+                (Uv::new(q.x, q.y), q.z)
+            }));
+        }
+        let target = Target {
+            locate: &|_, p, hint| chart.locate(p, hint),
+            derivatives: &|uv| chart.derivatives(uv),
+            poles: &chart.poles,
+            range: [0, 1].map(|d| {
+                if chart.period[d].is_some() { [f64::NEG_INFINITY, f64::INFINITY] } else { chart.range[d] }
+            }),
+            pole_tolerance: self.accuracy,
+            tolerance: self.tolerance,
+            budget: &self.budget,
+        };
+        let mut fit = target.fit(curve)?;
+        // Cubics between points of the border may swing over it.
+        for p in &mut fit.curve.points {
+            for d in 0..2 {
+                if chart.period[d].is_none() {
+                    // Farther out lie the control points of curves that touch the border, which themselves stay inside.
+                    let [a, b] = chart.range[d];
+                    let inside = p[d].clamp(a, b);
+                    if (p[d] - inside).abs() <= BORDER_SLACK * (b - a) {
+                        p[d] = inside;
+                    }
+                }
+            }
+        }
+        Ok(fit)
+    }
+
+    /// Turns the poles of a sphere away from the edges, unless the file cut it open itself.
+    pub(super) fn turn_sphere(&mut self) {
+        let Kind::Torus { frame, major: 0.0, .. } = self.chart.kind else { return };
+        let mut count: FxHashMap<usize, usize> = FxHashMap::default();
+        for &(edge, _) in self.loops.iter().flatten() {
+            *count.entry(edge).or_default() += 1;
+        }
+        if count.is_empty() || count.values().any(|&n| n > 1) {
+            return;
+        }
+        let mut directions: Vec<Vector> = Vec::new();
+        for edge in self.edges.values() {
+            let [a, b] = edge.domain();
+            let samples = (0..=32).map(|i| edge.evaluate(a + (b - a) * f64::from(i) / 32.0));
+            directions.extend(samples.filter_map(|p| (p - frame.origin).try_normalize()));
+        }
+        let clearance = |axis: Vector| directions.iter().map(|d| 1.0 - d.dot(axis).abs()).fold(1.0, f64::min);
+        let own = clearance(frame.z);
+        if own > POLE_CLEARANCE {
+            return;
+        }
+        let middle = directions.iter().sum::<Vector>().try_normalize().unwrap_or(frame.x);
+        let mut best = (own, frame.z);
+        for i in -1..=1 {
+            for j in -1..=1 {
+                for k in -1..=1 {
+                    let axis = f64::from(i) * frame.x + f64::from(j) * frame.y + f64::from(k) * frame.z;
+                    let Some(axis) = axis.try_normalize() else { continue };
+                    // Poles far from the edges, and rather outside the patch.
+                    let score = clearance(axis);
+                    if score > best.0 + SCORE_NOISE {
+                        best = (score, axis);
+                    }
+                }
+            }
+        }
+        if let Some(turned) = self.chart.with_axis(best.1, middle) {
+            self.chart = turned;
+        }
+    }
+}
