@@ -198,15 +198,20 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "nurbs",
-        &["basis", "mod", "spline", "surface patch", "conic", "curvature", "cut", "project", "sanitise", "sweep"],
-    ),
-    (
-        "step",
         &[
-            "bounds", "chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product",
-            "import",
+            "basis",
+            "mod",
+            "curve",
+            "surface patch",
+            "conic",
+            "curvature",
+            "blossom",
+            "project",
+            "sanitise",
+            "sweep",
         ],
     ),
+    ("step", &["chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product", "import"]),
     (
         "tessellate",
         &[

@@ -4,6 +4,7 @@
 //! basis' own domain that is refined until the middles of all cells agree. Known weakness: an offset beyond a radius of
 //! curvature folds; it is fitted as it is.
 
+use super::tolerances::{DIFFERENCE_STEP, INSIDE_SHARE, PARALLEL_DERIVATIVES, WORST_FIT_MM};
 use super::{Chart, Kind, SplineChart};
 use crate::math::{Homogeneous, Point, Uv, Vector};
 use crate::model::Analytic;
@@ -79,7 +80,7 @@ fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector,
     let s = basis.second_derivatives(uv);
     let n = s.du.cross(s.dv);
     let length = n.length();
-    if !(length > 1e-12 * s.du.length() * s.dv.length()) {
+    if !(length > PARALLEL_DERIVATIVES * s.du.length() * s.dv.length()) {
         return None;
     }
     let unit = n / length;
@@ -92,14 +93,14 @@ fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector,
 fn jet(basis: &Surface, distance: f64, uv: Uv, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Option<Jet> {
     // At a pole the limit from just inside.
     let inner = Uv::new(
-        uv.x.clamp(u0 + 1e-7 * (u1 - u0), u1 - 1e-7 * (u1 - u0)),
-        uv.y.clamp(v0 + 1e-7 * (v1 - v0), v1 - 1e-7 * (v1 - v0)),
+        uv.x.clamp(u0 + INSIDE_SHARE * (u1 - u0), u1 - INSIDE_SHARE * (u1 - u0)),
+        uv.y.clamp(v0 + INSIDE_SHARE * (v1 - v0), v1 - INSIDE_SHARE * (v1 - v0)),
     );
     let (at, (point, du, dv)) = match first_order(basis, distance, uv) {
         Some(found) => (uv, found),
         None => (inner, first_order(basis, distance, inner)?),
     };
-    let step = 1e-5 * (v1 - v0);
+    let step = DIFFERENCE_STEP * (v1 - v0);
     let (lo, hi) = ((at.y - step).max(v0), (at.y + step).min(v1));
     let below = first_order(basis, distance, Uv::new(at.x, lo)).map_or(du, |d| d.1);
     let above = first_order(basis, distance, Uv::new(at.x, hi)).map_or(du, |d| d.1);
@@ -137,7 +138,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
         }
         let full = lines.iter().any(|l| 2 * l.len() > MAX_CELLS.max(2 * base[0].len().max(base[1].len())));
         if error <= TOLERANCE || full {
-            return (error <= 1e-2).then_some((surface, error));
+            return (error <= WORST_FIT_MM).then_some((surface, error));
         }
         per_span *= 2;
     }

@@ -1,6 +1,10 @@
 //! Inversion of spline surfaces: Newton from a nearby start, a search over Bézier patches when there is none.
 
 use super::Pole;
+use super::tolerances::{
+    CLOSED_CONTROLS_LARGEST_MM, CLOSED_CONTROLS_SHARE, CLOSED_MM, CONVERGED_SHARE, EXACT_FOOT_MM,
+    FIRST_EXPECTATION_MM, LARGEST_MISS_SHARE, PERIOD_SLACK, SINGULAR_METRIC, STANDING_STILL,
+};
 use crate::math::{Aabb, Point, Uv};
 use crate::nurbs::{BezierPatch, ControlPoint, Curve, Surface};
 use std::cell::Cell;
@@ -9,6 +13,9 @@ use std::sync::OnceLock;
 /// Samples per direction in a patch that seed the search, at degrees up to 3. Threads have degree 13 and a whole turn in
 /// one patch: higher degrees take twice their number.
 const SEEDS: usize = 4;
+
+/// Patches from which a search starts; nearer boxes come first.
+const MAX_PATCHES_SEARCHED: usize = 200;
 
 /// A spline surface that knows where it closes and contracts.
 #[derive(Debug)]
@@ -32,7 +39,7 @@ impl Clone for SplineChart {
 impl SplineChart {
     pub(in crate::step) fn new(surface: Surface) -> Self {
         let size = surface.bounds().diagonal();
-        let near = 1e-6 * size.min(1000.0) + 1e-9;
+        let near = CLOSED_CONTROLS_SHARE * size.min(CLOSED_CONTROLS_LARGEST_MM) + CLOSED_MM;
         let [nu, nv] = surface.counts();
         let at = |i: usize, j: usize| surface.points[i * nv + j].position();
         let equal = |a: Point, b: Point| (a - b).length() <= near;
@@ -42,7 +49,7 @@ impl SplineChart {
             [0, nu - 1].map(|i| (1..nv).all(|j| equal(at(i, 0), at(i, j)))),
             [0, nv - 1].map(|j| (1..nu).all(|i| equal(at(0, j), at(i, j)))),
         ];
-        let expected = Cell::new(1e-4);
+        let expected = Cell::new(FIRST_EXPECTATION_MM);
         Self { surface, size, closed, collapsed, patches: OnceLock::new(), expected }
     }
 
@@ -79,7 +86,7 @@ impl SplineChart {
         let (uv, distance) = self.search(p, best);
         // Edges that stay off the surface by this much need no search at every point.
         let in_vain = best.is_some_and(|b| distance > 0.9 * b.1);
-        if distance > self.expected.get() && (in_vain || distance < 1e-2 * self.size) {
+        if distance > self.expected.get() && (in_vain || distance < LARGEST_MISS_SHARE * self.size) {
             self.expected.set(1.5 * distance);
         }
         uv
@@ -112,7 +119,7 @@ impl SplineChart {
             let (gu, gv) = (d.du.dot(r), d.dv.dot(r));
             let (mut e, f, mut g) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
             // A direction along which the surface stands still moves nothing.
-            let floor = 1e-18 * (e * extent[0] * extent[0]).max(g * extent[1] * extent[1]);
+            let floor = STANDING_STILL * (e * extent[0] * extent[0]).max(g * extent[1] * extent[1]);
             e = e.max(floor / (extent[0] * extent[0]));
             g = g.max(floor / (extent[1] * extent[1]));
             let held = |d: usize, gradient: f64| {
@@ -127,7 +134,7 @@ impl SplineChart {
                 Uv::new(0.0, -gv / g)
             } else if hold_v {
                 Uv::new(-gu / e, 0.0)
-            } else if det > 1e-12 * e * g {
+            } else if det > SINGULAR_METRIC * e * g {
                 Uv::new((-gu * g + gv * f) / det, (-gv * e + gu * f) / det)
             } else {
                 Uv::new(-gu / e, -gv / g) * 0.5
@@ -149,7 +156,8 @@ impl SplineChart {
                 }
                 step *= 0.5;
             }
-            if !moved || step.x.abs() <= 1e-15 * extent[0] && step.y.abs() <= 1e-15 * extent[1] {
+            if !moved || step.x.abs() <= CONVERGED_SHARE * extent[0] && step.y.abs() <= CONVERGED_SHARE * extent[1]
+            {
                 break;
             }
         }
@@ -185,7 +193,7 @@ impl SplineChart {
         let middle = Uv::new(0.5 * (domain[0][0] + domain[0][1]), 0.5 * (domain[1][0] + domain[1][1]));
         let mut best = known.unwrap_or((middle, f64::INFINITY));
         for (tried, (bound, i)) in order.into_iter().enumerate() {
-            if bound >= best.1 || best.1 < 1e-9 || tried > 200 {
+            if bound >= best.1 || best.1 < EXACT_FOOT_MM || tried > MAX_PATCHES_SEARCHED {
                 break;
             }
             let patch = &patches[i].0;
@@ -215,7 +223,7 @@ impl SplineChart {
         let mut surface = self.surface.clone();
         for d in 0..2 {
             let [a, b] = domain[d];
-            let near = 1e-9 * (base[d][1] - base[d][0]);
+            let near = PERIOD_SLACK * (base[d][1] - base[d][0]);
             if a < base[d][0] - near || b > base[d][1] + near {
                 let period = self.period()[d];
                 surface = surface.map_direction(d, |c| extend_periodically(&c, [a, b], period));
@@ -229,12 +237,12 @@ impl SplineChart {
 pub(super) fn extend_periodically(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> Curve {
     let [t0, t1] = curve.domain();
     let Some(period) = period else { return curve.clone() };
-    let near = 1e-9 * period;
+    let near = PERIOD_SLACK * period;
     if a >= t0 - near && b <= t1 + near {
         return curve.clone();
     }
-    let first = ((a - t0) / period + 1e-9).floor() as i64;
-    let last = (((b - t0) / period - 1e-9).ceil() as i64 - 1).clamp(first, first + 4);
+    let first = ((a - t0) / period + PERIOD_SLACK).floor() as i64;
+    let last = (((b - t0) / period - PERIOD_SLACK).ceil() as i64 - 1).clamp(first, first + 4);
     let start = t0 + first as f64 * period;
     let copy = curve.reparametrised([start, start + period]);
     let mut whole = copy.clone();

@@ -1,6 +1,9 @@
 //! Revolution and extrusion of any curve: one parameter in closed form, the other by projection to the curve.
 
-use super::Chart;
+use super::tolerances::{
+    EXPECTED_MM, EXPECTED_SHARE, GOLDEN_CUT, GOLDEN_ROUNDS, NEAR_AXIS_SHARE, PLANE_SHARE, PROFILE_SAMPLES,
+    PROFILE_SAMPLES_PER_SPAN,
+};
 use crate::math::{Frame, Point, Uv, Vector};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, project};
 use std::f64::consts::{PI, TAU};
@@ -23,7 +26,7 @@ pub(super) fn locate_revolution(
 ) -> Uv {
     let q = frame.local_point(p);
     let target = Vector::new(q.x.hypot(q.y), 0.0, q.z);
-    let expected = 1e-6 * size + 1e-6;
+    let expected = EXPECTED_SHARE * size + EXPECTED_MM;
     let Some(Plane { azimuth, crosses }) = plane else {
         let v = nearest_profile(frame, meridian, target);
         let m = frame.local_point(meridian.evaluate(v));
@@ -45,7 +48,7 @@ pub(super) fn locate_revolution(
     // On the other side of the axis half a turn on; where both fit, near the axis, what is expected decides.
     let behind = foot(-target.x);
     let turn = |u: f64| hint.map_or(0.0, |h| ((u - h.x) / TAU - ((u - h.x) / TAU).round()).abs());
-    let both = ahead.1.max(behind.1) <= expected.max(1e-3 * target.x);
+    let both = ahead.1.max(behind.1) <= expected.max(NEAR_AXIS_SHARE * target.x);
     let back = if both { turn(u + PI) < turn(u) } else { behind.1 < ahead.1 };
     if back { Uv::new(u + PI, behind.0) } else { Uv::new(u, ahead.0) }
 }
@@ -58,12 +61,13 @@ fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
         (Vector::new(m.x.hypot(m.y), 0.0, m.z) - target).length()
     };
     let [a, b] = meridian.domain();
-    let n = (16 * meridian.breakpoints().len()).min(2000);
+    let n = (PROFILE_SAMPLES_PER_SPAN * meridian.breakpoints().len()).min(PROFILE_SAMPLES);
     let sample = |i: usize| a + (b - a) * i as f64 / n as f64;
     let best = (0..=n).map(|i| (i, distance(sample(i)))).min_by(|x, y| x.1.total_cmp(&y.1)).map_or(0, |x| x.0);
     let (mut lo, mut hi) = (sample(best.saturating_sub(1)), sample((best + 1).min(n)));
-    for _ in 0..60 {
-        let (x, y) = (lo + 0.381966 * (hi - lo), hi - 0.381966 * (hi - lo));
+    for _ in 0..GOLDEN_ROUNDS {
+        let x = lo + GOLDEN_CUT * (hi - lo);
+        let y = hi - GOLDEN_CUT * (hi - lo);
         if distance(x) < distance(y) { hi = y } else { lo = x }
     }
     0.5 * (lo + hi)
@@ -80,7 +84,7 @@ pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
     let far = local.iter().copied().max_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))?;
     let r = far.x.hypot(far.y);
-    let near = 1e-9 * r * r;
+    let near = PLANE_SHARE * r * r;
     let flat = local.iter().all(|p| (far.x * p.y - far.y * p.x).abs() <= near);
     let crosses = local.iter().any(|p| far.x * p.x + far.y * p.y < -near);
     (flat && r > 0.0).then(|| Plane { azimuth: far.y.atan2(far.x), crosses })
@@ -96,13 +100,13 @@ pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives
 }
 
 /// u from the projection along the direction, v from what remains.
-pub(super) fn locate_extrusion(base: &Curve, direction: Vector, p: Point, hint: Option<Uv>, chart: &Chart) -> Uv {
+pub(super) fn locate_extrusion(base: &Curve, direction: Vector, p: Point, hint: Option<f64>, size: f64) -> Uv {
     let square = direction.length_squared();
     let flat = |q: Point| {
         let d = q - p;
         d - direction * (d.dot(direction) / square)
     };
-    let start = hint.map(|h| (chart.wrap(h).x, 1e-6 * chart.size + 1e-6));
+    let start = hint.map(|u| (u, EXPECTED_SHARE * size + EXPECTED_MM));
     let u = project::nearest_by(base, flat, start).0;
     Uv::new(u, (p - base.evaluate(u)).dot(direction) / square)
 }

@@ -1,7 +1,7 @@
 //! Bounded curves as splines: trimmed, composite, and whole curves.
 
-use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH};
-use super::pcurves::first_pcurve;
+use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH, first_pcurve};
+use super::tolerances::SEAM_SHARE;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
@@ -58,7 +58,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let (from, mut to) = if sense { (t1, t2) } else { (t2, t1) };
         if let Some(period) = shape.period() {
             to = from + (to - from).rem_euclid(period);
-            if to - from <= 1e-12 * period {
+            if to - from <= SEAM_SHARE * period {
                 to = from + period;
             }
         }

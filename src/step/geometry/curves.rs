@@ -1,6 +1,6 @@
 //! Curves of the file: closed forms where there is one, rational splines for the rest.
 
-use super::pcurves::first_pcurve;
+use super::tolerances::{CLOSED_MM, CLOSED_SHARE, CONVERGED_ANGLE, MERGED_POINTS_MM, SEAM_SHARE, SHORTEST_TAIL};
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
@@ -37,7 +37,7 @@ impl CurveShape {
     pub(crate) fn spline(curve: Curve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();
-        let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= 1e-6 * size + 1e-9;
+        let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= CLOSED_SHARE * size + CLOSED_MM;
         Self::Spline { curve, closed }
     }
 
@@ -116,12 +116,12 @@ fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     if s1 <= b {
         return curve.restricted(s0, s1);
     }
-    if b - s0 <= 1e-12 * period {
-        let end = (s1 - period).max(a + 1e-9 * period);
+    if b - s0 <= SEAM_SHARE * period {
+        let end = (s1 - period).max(a + SHORTEST_TAIL * period);
         return curve.restricted(a, end.min(b)).reparametrised([b, b + (end - a)]);
     }
     let head = curve.restricted(s0, b);
-    let tail = curve.restricted(a, (s1 - period).clamp(a + 1e-9 * period, b));
+    let tail = curve.restricted(a, (s1 - period).clamp(a + SHORTEST_TAIL * period, b));
     head.joined_with(&tail)
 }
 
@@ -143,11 +143,18 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
         }
         let step = slope / bend;
         t -= step;
-        if step.abs() < 1e-15 {
+        if step.abs() < CONVERGED_ANGLE {
             break;
         }
     }
     t
+}
+
+/// The first curve in a parameter plane of a surface curve that has none in space.
+pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
+    let list = e.attributes("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
+    let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
+    curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
@@ -278,7 +285,7 @@ pub(crate) fn polyline(points: &[Point]) -> Option<Curve> {
             }
             Some(&q) => {
                 let length = (p - q).length();
-                if length > 1e-9 {
+                if length > MERGED_POINTS_MM {
                     kept.push(p);
                     lengths.push(lengths[lengths.len() - 1] + length);
                 }

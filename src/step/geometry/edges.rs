@@ -2,6 +2,9 @@
 
 use super::composite::coincident;
 use super::curves::{CurveShape, DirectedCurve};
+use super::tolerances::{
+    EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LOOSE_VERTEX_MM, VERTEX_MM, VERTEX_SHARE,
+};
 use super::{Geometry, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
@@ -65,10 +68,10 @@ pub(crate) fn trim_to_vertices(
     let forward = sense != directed.reversed;
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
-    let accuracy = 1e-7 + 1e-9 * p.abs().max_element();
+    let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
     match shape.period() {
         Some(period) => {
-            let noise = 1e-9 * period;
+            let noise = EMPTY_SHARE * period;
             if let CurveShape::Spline { curve, .. } = shape {
                 // A vertex on the seam of a closed spline may have been found at either end.
                 let [d0, d1] = curve.domain();
@@ -98,7 +101,9 @@ pub(crate) fn trim_to_vertices(
             if let CurveShape::Spline { curve, .. } = shape {
                 let [d0, d1] = curve.domain();
                 if closed {
-                    if coincident(p, q, accuracy) && (curve.evaluate(d0) - curve.evaluate(d1)).length() > 1e-3 {
+                    if coincident(p, q, accuracy)
+                        && (curve.evaluate(d0) - curve.evaluate(d1)).length() > LOOSE_VERTEX_MM
+                    {
                         return Some(TrimmedEdge { curve: None, gap: 0.0 });
                     }
                     (ta, tb) = (d0, d1);
@@ -109,14 +114,14 @@ pub(crate) fn trim_to_vertices(
                 let curve = shape.segment(tb, ta);
                 return finish(curve, !forward, p, q);
             }
-            if !(tb - ta > 0.0) || (a - b).length() < 1e-12 && matches!(shape, CurveShape::Line { .. }) {
-                return coincident(p, q, 1e-3).then_some(TrimmedEdge { curve: None, gap: 0.0 });
+            if !(tb - ta > 0.0) || (a - b).length() < EQUAL_POINTS_MM && matches!(shape, CurveShape::Line { .. }) {
+                return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0 });
             }
         }
     }
-    let length_scale = 1e-14 * (ta.abs() + tb.abs());
+    let length_scale = EMPTY_PARAMETER * (ta.abs() + tb.abs());
     if !(tb - ta > length_scale) {
-        return coincident(p, q, 1e-3).then_some(TrimmedEdge { curve: None, gap: 0.0 });
+        return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0 });
     }
     finish(shape.segment(ta, tb), forward, p, q)
 }
@@ -129,7 +134,7 @@ fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge
     }
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
-    if extent < 1e-9 {
+    if extent < EMPTY_EDGE_MM {
         return Some(TrimmedEdge { curve: None, gap });
     }
     Some(TrimmedEdge { curve: Some(curve), gap })

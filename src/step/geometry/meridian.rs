@@ -1,6 +1,7 @@
 //! Profiles of surfaces of revolution that cross their axis: the part that the face lies on.
 
-use super::surfaces::FaceExtent;
+use super::extent::FaceExtent;
+use super::tolerances::{AXIS_SHARE, AXIS_SQUARE_SHARE, CLOSED_PROFILE, EVEN_FIT_MM, PROFILE_ERROR_SHARE};
 use crate::math::{Frame, Point, Vector};
 use crate::nurbs::Curve;
 use crate::step::chart::profile_distance;
@@ -25,7 +26,8 @@ pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExt
     let off: Vec<f64> = parts.iter().map(off).collect();
     let least = off.iter().copied().fold(f64::INFINITY, f64::min);
     // A circle about a point of the axis fits on both sides: its own start decides, which comes first.
-    let even = 1e-6 * points.len() as f64 * (1e-3 * curve.bounds().diagonal()).clamp(1e-3, 1.0);
+    let scale = (PROFILE_ERROR_SHARE * curve.bounds().diagonal()).clamp(PROFILE_ERROR_SHARE, 1.0);
+    let even = EVEN_FIT_MM * points.len() as f64 * scale;
     let first = off.iter().position(|&o| o <= least + even);
     first.and_then(|i| parts.get(i).cloned()).unwrap_or(curve)
 }
@@ -47,7 +49,7 @@ fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     for i in 0..SAMPLES {
         let (mut lo, mut hi) = (sample(i), sample(i + 1));
         let (s_lo, s_hi) = (side(lo), side(hi));
-        if s_lo.abs().max(s_hi.abs()) > 1e-9 * size * size && s_lo * s_hi < 0.0 {
+        if s_lo.abs().max(s_hi.abs()) > AXIS_SQUARE_SHARE * size * size && s_lo * s_hi < 0.0 {
             for _ in 0..100 {
                 let middle = 0.5 * (lo + hi);
                 if side(middle) * s_lo > 0.0 { lo = middle } else { hi = middle }
@@ -56,14 +58,14 @@ fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
         }
     }
     let (Some(&first), Some(&last)) = (cuts.first(), cuts.last()) else { return Vec::new() };
-    let near = 1e-9 * (b - a);
+    let near = AXIS_SHARE * (b - a);
     let mut parts: Vec<Curve> = Vec::new();
     if first - a > near {
         parts.push(curve.restricted(a, first));
     }
     if b - last > near {
         let tail = curve.restricted(last, b);
-        let closed = (at(a) - at(b)).length() <= 1e-9 * (1.0 + size);
+        let closed = (at(a) - at(b)).length() <= CLOSED_PROFILE * (1.0 + size);
         match parts.pop() {
             Some(head) if closed => parts.push(tail.joined_with(&head)),
             Some(head) => parts.extend([head, tail]),

@@ -1,7 +1,8 @@
 //! Curves given only in the parameter plane of a surface, offset curves, and cubic curves through what can be evaluated.
 
 use super::curves::{CurveShape, DirectedCurve};
-use super::surfaces::FaceExtent;
+use super::extent::FaceExtent;
+use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS};
 use super::units::Units;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Point, Uv, Vector};
@@ -30,13 +31,6 @@ pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), t
     }
 }
 
-/// The first curve in a parameter plane of a surface curve that has none in space.
-pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
-    let list = e.attributes("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
-    let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
-    curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
-}
-
 impl<'f, 'a> Geometry<'f, 'a> {
     /// An OFFSET_CURVE_3D: the basis moved along the reference direction × its tangent.
     pub(crate) fn offset_curve(
@@ -58,7 +52,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 let aside = aside.ok_or_else(|| Refusal::new(e, "its reference direction runs along its line"))?;
                 CurveShape::Line { origin: origin + sign * aside, direction }
             }
-            CurveShape::Ellipse { frame, a, b } if a == b && across.cross(frame.z).length() < 1e-9 => {
+            CurveShape::Ellipse { frame, a, b } if a == b && across.cross(frame.z).length() < PARALLEL_AXIS => {
                 // The tangent turned by a right angle about the axis points to the center.
                 let radius = a - sign * across.dot(frame.z).signum();
                 if !(radius > 0.0) {
@@ -76,15 +70,17 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 };
                 let moved = |t: f64| {
                     let d = curve.derivatives(t);
-                    d.point + sign * across.cross(d.first).try_normalize().unwrap_or_default()
+                    // Where the curve stands still, nothing says which way is aside: it stays where it is.
+                    let aside = across.cross(d.first).try_normalize().unwrap_or(Vector::ZERO);
+                    d.point + sign * aside
                 };
                 let [a, b] = curve.domain();
                 let at = |t: f64| {
-                    let h = 1e-5 * (b - a);
+                    let h = DIFFERENCE_STEP * (b - a);
                     let (lo, hi) = ((t - h).max(a), (t + h).min(b));
                     (moved(t), (moved(hi) - moved(lo)) / (hi - lo))
                 };
-                CurveShape::spline(fit_cubic([a, b], at, 1e-6).0)
+                CurveShape::spline(fit_cubic([a, b], at, CURVE_ERROR_MM).0)
             }
         };
         Ok(DirectedCurve { shape, reversed })
@@ -119,7 +115,7 @@ fn lift_to_surface(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
     // Corners stay corners: one cubic between each pair of knots of full multiplicity would do, all knots are simpler.
     let breaks = curve.breakpoints();
     if curve.degree > 1 || breaks.len() == 2 {
-        return fit_cubic(curve.domain(), at, 1e-6).0;
+        return fit_cubic(curve.domain(), at, CURVE_ERROR_MM).0;
     }
     let parts = breaks.windows(2).map(|w| {
         let middle = 0.5 * (w[0] + w[1]);
@@ -129,7 +125,7 @@ fn lift_to_surface(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
             let d = chart.derivatives(Uv::new(p.x * scale[0], p.y * scale[1]));
             (d.point, d.du * (slope.x * scale[0]) + d.dv * (slope.y * scale[1]))
         };
-        fit_cubic([w[0], w[1]], line, 1e-6).0
+        fit_cubic([w[0], w[1]], line, CURVE_ERROR_MM).0
     });
     parts.reduce(|a, b| a.joined_with(&b)).unwrap_or_else(|| curve.clone())
 }

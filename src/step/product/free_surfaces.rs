@@ -8,7 +8,7 @@ use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::chart::{Chart, Kind};
-use crate::step::geometry::surfaces::FaceExtent;
+use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::Entity;
 use crate::step::settings::Settings;

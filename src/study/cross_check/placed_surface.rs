@@ -250,6 +250,7 @@ mod tests {
             id: crate::math::FaceId(0),
             instance: 0,
             part: crate::model::PartId(0),
+            solid: 0,
             shell: None,
             face: Some(face),
             tessellated: None,

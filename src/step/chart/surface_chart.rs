@@ -1,0 +1,280 @@
+//! The chart of a surface: its kind, its periods, bounds and poles, and the three questions that it answers.
+
+use super::tolerances::{CLOSED_MM, CLOSED_SHARE};
+use super::{Pole, SplineChart, analytic, spline, swept};
+use crate::math::{Frame, Point, Uv, Vector};
+use crate::model::Analytic;
+use crate::nurbs::{Curve, Derivatives, Surface, conic};
+use std::f64::consts::PI;
+
+/// The kinds of surfaces.
+#[derive(Clone, Debug)]
+pub(in crate::step) enum Kind {
+    Plane {
+        frame: Frame,
+    },
+    /// `radius + v·slope` about z; a cylinder when the slope is 0.
+    Cone {
+        frame: Frame,
+        radius: f64,
+        half_angle: f64,
+    },
+    /// A sphere when `major` is 0.
+    Torus {
+        frame: Frame,
+        major: f64,
+        minor: f64,
+    },
+    /// `meridian(v)` turned about z by u; the plane of the meridian when it lies in one through the axis.
+    Revolution {
+        frame: Frame,
+        meridian: Curve,
+        plane: Option<swept::Plane>,
+    },
+    /// `base(u) + v·direction`.
+    Extrusion {
+        base: Curve,
+        direction: Vector,
+    },
+    Spline(SplineChart),
+}
+
+/// A surface in its own parameters.
+#[derive(Clone, Debug)]
+pub(in crate::step) struct Chart {
+    pub(in crate::step) kind: Kind,
+    /// What the face was in the file.
+    pub(in crate::step) analytic: Analytic,
+    /// Differences of parameters after which the surface repeats.
+    pub(in crate::step) period: [Option<f64>; 2],
+    /// Natural bounds; infinite where there is none, meaningless in periodic directions.
+    pub(in crate::step) range: [[f64; 2]; 2],
+    pub(in crate::step) poles: Vec<Pole>,
+    /// Something like the size of the surface, mm.
+    pub(in crate::step) size: f64,
+    /// Whether `Su × Sv` is opposite to that of the file's surface.
+    pub(in crate::step) flipped: bool,
+    /// Distance from what the file means, where that had to be fitted, mm.
+    pub(in crate::step) error: f64,
+}
+
+impl Chart {
+    /// The surface of revolution of a meridian.
+    pub(in crate::step) fn revolution(frame: Frame, meridian: Curve) -> Self {
+        let plane = swept::plane(&frame, &meridian);
+        Self::new(Kind::Revolution { frame, meridian, plane }, Analytic::Revolution)
+    }
+
+    /// A cylinder: a cone that does not widen.
+    pub(in crate::step) fn cylinder(frame: Frame, radius: f64) -> Self {
+        Self::new(Kind::Cone { frame, radius, half_angle: 0.0 }, Analytic::Cylinder { frame, radius })
+    }
+
+    pub(in crate::step) fn new(kind: Kind, analytic: Analytic) -> Self {
+        const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut chart = Self {
+            kind,
+            analytic,
+            period: [None; 2],
+            range: [FREE; 2],
+            poles: Vec::new(),
+            size: 1.0,
+            flipped: false,
+            error: 0.0,
+        };
+        chart.characterise();
+        chart
+    }
+
+    /// Fills in periods, bounds, poles and size.
+    fn characterise(&mut self) {
+        const TURN: f64 = 2.0 * PI;
+        match &self.kind {
+            Kind::Plane { .. } => {}
+            Kind::Cone { frame, radius, half_angle } => {
+                self.period[0] = Some(TURN);
+                self.size = radius.abs().max(1.0);
+                if *half_angle != 0.0 {
+                    let at = -radius / half_angle.tan();
+                    self.poles.push(Pole { fixed: 1, at, point: frame.point(Point::new(0.0, 0.0, at)) });
+                }
+            }
+            Kind::Torus { frame, major, minor } => {
+                self.period[0] = Some(TURN);
+                self.size = major.abs() + minor;
+                let range = analytic::minor_range(*major, *minor);
+                match range {
+                    None => self.period[1] = Some(TURN),
+                    Some(range) => {
+                        self.range[1] = range;
+                        for at in range {
+                            let point = frame.point(Point::new(0.0, 0.0, minor * at.sin()));
+                            self.poles.push(Pole { fixed: 1, at, point });
+                        }
+                    }
+                }
+            }
+            Kind::Revolution { frame, meridian, .. } => {
+                self.period[0] = Some(TURN);
+                let range = meridian.domain();
+                self.range[1] = range;
+                self.size = meridian.bounds().diagonal();
+                let ends = range.map(|t| meridian.evaluate(t));
+                let near = self.closure();
+                for (at, p) in range.into_iter().zip(ends) {
+                    let q = frame.local_point(p);
+                    if q.x.hypot(q.y) <= near {
+                        self.poles.push(Pole { fixed: 1, at, point: p });
+                    }
+                }
+                if self.poles.is_empty() && (ends[0] - ends[1]).length() <= near {
+                    self.period[1] = Some(range[1] - range[0]);
+                }
+            }
+            Kind::Extrusion { base, .. } => {
+                let range = base.domain();
+                self.range[0] = range;
+                self.size = base.bounds().diagonal();
+                if (base.evaluate(range[0]) - base.evaluate(range[1])).length() <= self.closure() {
+                    self.period[0] = Some(range[1] - range[0]);
+                }
+            }
+            Kind::Spline(s) => {
+                self.range = s.surface.domain();
+                self.size = s.size;
+                self.period = s.period();
+                self.poles = s.poles();
+            }
+        }
+    }
+
+    /// Distance below which ends of the surface are one, mm.
+    fn closure(&self) -> f64 {
+        CLOSED_SHARE * self.size + CLOSED_MM
+    }
+
+    /// Whether a parameter is an angle, whose spline parameter differs from it.
+    pub(in crate::step) fn angular_directions(&self) -> [bool; 2] {
+        match self.kind {
+            Kind::Cone { .. } | Kind::Revolution { .. } => [true, false],
+            Kind::Torus { .. } => [true, true],
+            _ => [false, false],
+        }
+    }
+
+    /// Parameters of the nearest point of the surface; of several by a period, the one nearest to `hint`.
+    pub(in crate::step) fn locate(&self, p: Point, hint: Option<Uv>) -> Uv {
+        let uv = match &self.kind {
+            Kind::Plane { frame } => analytic::locate_plane(frame, p),
+            Kind::Cone { frame, radius, half_angle } => analytic::locate_cone(frame, *radius, *half_angle, p),
+            Kind::Torus { frame, major, .. } => analytic::locate_torus(frame, *major, self.range[1], p),
+            Kind::Revolution { frame, meridian, plane } => {
+                let hint = hint.map(|h| self.wrap(h));
+                swept::locate_revolution((frame, meridian, *plane), p, hint, self.size)
+            }
+            Kind::Extrusion { base, direction } => {
+                swept::locate_extrusion(base, *direction, p, hint.map(|h| self.wrap(h).x), self.size)
+            }
+            Kind::Spline(s) => s.locate(p, hint),
+        };
+        hint.map_or(uv, |h| self.nearest_representative(uv, h))
+    }
+
+    /// The representative of `uv` that is nearest to `to`.
+    pub(in crate::step) fn nearest_representative(&self, uv: Uv, to: Uv) -> Uv {
+        let shift = |d: usize| self.period[d].map_or(0.0, |p| p * ((to[d] - uv[d]) / p).round());
+        uv + Uv::new(shift(0), shift(1))
+    }
+
+    /// Position and first derivatives, anywhere in the plane.
+    pub(in crate::step) fn derivatives(&self, uv: Uv) -> Derivatives {
+        match &self.kind {
+            Kind::Plane { frame } => {
+                Derivatives { point: frame.point(Point::new(uv.x, uv.y, 0.0)), du: frame.x, dv: frame.y }
+            }
+            Kind::Cone { frame, radius, half_angle } => analytic::cone(frame, *radius, *half_angle, uv),
+            Kind::Torus { frame, major, minor } => analytic::torus(frame, *major, *minor, uv),
+            Kind::Revolution { frame, meridian, .. } => {
+                let v = self.wrap(uv).y;
+                swept::revolution(frame, meridian, Uv::new(uv.x, v))
+            }
+            Kind::Extrusion { base, direction } => {
+                let d = base.derivatives(self.wrap(uv).x);
+                Derivatives { point: d.point + uv.y * *direction, du: d.first, dv: *direction }
+            }
+            Kind::Spline(s) => s.surface.derivatives(self.wrap(uv)),
+        }
+    }
+
+    /// Into the base period, and into the natural bounds.
+    pub(in crate::step) fn wrap(&self, uv: Uv) -> Uv {
+        let one = |d: usize| {
+            let [a, b] = self.range[d];
+            match self.period[d] {
+                Some(p) if a.is_finite() => {
+                    if uv[d] >= a && uv[d] <= b {
+                        uv[d]
+                    } else {
+                        a + (uv[d] - a).rem_euclid(p)
+                    }
+                }
+                Some(_) => uv[d],
+                None => uv[d].clamp(a, b),
+            }
+        };
+        Uv::new(one(0), one(1))
+    }
+
+    /// The spline over a rectangle, and the rectangle it really covers.
+    pub(in crate::step) fn surface(&self, domain: [[f64; 2]; 2]) -> Surface {
+        use crate::nurbs::sweep;
+        match &self.kind {
+            Kind::Plane { frame } => sweep::plane(frame, domain),
+            Kind::Cone { frame, radius, half_angle } => {
+                sweep::cone(frame, *radius, *half_angle, domain[0], domain[1])
+            }
+            Kind::Torus { frame, major, minor } => sweep::torus(frame, *major, *minor, domain[0], domain[1]),
+            Kind::Revolution { frame, meridian, .. } => sweep::revolution(
+                &spline::extend_periodically(meridian, domain[1], self.period[1]),
+                frame,
+                domain[0],
+            ),
+            Kind::Extrusion { base, direction } => sweep::extrusion(
+                &spline::extend_periodically(base, domain[0], self.period[0]),
+                *direction,
+                domain[1],
+            ),
+            Kind::Spline(s) => s.extend_periodically(domain),
+        }
+    }
+
+    /// The spline's parameters over `domain` at a point of the chart.
+    pub(in crate::step) fn to_surface(&self, domain: [[f64; 2]; 2], uv: Uv) -> Uv {
+        let [u, v] = self.angular_directions();
+        let one = |d: usize, angular: bool| {
+            if angular { conic::parameter_of_angle(domain[d], uv[d]) } else { uv[d] }
+        };
+        Uv::new(one(0, u), one(1, v))
+    }
+
+    /// Factors from the file's parameters to the chart's; `None` where they are not proportional.
+    pub(in crate::step) fn parameter_scale(&self, length: f64, angle: f64) -> Option<[f64; 2]> {
+        let direct = |c: &Curve| c.points.iter().all(|p| p.w == c.points[0].w);
+        match &self.kind {
+            Kind::Plane { .. } => Some([length; 2]),
+            Kind::Cone { .. } => Some([angle, length]),
+            Kind::Torus { .. } => Some([angle; 2]),
+            Kind::Revolution { meridian, .. } => direct(meridian).then_some([angle, 1.0]),
+            Kind::Extrusion { base, .. } => direct(base).then_some([1.0; 2]),
+            Kind::Spline(_) => Some([1.0; 2]),
+        }
+    }
+
+    /// The same sphere with its poles along another axis.
+    pub(in crate::step) fn with_axis(&self, axis: Vector, x_hint: Vector) -> Option<Self> {
+        let Kind::Torus { frame, major: 0.0, minor } = self.kind else { return None };
+        let frame = Frame::from_axis(frame.origin, axis, Some(x_hint));
+        let kind = Kind::Torus { frame, major: 0.0, minor };
+        Some(Self::new(kind, Analytic::Sphere { frame, radius: minor }))
+    }
+}

@@ -1,0 +1,31 @@
+//! Where a face is: what tells how much of an unbounded curve, and which side of an axis, its surface needs.
+
+use crate::math::{Aabb, Point};
+
+/// Where a face is, for surfaces whose curves have no ends or cross their axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FaceExtent<'r> {
+    /// Middle of its edges.
+    pub(crate) center: Point,
+    /// Distance from there that holds them all, mm.
+    pub(crate) radius: f64,
+    /// Some points of its edges.
+    pub(crate) points: &'r [Point],
+}
+
+impl<'r> FaceExtent<'r> {
+    /// Nothing is known of the face.
+    pub(crate) const UNKNOWN: Self = Self { center: Point::ZERO, radius: 0.0, points: &[] };
+
+    /// Around edges in a box.
+    pub(crate) fn from_bounds(bounds: Aabb, points: &'r [Point]) -> Self {
+        if bounds.is_empty() {
+            return Self::UNKNOWN;
+        }
+        Self { center: bounds.center(), radius: 0.5 * bounds.diagonal(), points }
+    }
+
+    pub(crate) fn grown_by(self, by: f64) -> Self {
+        Self { radius: self.radius + by, ..self }
+    }
+}

@@ -1,0 +1,162 @@
+//! Surfaces of revolution and of linear extrusion; revolutions of lines and circles in their closed forms.
+
+use super::curves::{CurveShape, DirectedCurve};
+use super::extent::FaceExtent;
+use super::meridian::keep_face_side_of_axis;
+use super::tolerances::{COPLANAR_MM, PARALLEL_AXIS, REACH_MARGIN, SMALLEST_REACH_MM, STEEP_RADIUS};
+use super::{Geometry, Outcome};
+use crate::math::{Frame, Point, Vector};
+use crate::model::Analytic;
+use crate::nurbs::Curve;
+use crate::step::chart::{Chart, Kind};
+use crate::step::part21::{Args, Entity};
+use std::f64::consts::PI;
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// The curve of a swept surface, cut to what can matter within reach.
+    fn swept_curve(
+        &self,
+        id: u64,
+        FaceExtent { center, radius, .. }: FaceExtent<'_>,
+        depth: usize,
+    ) -> Outcome<(Curve, Option<(Point, Vector)>)> {
+        let e = self.entity(id)?;
+        if e.is_one_of(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE"])
+            && let Ok(curve) = self.bounded_curve(id, depth + 1)
+        {
+            return Ok((curve, None));
+        }
+        let directed = self.curve(id, depth + 1)?;
+        let around = |t: f64, speed: f64| {
+            let reach = REACH_MARGIN * radius.max(SMALLEST_REACH_MM) / speed;
+            directed.shape.segment(t - reach, t + reach)
+        };
+        let curve = match &directed.shape {
+            CurveShape::Line { origin, direction } => {
+                let curve = around(directed.shape.parameter(center), direction.length());
+                let line = Some((*origin, *direction));
+                return Ok((curve, line));
+            }
+            CurveShape::Ellipse { .. } => directed.shape.segment(0.0, 2.0 * PI),
+            CurveShape::Hyperbola { a, b, .. } => {
+                let t = directed.shape.parameter(center);
+                let reach = (1.0 + 2.0 * radius / a.min(*b)).asinh() + t.abs();
+                directed.shape.segment(-reach, reach)
+            }
+            CurveShape::Parabola { f, .. } => {
+                let t = directed.shape.parameter(center);
+                let reach = t.abs() + (2.0 * radius / f).sqrt().max(radius / f);
+                directed.shape.segment(-reach, reach)
+            }
+            CurveShape::Spline { curve, .. } => curve.clone(),
+        };
+        Ok((if directed.reversed { curve.reversed() } else { curve }, None))
+    }
+
+    /// A SURFACE_OF_REVOLUTION.
+    pub(super) fn revolution(
+        &self,
+        e: Entity<'f, 'a>,
+        a: Args<'f, 'a>,
+        reach: FaceExtent<'_>,
+        depth: usize,
+    ) -> Outcome<Chart> {
+        let axis = self.resolve(e, a.id(1), "axis")?;
+        let frame = self.placement(axis.id)?;
+        let profile = self.resolve(e, a.id(0), "swept curve")?;
+        // The profile passes the same heights and radii as the face, at another azimuth.
+        let local = frame.local_point(reach.center);
+        let around = reach.grown_by(2.0 * local.x.hypot(local.y));
+        // Without edges the parameters of the surface matter, which a closed form would change.
+        if let (Ok(DirectedCurve { shape: CurveShape::Ellipse { frame: circle, a, b }, reversed: false }), false) =
+            (self.curve(profile.id, depth + 1), reach.points.is_empty())
+            && a == b
+            && let Some(chart) = revolved_circle(&frame, &circle, a)
+        {
+            return Ok(chart);
+        }
+        let (curve, line) = self.swept_curve(profile.id, around, depth)?;
+        if let Some((origin, direction)) = line
+            && let Some(chart) = revolved_line(&frame, origin, direction)
+        {
+            return Ok(chart);
+        }
+        Ok(Chart::revolution(frame, keep_face_side_of_axis(&frame, curve, reach)))
+    }
+
+    /// A SURFACE_OF_LINEAR_EXTRUSION.
+    pub(super) fn extrusion(
+        &self,
+        e: Entity<'f, 'a>,
+        a: Args<'f, 'a>,
+        reach: FaceExtent<'_>,
+        depth: usize,
+    ) -> Outcome<Chart> {
+        let axis = self.resolve(e, a.id(1), "extrusion axis")?;
+        let direction = self.vector(axis.id)?;
+        let profile = self.resolve(e, a.id(0), "swept curve")?;
+        // Moved along the direction, the face may lie anywhere beside the profile.
+        let base_point = self.curve(profile.id, depth + 1).map(|c| match c.shape {
+            CurveShape::Line { origin, .. } => origin,
+            CurveShape::Ellipse { frame, .. }
+            | CurveShape::Hyperbola { frame, .. }
+            | CurveShape::Parabola { frame, .. } => frame.origin,
+            CurveShape::Spline { .. } => reach.center,
+        });
+        let d = base_point.map_or(0.0, |b| (b - reach.center).length());
+        let (base, _) = self.swept_curve(profile.id, reach.grown_by(d), depth)?;
+        Ok(Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion))
+    }
+}
+
+/// A circle turned about an axis in its plane: a sphere, or a torus that does not touch itself.
+fn revolved_circle(frame: &Frame, circle: &Frame, radius: f64) -> Option<Chart> {
+    let (o, n) = (frame.local_point(circle.origin), frame.local_direction(circle.z.try_normalize()?));
+    let major = o.x.hypot(o.y);
+    let near = COPLANAR_MM * (1.0 + radius);
+    // The plane of the circle holds the axis: its normal is across the axis and across the way to the center.
+    if n.z.abs() > PARALLEL_AXIS || (o.x * n.x + o.y * n.y).abs() > near {
+        return None;
+    }
+    let at = Frame { origin: frame.point(Point::new(0.0, 0.0, o.z)), ..*frame };
+    let mut chart = if major <= near {
+        let (kind, analytic) =
+            (Kind::Torus { frame: at, major: 0.0, minor: radius }, Analytic::Sphere { frame: at, radius });
+        Chart::new(kind, analytic)
+    } else if major > radius {
+        Chart::new(
+            Kind::Torus { frame: at, major, minor: radius },
+            Analytic::Torus { frame: at, major, minor: radius },
+        )
+    } else {
+        return None;
+    };
+    // Around the circle from outside towards the axis direction is the sense of the torus. A circle about a point of
+    // the axis runs in both senses on its two sides; its parameter 0 says which side is meant.
+    let across = |d: Vector| Vector::new(d.x, d.y, 0.0).try_normalize();
+    let outward = if major > near {
+        across(o)?
+    } else {
+        let x = frame.local_direction(circle.x.try_normalize()?);
+        if x.x.hypot(x.y) > STEEP_RADIUS { across(x)? } else { across(n.cross(x))? }
+    };
+    chart.flipped = n.cross(outward).z < 0.0;
+    Some(chart)
+}
+
+/// A line turned about an axis in its plane: a plane, cylinder or cone, with the orientation of the revolution.
+fn revolved_line(frame: &Frame, origin: Point, direction: Vector) -> Option<Chart> {
+    let (o, d) = (frame.local_point(origin), frame.local_direction(direction.try_normalize()?));
+    // Only lines that lie in a plane through the axis.
+    let out_of_plane = o.cross(d).z.abs();
+    let r = o.x.hypot(o.y);
+    if out_of_plane > COPLANAR_MM * (1.0 + r) {
+        return None;
+    }
+    if d.x.hypot(d.y) < PARALLEL_AXIS && r > COPLANAR_MM {
+        let mut chart = Chart::cylinder(*frame, r);
+        chart.flipped = d.z < 0.0;
+        return Some(chart);
+    }
+    None
+}
