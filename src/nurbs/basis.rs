@@ -1,3 +1,5 @@
+//! B-spline basis functions and their derivatives: *The NURBS Book*, A2.1 to A2.3.
+
 /// Highest polynomial degree the program handles; real files go to 13.
 pub const MAX_DEGREE: usize = 25;
 

@@ -1,3 +1,5 @@
+//! Curvatures of a surface at a point, by its fundamental forms.
+
 use super::{SecondDerivatives, Surface};
 use crate::math::{Uv, Vector};
 

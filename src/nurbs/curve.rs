@@ -1,3 +1,5 @@
+//! Curves in space and in the parameter plane: one rational spline over either kind of control point.
+
 use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, basis_functions, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};

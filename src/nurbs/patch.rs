@@ -1,3 +1,5 @@
+//! Bézier patches: the polynomial pieces of a surface, evaluated in Bernstein form.
+
 use super::basis::{BROAD, MIDDLE, NARROW, WIDE};
 use super::{Curve, SecondDerivatives, Surface};
 use crate::math::{Aabb, Homogeneous, Uv};

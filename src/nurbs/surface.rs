@@ -1,3 +1,5 @@
+//! Rational B-spline surfaces: evaluation, derivatives, normals also at poles, isolines, parts.
+
 use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, basis_functions, find_span};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};

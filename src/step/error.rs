@@ -1,3 +1,5 @@
+//! Errors of reading a file as a whole.
+
 use std::path::PathBuf;
 
 /// Why a file could not be read at all. Faces and records that cannot be converted are no errors: they are

@@ -1,13 +1,17 @@
+//! The reading of a file from its bytes to the model and its account.
+
+use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
 use super::product::assembly::{Assembly, PlacedRepresentation};
-use super::product::conversion::{ConvertedPart, convert};
+use super::product::conversion::convert;
+use super::product::numbering::ConvertedPart;
 use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
-use super::report::{ImportReport, Note, SurfaceCounts};
+use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
 use crate::math::Frame;
-use crate::model::{Analytic, Instance, Model, PartId};
+use crate::model::{Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
 use std::time::Instant;
@@ -67,9 +71,13 @@ fn schema(file: &File<'_>) -> Vec<String> {
     (0..list.len()).filter_map(|i| list.text(i)).collect()
 }
 
-fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Model {
+/// Reads the units of all contexts: by context, and those of a representation without one.
+fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (FxHashMap<u64, Units>, Units) {
     let mut units: FxHashMap<u64, Units> = FxHashMap::default();
     let mut fallback = None;
+    let add = |list: &mut Vec<String>, name: Option<String>| {
+        list.extend(name.filter(|n| !list.contains(n)));
+    };
     for (id, mut assigned) in contexts(file) {
         if let Some(length) = settings.length_unit_mm {
             let accuracy = assigned.units.accuracy.map(|a| a / assigned.units.length * length);
@@ -79,129 +87,147 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
         if assigned.length_name.is_some() {
             fallback.get_or_insert(assigned.units);
         }
-        for (list, name) in
-            [(&mut report.units.length, assigned.length_name), (&mut report.units.angle, assigned.angle_name)]
-        {
-            if let Some(name) = name.filter(|n| !list.contains(n)) {
-                list.push(name);
-            }
-        }
+        add(&mut names.length, assigned.length_name);
+        add(&mut names.angle, assigned.angle_name);
     }
-    let common = SharedInput { file, styles: Styles::read(file), settings };
-    let assembly = Assembly::read(
-        file,
-        units,
-        fallback.unwrap_or(Units {
-            length: settings.length_unit_mm.unwrap_or(Units::DEFAULT.length),
-            ..Units::DEFAULT
-        }),
-    );
-    let (placed, assembly) = assembly.walk();
+    let length = settings.length_unit_mm.unwrap_or(Units::DEFAULT.length);
+    (units, fallback.unwrap_or(Units { length, ..Units::DEFAULT }))
+}
+
+fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Model {
+    let (units, fallback) = read_units(file, settings, &mut report.units);
+    let (placed, assembly) = Assembly::read(file, units, fallback).walk();
     report.problems.extend(assembly.problems.iter().cloned());
-    let mut model = Model { name: name.to_string(), ..Model::default() };
-    let mut parts: FxHashMap<u64, Option<(PartId, usize)>> = FxHashMap::default();
+    let mut reader = Reader {
+        file,
+        styles: Styles::read(file),
+        settings,
+        model: Model { name: name.to_string(), ..Model::default() },
+        report,
+    };
+    // A representation becomes a part where it is placed first.
+    let mut parts: FxHashMap<u64, Option<PartFaces>> = FxHashMap::default();
     let mut items_placed: FxHashMap<u64, Frame> = FxHashMap::default();
     for p in placed {
-        let known = parts.get(&p.representation).copied();
-        let entry = known.unwrap_or_else(|| {
-            let mut items = assembly.items(p.representation);
-            // Linked representations often name the same shapes; each is meant once in a place.
-            let again = |item: &u64| items_placed.get(item).is_some_and(|at| p.orphan || *at == p.placement);
-            items.retain(|item| !again(item));
-            for item in &items {
-                items_placed.entry(*item).or_insert(p.placement);
-                // Shells of models and elements of sets stand with them.
-                let mut inner = Vec::new();
-                file.entity(*item).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut inner));
-                for id in inner {
-                    items_placed.entry(id).or_insert(p.placement);
-                }
+        let entry = match parts.get(&p.representation) {
+            Some(known) => *known,
+            None => {
+                let items = items_not_placed(file, &assembly, &p, &mut items_placed);
+                let made = reader.convert_representation(assembly.units_of(p.representation), &p, &items);
+                parts.insert(p.representation, made);
+                made
             }
-            let units = assembly.units_of(p.representation);
-            let made = convert_representation(&common, units, &p, &items, &mut model, report);
-            parts.insert(p.representation, made);
-            made
-        });
-        let Some((part, found)) = entry else { continue };
-        report.faces_placed.found += found;
-        if model.part(part).face_count() == 0 {
-            continue;
+        };
+        if let Some(part) = entry {
+            reader.add_instance(part, p);
         }
-        let named = if p.name.is_empty() { model.part(part).name.clone() } else { p.name.clone() };
-        let colour = p.owners.iter().rev().find_map(|o| common.styles.colour(*o));
-        model.instances.push(Instance { name: named, part, placement: p.placement, colour });
     }
+    let Reader { model, report, .. } = reader;
+    count_model(&model, report);
+    model
+}
+
+/// Items of a representation that do not stand in its place already: linked representations often name the same shapes, each of which
+/// is meant once in a place.
+fn items_not_placed(
+    file: &File<'_>,
+    assembly: &Assembly<'_, '_>,
+    p: &PlacedRepresentation,
+    items_placed: &mut FxHashMap<u64, Frame>,
+) -> Vec<u64> {
+    let mut items = assembly.items(p.representation);
+    items.retain(|item| !items_placed.get(item).is_some_and(|place| p.orphan || *place == p.placement));
+    for item in &items {
+        items_placed.entry(*item).or_insert(p.placement);
+        // Shells of models and elements of sets stand with them.
+        let mut inner = Vec::new();
+        file.entity(*item).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut inner));
+        for id in inner {
+            items_placed.entry(id).or_insert(p.placement);
+        }
+    }
+    items
+}
+
+/// Fills in what the report says of the whole model.
+fn count_model(model: &Model, report: &mut ImportReport) {
     report.parts = model.parts.iter().filter(|p| p.face_count() > 0).count();
     report.instances = model.instances.len();
     report.shells = model.parts.iter().map(|p| p.shells.len()).sum();
     report.faces_placed.converted = model.placed_face_count();
+    let mut seen: FxHashSet<&str> = FxHashSet::default();
     for name in model.parts.iter().map(|p| &p.name).chain(model.instances.iter().map(|i| &i.name)) {
-        if !name.is_empty() && !report.names.contains(name) {
+        if !name.is_empty() && seen.insert(name) {
             report.names.push(name.clone());
         }
     }
-    model
 }
 
-/// What all parts of a file share.
-struct SharedInput<'f, 'a> {
+/// A part of the model, and the faces that the file has in it.
+#[derive(Clone, Copy)]
+struct PartFaces {
+    part: PartId,
+    found: usize,
+}
+
+/// A model under construction, with its account.
+struct Reader<'f, 'a, 'r> {
     file: &'f File<'a>,
     styles: Styles,
     settings: &'f Settings,
+    model: Model,
+    report: &'r mut ImportReport,
 }
 
-/// Converts a representation that holds shapes; `None` when it holds none.
-fn convert_representation(
-    common: &SharedInput<'_, '_>,
-    units: Units,
-    placed: &PlacedRepresentation,
-    ids: &[u64],
-    model: &mut Model,
-    report: &mut ImportReport,
-) -> Option<(PartId, usize)> {
-    let SharedInput { file, styles, settings } = common;
-    let mut items = ShapeItems::default();
-    for &id in ids {
-        items.add(file, id);
-    }
-    if items.is_empty() {
-        return None;
-    }
-    let ConvertedPart { mut part, found, refused, repaired } = convert(file, units, &items, styles, settings);
-    part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
-    part.colour = styles.colour(placed.representation);
-    report.faces.found += found;
-    report.faces.refused += refused.len();
-    report.faces.converted += found - refused.len().min(found);
-    report.faces.repaired += repaired.len();
-    let note = |r: super::geometry::Refusal| Note { id: r.id, entity: r.entity, reason: r.reason };
-    report.refusals.extend(refused.into_iter().map(note));
-    report.repairs.extend(repaired.into_iter().map(note));
-    let mut counted = FxHashSet::default();
-    for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e))) {
-        count_surface(&mut report.by_surface, &face.analytic);
-        report.gap_max_mm = report.gap_max_mm.max(face.gap);
-    }
-    report.by_surface.tessellated += part.tessellated.len();
-    model.parts.push(part);
-    Some((PartId(model.parts.len() as u32 - 1), found))
-}
+impl Reader<'_, '_, '_> {
+    /// Converts a representation that holds shapes; `None` when it holds none.
+    fn convert_representation(
+        &mut self,
+        units: Units,
+        placed: &PlacedRepresentation,
+        ids: &[u64],
+    ) -> Option<PartFaces> {
+        let mut items = ShapeItems::default();
+        for &id in ids {
+            items.add(self.file, id);
+        }
+        if items.is_empty() {
+            return None;
+        }
+        let converted = convert(self.file, units, &items, &self.styles, self.settings);
+        let ConvertedPart { mut part, found, refused, repaired } = converted;
+        part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
+        part.colour = self.styles.colour(placed.representation);
 
-fn count_surface(counts: &mut SurfaceCounts, analytic: &Analytic) {
-    let slot = match analytic {
-        Analytic::Plane { .. } => &mut counts.plane,
-        Analytic::Cylinder { .. } => &mut counts.cylinder,
-        Analytic::Cone { .. } => &mut counts.cone,
-        Analytic::Sphere { .. } => &mut counts.sphere,
-        Analytic::Torus { .. } => &mut counts.torus,
-        Analytic::Revolution => &mut counts.revolution,
-        Analytic::Extrusion => &mut counts.extrusion,
-        Analytic::Offset => &mut counts.offset,
-        Analytic::Bspline => &mut counts.bspline,
-        Analytic::Rational => &mut counts.rational,
-        _ => &mut counts.other,
-    };
-    *slot += 1;
+        let report = &mut *self.report;
+        report.faces.found += found;
+        report.faces.refused += refused.len();
+        report.faces.converted += found - refused.len().min(found);
+        report.faces.repaired += repaired.len();
+        let note = |r: Refusal| Note { id: r.id, entity: r.entity, reason: r.reason };
+        report.refusals.extend(refused.into_iter().map(note));
+        report.repairs.extend(repaired.into_iter().map(note));
+        let mut counted = FxHashSet::default();
+        for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e)))
+        {
+            report.by_surface.count(face.analytic.kind());
+            report.gap_max_mm = report.gap_max_mm.max(face.gap);
+        }
+        report.by_surface.tessellated += part.tessellated.len();
+        self.model.parts.push(part);
+        Some(PartFaces { part: PartId(self.model.parts.len() as u32 - 1), found })
+    }
+
+    /// Places a part.
+    fn add_instance(&mut self, PartFaces { part, found }: PartFaces, p: PlacedRepresentation) {
+        self.report.faces_placed.found += found;
+        if self.model.part(part).face_count() == 0 {
+            return;
+        }
+        let name = if p.name.is_empty() { self.model.part(part).name.clone() } else { p.name };
+        let colour = p.owners.iter().rev().find_map(|o| self.styles.colour(*o));
+        self.model.instances.push(Instance { name, part, placement: p.placement, colour });
+    }
 }
 
 /// Largest resident size of this process; 0 where the system does not tell.

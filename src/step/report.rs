@@ -1,3 +1,6 @@
+//! The account of an import, as `info --json` prints it.
+
+use crate::model::SurfaceKind;
 use serde::Serialize;
 
 /// What a file holds and what could not be read: the object of `info --json`.
@@ -88,6 +91,27 @@ pub struct SurfaceCounts {
     pub rational: usize,
     pub tessellated: usize,
     pub other: usize,
+}
+
+impl SurfaceCounts {
+    /// Counts one more face of a kind.
+    pub(super) fn count(&mut self, kind: SurfaceKind) {
+        let slot = match kind {
+            SurfaceKind::Plane => &mut self.plane,
+            SurfaceKind::Cylinder => &mut self.cylinder,
+            SurfaceKind::Cone => &mut self.cone,
+            SurfaceKind::Sphere => &mut self.sphere,
+            SurfaceKind::Torus => &mut self.torus,
+            SurfaceKind::Revolution => &mut self.revolution,
+            SurfaceKind::Extrusion => &mut self.extrusion,
+            SurfaceKind::Offset => &mut self.offset,
+            SurfaceKind::Bspline => &mut self.bspline,
+            SurfaceKind::Rational => &mut self.rational,
+            SurfaceKind::Tessellated => &mut self.tessellated,
+            SurfaceKind::Other => &mut self.other,
+        };
+        *slot += 1;
+    }
 }
 
 /// A remark about an entity.

@@ -1,3 +1,5 @@
+//! Settings of an import.
+
 /// How a file is read.
 #[derive(Clone, Debug)]
 pub struct Settings {

@@ -1,3 +1,5 @@
+//! The one pass over the text: statements into the arena of values, faults noted and stepped over.
+
 use super::{Fault, File, Index, Instance, Record, Span, Value, number::number};
 use crate::step::{Error, ErrorKind};
 use rustc_hash::FxHashMap;

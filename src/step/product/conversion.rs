@@ -1,6 +1,8 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
+use super::free_surfaces::convert_free_surfaces;
 use super::loop_order::{DirectedUse, put_in_order};
+use super::numbering::{ConvertedPart, add_face};
 use super::orientation::is_inside_out;
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
@@ -13,23 +15,29 @@ use crate::step::geometry::units::Units;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{BuiltFace, build_face, trim_loops};
+use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
-use crate::step::trim::loops::Source;
 use crate::step::trim::task::FaceTask;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// A part with the account of its conversion.
-#[derive(Debug, Default)]
-pub(crate) struct ConvertedPart {
-    pub(crate) part: Part,
-    /// Faces the file has, distinct.
-    pub(crate) found: usize,
-    pub(crate) refused: Vec<Refusal>,
-    /// Faces that were repaired, and how.
-    pub(crate) repaired: Vec<Refusal>,
-}
+/// Least and most that a file's stated accuracy counts for, mm: zero and metres are both written.
+const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+/// Share of a face's size above which a stated accuracy would merge its own edges.
+const ACCURACY_SHARE: f64 = 1e-3;
+/// Faces smaller than this count as this large there, mm.
+const SMALLEST_FACE_MM: f64 = 1e-3;
+/// Ends of edges this many of their gaps apart are one, up to a gap of [`LARGEST_GAP_MM`].
+const GAPS: f64 = 2.0;
+/// See [`GAPS`]; mm.
+const LARGEST_GAP_MM: f64 = 0.05;
+/// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
+/// below the length of an edge that is run the wrong way.
+const FOLLOWING_SHARE: f64 = 0.1;
+/// An edge shorter than this has no length, mm.
+const EMPTY_EDGE_MM: f64 = 1e-9;
+/// Edges of a face whose places are asked for where a surface may touch its own axis.
+const ASKED_EDGES: usize = 64;
 
 /// Converts the items of a representation.
 pub(crate) fn convert(
@@ -42,7 +50,8 @@ pub(crate) fn convert(
     let geometry = Geometry { file, units };
     let mut out = ConvertedPart { refused: items.refused.clone(), ..ConvertedPart::default() };
     out.found += items.refused.len();
-    // A face that occurs in several shells is converted once.
+
+    // What to convert: a face that occurs in several shells, and an edge that bounds several faces, once.
     let mut seen = FxHashSet::default();
     let ids: Vec<u64> =
         items.shells.iter().flat_map(|s| &s.faces).map(|f| f.0).filter(|f| seen.insert(*f)).collect();
@@ -50,22 +59,50 @@ pub(crate) fn convert(
     let plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, read_face(file, id))).collect();
     let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
     let (keys, index) = number_edges(in_order);
+
     let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
-    let built: Vec<(u64, Outcome<BuiltFace>)> = ids
-        .par_iter()
-        .map(|id| {
-            let plan = match &plans[id] {
-                Ok(plan) => plan,
-                Err(refusal) => return (*id, Err(refusal.clone())),
-            };
-            (*id, convert_face(&geometry, *id, plan, &edges, &index, settings))
-        })
-        .collect();
+    let convert_one = |id: &u64| {
+        let plan = plans[id].as_ref().map_err(Refusal::clone);
+        (*id, plan.and_then(|plan| convert_face(&geometry, *id, plan, &edges, &index, settings)))
+    };
+    let built: Vec<(u64, Outcome<BuiltFace>)> = ids.par_iter().map(convert_one).collect();
+
     // Edges move into the part only now: a second copy of them, and of the faces below, took the peak of a 30 MB file
     // from 103 to 117 MiB.
     let mut part = Part::default();
+    let numbers = add_edges(&geometry, &keys, edges, &mut part);
+    let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
+    for (id, outcome) in built {
+        match outcome {
+            Ok(built) => {
+                if !built.repairs.is_empty() {
+                    out.repaired.push(remark(file, id, built.repairs.join("; ")));
+                }
+                let name = plans[&id].as_ref().map(|p| p.name.clone()).unwrap_or_default();
+                faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
+            }
+            Err(refusal) => out.refused.push(refusal),
+        }
+    }
+    add_shells(file, items, faces, styles, &mut part, &mut out);
+    convert_free_surfaces(&geometry, items, styles, settings, &mut part, &mut out);
+    out.part = part;
+    out
+}
+
+/// A remark about an instance of the file.
+fn remark(file: &File<'_>, id: u64, reason: String) -> Refusal {
+    Refusal { id, entity: file.entity(id).map(|e| e.name()).unwrap_or_default(), reason }
+}
+
+/// Moves edges into the part; their numbers there, none for edges without length or that failed.
+fn add_edges(
+    geometry: &Geometry<'_, '_>,
+    keys: &[EdgeKey],
+    edges: Vec<Outcome<TrimmedEdge>>,
+    part: &mut Part,
+) -> Vec<Option<EdgeId>> {
     let mut vertices: FxHashMap<u64, VertexId> = FxHashMap::default();
-    // Positions of edges in the part; edges without length or that failed have none.
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
         let Ok(TrimmedEdge { curve: Some(curve), .. }) = edge else {
@@ -73,7 +110,7 @@ pub(crate) fn convert(
             continue;
         };
         let [a, b] = curve.domain();
-        let ends = vertex_ids(file, *key);
+        let ends = vertex_ids(geometry.file, *key);
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             *vertices.entry(id).or_insert_with(|| {
                 part.vertices.push(geometry.vertex(id).unwrap_or_else(|_| curve.evaluate(t)));
@@ -84,56 +121,52 @@ pub(crate) fn convert(
         numbers.push(Some(EdgeId(part.edges.len() as u32)));
         part.edges.push(Edge { curve, vertices, entity });
     }
-    let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
-    for (id, outcome) in built {
-        match outcome {
-            Ok(built) => {
-                if !built.repairs.is_empty() {
-                    let entity = file.entity(id).map(|e| e.name()).unwrap_or_default();
-                    out.repaired.push(Refusal { id, entity, reason: built.repairs.join("; ") });
-                }
-                let name = plans[&id].as_ref().map(|p| p.name.clone()).unwrap_or_default();
-                faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
-            }
-            Err(refusal) => out.refused.push(refusal),
-        }
-    }
+    numbers
+}
+
+/// Puts the faces into their shells; the shell of a solid that is inside out is turned.
+fn add_shells(
+    file: &File<'_>,
+    items: &ShapeItems,
+    mut faces: FxHashMap<u64, Face>,
+    styles: &Styles,
+    part: &mut Part,
+    out: &mut ConvertedPart,
+) {
+    // A face moves into the last shell that has it, and is copied into those before.
     let mut left: FxHashMap<u64, usize> = FxHashMap::default();
     items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
     // A void without the shell around it stands alone.
     let mut enclosed = false;
     for plan in &items.shells {
         let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
-        let own = plan.faces.iter().filter_map(|(id, flip)| {
+        let mut own: Vec<Face> = Vec::with_capacity(plan.faces.len());
+        for (id, flip) in &plan.faces {
             let uses = left.entry(*id).or_default();
             *uses = uses.saturating_sub(1);
-            let mut face = if *uses == 0 { faces.remove(id)? } else { faces.get(id)?.clone() };
+            let face = if *uses == 0 { faces.remove(id) } else { faces.get(id).cloned() };
+            let Some(mut face) = face else { continue };
             face.reversed ^= flip;
             face.layer = face.layer.or_else(|| layer.clone());
-            Some(face)
-        });
-        let mut own: Vec<Face> = own.collect();
+            own.push(face);
+        }
+        // Only a whole shell tells by its volume which way it faces.
         if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
-            let id = plan.owners.first().copied().unwrap_or_default();
-            let entity = file.entity(id).map(|e| e.name()).unwrap_or_default();
-            out.repaired.push(Refusal { id, entity, reason: "the shell of a solid was inside out".into() });
+            let owner = plan.owners.first().copied().unwrap_or_default();
+            out.repaired.push(remark(file, owner, "the shell of a solid was inside out".into()));
         }
-        let shell = Shell {
-            faces: own,
-            closed: plan.closed,
-            void: plan.void && enclosed,
-            colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
-            name: plan.name.clone(),
-        };
-        enclosed = if plan.void { enclosed } else { !shell.faces.is_empty() };
-        if !shell.faces.is_empty() {
-            part.shells.push(shell);
+        enclosed = if plan.void { enclosed } else { !own.is_empty() };
+        if !own.is_empty() {
+            part.shells.push(Shell {
+                faces: own,
+                closed: plan.closed,
+                void: plan.void && enclosed,
+                colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
+                name: plan.name.clone(),
+            });
         }
     }
-    super::free_surfaces::convert_free_surfaces(&geometry, items, styles, settings, &mut part, &mut out);
-    out.part = part;
-    out
 }
 
 /// Vertex entities of an edge.
@@ -154,9 +187,63 @@ fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge>
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();
-            Ok(TrimmedEdge { curve: (length > 1e-9).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
+            Ok(TrimmedEdge { curve: (length > EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
         }
     }
+}
+
+/// The edges of a face, in the order of its loops.
+struct FaceEdges<'e> {
+    curves: FxHashMap<usize, &'e Curve>,
+    /// Number of the edge, and whether the loop runs against it.
+    loops: Vec<Vec<(usize, bool)>>,
+    bounds: Aabb,
+    /// Largest distance of an edge's ends from its vertices, mm.
+    gap: f64,
+    repairs: Vec<&'static str>,
+}
+
+/// Collects the edges of a face and puts each loop in order.
+fn face_edges<'e>(
+    plan: &FacePlan,
+    edges: &'e [Outcome<TrimmedEdge>],
+    index: &FxHashMap<EdgeKey, usize>,
+) -> Result<FaceEdges<'e>, &'e Refusal> {
+    let mut found = FaceEdges {
+        curves: FxHashMap::default(),
+        loops: Vec::with_capacity(plan.loops.len()),
+        bounds: Aabb::EMPTY,
+        gap: 0.0,
+        repairs: Vec::new(),
+    };
+    for uses in &plan.loops {
+        let mut kept: Vec<DirectedUse<usize>> = Vec::with_capacity(uses.len());
+        for (key, reversed) in uses {
+            let k = index[key];
+            let edge = edges[k].as_ref()?;
+            found.gap = found.gap.max(edge.gap);
+            let Some(curve) = &edge.curve else { continue };
+            found.bounds = found.bounds.union(curve.bounds());
+            found.curves.entry(k).or_insert(curve);
+            let [a, b] = curve.domain().map(|t| curve.evaluate(t));
+            let (from, to) = if *reversed { (b, a) } else { (a, b) };
+            kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
+        }
+        let lengths = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
+        let tolerance = (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(ACCURACY_MM[0]);
+        found.repairs.extend(put_in_order(&mut kept, tolerance));
+        if !kept.is_empty() {
+            found.loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
+        }
+    }
+    Ok(found)
+}
+
+/// Whether the edges must say which part of a surface is meant: of one that may touch its own axis.
+fn asks_for_edges(file: &File<'_>, surface: u64) -> bool {
+    let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
+    let known = |k: &str| simple.iter().any(|s| k.starts_with(s));
+    file.entity(surface).is_some_and(|e| !e.keywords().any(known))
 }
 
 fn convert_face(
@@ -168,57 +255,33 @@ fn convert_face(
     settings: &Settings,
 ) -> Outcome<BuiltFace> {
     let entity = geometry.entity(id)?;
-    let mut shapes: FxHashMap<usize, &Curve> = FxHashMap::default();
-    let mut loops = Vec::with_capacity(plan.loops.len());
-    let mut bounds = Aabb::EMPTY;
-    let mut edge_gap = 0f64;
-    let mut repairs = Vec::new();
-    for uses in &plan.loops {
-        let mut kept: Vec<DirectedUse<usize>> = Vec::with_capacity(uses.len());
-        for (key, reversed) in uses {
-            let k = index[key];
-            let edge = edges[k].as_ref().map_err(|r| Refusal {
-                id,
-                entity: entity.name(),
-                reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
-            })?;
-            edge_gap = edge_gap.max(edge.gap);
-            let Some(curve) = &edge.curve else { continue };
-            bounds = bounds.union(curve.bounds());
-            shapes.entry(k).or_insert(curve);
-            let [a, b] = curve.domain().map(|t| curve.evaluate(t));
-            let (from, to) = if *reversed { (b, a) } else { (a, b) };
-            kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
-        }
-        // Far above the gaps of real files, far below the length of an edge that is run the wrong way.
-        let shortest = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > 1e-9).fold(1.0, f64::min);
-        repairs.extend(put_in_order(&mut kept, (0.1 * shortest).max(1e-6)));
-        if !kept.is_empty() {
-            loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
-        }
-    }
-    // Only what may touch its own axis asks where the edges run.
-    let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
-    let asks = !geometry.entity(plan.surface)?.keywords().any(|k| simple.iter().any(|s| k.starts_with(s)));
+    let blame = |r: &Refusal| Refusal {
+        id,
+        entity: entity.name(),
+        reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
+    };
+    let FaceEdges { curves, loops, bounds, gap, repairs } = face_edges(plan, edges, index).map_err(blame)?;
+
+    // The surface, as much of it as the edges need.
+    geometry.entity(plan.surface)?;
+    let asked = if asks_for_edges(geometry.file, plan.surface) { ASKED_EDGES } else { 0 };
     let along = |curve: &&Curve| {
         let [a, b] = curve.domain();
         [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| curve.evaluate(a + f * (b - a)))
     };
-    let points: Vec<Point> = shapes.values().take(if asks { 64 } else { 0 }).flat_map(along).collect();
-    let reach = FaceExtent::from_bounds(bounds, &points);
-    let chart = geometry.chart(plan.surface, reach, 0).map_err(|r| Refusal {
-        id,
-        entity: entity.name(),
-        reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
-    })?;
-    let stated = geometry.units.accuracy.unwrap_or(1e-6).clamp(1e-6, 1e-2);
+    let points: Vec<Point> = curves.values().take(asked).flat_map(along).collect();
+    let chart = geometry.chart(plan.surface, FaceExtent::from_bounds(bounds, &points), 0).map_err(|r| blame(&r))?;
+
+    // Points are one within what the file states, less on small faces, more where its edges leave gaps.
+    let stated = geometry.units.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
+    let accuracy = stated.min(ACCURACY_SHARE * bounds.diagonal().max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0]);
     let task = FaceTask {
         chart,
         same_sense: plan.same_sense,
         loops,
-        edges: shapes,
+        edges: curves,
         tolerance: settings.uv_tolerance,
-        accuracy: stated.min(1e-3 * bounds.diagonal().max(1e-3)).max(1e-6).max(2.0 * edge_gap.min(0.05)),
+        accuracy: accuracy.max(GAPS * gap.min(LARGEST_GAP_MM)),
         budget: Budget::new(settings.face_budget),
         implicit_outer: false,
     };
@@ -228,59 +291,4 @@ fn convert_face(
     })?;
     built.repairs.extend(repairs.into_iter().map(String::from));
     Ok(built)
-}
-
-/// Numbers a built face's seams and vertices into the part.
-pub(crate) fn add_face(
-    built: BuiltFace,
-    id: u64,
-    name: String,
-    part: &mut Part,
-    numbers: &[Option<EdgeId>],
-    styles: &Styles,
-) -> Face {
-    // Vertices that the face knows; ends of seams are looked up among them.
-    let sources =
-        built.loops.iter().flatten().filter_map(|u| if let Source::Edge(e) = u.source { numbers[e] } else { None });
-    let mut known: Vec<VertexId> = sources.flat_map(|e| part.edges[e.0 as usize].vertices).collect();
-    known.sort();
-    known.dedup();
-    let near = 1e-5 + 4.0 * built.gap.min(0.1);
-    let seams: Vec<EdgeId> = built
-        .seams
-        .into_iter()
-        .map(|seam| {
-            let vertices = seam.ends.map(|p| {
-                let distance = |v: &VertexId| (part.vertices[v.0 as usize] - p).length();
-                let found = known.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-                match found.filter(|v| distance(v) <= near) {
-                    Some(v) => v,
-                    None => {
-                        part.vertices.push(p);
-                        let v = VertexId(part.vertices.len() as u32 - 1);
-                        known.push(v);
-                        v
-                    }
-                }
-            });
-            part.edges.push(Edge { curve: seam.curve, vertices, entity: None });
-            EdgeId(part.edges.len() as u32 - 1)
-        })
-        .collect();
-    let loops = trim_loops(built.loops, |source| match source {
-        Source::Edge(e) => numbers[e],
-        Source::Seam(k) => Some(seams[k]),
-        Source::Nothing => None,
-    });
-    Face {
-        name,
-        entity: Some(id),
-        colour: styles.colour(id),
-        layer: styles.layer(id),
-        surface: built.surface,
-        analytic: built.analytic,
-        reversed: built.reversed,
-        loops,
-        gap: built.gap,
-    }
 }

@@ -1,6 +1,6 @@
 //! Surfaces without a face (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
 
-use super::conversion::{ConvertedPart, add_face};
+use super::numbering::{ConvertedPart, add_face};
 use super::styles::Styles;
 use super::tessellated::TessellatedItems;
 use super::topology::ShapeItems;
@@ -17,6 +17,11 @@ use crate::step::trim::fit::Budget;
 use crate::step::trim::task::FaceTask;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+
+/// Boundaries of geometric sets meet loosely: real files leave 1e-3 mm.
+const LOOSE_BOUNDARY_MM: f64 = 1e-3;
+/// A rectangle short of a whole period by less than this share of it is whole.
+const PERIOD_SLACK: f64 = 1e-9;
 
 /// A built face with its boundary curves.
 type Bounded = (BuiltFace, Vec<Vec<Curve>>);
@@ -94,7 +99,7 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
             let range = trim_rectangle(geometry, e, &chart)?;
             for d in 0..2 {
                 let [a, b] = range[d];
-                if chart.period[d].is_none_or(|p| b - a < p * (1.0 - 1e-9)) {
+                if chart.period[d].is_none_or(|p| b - a < p * (1.0 - PERIOD_SLACK)) {
                     chart.period[d] = None;
                     chart.poles.retain(|pole| pole.fixed != d || pole.at == a || pole.at == b);
                     chart.range[d] = range[d];
@@ -129,8 +134,7 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
         loops,
         edges,
         tolerance: settings.uv_tolerance,
-        // Boundaries of geometric sets meet loosely: real files leave 1e-3 mm.
-        accuracy: 1e-3,
+        accuracy: LOOSE_BOUNDARY_MM,
         budget: Budget::new(settings.face_budget),
         implicit_outer: false,
     }

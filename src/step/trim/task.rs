@@ -6,6 +6,7 @@ use crate::math::{Uv, Vector};
 use crate::nurbs::Curve;
 use crate::step::chart::{Chart, Kind};
 use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry;
 
 /// A face to be built.
 pub(crate) struct FaceTask<'e> {
@@ -39,8 +40,8 @@ impl FaceTask<'_> {
         let mut fits: FxHashMap<usize, Fit> = FxHashMap::default();
         for &(edge, _) in self.loops.iter().flatten() {
             // An edge that is run twice, along a seam, is fitted once.
-            if !fits.contains_key(&edge) {
-                fits.insert(edge, self.fit_edge(self.edges[&edge])?);
+            if let Entry::Vacant(slot) = fits.entry(edge) {
+                slot.insert(self.fit_edge(self.edges[&edge])?);
             }
         }
         Ok(fits)

@@ -1,0 +1,80 @@
+//! A part under construction: faces come in with their seams and vertices numbered, and every refusal is kept.
+
+use super::styles::Styles;
+use crate::model::{Edge, EdgeId, Face, Part, VertexId};
+use crate::step::geometry::Refusal;
+use crate::step::trim::face::{BuiltFace, trim_loops};
+use crate::step::trim::loops::Source;
+
+/// Ends of a seam this near to a vertex of the face are that vertex, mm; gaps of the file add to it.
+const SEAM_END_MM: f64 = 1e-5;
+/// How many gaps they may lie apart, and the largest gap that counts, mm.
+const GAPS: f64 = 4.0;
+/// See [`GAPS`].
+const LARGEST_GAP_MM: f64 = 0.1;
+
+/// A part with the account of its conversion.
+#[derive(Debug, Default)]
+pub(crate) struct ConvertedPart {
+    pub(crate) part: Part,
+    /// Faces the file has, distinct.
+    pub(crate) found: usize,
+    pub(crate) refused: Vec<Refusal>,
+    /// Faces that were repaired, and how.
+    pub(crate) repaired: Vec<Refusal>,
+}
+
+/// Numbers a built face's seams and vertices into the part.
+pub(crate) fn add_face(
+    built: BuiltFace,
+    id: u64,
+    name: String,
+    part: &mut Part,
+    numbers: &[Option<EdgeId>],
+    styles: &Styles,
+) -> Face {
+    // Vertices that the face knows; ends of seams are looked up among them.
+    let sources =
+        built.loops.iter().flatten().filter_map(|u| if let Source::Edge(e) = u.source { numbers[e] } else { None });
+    let mut known: Vec<VertexId> = sources.flat_map(|e| part.edges[e.0 as usize].vertices).collect();
+    known.sort();
+    known.dedup();
+    let near = SEAM_END_MM + GAPS * built.gap.min(LARGEST_GAP_MM);
+    let seams: Vec<EdgeId> = built
+        .seams
+        .into_iter()
+        .map(|seam| {
+            let vertices = seam.ends.map(|p| {
+                let distance = |v: &VertexId| (part.vertices[v.0 as usize] - p).length();
+                let found = known.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+                match found.filter(|v| distance(v) <= near) {
+                    Some(v) => v,
+                    None => {
+                        part.vertices.push(p);
+                        let v = VertexId(part.vertices.len() as u32 - 1);
+                        known.push(v);
+                        v
+                    }
+                }
+            });
+            part.edges.push(Edge { curve: seam.curve, vertices, entity: None });
+            EdgeId(part.edges.len() as u32 - 1)
+        })
+        .collect();
+    let loops = trim_loops(built.loops, |source| match source {
+        Source::Edge(e) => numbers[e],
+        Source::Seam(k) => Some(seams[k]),
+        Source::Nothing => None,
+    });
+    Face {
+        name,
+        entity: Some(id),
+        colour: styles.colour(id),
+        layer: styles.layer(id),
+        surface: built.surface,
+        analytic: built.analytic,
+        reversed: built.reversed,
+        loops,
+        gap: built.gap,
+    }
+}
