@@ -151,10 +151,12 @@ impl Face {
         let sweep = Sweep { face: self, breaks };
         if self.loops.is_empty() {
             let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
-            return sides.map(|side| sweep.along(&side)).sum::<f64>().abs();
+            return sides.map(|side| sweep.area_left_of(&side)).sum::<f64>().abs();
         }
         let uses = self.loops.iter().flat_map(|l| &l.uses);
-        uses.map(|u| if u.reversed { -sweep.along(&u.uv) } else { sweep.along(&u.uv) }).sum::<f64>().abs()
+        uses.map(|u| if u.reversed { -sweep.area_left_of(&u.uv) } else { sweep.area_left_of(&u.uv) })
+            .sum::<f64>()
+            .abs()
     }
 }
 
@@ -167,7 +169,7 @@ struct Sweep<'f> {
 
 impl Sweep<'_> {
     /// Signed area to the left of a curve: the integral of the row areas over dv.
-    fn along(&self, curve: &UvCurve) -> f64 {
+    fn area_left_of(&self, curve: &UvCurve) -> f64 {
         let mut sum = 0.0;
         for span in curve.breakpoints().windows(2) {
             let width = (span[1] - span[0]) / PIECES as f64;

@@ -4,9 +4,12 @@ use super::{ControlPoint, Curve};
 use crate::math::{Frame, Homogeneous, Point};
 use std::f64::consts::FRAC_PI_2;
 
+/// An arc longer than a multiple of 90° by this share of 90° still has that many pieces: a full turn in rounded radians has four.
+const PIECE_SLACK: f64 = 1e-9;
+
 /// Breakpoints of an arc: pieces of at most 90°.
 fn breakpoints([a, b]: [f64; 2]) -> Vec<f64> {
-    let pieces = ((b - a) / FRAC_PI_2 - 1e-9).ceil().max(1.0) as usize;
+    let pieces = ((b - a) / FRAC_PI_2 - PIECE_SLACK).ceil().max(1.0) as usize;
     (0..=pieces).map(|i| if i == pieces { b } else { a + (b - a) * i as f64 / pieces as f64 }).collect()
 }
 

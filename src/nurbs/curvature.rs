@@ -3,6 +3,9 @@
 use super::{SecondDerivatives, Surface};
 use crate::math::{Uv, Vector};
 
+/// Derivatives whose product, or whose ratio, is below this share span no plane: curvatures would be rounding.
+const SINGULAR: f64 = 1e-9;
+
 /// First and second fundamental form of a surface at a point, with respect to `Su × Sv`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FundamentalForms {
@@ -19,7 +22,7 @@ impl FundamentalForms {
     pub fn new(d: &SecondDerivatives) -> Option<Self> {
         let n = d.du.cross(d.dv);
         let (lu, lv) = (d.du.length(), d.dv.length());
-        let spans = n.length() > 1e-9 * lu * lv && lu.min(lv) > 1e-9 * lu.max(lv);
+        let spans = n.length() > SINGULAR * lu * lv && lu.min(lv) > SINGULAR * lu.max(lv);
         let normal = n.try_normalize().filter(|_| spans)?;
         Some(Self {
             first: [d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv)],

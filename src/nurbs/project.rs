@@ -11,6 +11,8 @@ use crate::math::Point;
 
 /// Samples of each Bézier span that seed the search.
 const SEEDS: usize = 8;
+/// Steps below this share of the domain end: a few units in the last place.
+const CONVERGED_SHARE: f64 = 1e-15;
 
 /// The parameter of the point of the curve that is nearest to `p`, and the distance.
 pub fn nearest(curve: &Curve, p: Point) -> (f64, f64) {
@@ -30,7 +32,6 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
             return found;
         }
     }
-    let zero = offset(Point::ZERO);
     let [t0, t1] = curve.domain();
     let mut best = (t0, f64::INFINITY);
     let pieces = curve.bezier_pieces();
@@ -49,12 +50,11 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
         }
     }
     seeds.push((t1, offset(curve.evaluate(t1)).length_squared()));
-    let _ = zero;
     for i in 0..seeds.len() {
         let d = seeds[i].1;
         let lower = (i == 0 || d <= seeds[i - 1].1) && (i + 1 == seeds.len() || d <= seeds[i + 1].1);
         // A dip between samples cannot be much below its samples unless they are near: try the promising ones.
-        if lower && d.sqrt() <= 2.0 * best.1 + 1e-300 || best.1.is_infinite() {
+        if lower && d.sqrt() <= 2.0 * best.1 + f64::MIN_POSITIVE || best.1.is_infinite() {
             let found = descend_from(curve, &offset, seeds[i].0);
             if found.1 < best.1 {
                 best = found;
@@ -86,7 +86,7 @@ fn descend_from(curve: &Curve, offset: &impl Fn(Point) -> Point, start: f64) -> 
             let next = (t + step).clamp(t0, t1);
             let distance = offset(curve.evaluate(next)).length();
             if distance <= at {
-                moved = (next - t).abs() > 1e-15 * (t1 - t0) && distance < at;
+                moved = (next - t).abs() > CONVERGED_SHARE * (t1 - t0) && distance < at;
                 t = next;
                 at = distance;
                 break;

@@ -14,6 +14,13 @@ use crate::math::{Homogeneous, Point};
 /// Most control points in one spline: 2²⁴ would be 0.5 GB.
 const MAX_POINTS: usize = 1 << 22;
 
+/// Weights below this share of the largest are none: a point of weight 0 lies at infinity.
+const SMALLEST_WEIGHT: f64 = 1e-12;
+/// Largest coordinate, mm: of differences that matter, 1e-1 mm and more, nothing is left of a double beyond it.
+const LARGEST_COORDINATE_MM: f64 = 1e15;
+/// Knots nearer than this share of the domain are one knot.
+const SAME_KNOT: f64 = 1e-10;
+
 /// Control points of several lines, their common knots, and what was changed.
 type Conformed = (Vec<Vec<Homogeneous>>, Vec<f64>, Repairs);
 
@@ -89,7 +96,7 @@ pub fn curve(
     let points = homogeneous(points, weights)?;
     let (knots, fixed) = check_knots(degree, knots, points.len())?;
     let (lines, knots, repairs) = conform(degree, knots, vec![points], fixed)?;
-    let points = lines.into_iter().next().unwrap_or_default();
+    let points = lines.into_iter().next().ok_or(Defect::Counts)?;
     Ok((Curve { degree, knots, points }, repairs))
 }
 
@@ -134,9 +141,9 @@ fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogene
         .enumerate()
         .map(|(i, &p)| {
             let w = weight(i);
-            if !(w > 1e-12) {
+            if !(w > SMALLEST_WEIGHT) {
                 Err(Defect::Weights)
-            } else if !(p.is_finite() && p.abs().max_element() < 1e15) {
+            } else if !(p.is_finite() && p.abs().max_element() < LARGEST_COORDINATE_MM) {
                 Err(Defect::Points)
             } else {
                 Ok(Homogeneous::weighted(p, w))
@@ -163,7 +170,7 @@ fn check_knots(degree: usize, mut knots: Vec<f64>, points: usize) -> Result<(Vec
     }
     // Differences below rounding of the parameter itself are noise as well.
     let magnitude = knots[0].abs().max(knots[knots.len() - 1].abs());
-    let same = (1e-10 * extent).max(4.0 * f64::EPSILON * magnitude);
+    let same = (SAME_KNOT * extent).max(4.0 * f64::EPSILON * magnitude);
     for i in 1..knots.len() {
         let step = knots[i] - knots[i - 1];
         if step < -same {

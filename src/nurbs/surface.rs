@@ -4,6 +4,15 @@ use super::basis::{BROAD, Basis, MIDDLE, NARROW, WIDE, basis, basis_functions, f
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 
+/// Derivatives whose product, or whose ratio over the whole domain, is below this share span no plane of their own.
+const NO_PLANE: f64 = 1e-10;
+/// A derivative below this share of the other vanishes: the limit along the mixed derivative is taken.
+const VANISHING: f64 = 1e-8;
+/// How far inside the domain the normal is taken where no limit tells, as a share of it.
+const INSIDE_SHARE: f64 = 1e-4;
+/// Derivatives inside the domain whose product is below this share have no normal.
+const NO_NORMAL: f64 = 1e-12;
+
 /// A rational B-spline surface with clamped ends in both directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
@@ -157,11 +166,11 @@ impl Surface {
     pub fn normal(&self, uv: Uv) -> Option<Vector> {
         let d = self.derivatives(uv);
         let n = d.du.cross(d.dv);
-        if n.length() > 1e-10 * d.du.length() * d.dv.length() && n.length_squared() > 0.0 {
+        if n.length() > NO_PLANE * d.du.length() * d.dv.length() && n.length_squared() > 0.0 {
             // Over the whole domain, in lengths that compare: at the apex of a cone 850 m long what rounding leaves of Su was 1e-10 of Sv.
             let [[u0, u1], [v0, v1]] = self.domain();
             let (lu, lv) = (d.du.length() * (u1 - u0), d.dv.length() * (v1 - v0));
-            if lu.min(lv) > 1e-10 * lu.max(lv) {
+            if lu.min(lv) > NO_PLANE * lu.max(lv) {
                 return n.try_normalize();
             }
         }
@@ -177,15 +186,15 @@ impl Surface {
         let inward_v = if uv.y > 0.5 * (v0 + v1) { -1.0 } else { 1.0 };
         // Comparable lengths: derivatives times the extent of the domain.
         let (lu, lv) = (d.du.length() * (u1 - u0), d.dv.length() * (v1 - v0));
-        let n = if lu < 1e-8 * lv { d.duv.cross(d.dv) * inward_v } else { d.du.cross(d.duv) * inward_u };
+        let n = if lu < VANISHING * lv { d.duv.cross(d.dv) * inward_v } else { d.du.cross(d.duv) * inward_u };
         let reference = d.duv.length() * d.du.length().max(d.dv.length());
-        if lu.min(lv) < 1e-8 * lu.max(lv) && n.length() > 1e-8 * reference {
+        if lu.min(lv) < VANISHING * lu.max(lv) && n.length() > VANISHING * reference {
             return n.try_normalize();
         }
-        let moved = uv + 1e-4 * Uv::new((u1 - u0) * inward_u, (v1 - v0) * inward_v);
+        let moved = uv + INSIDE_SHARE * Uv::new((u1 - u0) * inward_u, (v1 - v0) * inward_v);
         let d = self.derivatives(moved);
         let n = d.du.cross(d.dv);
-        (n.length() > 1e-12 * d.du.length() * d.dv.length()).then(|| n.try_normalize()).flatten()
+        (n.length() > NO_NORMAL * d.du.length() * d.dv.length()).then(|| n.try_normalize()).flatten()
     }
 
     /// A box that contains the surface: that of its control points.

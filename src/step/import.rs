@@ -48,7 +48,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     let mut report = ImportReport { file: name.to_string(), bytes: bytes.len() as u64, ..ImportReport::default() };
     report.schema = schema(&file);
     for fault in &file.faults {
-        let id = fault.id.map(|id| format!(" #{id}")).unwrap_or_default();
+        let id = fault.id.map_or_else(String::new, |id| format!(" #{id}"));
         report.problems.push(format!("{name}: line {}:{id} {}", fault.line, fault.what));
     }
     if file.fault_count > file.faults.len() {

@@ -1,5 +1,8 @@
 //! Settings of an import.
 
+/// Far below any tolerance of meshing, 1e-3 mm at the finest, so that uv curves never show in it.
+const UV_TOLERANCE_MM: f64 = 1e-6;
+
 /// How a file is read.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -14,6 +17,6 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { uv_tolerance: 1e-6, face_budget: 3_000_000, length_unit_mm: None }
+        Self { uv_tolerance: UV_TOLERANCE_MM, face_budget: 3_000_000, length_unit_mm: None }
     }
 }

@@ -6,7 +6,7 @@ use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
+use lampyris::model::{Face, Instance, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
 use lampyris::simulate::{Results, RunSettings, Scene, simulate};
 use lampyris::step;

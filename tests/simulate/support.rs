@@ -4,7 +4,7 @@
 use crate::files::fixture;
 use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
-use lampyris::model::{Analytic, Face, Instance, Model, Part, PartId, Shell};
+use lampyris::model::{Face, Instance, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
 use lampyris::simulate::scene::ModelUse;
 use lampyris::simulate::{BoundScene, KernelChoice, Results, RunSettings, Scene, simulate};

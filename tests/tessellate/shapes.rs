@@ -1,9 +1,7 @@
 //! Shapes with closed forms: closed meshes, true areas and volumes, nothing over its tolerance.
 
 use lampyris::math::{Frame, Point, Uv, Vector};
-use lampyris::model::{
-    Analytic, Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId,
-};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use std::f64::consts::PI;

@@ -186,6 +186,12 @@ impl Chart {
         uv + Uv::new(shift(0), shift(1))
     }
 
+    /// The displacement by whole periods; directions without a period are not displaced.
+    pub(in crate::step) fn whole_periods(&self, count: [i32; 2]) -> Uv {
+        let one = |d: usize| self.period[d].map_or(0.0, |p| p * f64::from(count[d]));
+        Uv::new(one(0), one(1))
+    }
+
     /// Position and first derivatives, anywhere in the plane.
     pub(in crate::step) fn derivatives(&self, uv: Uv) -> Derivatives {
         match &self.kind {

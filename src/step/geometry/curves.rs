@@ -190,7 +190,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         if let Some(own) = e.attributes("CURVE_REPLICA", 1) {
             let parent = self.resolve(e, own.id(0), "parent curve")?;
-            let frame = self.transformation(own.id(1).unwrap_or(0))?;
+            let frame = self.transformation(self.resolve(e, own.id(1), "transformation")?.id)?;
             let bounded = self.bounded_curve(parent.id, depth + 1)?;
             return ahead(CurveShape::spline(map_points(bounded, |p| frame.point(p))));
         }
@@ -257,7 +257,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     fn spline_curve(&self, e: Entity<'f, 'a>) -> Outcome<Curve> {
         let base = e.attributes("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
-        let degree = base.count(shift).unwrap_or(0);
+        let degree = base.count(shift).ok_or_else(|| Refusal::new(e, "its degree is missing"))?;
         let ids = base.list(shift + 1).ids();
         let points = ids.iter().map(|&p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
         let weights = e.attributes("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());

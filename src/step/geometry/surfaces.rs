@@ -73,7 +73,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let simple = !e.keyword().is_empty();
         let base = e.attributes("B_SPLINE_SURFACE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(simple && e.keyword() != "B_SPLINE_SURFACE");
-        let degree = [base.count(shift).unwrap_or(0), base.count(shift + 1).unwrap_or(0)];
+        let (Some(p), Some(q)) = (base.count(shift), base.count(shift + 1)) else {
+            return Err(Refusal::new(e, "a degree is missing"));
+        };
+        let degree = [p, q];
         let rows = base.list(shift + 2);
         let nu = rows.len();
         let nv = rows.list(0).len();

@@ -74,7 +74,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
         return si_unit(si);
     }
     let conversion = unit.attributes("CONVERSION_BASED_UNIT", 1)?;
-    let name = conversion.text(0).unwrap_or_default();
+    let name = conversion.name(0);
     let declared = if unit.is_a("LENGTH_UNIT") {
         Some(Kind::Length)
     } else if unit.is_a("PLANE_ANGLE_UNIT") {

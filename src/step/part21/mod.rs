@@ -13,6 +13,9 @@ pub(super) use parser::parse;
 
 use rustc_hash::FxHashMap;
 
+/// Reals below this that stand for a count are exact: 2⁵³ is 9e15.
+const EXACT_COUNT: f64 = 1e15;
+
 /// A range of the source or of an arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Span {
@@ -118,6 +121,11 @@ impl<'a> File<'a> {
     fn instance(&self, position: usize) -> Entity<'_, 'a> {
         let i = self.instances[position];
         Entity { file: self, id: i.id, records: &self.records[i.first as usize..(i.first + i.count) as usize] }
+    }
+
+    /// The name of the instance with an id, empty when the file has none such.
+    pub(super) fn entity_name(&self, id: u64) -> String {
+        self.entity(id).map_or_else(String::new, |e| e.name())
     }
 
     /// All instances in the order of the file.
@@ -232,7 +240,7 @@ impl<'f, 'a> Args<'f, 'a> {
     pub(super) fn count(&self, i: usize) -> Option<usize> {
         match self.value(i)? {
             Value::Integer(x) => usize::try_from(x).ok(),
-            Value::Real(x) if x >= 0.0 && x.fract() == 0.0 && x < 1e15 => Some(x as usize),
+            Value::Real(x) if x >= 0.0 && x.fract() == 0.0 && x < EXACT_COUNT => Some(x as usize),
             _ => None,
         }
     }
@@ -257,6 +265,11 @@ impl<'f, 'a> Args<'f, 'a> {
             Value::Typed(_) => self.typed(i)?.1.text(0),
             _ => None,
         }
+    }
+
+    /// A name: a decoded text, empty where the file gives none, as the schemas allow.
+    pub(super) fn name(&self, i: usize) -> String {
+        self.text(i).unwrap_or_default()
     }
 
     /// An enumeration value without its dots.

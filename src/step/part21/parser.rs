@@ -6,6 +6,8 @@ use rustc_hash::FxHashMap;
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.
 const MAX_DEPTH: usize = 32;
+/// Stands for the byte behind the last one; a NUL in the text is an unexpected byte as well.
+const END: u8 = 0;
 /// Faults that are kept with their lines; the rest is counted.
 const MAX_FAULTS: usize = 100;
 
@@ -89,7 +91,7 @@ impl Parser<'_> {
             let c = self.peek();
             let start = self.at;
             match c {
-                0 if self.at >= self.source.len() => return marked,
+                END if self.at >= self.source.len() => return marked,
                 b'#' => {
                     let (values, records, typed) = (self.values.len(), self.records.len(), self.typed.len());
                     let mut id = None;
@@ -187,7 +189,7 @@ impl Parser<'_> {
             return c;
         }
         self.skip();
-        self.source.get(self.at).copied().unwrap_or(0)
+        self.source.get(self.at).copied().unwrap_or(END)
     }
 
     fn end(&mut self) -> Parsed<()> {
@@ -278,7 +280,7 @@ impl Parser<'_> {
             match self.peek() {
                 b')' => break,
                 b',' => self.at += 1,
-                0 => return Err("the file ends inside a list"),
+                END => return Err("the file ends inside a list"),
                 c => {
                     let value = self.value(c, depth)?;
                     self.stack.push(value);

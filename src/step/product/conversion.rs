@@ -78,7 +78,7 @@ pub(crate) fn convert(
                 if !built.repairs.is_empty() {
                     out.repaired.push(remark(file, id, built.repairs.join("; ")));
                 }
-                let name = plans[&id].as_ref().map(|p| p.name.clone()).unwrap_or_default();
+                let name = plans[&id].as_ref().map_or_else(|_| String::new(), |p| p.name.clone());
                 faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
             }
             Err(refusal) => out.refused.push(refusal),
@@ -92,7 +92,7 @@ pub(crate) fn convert(
 
 /// A remark about an instance of the file.
 fn remark(file: &File<'_>, id: u64, reason: String) -> Refusal {
-    Refusal { id, entity: file.entity(id).map(|e| e.name()).unwrap_or_default(), reason }
+    Refusal { id, entity: file.entity_name(id), reason }
 }
 
 /// Moves edges into the part; their numbers there, none for edges without length or that failed.
@@ -102,7 +102,7 @@ fn add_edges(
     edges: Vec<Outcome<TrimmedEdge>>,
     part: &mut Part,
 ) -> Vec<Option<EdgeId>> {
-    let mut vertices: FxHashMap<u64, VertexId> = FxHashMap::default();
+    let mut vertices: FxHashMap<Option<u64>, VertexId> = FxHashMap::default();
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
         let Ok(TrimmedEdge { curve: Some(curve), .. }) = edge else {
@@ -113,7 +113,8 @@ fn add_edges(
         let ends = vertex_ids(geometry.file, *key);
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             *vertices.entry(id).or_insert_with(|| {
-                part.vertices.push(geometry.vertex(id).unwrap_or_else(|_| curve.evaluate(t)));
+                let given = id.and_then(|id| geometry.vertex(id).ok());
+                part.vertices.push(given.unwrap_or_else(|| curve.evaluate(t)));
                 VertexId(part.vertices.len() as u32 - 1)
             })
         });
@@ -153,8 +154,8 @@ fn add_shells(
         // Only a whole shell tells by its volume which way it faces.
         if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
-            let owner = plan.owners.first().copied().unwrap_or_default();
-            out.repaired.push(remark(file, owner, "the shell of a solid was inside out".into()));
+            let reason = "the shell of a solid was inside out";
+            out.repaired.extend(plan.owners.first().map(|owner| remark(file, *owner, reason.into())));
         }
         enclosed = if plan.void { enclosed } else { !own.is_empty() };
         if !own.is_empty() {
@@ -170,13 +171,13 @@ fn add_shells(
 }
 
 /// Vertex entities of an edge.
-fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [u64; 2] {
+fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     match key {
-        EdgeKey::Straight(a, b) => [a, b],
+        EdgeKey::Straight(a, b) => [Some(a), Some(b)],
         EdgeKey::Entity(id) => {
             let args =
                 file.entity(id).and_then(|e| e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1)));
-            [0, 1].map(|i| args.and_then(|a| a.id(i)).unwrap_or(0))
+            [0, 1].map(|i| args.and_then(|a| a.id(i)))
         }
     }
 }
@@ -286,7 +287,7 @@ fn convert_face(
         implicit_outer: false,
     };
     let mut built = build_face(task).map_err(|reason| {
-        let surface = geometry.file.entity(plan.surface).map(|s| s.name()).unwrap_or_default();
+        let surface = geometry.file.entity_name(plan.surface);
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
     })?;
     built.repairs.extend(repairs.into_iter().map(String::from));

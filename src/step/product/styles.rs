@@ -23,7 +23,7 @@ impl Styles {
         let mut layers = FxHashMap::default();
         for e in file.entities() {
             if let Some(args) = e.attributes("PRESENTATION_LAYER_ASSIGNMENT", 0) {
-                let name: Arc<str> = args.text(0).unwrap_or_default().into();
+                let name: Arc<str> = args.name(0).into();
                 layers.extend(args.list(2).ids().into_iter().map(|item| (item, name.clone())));
                 continue;
             }

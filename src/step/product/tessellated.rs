@@ -40,7 +40,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         if let Some(layout) = layout(e.keyword()) {
             match self.triangles(e, &layout) {
                 Ok(mesh) => {
-                    let name = e.args().text(0).unwrap_or_default();
+                    let name = e.args().name(0);
                     into.faces.push(TessellatedFace { name, entity: Some(id), colour: None, layer: None, mesh });
                 }
                 Err(refusal) => into.refused.push(refusal),

@@ -77,7 +77,7 @@ impl ShapeItems {
     /// Sorts one item in; what is no shape is left out.
     pub(crate) fn add(&mut self, file: &File<'_>, id: u64) {
         let Some(e) = file.entity(id) else { return };
-        let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).text(0).unwrap_or_default();
+        let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).name(0);
         if let Some(a) = e.attributes("MANIFOLD_SOLID_BREP", 1).or_else(|| e.attributes("FACETED_BREP", 1)) {
             self.add_shell(file, a.id(0), &name, &[id], true, e);
             if let Some(v) = e.attributes("BREP_WITH_VOIDS", 2) {
@@ -248,7 +248,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
             loops.push(edges);
         }
     }
-    let name = if complex { String::new() } else { e.args().text(0).unwrap_or_default() };
+    let name = if complex { String::new() } else { e.args().name(0) };
     Ok(FacePlan { name, surface, same_sense: sense != Some(false), loops })
 }
 

@@ -68,9 +68,6 @@ pub(crate) fn bound_region(
 fn place_hole(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
     let polygon = hole.polygon();
     let options = |d: usize| if chart.period[d].is_some() { vec![0, -1, 1, -2, 2] } else { vec![0] };
-    let shift_of = |i: i32, j: i32| {
-        Uv::new(chart.period[0].unwrap_or(0.0) * f64::from(i), chart.period[1].unwrap_or(0.0) * f64::from(j))
-    };
     let inside = |shift: Uv| {
         let n = polygon.len();
         let hits = (0..5).filter(|k| contains(border, polygon[k * n / 5] + shift)).count();
@@ -79,7 +76,7 @@ fn place_hole(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&
     let shift = options(0)
         .into_iter()
         .flat_map(|i| options(1).into_iter().map(move |j| (i, j)))
-        .map(|(i, j)| shift_of(i, j))
+        .map(|(i, j)| chart.whole_periods([i, j]))
         .find(|&s| inside(s));
     match shift {
         Some(shift) => {
@@ -120,7 +117,7 @@ fn bound_without_winding(
         }
         return Ok(());
     }
-    let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs())).unwrap_or(0);
+    let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs())).ok_or("no loop")?;
     let mut outer = plain.remove(largest);
     if areas[largest] < 0.0 {
         outer.reverse();

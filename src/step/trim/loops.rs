@@ -127,8 +127,7 @@ impl Chain {
 
     /// The displacement that the winding stands for.
     pub(crate) fn displacement(&self, chart: &Chart) -> Uv {
-        let one = |d: usize| chart.period[d].unwrap_or(0.0) * f64::from(self.winding[d]);
-        Uv::new(one(0), one(1))
+        chart.whole_periods(self.winding)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Trimmed faces for the tests of meshing.
 
 use lampyris::math::Uv;
-use lampyris::model::{Analytic, Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve};
 
 /// A face between chains of points in the parameter plane, one chain an edge; each edge follows the surface from point to point.
