@@ -2,7 +2,8 @@
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
 use super::loops::{Chain, Piece, Source, contains, signed_area};
-use super::tolerances::{CROSSING_NOISE, EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
+use super::seam_path::{Goals, Obstacles, SeamPath, unrolled_polygon};
+use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use crate::math::Uv;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
@@ -52,32 +53,33 @@ pub(crate) fn bound_region(
         }
         _ => return Err("more than two loops wind around the surface"),
     };
-    let border = outer.polygon();
-    if signed_area(&border) < 0.0 {
+    if signed_area(&outer.polygon()) < 0.0 {
         outer.reverse();
         out.repairs.push("the loops ran against the face's orientation");
     }
-    out.loops.push(outer);
-    for hole in plain {
-        out.loops.push(place_hole(hole, &border, chart, &mut out.repairs));
-    }
+    add_with_holes(outer, plain, chart, &mut out);
     Ok(out)
 }
 
+/// How much finer the border's polygon is where the first one has a hole outside: a hexagon in a circle 1.5 % wider stood out of the
+/// 16-sided polygon of that circle.
+const FINE_DENSITY: usize = 16;
+
 /// Moves a hole by periods into the border and turns it clockwise.
-fn place_hole(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
+fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
     let polygon = hole.polygon();
     let options = |d: usize| if chart.period[d].is_some() { vec![0, -1, 1, -2, 2] } else { vec![0] };
-    let inside = |shift: Uv| {
-        let n = polygon.len();
-        let hits = (0..5).filter(|k| contains(border, polygon[k * n / 5] + shift)).count();
-        hits >= 3
+    let shift_into = |border: &[Uv]| {
+        let shifts = options(0).into_iter().flat_map(|i| options(1).into_iter().map(move |j| [i, j]));
+        // Most of a few places decide: one may lie on the border.
+        let inside = |shift: &Uv| {
+            let n = polygon.len();
+            let hits = (0..5).filter(|k| contains(border, polygon[k * n / 5] + *shift)).count();
+            hits >= 3
+        };
+        shifts.map(|count| chart.whole_periods(count)).find(inside)
     };
-    let shift = options(0)
-        .into_iter()
-        .flat_map(|i| options(1).into_iter().map(move |j| (i, j)))
-        .map(|(i, j)| chart.whole_periods([i, j]))
-        .find(|&s| inside(s));
+    let shift = shift_into(&outer.polygon()).or_else(|| shift_into(&outer.polygon_of_density(FINE_DENSITY)));
     match shift {
         Some(shift) => {
             hole.shift(shift);
@@ -96,6 +98,13 @@ fn place_hole(mut hole: Chain, border: &[Uv], chart: &Chart, repairs: &mut Vec<&
     hole
 }
 
+/// Adds an outer loop with the holes that it holds.
+fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &Chart, out: &mut Boundary) {
+    let holes: Vec<Chain> = holes.into_iter().map(|h| place_hole(h, &outer, chart, &mut out.repairs)).collect();
+    out.loops.push(outer);
+    out.loops.extend(holes);
+}
+
 /// Loops that wind around nothing: the largest is the outer one, except on a closed surface, where loops that all run
 /// clockwise leave the rest of the surface as the face.
 fn bound_without_winding(
@@ -110,11 +119,7 @@ fn bound_without_winding(
     if implicit_outer || all_holes && is_closed(chart) {
         let polygons: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
         let outer = natural_boundary(chart, &polygons, &mut out.seams)?;
-        let border = outer.polygon();
-        out.loops.push(outer);
-        for hole in plain.drain(..) {
-            out.loops.push(place_hole(hole, &border, chart, &mut out.repairs));
-        }
+        add_with_holes(outer, plain.drain(..), chart, out);
         return Ok(());
     }
     let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs())).ok_or("no loop")?;
@@ -123,12 +128,7 @@ fn bound_without_winding(
         outer.reverse();
         out.repairs.push("the outer loop ran against the face's orientation");
     }
-    let border = outer.polygon();
-    out.loops.push(outer);
-    for hole in plain.drain(..) {
-        let turned = place_hole(hole, &border, chart, &mut out.repairs);
-        out.loops.push(turned);
-    }
+    add_with_holes(outer, plain.drain(..), chart, out);
     Ok(())
 }
 
@@ -242,24 +242,27 @@ fn extend_to_border(
         None => return Err("a loop winds around an unbounded surface and nothing closes it"),
     };
     let displacement = chain.displacement(chart);
-    // Straight across from a vertex that sees the border.
+    // Straight across from a vertex that sees the border, or around the holes before it.
     let starts: Vec<Uv> = chain.pieces.iter().map(Piece::start).collect();
-    let own = unrolled_polygon(&polygon, displacement);
-    let sees = |&i: &usize| {
-        let mut to = starts[i];
-        to[across] = at;
-        !holes.iter().any(|h| segment_crosses(h, true, starts[i], to, displacement))
-            && !segment_crosses(&own, false, starts[i], to, displacement)
+    let obstacles = Obstacles { holes, borders: &[unrolled_polygon(&polygon, displacement)], displacement };
+    let foot_of = |p: Uv| {
+        let mut foot = p;
+        foot[across] = at;
+        foot
     };
-    let first = (0..starts.len()).find(sees).ok_or("no vertex sees the pole past the holes")?;
-    let chain = started_at(chain, first, displacement);
-    let from = chain.pieces[0].start();
-    let mut foot = from;
-    foot[across] = at;
-    seams.push([from, foot]);
-    let seam = Source::Seam(seams.len() - 1);
-    let up = UvCurve::line(from, foot, [0.0, 1.0]);
-    let far = Piece { source: seam, reversed: false, curve: up.clone() }.shifted(displacement);
+    let straight = (0..starts.len()).find(|&i| obstacles.leave_free(starts[i], foot_of(starts[i])));
+    let seam = match straight {
+        Some(i) => SeamPath { start: i, goal: 0, points: vec![starts[i], foot_of(starts[i])] },
+        None => {
+            let metric = chart.derivatives(starts[0]);
+            obstacles
+                .way_around(&starts, &Goals::Line(&foot_of), &metric)
+                .ok_or("no way from the loop to the pole past the holes")?
+        }
+    };
+    let chain = started_at(chain, seam.start, displacement);
+    let foot = seam.points[seam.points.len() - 1];
+    let up = seam_pieces(&seam.points, seams);
     let border = if pole.is_some() {
         Piece::straight(foot + displacement, foot)
     } else {
@@ -268,15 +271,10 @@ fn extend_to_border(
         Piece { source: Source::Seam(seams.len() - 1), reversed: true, curve }
     };
     let mut pieces = chain.pieces;
-    pieces.extend([far, border, Piece { source: seam, reversed: true, curve: up }]);
+    pieces.extend(up.iter().map(|p| p.clone().shifted(displacement)));
+    pieces.push(border);
+    pieces.extend(run_back(up));
     Ok(Chain { bridged: chain.bridged, ..Chain::closed(pieces) })
-}
-
-/// The polygon with its end point, for a chain that winds.
-fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
-    let mut open = polygon.to_vec();
-    open.push(polygon[0] + displacement);
-    open
 }
 
 /// The chain starting with another piece.
@@ -284,29 +282,6 @@ fn started_at(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
     let head: Vec<Piece> = chain.pieces.drain(..first).map(|p| p.shifted(displacement)).collect();
     chain.pieces.extend(head);
     chain
-}
-
-/// Whether a segment properly meets a polygon, or one of its copies by `period`.
-fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
-    let n = polygon.len();
-    let sides = if closed { n } else { n - 1 };
-    [-2.0, -1.0, 0.0, 1.0, 2.0].iter().any(|&k| {
-        let by = period * k;
-        let lo = a.min(b) - by;
-        let hi = a.max(b) - by;
-        (0..sides).any(|i| {
-            let (p, q) = (polygon[i], polygon[(i + 1) % n]);
-            if p.x.max(q.x) < lo.x || p.x.min(q.x) > hi.x || p.y.max(q.y) < lo.y || p.y.min(q.y) > hi.y {
-                return false;
-            }
-            let (p, q) = (p + by, q + by);
-            let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
-            let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
-            let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
-            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise)
-                && (s3 > noise && s4 < -noise || s3 < -noise && s4 > noise)
-        })
-    })
 }
 
 /// Two loops that wind in opposite senses, joined by a seam run twice.
@@ -318,8 +293,8 @@ fn join_winding_pair(
     seams: &mut Vec<[Uv; 2]>,
 ) -> Result<Chain, &'static str> {
     let displacement = a.displacement(chart);
-    let (border_a, border_b) =
-        (unrolled_polygon(&a.polygon(), displacement), unrolled_polygon(&b.polygon(), -displacement));
+    let border_a = unrolled_polygon(&a.polygon(), displacement);
+    let border_b = unrolled_polygon(&b.polygon(), -displacement);
     let starts_a: Vec<Uv> = a.pieces.iter().map(Piece::start).collect();
     let starts_b: Vec<Uv> = b.pieces.iter().map(Piece::start).collect();
     let along = usize::from(a.winding[0] == 0);
@@ -348,23 +323,42 @@ fn join_winding_pair(
     }
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0));
     pairs.truncate(4096);
-    let clear = |from: Uv, to: Uv| {
-        !holes.iter().any(|h| segment_crosses(h, true, from, to, displacement))
-            && ![&border_a, &border_b].into_iter().any(|h| segment_crosses(h, false, from, to, displacement))
+    let obstacles = Obstacles { holes, borders: &[border_a, border_b], displacement };
+    let straight = pairs.iter().find(|(_, i, _, q)| obstacles.leave_free(starts_a[*i], *q));
+    let seam = match straight {
+        Some(&(_, i, j, q)) => SeamPath { start: i, goal: j, points: vec![starts_a[i], q] },
+        None => {
+            let goals: Vec<(usize, Uv)> = pairs.iter().map(|(_, _, j, q)| (*j, *q)).collect();
+            let metric = chart.derivatives(starts_a[0]);
+            obstacles
+                .way_around(&starts_a, &Goals::Points(&goals), &metric)
+                .ok_or("no seam between the two loops misses the holes")?
+        }
     };
-    let found = pairs.iter().find(|(_, i, _, q)| clear(starts_a[*i], *q));
-    let Some(&(_, i, j, q)) = found else { return Err("no straight seam between the two loops misses the holes") };
-    let a = started_at(a, i, displacement);
-    let mut b = started_at(b, j, -displacement);
-    b.shift(q - b.pieces[0].start());
-    let p = a.pieces[0].start();
-    seams.push([p, q]);
-    let seam = Source::Seam(seams.len() - 1);
-    let up = UvCurve::line(p, q, [0.0, 1.0]);
+    let a = started_at(a, seam.start, displacement);
+    let mut b = started_at(b, seam.goal, -displacement);
+    b.shift(seam.points[seam.points.len() - 1] - b.pieces[0].start());
+    let up = seam_pieces(&seam.points, seams);
     b.shift(displacement);
     let mut pieces = a.pieces;
-    pieces.push(Piece { source: seam, reversed: false, curve: up.clone() }.shifted(displacement));
+    pieces.extend(up.iter().map(|p| p.clone().shifted(displacement)));
     pieces.extend(b.pieces);
-    pieces.push(Piece { source: seam, reversed: true, curve: up });
+    pieces.extend(run_back(up));
     Ok(Chain { bridged: a.bridged.max(b.bridged), ..Chain::closed(pieces) })
+}
+
+/// The straight pieces of a seam, each entered in the list of seams.
+fn seam_pieces(points: &[Uv], seams: &mut Vec<[Uv; 2]>) -> Vec<Piece> {
+    let mut pieces = Vec::with_capacity(points.len() - 1);
+    for side in points.windows(2) {
+        seams.push([side[0], side[1]]);
+        let curve = UvCurve::line(side[0], side[1], [0.0, 1.0]);
+        pieces.push(Piece { source: Source::Seam(seams.len() - 1), reversed: false, curve });
+    }
+    pieces
+}
+
+/// The pieces of a seam run the other way.
+fn run_back(pieces: Vec<Piece>) -> impl Iterator<Item = Piece> {
+    pieces.into_iter().rev().map(|p| Piece { reversed: true, ..p })
 }

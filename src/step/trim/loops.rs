@@ -59,11 +59,11 @@ impl Piece {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
-    /// Points along the piece in the direction of the loop, without the last.
-    pub(crate) fn sample(&self, into: &mut Vec<Uv>) {
+    /// Points along the piece in the direction of the loop, without the last; `density` times as many as a first test needs.
+    fn sample(&self, density: usize, into: &mut Vec<Uv>) {
         let start = into.len();
         let breaks = self.curve.breakpoints();
-        let per_span = if self.curve.degree == 1 { 1 } else { 16usize.div_ceil(breaks.len() - 1).max(3) };
+        let per_span = if self.curve.degree == 1 { 1 } else { density * 16usize.div_ceil(breaks.len() - 1).max(3) };
         for pair in breaks.windows(2) {
             for k in 0..per_span {
                 into.push(self.curve.evaluate(pair[0] + (pair[1] - pair[0]) * k as f64 / per_span as f64));
@@ -93,9 +93,14 @@ impl Chain {
     }
 
     pub(crate) fn polygon(&self) -> Vec<Uv> {
+        self.polygon_of_density(1)
+    }
+
+    /// The polygon with so many times the points.
+    pub(crate) fn polygon_of_density(&self, density: usize) -> Vec<Uv> {
         let mut points = Vec::new();
         for piece in &self.pieces {
-            piece.sample(&mut points);
+            piece.sample(density, &mut points);
         }
         points
     }

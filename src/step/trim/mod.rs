@@ -1,8 +1,8 @@
 //! From the loops of a face to one trimmed spline.
 //!
 //! Every edge is located in the parameters of the face's surface (`fit`, `task`); the loops are chained and unwrapped (`loops`), joined
-//! and closed over poles and by seams (`boundary`); the rectangle that they cover becomes one rational B-spline (`region`), in whose
-//! parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`, `boundary`, `region`,
+//! and closed over poles and by seams (`boundary`, `seam_path`); the rectangle that they cover becomes one rational B-spline (`region`), in whose
+//! parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`, `seam_path`, `boundary`, `region`,
 //! `seams` and `face` each sees only those before it.
 
 mod boundary;
@@ -10,6 +10,7 @@ pub(super) mod face;
 pub(super) mod fit;
 pub(super) mod loops;
 mod region;
+mod seam_path;
 mod seams;
 pub(super) mod task;
 mod tolerances;

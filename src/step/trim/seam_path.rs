@@ -1,0 +1,218 @@
+//! The way of a seam from one loop to another past the holes between them: straight where something straight is free, otherwise the
+//! shortest way by corners of boxes around the holes.
+//!
+//! Source: shortest paths by visibility graphs, after Lozano-Pérez and Wesley 1979, expanded by Dijkstra only as far as needed. Known
+//! weakness: a hole so near to a border or another hole that the smallest box around it touches them leaves no way between.
+
+use super::tolerances::CROSSING_NOISE;
+use crate::math::Uv;
+use crate::nurbs::Derivatives;
+
+/// How far a box stands off its hole, as shares of the hole's size; the first with which there is a way.
+const MARGINS: [f64; 4] = [0.2, 0.06, 0.015, 0.004];
+/// Most corners that are tried: beyond them a face has too many holes for a search that is quadratic in them.
+const MAX_CORNERS: usize = 4000;
+
+/// Places along each side of the strip between two loops that are in each other's way.
+const LATTICE: f64 = 24.0;
+
+/// A seam from a start to a goal, by their numbers, and its corners with both.
+pub(super) struct SeamPath {
+    pub(super) start: usize,
+    pub(super) goal: usize,
+    pub(super) points: Vec<Uv>,
+}
+
+/// Where a seam may end.
+pub(super) enum Goals<'g> {
+    /// At one of these, each with its number.
+    Points(&'g [(usize, Uv)]),
+    /// On a line, at the foot of any point.
+    Line(&'g dyn Fn(Uv) -> Uv),
+}
+
+/// What a seam must not cross, with all copies by the displacement.
+pub(super) struct Obstacles<'o> {
+    pub(super) holes: &'o [Vec<Uv>],
+    pub(super) borders: &'o [Vec<Uv>],
+    pub(super) displacement: Uv,
+}
+
+/// A corner on the way.
+struct Node {
+    place: Uv,
+    /// Length of the way to it, mm; infinite while none is known.
+    length: f64,
+    /// The node before it; starts have none.
+    before: Option<usize>,
+    settled: bool,
+}
+
+impl Obstacles<'_> {
+    /// Whether a straight seam crosses nothing.
+    pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
+        !self.holes.iter().any(|h| segment_crosses(h, true, from, to, self.displacement))
+            && !self.borders.iter().any(|b| segment_crosses(b, false, from, to, self.displacement))
+    }
+
+    /// The shortest way from one of the starts to a goal, by lengths on the surface near the first start.
+    pub(super) fn way_around(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives) -> Option<SeamPath> {
+        let mut around_holes = MARGINS.iter().map(|margin| self.corners(*margin));
+        let found = around_holes.find_map(|corners| self.way_by(starts, goals, metric, corners));
+        // Where the loops themselves are in the way, by places between them.
+        found.or_else(|| {
+            let everywhere = [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice()].concat();
+            self.way_by(starts, goals, metric, everywhere)
+        })
+    }
+
+    fn way_by(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives, corners: Vec<Uv>) -> Option<SeamPath> {
+        let length = |a: Uv, b: Uv| (metric.du * (b.x - a.x) + metric.dv * (b.y - a.y)).length();
+        let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
+        let mut nodes: Vec<Node> = starts.iter().map(|p| node(*p, 0.0)).collect();
+        nodes.extend(corners.into_iter().map(|p| node(p, f64::INFINITY)));
+        // Shortest complete way so far: its length, last node, goal and end.
+        let mut best: Option<(f64, usize, usize, Uv)> = None;
+        loop {
+            let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
+            let Some(i) = open.min_by(|&a, &b| nodes[a].length.total_cmp(&nodes[b].length)) else { break };
+            let (place, so_far) = (nodes[i].place, nodes[i].length);
+            if best.is_some_and(|b| b.0 <= so_far) {
+                break;
+            }
+            nodes[i].settled = true;
+            let mut reach = |goal: usize, end: Uv| {
+                let whole = so_far + length(place, end);
+                if best.is_none_or(|b| whole < b.0) && self.leave_free(place, end) {
+                    best = Some((whole, i, goal, end));
+                }
+            };
+            match goals {
+                Goals::Points(points) => points.iter().for_each(|(goal, end)| reach(*goal, *end)),
+                Goals::Line(foot) => reach(0, foot(place)),
+            }
+            for k in 0..nodes.len() {
+                let whole = so_far + length(place, nodes[k].place);
+                if !nodes[k].settled && whole < nodes[k].length && self.leave_free(place, nodes[k].place) {
+                    nodes[k].length = whole;
+                    nodes[k].before = Some(i);
+                }
+            }
+        }
+        let (_, last, goal, end) = best?;
+        let mut points = vec![end];
+        let mut at = last;
+        loop {
+            points.push(nodes[at].place);
+            match nodes[at].before {
+                Some(before) => at = before,
+                None => break,
+            }
+        }
+        points.reverse();
+        self.is_simple(&points).then_some(SeamPath { start: at, goal, points })
+    }
+
+    /// Corners of boxes around the holes and their next copies.
+    fn corners(&self, margin: f64) -> Vec<Uv> {
+        let mut corners = Vec::new();
+        for hole in self.holes {
+            let lo = hole.iter().fold(Uv::INFINITY, |m, p| m.min(*p));
+            let hi = hole.iter().fold(Uv::NEG_INFINITY, |m, p| m.max(*p));
+            let off = margin * (hi - lo);
+            for copy in [0.0, -1.0, 1.0] {
+                let by = self.displacement * copy;
+                let [a, b] = [lo - off + by, hi + off + by];
+                corners.extend([a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]);
+            }
+        }
+        corners.truncate(MAX_CORNERS);
+        corners
+    }
+
+    /// Places all over the strip that the borders span, and over its next copies.
+    fn lattice(&self) -> Vec<Uv> {
+        let points = || self.borders.iter().flatten();
+        let lo = points().fold(Uv::INFINITY, |m, p| m.min(*p));
+        let hi = points().fold(Uv::NEG_INFINITY, |m, p| m.max(*p));
+        let cell = (hi - lo) / LATTICE;
+        let mut places = Vec::new();
+        for i in 0..=LATTICE as usize {
+            for j in 0..=LATTICE as usize {
+                places.push(lo + cell * Uv::new(i as f64, j as f64));
+            }
+        }
+        places
+    }
+
+    /// Whether a way misses its own copies: the cut surface then lies in one sheet.
+    fn is_simple(&self, points: &[Uv]) -> bool {
+        let crosses_copy = |side: &[Uv]| {
+            [-1.0, 1.0].iter().any(|&copy| {
+                let by = self.displacement * copy;
+                segment_crosses(points, false, side[0] + by, side[1] + by, Uv::ZERO)
+            })
+        };
+        !points.windows(2).any(crosses_copy)
+    }
+}
+
+/// The polygon with its end point, for a chain that winds.
+pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
+    let mut open = polygon.to_vec();
+    open.push(polygon[0] + displacement);
+    open
+}
+
+/// Whether a segment properly meets a polygon, or one of its copies by `period`.
+fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
+    let n = polygon.len();
+    let sides = if closed { n } else { n - 1 };
+    [-2.0, -1.0, 0.0, 1.0, 2.0].iter().any(|&k| {
+        let by = period * k;
+        let lo = a.min(b) - by;
+        let hi = a.max(b) - by;
+        (0..sides).any(|i| {
+            let (p, q) = (polygon[i], polygon[(i + 1) % n]);
+            if p.x.max(q.x) < lo.x || p.x.min(q.x) > hi.x || p.y.max(q.y) < lo.y || p.y.min(q.y) > hi.y {
+                return false;
+            }
+            let p = p + by;
+            let q = q + by;
+            let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
+            let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
+            let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
+            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise)
+                && (s3 > noise && s4 < -noise || s3 < -noise && s4 > noise)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+
+    /// A unit strip with a hole in the way of its only straight seam.
+    #[test]
+    fn a_seam_runs_around_the_hole_in_its_way() {
+        let turn = Uv::new(6.0, 0.0);
+        let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(3.0, v)], turn);
+        let hole: Vec<Uv> =
+            (0..16).map(|k| Uv::from_angle(f64::from(k) * 0.3926990817) * 0.3 + Uv::new(0.0, 0.5)).collect();
+        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
+        let holes = [hole];
+        let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(1.0)], displacement: turn };
+        let (start, goal) = (Uv::ZERO, Uv::new(0.0, 1.0));
+        assert!(!obstacles.leave_free(start, goal));
+        let path = obstacles.way_around(&[start], &Goals::Points(&[(7, goal)]), &metric).expect("a way");
+        assert_eq!(
+            (path.start, path.goal, path.points[0], path.points[path.points.len() - 1]),
+            (0, 7, start, goal)
+        );
+        assert!(path.points.len() > 2 && path.points.windows(2).all(|s| obstacles.leave_free(s[0], s[1])));
+        let foot = |p: Uv| Uv::new(p.x, 1.0);
+        let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
+        assert_eq!(border.points[border.points.len() - 1].y, 1.0);
+    }
+}
