@@ -28,6 +28,18 @@ pub enum ErrorKind {
         /// Name of the file.
         file: String,
     },
+    /// Assemblies that place more than the settings allow.
+    #[error(
+        "{file}: its assemblies place {count} products and shapes, more than {limit}; raise the limit if that is meant, or export fewer"
+    )]
+    TooManyPlaced {
+        /// Name of the file.
+        file: String,
+        /// How many, as far as a 64-bit number tells.
+        count: u64,
+        /// Most that are placed.
+        limit: u64,
+    },
     /// Longer than 4 GiB.
     #[error("{file}: longer than 4 GiB; split the assembly into several files")]
     TooLarge {

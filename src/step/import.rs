@@ -40,7 +40,7 @@ pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
 /// Reads the bytes of a STEP file; `name` is for messages and the model's name.
 ///
 /// # Errors
-/// When the bytes are no Part 21 text.
+/// When the bytes are no Part 21 text, or when its assemblies place more than [`Settings::max_placed`].
 pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Import, Error> {
     let start = Instant::now();
     let file = parse(name, bytes)?;
@@ -54,7 +54,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     if file.fault_count > file.faults.len() {
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
-    let model = assemble(&file, name, settings, &mut report);
+    let model = assemble(&file, name, settings, &mut report)?;
     let bounds = model.bounds();
     if !bounds.is_empty() {
         report.bbox_mm = Some([bounds.min.to_array(), bounds.max.to_array()]);
@@ -94,9 +94,23 @@ fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (F
     (units, fallback.unwrap_or(Units { length, ..Units::DEFAULT }))
 }
 
-fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Model {
+fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Result<Model, Error> {
     let (units, fallback) = read_units(file, settings, &mut report.units);
-    let (placed, assembly) = Assembly::read(file, units, fallback).walk();
+    let assembly = Assembly::read(file, units, fallback);
+    // Thirty kilobytes can place a part 2⁴⁰ times: what is counted first need not be expanded.
+    let count = assembly.count();
+    if count > settings.max_placed {
+        return Err(Error::new(ErrorKind::TooManyPlaced { file: name.into(), count, limit: settings.max_placed }));
+    }
+    let (placed, assembly) = assembly.walk();
+    for (id, reason) in &assembly.left_out {
+        // Those without shapes would have given nothing.
+        let mut items = ShapeItems::default();
+        assembly.items(*id).into_iter().for_each(|item| items.add(file, item));
+        if !items.is_empty() {
+            report.left_out.push(Note { id: *id, entity: file.entity_name(*id), reason: reason.clone() });
+        }
+    }
     report.problems.extend(assembly.problems.iter().cloned());
     let mut reader = Reader {
         file,
@@ -124,7 +138,7 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
     }
     let Reader { model, report, .. } = reader;
     count_model(&model, report);
-    model
+    Ok(model)
 }
 
 /// Items of a representation that do not stand in its place already: linked representations often name the same shapes, each of which

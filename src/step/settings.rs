@@ -11,12 +11,14 @@ pub struct Settings {
     pub uv_tolerance: f64,
     /// Surface evaluations that one face may take before it is refused; 1e6 are about a second.
     pub face_budget: u64,
+    /// Most products and shapes that the assemblies of a file may place; each takes about 500 bytes. Beyond it the file is refused.
+    pub max_placed: u64,
     /// Millimetres per unit of length, for files whose own unit is wrong; every context of the file then has it.
     pub length_unit_mm: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { uv_tolerance: UV_TOLERANCE_MM, face_budget: 3_000_000, length_unit_mm: None }
+        Self { uv_tolerance: UV_TOLERANCE_MM, face_budget: 3_000_000, max_placed: 1 << 20, length_unit_mm: None }
     }
 }

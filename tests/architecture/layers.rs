@@ -206,6 +206,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "conic",
             "curvature",
             "blossom",
+            "fit",
             "project",
             "sanitise",
             "sweep",

@@ -1,14 +1,17 @@
-//! Offset surfaces: exact where the basis is analytic, otherwise a bicubic fitted to 1e-6 mm.
+//! Offset surfaces: exact where the basis is analytic, otherwise a bicubic fitted to 1e-6 mm; of an extrusion only its profile is
+//! fitted, since the offset is an extrusion too and has no end.
 //!
 //! The fit interpolates position, both first and the mixed derivative (a C¹ bicubic Hermite spline) on a grid over the
 //! basis' own domain that is refined until the middles of all cells agree. Known weakness: an offset beyond a radius of
 //! curvature folds; it is fitted as it is.
 
-use super::tolerances::{DIFFERENCE_STEP, INSIDE_SHARE, PARALLEL_DERIVATIVES, WORST_FIT_MM};
+use super::tolerances::{
+    CLOSED_SHARE, DIFFERENCE_STEP, INSIDE_SHARE, PARALLEL_DERIVATIVES, VANISHING_RATIO, WORST_FIT_MM,
+};
 use super::{Chart, Kind, SplineChart};
 use crate::math::{Homogeneous, Point, Uv, Vector};
 use crate::model::Analytic;
-use crate::nurbs::Surface;
+use crate::nurbs::{Curve, Surface, fit_cubic};
 
 /// Stated error of fitted offsets, mm.
 pub(crate) const TOLERANCE: f64 = 1e-6;
@@ -46,6 +49,11 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
             };
             Chart::new(Kind::Torus { frame, major, minor }, analytic)
         }
+        Kind::Extrusion { base, direction } => {
+            let (base, error) = offset_profile(base, *direction, distance)?;
+            let kind = Kind::Extrusion { base, direction: *direction };
+            Chart { error, ..Chart::new(kind, Analytic::Offset) }
+        }
         _ => {
             let domain = basis_domain(basis)?;
             let (surface, error) = fit(&basis.surface(domain), distance)?;
@@ -54,6 +62,41 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     };
     chart.flipped = basis.flipped;
     Some(chart)
+}
+
+/// The profile of an extrusion moved along the normals of its surface, and the error of the fit; `None` where it is torn at a corner.
+fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Curve, f64)> {
+    let mut whole: Option<Curve> = None;
+    let mut worst = 0f64;
+    for span in base.breakpoints().windows(2) {
+        let piece = base.restricted(span[0], span[1]);
+        let moved = |t: f64| {
+            let d = piece.derivatives(t);
+            d.point + distance * d.first.cross(direction).try_normalize().unwrap_or(Vector::NAN)
+        };
+        let step = DIFFERENCE_STEP * (span[1] - span[0]);
+        let jet = |t: f64| {
+            let lo = (t - step).max(span[0]);
+            let hi = (t + step).min(span[1]);
+            (moved(t), (moved(hi) - moved(lo)) / (hi - lo))
+        };
+        let (fitted, error) = fit_cubic([span[0], span[1]], jet, TOLERANCE);
+        if !(error <= WORST_FIT_MM) {
+            return None;
+        }
+        worst = worst.max(error);
+        whole = match whole {
+            None => Some(fitted),
+            Some(head) => {
+                let tear = (head.evaluate(span[0]) - fitted.evaluate(span[0])).length();
+                if !(tear <= CLOSED_SHARE * head.bounds().diagonal() + TOLERANCE) {
+                    return None;
+                }
+                Some(head.joined_with(&fitted))
+            }
+        };
+    }
+    Some((whole?, worst))
 }
 
 fn basis_domain(basis: &Chart) -> Option<[[f64; 2]; 2]> {
@@ -80,7 +123,12 @@ fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector,
     let s = basis.second_derivatives(uv);
     let n = s.du.cross(s.dv);
     let length = n.length();
-    if !(length > PARALLEL_DERIVATIVES * s.du.length() * s.dv.length()) {
+    // At a pole one derivative is what rounding left of it, in any direction.
+    let [[u0, u1], [v0, v1]] = basis.domain();
+    let across_u = s.du.length() * (u1 - u0);
+    let across_v = s.dv.length() * (v1 - v0);
+    let singular = across_u.min(across_v) <= VANISHING_RATIO * across_u.max(across_v);
+    if singular || !(length > PARALLEL_DERIVATIVES * s.du.length() * s.dv.length()) {
         return None;
     }
     let unit = n / length;

@@ -44,6 +44,9 @@ pub(super) const GOLDEN_ROUNDS: usize = 60;
 
 /// Unit normals need derivatives whose product is above this share of theirs.
 pub(super) const PARALLEL_DERIVATIVES: f64 = 1e-12;
+/// A derivative over the whole domain below this share of the other has vanished: of a collapsed row rounding leaves 1e-16 of it, and
+/// [`INSIDE_SHARE`] beside it 1e-7 are there again.
+pub(super) const VANISHING_RATIO: f64 = 1e-11;
 /// At a pole the offset is taken this share of the domain inside.
 pub(super) const INSIDE_SHARE: f64 = 1e-7;
 /// Step of a difference quotient, as a share of the domain: near the cube root of the unit in the last place.

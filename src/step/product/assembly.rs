@@ -7,14 +7,11 @@
 use crate::math::Frame;
 use crate::step::geometry::Geometry;
 use crate::step::geometry::units::Units;
-use crate::step::part21::{Entity, File};
+use crate::step::part21::{Args, Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Deepest nesting of assemblies.
 const MAX_DEPTH: usize = 64;
-/// Most placed representations.
-const MAX_PLACED: usize = 1 << 20;
-
 /// A representation where it stands.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedRepresentation {
@@ -57,11 +54,15 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Usage → placement of the child in the parent.
     placements: FxHashMap<u64, Frame>,
     links: FxHashMap<u64, Vec<Link>>,
+    /// Representations that are not the shape of a product, and what they are.
+    pub(crate) left_out: Vec<(u64, String)>,
     /// Things that could not be placed.
     pub(crate) problems: Vec<String>,
     placed: Vec<PlacedRepresentation>,
     reached: FxHashSet<u64>,
     in_orphans: bool,
+    /// Representations of what is no product (shape aspects, datums, …), and the entity that they describe.
+    aspects: FxHashMap<u64, u64>,
     /// What products reach; orphans do not place it again.
     by_products: FxHashSet<u64>,
 }
@@ -78,10 +79,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
             usages: FxHashMap::default(),
             placements: FxHashMap::default(),
             links: FxHashMap::default(),
+            left_out: Vec::new(),
             problems: Vec::new(),
             placed: Vec::new(),
             reached: FxHashSet::default(),
             in_orphans: false,
+            aspects: FxHashMap::default(),
             by_products: FxHashSet::default(),
         };
         let mut contextual = Vec::new();
@@ -135,14 +138,15 @@ impl<'f, 'a> Assembly<'f, 'a> {
     fn read_shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
         let (Some(definition), Some(representation)) = (definition, representation) else { return };
         // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
-        let Some(owner) = definition.attributes("PROPERTY_DEFINITION", 2).or_else(|| Some(definition.args()))
-        else {
+        let target = described(definition).entity(2);
+        let Some(target) = target else { return };
+        if !target.keywords().any(|k| k.starts_with("PRODUCT_DEFINITION")) {
+            // Shapes of usages are placed by them; the geometry of an aspect is a part of its product's, named once more.
+            if !target.keywords().any(|k| k.contains("USAGE")) {
+                self.aspects.insert(representation, target.id);
+            }
             return;
-        };
-        let target = owner.entity(if definition.keyword().is_empty() { 0 } else { 2 });
-        let Some(target) = target.filter(|t| t.keywords().any(|k| k.starts_with("PRODUCT_DEFINITION"))) else {
-            return;
-        };
+        }
         let shapes = self.shapes.entry(target.id).or_default();
         if !shapes.contains(&representation) {
             shapes.push(representation);
@@ -178,8 +182,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let args = e.args();
         let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
         used.insert(relation.id);
-        let usage = shape.attributes("PROPERTY_DEFINITION", 2).unwrap_or_else(|| shape.args());
-        let Some(usage) = usage.id(if shape.keyword().is_empty() { 0 } else { 2 }) else { return };
+        let Some(usage) = described(shape).id(2) else { return };
         let Some((first, second, placement)) = self.related_representations(relation) else { return };
         let Some(mut placement) = placement else { return };
         // The first representation is the child's; some writers swap them.
@@ -203,6 +206,22 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 self.links.entry(second).or_default().push(Link { to: first, placement: same });
             }
         }
+    }
+
+    /// How many products and representations a walk would place, without walking: what is used twice counts twice.
+    pub(crate) fn count(&self) -> u64 {
+        let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
+        let mut counter = Counter { assembly: self, products: FxHashMap::default(), shapes: FxHashMap::default() };
+        let products: FxHashSet<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
+        let roots = products.into_iter().filter(|p| !children.contains(p));
+        let placed = roots.fold(0u64, |n, root| n.saturating_add(counter.product(root, 0)));
+        // Representations without a product nest by their mapped items.
+        let lone = self.file.entities().filter(|e| e.is_a("MAPPED_ITEM"));
+        let maps = lone
+            .filter_map(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0)?.attributes("REPRESENTATION_MAP", 0)?.id(1));
+        let maps: FxHashSet<u64> = maps.collect();
+        let largest = maps.into_iter().map(|id| counter.representation(id, 0)).max();
+        placed.max(largest.unwrap_or(1))
     }
 
     /// Every placed representation, in the order of the file.
@@ -234,13 +253,21 @@ impl<'f, 'a> Assembly<'f, 'a> {
             .file
             .entities()
             .filter(|e| e.keywords().any(|k| k.ends_with("SHAPE_REPRESENTATION")))
-            .filter(|e| !e.keywords().any(|k| k.contains("DRAUGHTING") || k.contains("PRESENTATION_")))
             .map(|e| e.id)
             .collect();
         let mapped: FxHashSet<u64> =
             self.file.entities().filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
         for id in candidates {
-            if !self.reached.contains(&id) && !mapped.contains(&id) {
+            if self.reached.contains(&id) || mapped.contains(&id) {
+                continue;
+            }
+            if let Some(aspect) = self.aspects.get(&id) {
+                let what = format!("#{aspect} {}", self.file.entity_name(*aspect));
+                self.left_out.push((
+                    id,
+                    format!("describes {what}, which is no product: its shape is named by its product"),
+                ));
+            } else {
                 self.place_representation(id, Frame::IDENTITY, ("", ""), &mut Vec::new(), &[]);
             }
         }
@@ -287,6 +314,20 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path.pop();
     }
 
+    /// What a representation is for, when that is not the shape of a product.
+    fn purpose_besides_shape(&self, id: u64) -> Option<&'static str> {
+        let e = self.file.entity(id)?;
+        let has = |word: &str| e.keywords().any(|k| k.contains(word));
+        if has("CONSTRUCTIVE_GEOMETRY") {
+            return Some("holds construction geometry");
+        }
+        if has("DRAUGHTING") {
+            return Some("holds annotations of a drawing");
+        }
+        let shows = |k: &str| k.starts_with("PRESENTATION") || k.contains("_PRESENTATION_");
+        e.keywords().any(shows).then_some("says how something is shown")
+    }
+
     fn place_representation(
         &mut self,
         id: u64,
@@ -295,8 +336,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path: &mut Vec<u64>,
         owners: &[u64],
     ) {
-        let bounded = path.len() < MAX_DEPTH && !path.contains(&id) && self.placed.len() < MAX_PLACED;
-        if !bounded || self.by_products.contains(&id) {
+        if path.len() >= MAX_DEPTH || path.contains(&id) || self.by_products.contains(&id) {
+            return;
+        }
+        if let Some(purpose) = self.purpose_besides_shape(id) {
+            if self.reached.insert(id) {
+                self.left_out.push((id, purpose.into()));
+            }
             return;
         }
         path.push(id);
@@ -340,5 +386,60 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
         }
         path.pop();
+    }
+}
+
+/// Attributes of a property definition, the third of which is what it describes; subtypes add none.
+fn described<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
+    definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
+}
+
+/// Counts what a walk would place; each product and representation is looked at once.
+struct Counter<'c, 'f, 'a> {
+    assembly: &'c Assembly<'f, 'a>,
+    /// Numbers that are known; 0 while they are being found, so that cycles end.
+    products: FxHashMap<u64, u64>,
+    shapes: FxHashMap<u64, u64>,
+}
+
+impl Counter<'_, '_, '_> {
+    fn product(&mut self, id: u64, depth: usize) -> u64 {
+        if let Some(known) = self.products.get(&id) {
+            return *known;
+        }
+        self.products.insert(id, 0);
+        let mut count = 1u64;
+        if depth < MAX_DEPTH {
+            let assembly = self.assembly;
+            for shape in assembly.shapes.get(&id).into_iter().flatten() {
+                count = count.saturating_add(self.representation(*shape, 0));
+            }
+            for usage in assembly.usages.get(&id).into_iter().flatten() {
+                count = count.saturating_add(self.product(usage.child, depth + 1));
+            }
+        }
+        self.products.insert(id, count);
+        count
+    }
+
+    fn representation(&mut self, id: u64, depth: usize) -> u64 {
+        if let Some(known) = self.shapes.get(&id) {
+            return *known;
+        }
+        self.shapes.insert(id, 0);
+        let mut count = 1u64;
+        if depth < MAX_DEPTH {
+            let file = self.assembly.file;
+            for item in self.assembly.items(id) {
+                let mapped = file.entity(item).and_then(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0));
+                let inner = mapped.and_then(|m| m.attributes("REPRESENTATION_MAP", 0)?.id(1));
+                count = count.saturating_add(inner.map_or(0, |inner| self.representation(inner, depth + 1)));
+            }
+            for link in self.assembly.links.get(&id).into_iter().flatten() {
+                count = count.saturating_add(self.representation(link.to, depth + 1));
+            }
+        }
+        self.shapes.insert(id, count);
+        count
     }
 }

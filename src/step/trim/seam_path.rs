@@ -198,8 +198,9 @@ mod tests {
     fn a_seam_runs_around_the_hole_in_its_way() {
         let turn = Uv::new(6.0, 0.0);
         let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(3.0, v)], turn);
-        let hole: Vec<Uv> =
-            (0..16).map(|k| Uv::from_angle(f64::from(k) * 0.3926990817) * 0.3 + Uv::new(0.0, 0.5)).collect();
+        let hole: Vec<Uv> = (0..16)
+            .map(|k| Uv::from_angle(f64::from(k) * std::f64::consts::FRAC_PI_8) * 0.3 + Uv::new(0.0, 0.5))
+            .collect();
         let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
         let holes = [hole];
         let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(1.0)], displacement: turn };

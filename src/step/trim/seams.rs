@@ -5,8 +5,7 @@ use super::loops::{Piece, Source};
 use super::region::Region;
 use super::tolerances::{ISOLINE_SLACK, SEAM_ERROR_MM};
 use crate::math::{Point, Uv};
-use crate::nurbs::{Curve, UvCurve};
-use crate::step::geometry::pcurves::fit_cubic;
+use crate::nurbs::{Curve, UvCurve, fit_cubic};
 
 /// A seam in space.
 #[derive(Clone, Debug)]

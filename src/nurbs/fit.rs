@@ -1,0 +1,25 @@
+//! Cubic curves through what can be evaluated.
+
+use super::Curve;
+use crate::math::{Point, Vector};
+
+/// Most pieces of a fitted curve.
+const MAX_PIECES: u32 = 4096;
+
+/// The C¹ cubic through a curve given by position and derivative, its pieces doubled until the middles agree to
+/// `tolerance` mm; the error left.
+pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
+    let mut n = 8u32;
+    loop {
+        let t = |i: f64| a + (b - a) * i / f64::from(n);
+        let ts: Vec<f64> = (0..=n).map(|i| t(f64::from(i))).collect();
+        let (points, slopes): (Vec<Point>, Vec<Vector>) = ts.iter().map(|&t| at(t)).unzip();
+        let curve = Curve::hermite(&ts, &points, &slopes);
+        let middles = (0..n).map(|i| t(f64::from(i) + 0.5));
+        let error = middles.fold(0f64, |e, t| e.max((curve.evaluate(t) - at(t).0).length()));
+        if error < tolerance || n >= MAX_PIECES {
+            return (curve, error);
+        }
+        n *= 2;
+    }
+}
