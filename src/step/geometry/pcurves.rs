@@ -5,7 +5,7 @@ use super::extent::FaceExtent;
 use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS};
 use super::units::Units;
 use super::{Geometry, Outcome, Refusal};
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Uv, Vector};
 use crate::nurbs::{Curve, fit_cubic};
 use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
