@@ -65,7 +65,7 @@ fn bench(name: &str, model: &Model) {
             let hit = hit.filter(|h| h.certainty == Certainty::Polished)?;
             let placed = &faces[hit.face.index()];
             let point = placed.placement.point(placed.face?.surface.evaluate(hit.uv));
-            Some(point.distance(ray.at(hit.t)))
+            Some(point.distance(ray.point_at(hit.t)))
         })
         .collect();
     residuals.sort_by(f64::total_cmp);

@@ -181,7 +181,7 @@ impl<'m> Bvh<'m> {
     }
 
     fn nearest_shipped(&self, triangles: &[RtTriangle], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
-        let own = ray.from.map(|d| d.primitive);
+        let own = ray.departure.map(|d| d.primitive);
         let t_max = if ray.t_max < f64::from(f32::MAX) { ray.t_max as f32 } else { f32::INFINITY };
         let (origin, direction) = (ray.origin.as_vec3a(), ray.direction.as_vec3a());
         if !(origin.is_finite() && direction.is_finite()) {

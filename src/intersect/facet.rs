@@ -5,7 +5,7 @@
 //! without fused operations, so that both sides of a shared edge get exactly opposite values; where one is zero its
 //! sign is taken in exact arithmetic. The result depends on ray and facet alone, not on who asks in which order.
 //!
-//! A ray that leaves a facet ([`Ray::from`]) cannot meet the triangle it starts on. Facets that share a vertex with
+//! A ray that leaves a facet ([`Ray::departure`]) cannot meet the triangle it starts on. Facets that share a vertex with
 //! it and have the start on their border are asked from a point moved a millionth of a facet into the starting
 //! triangle: so a concave neighbour is met where it is, and a convex one is not, whatever the rounding of the start.
 //! A ray that grazes the facet that it leaves starts a little over it ([`Surroundings::lifted`]).
@@ -55,7 +55,7 @@ impl<'m> Surroundings<'m> {
     /// A start is a rounded `origin + t·direction`; 2⁻⁴⁰ of the largest coordinate covers rays a thousand times
     /// longer than the scene and is a picometre for a lamp.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
-        let bounds = Aabb::around(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
+        let bounds = Aabb::from_points(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
         Self { mesh, reach: largest * REACH, bounds }
     }
@@ -64,7 +64,7 @@ impl<'m> Surroundings<'m> {
     /// pass under the next facet where it starts nearer to their common edge than it rises. Other rays rise out of the rounding
     /// within [`Self::reach`] of an edge, where neighbours are asked from a point inside the facet.
     pub(crate) fn lifted(&self, ray: &Ray) -> Ray {
-        let Some(own) = ray.from.map(|d| d.primitive as usize).filter(|&f| f < self.mesh.facets.len()) else {
+        let Some(own) = ray.departure.map(|d| d.primitive as usize).filter(|&f| f < self.mesh.facets.len()) else {
             return *ray;
         };
         let corners = self.mesh.corners(own);
@@ -85,7 +85,7 @@ impl<'m> Surroundings<'m> {
 
     /// Room that a box test must leave around a start so that a moved start stays inside, mm.
     pub(crate) fn slack(&self, ray: &Ray) -> f64 {
-        if ray.from.is_some() { 2.0 * (1.0 + LONGEST_NUDGE) * self.reach } else { 0.0 }
+        if ray.departure.is_some() { 2.0 * (1.0 + LONGEST_NUDGE) * self.reach } else { 0.0 }
     }
 }
 
@@ -118,7 +118,7 @@ impl FacetRay {
             axes: [kx as u8, ky as u8, kz as u8],
             t_min: ray.t_min,
             direction: ray.direction,
-            from: ray.from.map(|d| d.primitive),
+            from: ray.departure.map(|d| d.primitive),
         }
     }
 

@@ -118,8 +118,9 @@ impl<'a> Polished<'a> {
         let window = (WINDOW_OF_SAGS * sag / sine.max(LEAST_WINDOW_SINE)).max(LEAST_WINDOW);
         let found = self.exact.converge(ray, facet_hit.face, facet_hit.uv, STEPS);
         let nearby = found.filter(|p| (p.t - facet_hit.t).abs() <= window);
-        let own =
-            |p: &SurfacePoint| ray.from.is_some_and(|f| f.face == facet_hit.face && is_own(self.exact, &f, ray, p));
+        let own = |p: &SurfacePoint| {
+            ray.departure.is_some_and(|f| f.face == facet_hit.face && is_own(self.exact, &f, ray, p))
+        };
         // Of two roots close by Newton's method may find the one that the ray crosses the other way.
         let turned =
             |p: &SurfacePoint| p.normal.dot(ray.direction) * facet_hit.geometric_normal.dot(ray.direction) <= 0.0;
@@ -137,7 +138,7 @@ impl<'a> Polished<'a> {
             });
         }
         // Over an edge, at a silhouette, or in a corner of several roots: the exact model decides in a window around.
-        let around = ray.within(ray.t_min.max(facet_hit.t - window), ray.t_max.min(facet_hit.t + window));
+        let around = ray.with_range(ray.t_min.max(facet_hit.t - window), ray.t_max.min(facet_hit.t + window));
         if around.t_min > around.t_max {
             return Polishing::Behind;
         }
@@ -192,7 +193,7 @@ impl<'a> Polished<'a> {
         }
         // A facet where the spline is not; ready meshes may stand behind it.
         for _ in 0..MOST_OUTSIDE {
-            let behind = ray.within(answer?.t.next_up(), ray.t_max);
+            let behind = ray.with_range(answer?.t.next_up(), ray.t_max);
             answer = self.search(&behind, None, cost);
             if !self.comes_out(ray, answer.as_ref()) {
                 return answer;
@@ -226,7 +227,7 @@ impl<'a> Polished<'a> {
             && let Some(reach) = self.hidden_range(&ray, from, normal)
         {
             let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
-            if let Some(hit) = self.on_spline(&ray.within(ray.t_min, end)) {
+            if let Some(hit) = self.on_spline(&ray.with_range(ray.t_min, end)) {
                 cost.rays += 1;
                 return Some(hit);
             }
@@ -238,7 +239,7 @@ impl<'a> Polished<'a> {
         let mut answer = None;
         for _ in 0..MOST_FACETS {
             let mut own = Cost::default();
-            let facet_hit = self.facets.intersect(&ray.within(start, ray.t_max + slack), &mut own);
+            let facet_hit = self.facets.intersect(&ray.with_range(start, ray.t_max + slack), &mut own);
             rays += own.rays;
             *cost += Cost { rays: 0, ..own };
             let Some(facet_hit) = facet_hit else { break };
@@ -252,7 +253,7 @@ impl<'a> Polished<'a> {
                 Polishing::Lost if !self.exact.traces(facet_hit.face) => answer = in_range(ray, facet_hit),
                 // The exact model has no point there: a facet of the surface being left.
                 Polishing::Lost
-                    if ray.from.is_some_and(|f| {
+                    if ray.departure.is_some_and(|f| {
                         f.face == facet_hit.face && facet_hit.t < self.neighbourhood(&facet_hit)
                     }) => {}
                 Polishing::Lost => {
@@ -277,13 +278,13 @@ fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::Surf
     }
     let tolerance = SAME_POINT + OWN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
     // By parameters where they are regular, by place across a seam or at a pole.
-    exact.distance_at(from.face, from.uv, ray.at(point.t)).is_some_and(|d| d <= tolerance)
+    exact.distance_at(from.face, from.uv, ray.point_at(point.t)).is_some_and(|d| d <= tolerance)
 }
 
 impl Intersector for Polished<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let normal = |f: &Departure| self.exact.normal_at(f.face, f.uv);
-        let Some(left) = ray.from.as_ref().and_then(|f| Some((f, normal(f)?))) else {
+        let Some(left) = ray.departure.as_ref().and_then(|f| Some((f, normal(f)?))) else {
             return self.search_from_outside(ray, cost);
         };
         let mut answer = self.search(ray, Some(left), cost);

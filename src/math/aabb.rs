@@ -14,7 +14,7 @@ impl Aabb {
     pub const EMPTY: Self = Self { min: Point::INFINITY, max: Point::NEG_INFINITY };
 
     /// The smallest box around the points; [`Aabb::EMPTY`] without any.
-    pub fn around(points: impl IntoIterator<Item = Point>) -> Self {
+    pub fn from_points(points: impl IntoIterator<Item = Point>) -> Self {
         points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
 
@@ -113,12 +113,12 @@ mod tests {
         assert!((near - 2.0).abs() < 1e-14 && (far - 3.0).abs() < 1e-14);
         assert!(b.clip(&Ray::new(Point::new(1.5, 0.5, -2.0), Vector::Z)).is_none());
         assert!(b.clip(&Ray::new(Point::new(1.0, 0.5, -2.0), Vector::Z)).is_some(), "a ray in a wall touches");
-        assert!(b.clip(&through.within(0.0, 1.0)).is_none());
+        assert!(b.clip(&through.with_range(0.0, 1.0)).is_none());
     }
 
     #[test]
     fn empty_is_neutral() {
-        let b = Aabb::around([Point::ONE, Point::new(2.0, 0.0, 3.0)]);
+        let b = Aabb::from_points([Point::ONE, Point::new(2.0, 0.0, 3.0)]);
         assert_eq!(Aabb::EMPTY.union(b), b);
         assert!(Aabb::EMPTY.is_empty() && Aabb::EMPTY.half_area() == 0.0);
         assert_eq!(b.corners().len(), 8);

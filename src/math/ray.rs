@@ -13,7 +13,7 @@ pub struct Ray {
     pub t_max: f64,
     /// The surface point the ray starts on, if it starts on one. An intersector excludes that very point by
     /// identity and geometry, never by a global epsilon.
-    pub from: Option<Departure>,
+    pub departure: Option<Departure>,
 }
 
 /// A point on a surface that a ray leaves.
@@ -30,26 +30,26 @@ pub struct Departure {
 impl Ray {
     /// A ray in free space with `t` in `[0, ∞)`. `direction` must be of unit length.
     pub fn new(origin: Point, direction: Vector) -> Self {
-        Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY, from: None }
+        Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY, departure: None }
     }
 
     /// A ray through two points, with `t` in `[0, ∞)`; `None` when they coincide.
-    pub fn through(origin: Point, target: Point) -> Option<Self> {
+    pub fn from_points(origin: Point, target: Point) -> Option<Self> {
         (target - origin).try_normalize().map(|direction| Self::new(origin, direction))
     }
 
     /// The same ray, leaving a known surface point.
-    pub fn leaving(self, departure: Departure) -> Self {
-        Self { from: Some(departure), ..self }
+    pub fn with_departure(self, departure: Departure) -> Self {
+        Self { departure: Some(departure), ..self }
     }
 
     /// The same ray with another range of `t`.
-    pub fn within(self, t_min: f64, t_max: f64) -> Self {
+    pub fn with_range(self, t_min: f64, t_max: f64) -> Self {
         Self { t_min, t_max, ..self }
     }
 
     /// The point at distance `t`.
-    pub fn at(&self, t: f64) -> Point {
+    pub fn point_at(&self, t: f64) -> Point {
         self.origin + self.direction * t
     }
 }

@@ -65,7 +65,7 @@ impl FacetMesh {
 
     /// A box around all positions.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around(self.positions.iter().copied())
+        Aabb::from_points(self.positions.iter().copied())
     }
 
     /// Area of the facets as traced, mm².

@@ -219,7 +219,7 @@ impl TessellatedFace {
             kind: SurfaceKind::Tessellated,
             radius_mm: None,
             area_mm2: self.mesh.area() * placement.scale * placement.scale,
-            bbox_mm: corners(Aabb::around(points)),
+            bbox_mm: corners(Aabb::from_points(points)),
             at: middle.map_or(placement.origin, |p| placement.point(p)).to_array(),
         }
     }

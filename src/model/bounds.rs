@@ -94,7 +94,7 @@ impl<'m> PartHulls<'m> {
     fn new(part: &'m super::Part) -> Self {
         let faces = part.shells.iter().flat_map(|s| &s.faces).map(|f| (Shape::Face(f), f.surface.bounds()));
         let meshes =
-            part.tessellated.iter().map(|t| (Shape::Mesh(t), Aabb::around(t.mesh.positions.iter().copied())));
+            part.tessellated.iter().map(|t| (Shape::Mesh(t), Aabb::from_points(t.mesh.positions.iter().copied())));
         let shapes: Vec<(Shape<'m>, Aabb)> = faces.chain(meshes).collect();
         let whole = shapes.iter().fold(Aabb::EMPTY, |b, (_, hull)| b.union(*hull));
         Self { shapes, whole }
@@ -115,7 +115,7 @@ impl<'m> PartHulls<'m> {
                 Shape::Face(face) => grow_by_face(face, placement, bounds),
                 Shape::Mesh(ready) => {
                     let points = ready.mesh.positions.iter().map(|&p| placement.point(p));
-                    bounds.union(Aabb::around(points))
+                    bounds.union(Aabb::from_points(points))
                 }
             };
         }
@@ -125,7 +125,7 @@ impl<'m> PartHulls<'m> {
 
 /// A box around a box in its place.
 fn placed(local: &Aabb, placement: &Frame) -> Aabb {
-    Aabb::around(local.corners().map(|p| placement.point(p)))
+    Aabb::from_points(local.corners().map(|p| placement.point(p)))
 }
 
 fn covers(bounds: &Aabb, hull: &Aabb) -> bool {
@@ -135,13 +135,13 @@ fn covers(bounds: &Aabb, hull: &Aabb) -> bool {
 /// Grows a box by a face.
 fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     let position = |uv: Uv| placement.point(face.surface.evaluate(uv));
-    let hull = Aabb::around(face.surface.points.iter().map(|p| placement.point(p.position())));
+    let hull = Aabb::from_points(face.surface.points.iter().map(|p| placement.point(p.position())));
     if covers(&bounds, &hull) {
         return bounds;
     }
     let outline = Outline::new(face);
     let border = outline.polygons.iter().flatten().map(|uv| position(*uv));
-    bounds = bounds.union(Aabb::around(border));
+    bounds = bounds.union(Aabb::from_points(border));
     if covers(&bounds, &hull) {
         return bounds;
     }
@@ -168,7 +168,7 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
         let starts = samples.iter().filter(|s| outline.contains(s.0)).take(STARTS);
         let summits: Vec<Point> =
             starts.map(|s| position(climb(s.0, cell, |uv| side.height(position(uv)), &outline))).collect();
-        bounds = bounds.union(Aabb::around(summits));
+        bounds = bounds.union(Aabb::from_points(summits));
     }
     bounds
 }

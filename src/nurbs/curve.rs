@@ -243,7 +243,7 @@ impl<P: ControlPoint> Spline<P> {
 impl Curve {
     /// A box that contains the curve: that of its control points.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around(self.points.iter().map(|p| p.position()))
+        Aabb::from_points(self.points.iter().map(|p| p.position()))
     }
 }
 

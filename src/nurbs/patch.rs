@@ -155,7 +155,7 @@ impl BezierPatch {
 
     /// A box that contains the patch: that of its control points.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around(self.points.iter().map(|p| p.project()))
+        Aabb::from_points(self.points.iter().map(|p| p.project()))
     }
 
     /// The two halves in `direction` (0: u, 1: v), by de Casteljau.

@@ -199,7 +199,7 @@ impl Surface {
 
     /// A box that contains the surface: that of its control points.
     pub fn bounds(&self) -> Aabb {
-        Aabb::around(self.points.iter().map(|p| p.project()))
+        Aabb::from_points(self.points.iter().map(|p| p.project()))
     }
 
     /// The line of constant `u` (a curve in v) or of constant `v` (a curve in u).

@@ -1,4 +1,4 @@
-use super::error::{Error, ErrorKind, checked};
+use super::error::{Error, ErrorKind, require};
 use crate::math::Vector;
 use std::f64::consts::PI;
 
@@ -25,9 +25,9 @@ const RINGS: usize = 256;
 impl Abg {
     /// `a` and `b` positive, `g` from 0; refused when the whole disk of radius 2 would scatter more than there is.
     pub fn new(a: f64, b: f64, g: f64) -> Result<Self, Error> {
-        checked("A of the ABg model", a, a >= 0.0, "zero or more")?;
-        checked("B of the ABg model", b, b > 0.0, "positive")?;
-        checked("g of the ABg model", g, (0.0..=10.0).contains(&g), "from 0 to 10")?;
+        require("A of the ABg model", a, a >= 0.0, "zero or more")?;
+        require("B of the ABg model", b, b > 0.0, "positive")?;
+        require("g of the ABg model", g, (0.0..=10.0).contains(&g), "from 0 to 10")?;
         let mut abg = Self { a, b, g, radii: Vec::new(), shares: Vec::new() };
         if g != 2.0 {
             abg.tabulate();

@@ -78,7 +78,7 @@ fn entry(name: &str) -> Option<&'static Entry> {
 ///
 /// ```
 /// use lampyris::optics::{catalogue, line};
-/// assert!((catalogue::medium("N-BK7").unwrap().index.at(line::D) - 1.516800).abs() < 1e-6);
+/// assert!((catalogue::medium("N-BK7").unwrap().index.value(line::D) - 1.516800).abs() < 1e-6);
 /// ```
 pub fn medium(name: &str) -> Option<Medium> {
     entry(name).map(|e| Medium::clear(e.name, Index::Sellmeier(e.sellmeier.to_vec())))
@@ -114,7 +114,7 @@ mod tests {
         ] {
             let index = medium(name).unwrap().index;
             for (nm, n) in lines.into_iter().zip(expected) {
-                assert!((index.at(nm) - n).abs() < 1e-6, "{name} at {nm}: {}", index.at(nm));
+                assert!((index.value(nm) - n).abs() < 1e-6, "{name} at {nm}: {}", index.value(nm));
             }
         }
         assert!((medium("bk7").unwrap().index.abbe_number() - 64.17).abs() < 5e-3);
@@ -130,7 +130,7 @@ mod tests {
             ("silicone", 589.3, 1.430, 1e-3),
         ] {
             let index = medium(name).unwrap().index;
-            assert!((index.at(nm) - n).abs() < within, "{name}: {}", index.at(nm));
+            assert!((index.value(nm) - n).abs() < within, "{name}: {}", index.value(nm));
         }
     }
 

@@ -1,6 +1,6 @@
-use super::bend::cos_transmitted;
-use super::error::{Error, ErrorKind, checked};
+use super::error::{Error, ErrorKind, require};
 use super::fresnel::{self, Power};
+use super::refraction::cos_transmitted;
 use super::table::{bracket, check_increasing};
 
 /// What an interface does to the power that meets it.
@@ -49,10 +49,10 @@ impl Coating {
     /// Constant shares, each from 0 to 1 and no more than 1 together.
     pub fn ideal(reflectance: f64, transmittance: f64) -> Result<Self, Error> {
         let share = |x: f64| (0.0..=1.0).contains(&x);
-        checked("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
-        checked("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
+        require("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
+        require("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
         let sum = reflectance + transmittance;
-        checked("reflectance plus transmittance", sum, sum <= 1.0 + 1e-12, "at most 1")?;
+        require("reflectance plus transmittance", sum, sum <= 1.0 + 1e-12, "at most 1")?;
         Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
     }
 
@@ -73,7 +73,7 @@ impl Coating {
             Self::Ideal { reflectance: r, transmittance: t } => {
                 Split { reflected: Power { rs: *r, rp: *r }, transmitted: Power { rs: *t, rp: *t } }
             }
-            Self::Table(table) => table.at(table.angle_deg(cos_i, eta), wavelength_nm),
+            Self::Table(table) => table.shares(table.angle_deg(cos_i, eta), wavelength_nm),
         };
         if cos_transmitted(cos_i, eta).is_some() {
             return split;
@@ -129,7 +129,7 @@ impl CoatingTable {
         check_increasing("coating angle", &angles_deg)?;
         check_increasing("coating wavelength", &wavelengths_nm)?;
         for &angle in &angles_deg {
-            checked("a coating angle", angle, (0.0..=90.0).contains(&angle), "from 0 to 90 degrees")?;
+            require("a coating angle", angle, (0.0..=90.0).contains(&angle), "from 0 to 90 degrees")?;
         }
         let expected = angles_deg.len() * wavelengths_nm.len();
         if cells.len() != expected {
@@ -137,16 +137,16 @@ impl CoatingTable {
         }
         for c in &cells {
             for (r, t) in [(c.reflected.rs, c.transmitted.rs), (c.reflected.rp, c.transmitted.rp)] {
-                checked("a reflectance of the coating", r, (0.0..=1.0).contains(&r), "from 0 to 1")?;
-                checked("a transmittance of the coating", t, (0.0..=1.0).contains(&t), "from 0 to 1")?;
-                checked("reflectance plus transmittance of the coating", r + t, r + t <= 1.0 + 1e-9, "at most 1")?;
+                require("a reflectance of the coating", r, (0.0..=1.0).contains(&r), "from 0 to 1")?;
+                require("a transmittance of the coating", t, (0.0..=1.0).contains(&t), "from 0 to 1")?;
+                require("reflectance plus transmittance of the coating", r + t, r + t <= 1.0 + 1e-9, "at most 1")?;
             }
         }
         Ok(Self { angles_deg, wavelengths_nm, cells })
     }
 
     /// The shares at an angle of the table and a wavelength.
-    pub fn at(&self, angle_deg: f64, wavelength_nm: f64) -> Split {
+    pub fn shares(&self, angle_deg: f64, wavelength_nm: f64) -> Split {
         let (i, s) = bracket(&self.angles_deg, angle_deg);
         let (j, t) = bracket(&self.wavelengths_nm, wavelength_nm);
         let columns = self.wavelengths_nm.len();

@@ -86,18 +86,18 @@ impl Effects {
     pub const ALL: Self = Self((1 << Effect::ALL.len()) - 1);
 
     /// The set with one more effect.
-    pub const fn with(self, effect: Effect) -> Self {
+    pub const fn with_effect(self, effect: Effect) -> Self {
         Self(self.0 | 1 << effect as u16)
     }
 
     /// The set without an effect.
-    pub const fn without(self, effect: Effect) -> Self {
+    pub const fn without_effect(self, effect: Effect) -> Self {
         Self(self.0 & !(1 << effect as u16))
     }
 
     /// Adds an effect.
     pub fn insert(&mut self, effect: Effect) {
-        *self = self.with(effect);
+        *self = self.with_effect(effect);
     }
 
     /// Whether the effect is in the set.
@@ -134,7 +134,7 @@ impl<const N: usize> From<[Effect; N]> for Effects {
 
 impl FromIterator<Effect> for Effects {
     fn from_iter<I: IntoIterator<Item = Effect>>(effects: I) -> Self {
-        effects.into_iter().fold(Self::NONE, Self::with)
+        effects.into_iter().fold(Self::NONE, Self::with_effect)
     }
 }
 
@@ -185,10 +185,10 @@ mod tests {
     #[test]
     fn sets_add_and_subtract() {
         let a = Effects::from([Effect::Reflection, Effect::Coating]);
-        let b = Effects::NONE.with(Effect::Coating);
+        let b = Effects::NONE.with_effect(Effect::Coating);
         assert!(a.contains_all(b) && !b.contains_all(a));
         assert_eq!(a - b, Effects::from([Effect::Reflection]));
         assert_eq!(b | Effects::from([Effect::Reflection]), a);
-        assert_eq!(a.without(Effect::Reflection).without(Effect::Coating), Effects::default());
+        assert_eq!(a.without_effect(Effect::Reflection).without_effect(Effect::Coating), Effects::default());
     }
 }

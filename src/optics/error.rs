@@ -69,6 +69,6 @@ impl From<ErrorKind> for Error {
 }
 
 /// `value` when `good`, else the refusal that names it.
-pub(super) fn checked(what: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
+pub(super) fn require(what: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
     if good && value.is_finite() { Ok(value) } else { Err(ErrorKind::OutOfRange { what, value, allowed }.into()) }
 }

@@ -2,7 +2,7 @@
 //!
 //! Source: Born & Wolf, *Principles of Optics*, 1.5.2 (dielectric) and 14.2 (absorbing second medium).
 
-use super::bend::cos_transmitted;
+use super::refraction::cos_transmitted;
 
 /// Shares of power (reflected, unless said otherwise), for light polarised across (s) and in (p) the plane of incidence.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-use super::error::{Error, ErrorKind, checked};
+use super::error::{Error, ErrorKind, require};
 use crate::formats::{PhotometricType, Photometry};
 use crate::math::{Vector, safe_newton};
 
@@ -30,7 +30,7 @@ impl IntensitySampler {
             super::table::check_increasing("intensity", angles)?;
         }
         for &cd in &p.candela {
-            checked("an intensity", cd, cd >= 0.0, "zero or more")?;
+            require("an intensity", cd, cd >= 0.0, "zero or more")?;
         }
         let radians = |angles: &[f64], offset: f64| angles.iter().map(|a| (a + offset).to_radians()).collect();
         let by_row = |h: usize, v: usize| p.candela[h * rows + v];
@@ -48,10 +48,10 @@ impl IntensitySampler {
         };
         let within = |x: f64| (-1e-9..=std::f64::consts::PI + 1e-9).contains(&x);
         for &x in &polar {
-            checked("an angle from the pole", x.to_degrees(), within(x), "from 0 to 180 degrees")?;
+            require("an angle from the pole", x.to_degrees(), within(x), "from 0 to 180 degrees")?;
         }
         let turn = turning[turning.len() - 1] - turning[0];
-        checked(
+        require(
             "the range of the angle about the pole",
             turn.to_degrees(),
             turn <= 6.2831854,
@@ -97,7 +97,7 @@ impl IntensitySampler {
         .unwrap_or(b);
         let s = (x - a) / (b - a);
         let along = |t: usize| {
-            let (y0, y1) = (self.at(t, i), self.at(t, i + 1));
+            let (y0, y1) = (self.node(t, i), self.node(t, i + 1));
             y0 + s * (y1 - y0)
         };
         let turned = self.turning[t] + width * linear_quantile(along(t), along(t + 1), u[1]);
@@ -116,17 +116,17 @@ impl IntensitySampler {
         let (Some((i, s)), Some((t, r))) = (cell(&self.polar, x), cell(&self.turning, turned)) else {
             return 0.0;
         };
-        let along = |t: usize| self.at(t, i) + s * (self.at(t, i + 1) - self.at(t, i));
+        let along = |t: usize| self.node(t, i) + s * (self.node(t, i + 1) - self.node(t, i));
         (along(t) + r * (along(t + 1) - along(t))) / self.flux()
     }
 
-    fn at(&self, t: usize, i: usize) -> f64 {
+    fn node(&self, t: usize, i: usize) -> f64 {
         self.intensity[t * self.polar.len() + i]
     }
 
     /// Mean intensity over the turning angle of a cell, at its two polar angles.
     fn marginal(&self, t: usize, i: usize) -> [f64; 2] {
-        [0.5 * (self.at(t, i) + self.at(t + 1, i)), 0.5 * (self.at(t, i + 1) + self.at(t + 1, i + 1))]
+        [0.5 * (self.node(t, i) + self.node(t + 1, i)), 0.5 * (self.node(t, i + 1) + self.node(t + 1, i + 1))]
     }
 
     /// Integral of an intensity, linear from `low` to `high` over the polar interval `i`, times the sine, up to `x`.

@@ -1,4 +1,4 @@
-use super::error::{Error, checked};
+use super::error::{Error, require};
 use super::phase::BulkScatter;
 use super::table::Table;
 
@@ -55,7 +55,7 @@ impl Index {
     /// The index at a vacuum wavelength.
     ///
     /// NaN where a formula has no real value, far outside the range it was fitted to; see [`Index::checked`].
-    pub fn at(&self, wavelength_nm: f64) -> f64 {
+    pub fn value(&self, wavelength_nm: f64) -> f64 {
         let um = wavelength_nm * 1e-3;
         let l2 = um * um;
         match self {
@@ -65,7 +65,7 @@ impl Index {
             Self::Schott([a0, a1, rest @ ..]) => {
                 (a0 + a1 * l2 + rest.iter().rev().fold(0.0, |n, a| (n + a) / l2)).sqrt()
             }
-            Self::Table(table) => table.at(wavelength_nm),
+            Self::Table(table) => table.value(wavelength_nm),
         }
     }
 
@@ -83,8 +83,8 @@ impl Index {
     /// The same index, refused when it is not a number of at least 0.1 at any of the wavelengths.
     pub fn checked(self, wavelengths_nm: &[f64]) -> Result<Self, Error> {
         for &nm in wavelengths_nm {
-            let n = self.at(nm);
-            checked(
+            let n = self.value(nm);
+            require(
                 "a refractive index",
                 n,
                 (0.1..=10.0).contains(&n),
@@ -96,7 +96,7 @@ impl Index {
 
     /// The Abbe number `(n_d − 1)/(n_F − n_C)`; infinite without dispersion.
     pub fn abbe_number(&self) -> f64 {
-        (self.at(line::D) - 1.0) / (self.at(line::F) - self.at(line::C))
+        (self.value(line::D) - 1.0) / (self.value(line::F) - self.value(line::C))
     }
 }
 
@@ -130,14 +130,14 @@ pub enum Absorption {
 impl Absorption {
     /// A constant coefficient, per mm.
     pub fn per_mm(coefficient: f64) -> Result<Self, Error> {
-        Ok(Self::Constant(checked("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
+        Ok(Self::Constant(require("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
     }
 
     /// Coefficients per mm at wavelengths in nm.
     pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
         let table = Table::new("absorption", points)?;
         let [low, _] = table.extremes();
-        checked("an absorption coefficient", low, low >= 0.0, "zero or more")?;
+        require("an absorption coefficient", low, low >= 0.0, "zero or more")?;
         Ok(Self::Table(table))
     }
 
@@ -146,9 +146,9 @@ impl Absorption {
         thickness_mm: f64,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Result<Self, Error> {
-        checked("a thickness", thickness_mm, thickness_mm > 0.0, "positive")?;
+        require("a thickness", thickness_mm, thickness_mm > 0.0, "positive")?;
         let rows = points.into_iter().map(|(nm, t)| {
-            checked("an internal transmittance", t, t > 0.0 && t <= 1.0, "above 0 and at most 1")?;
+            require("an internal transmittance", t, t > 0.0 && t <= 1.0, "above 0 and at most 1")?;
             Ok((nm, -t.ln() / thickness_mm))
         });
         Self::table(rows.collect::<Result<Vec<_>, Error>>()?)
@@ -159,7 +159,7 @@ impl Absorption {
         match self {
             Self::None => 0.0,
             Self::Constant(a) => *a,
-            Self::Table(table) => table.at(wavelength_nm),
+            Self::Table(table) => table.value(wavelength_nm),
         }
     }
 
@@ -193,11 +193,11 @@ mod tests {
     #[test]
     fn formulas_agree_with_hand_evaluation() {
         // λ = 0.5 µm, λ² = 0.25.
-        assert!((Index::Cauchy(vec![1.5, 0.004, 0.0001]).at(500.0) - (1.5 + 0.016 + 0.0016)).abs() < 1e-15);
+        assert!((Index::Cauchy(vec![1.5, 0.004, 0.0001]).value(500.0) - (1.5 + 0.016 + 0.0016)).abs() < 1e-15);
         let schott = Index::Schott([2.25, -0.01, 0.01, 0.001, 0.0001, 0.00001]);
         let n2 = 2.25 - 0.0025 + 0.04 + 0.016 + 0.0064 + 0.00256;
-        assert!((schott.at(500.0) - f64::sqrt(n2)).abs() < 1e-15);
-        assert!((Index::sultanova(1.25, 0.05).at(500.0) - f64::sqrt(1.0 + 1.25 * 0.25 / 0.2)).abs() < 1e-15);
+        assert!((schott.value(500.0) - f64::sqrt(n2)).abs() < 1e-15);
+        assert!((Index::sultanova(1.25, 0.05).value(500.0) - f64::sqrt(1.0 + 1.25 * 0.25 / 0.2)).abs() < 1e-15);
         assert!(schott.is_dispersive() && !Index::Cauchy(vec![1.5, 0.0]).is_dispersive());
         assert_eq!(Index::Constant(1.5).abbe_number(), f64::INFINITY);
     }
@@ -208,7 +208,7 @@ mod tests {
         let old =
             Index::Schott([2.2718929, -1.0108077e-2, 1.0592509e-2, 2.0816965e-4, -7.6472538e-6, 4.9240991e-7]);
         for (nm, n) in [(line::D, 1.51680), (line::F, 1.52238), (line::C, 1.51432)] {
-            assert!((old.at(nm) - n).abs() < 1e-5, "{nm}: {}", old.at(nm));
+            assert!((old.value(nm) - n).abs() < 1e-5, "{nm}: {}", old.value(nm));
         }
     }
 

@@ -12,7 +12,6 @@
 //! no birefringence, no gradient index.
 
 mod abg;
-mod bend;
 pub mod catalogue;
 mod cie;
 mod coating;
@@ -23,6 +22,7 @@ mod intensity;
 mod media;
 mod phase;
 pub mod polarised;
+mod refraction;
 pub mod sampling;
 mod scatter;
 mod spectrum;
@@ -31,13 +31,13 @@ mod table;
 mod testing;
 
 pub use abg::Abg;
-pub use bend::{reflect, refract, refract_with_cosine};
 pub use coating::{Coating, CoatingTable, Split};
 pub use effects::{Effect, Effects};
 pub use error::{Error, ErrorKind};
 pub use intensity::IntensitySampler;
 pub use media::{Absorption, Index, Medium, line};
 pub use phase::BulkScatter;
+pub use refraction::{reflect, refract, refract_with_cosine};
 pub use scatter::{Lobe, Scatter};
 pub use spectrum::{MAX_EFFICACY, Spectrum, Wavelengths, WhiteLed, chromaticity, xyz_of_watt};
 pub use table::Table;

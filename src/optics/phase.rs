@@ -1,4 +1,4 @@
-use super::error::{Error, checked};
+use super::error::{Error, require};
 use crate::math::{Vector, orthonormal_pair};
 use std::f64::consts::PI;
 
@@ -14,8 +14,8 @@ pub struct BulkScatter {
 impl BulkScatter {
     /// Refuses a negative coefficient and a `g` outside (−1, 1).
     pub fn new(coefficient: f64, g: f64) -> Result<Self, Error> {
-        checked("a scattering coefficient", coefficient, coefficient >= 0.0, "zero or more per mm")?;
-        checked("the mean cosine g", g, g.abs() < 1.0, "above -1 and below 1")?;
+        require("a scattering coefficient", coefficient, coefficient >= 0.0, "zero or more per mm")?;
+        require("the mean cosine g", g, g.abs() < 1.0, "above -1 and below 1")?;
         Ok(Self { coefficient, g })
     }
 

@@ -7,7 +7,7 @@
 //!
 //! Source: Born & Wolf, *Principles of Optics*, 1.4 and 1.5; Chandrasekhar, *Radiative Transfer*, 1.15.
 
-use super::bend::cos_transmitted;
+use super::refraction::cos_transmitted;
 use crate::math::{Vector, orthonormal_pair};
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -97,7 +97,7 @@ pub struct Mueller {
 }
 
 impl Mueller {
-    fn of(s: Complex, p: Complex, factor: f64) -> Self {
+    fn from_amplitudes(s: Complex, p: Complex, factor: f64) -> Self {
         let (ps, pp, cross) = (s.square(), p.square(), s.conjugate() * p);
         Self {
             a: 0.5 * factor * (ps + pp),
@@ -109,14 +109,14 @@ impl Mueller {
 
     /// From the power shares of s and p alone, without a phase between them: a tabulated coating.
     pub fn without_phase(power: super::fresnel::Power) -> Self {
-        Self::of(Complex::real(power.rs.sqrt()), Complex::real(power.rp.sqrt()), 1.0)
+        Self::from_amplitudes(Complex::real(power.rs.sqrt()), Complex::real(power.rp.sqrt()), 1.0)
     }
 }
 
 /// Reflection at an interface of two transparent media, total reflection with its phases included; `eta = n1/n2`.
 pub fn reflected(cos_i: f64, eta: f64) -> Mueller {
     let [s, p] = amplitudes(cos_i, eta);
-    Mueller::of(s, p, 1.0)
+    Mueller::from_amplitudes(s, p, 1.0)
 }
 
 /// Transmission through such an interface; zero at total reflection.
@@ -128,7 +128,7 @@ pub fn transmitted(cos_i: f64, eta: f64) -> Mueller {
     let p = Complex::real(2.0 * eta * cos_i / (cos_i + eta * cos_t));
     // Power: (n2 cos t)/(n1 cos i) times the square of the field.
     let factor = if cos_i > 0.0 { cos_t / (eta * cos_i) } else { 0.0 };
-    Mueller::of(s, p, factor)
+    Mueller::from_amplitudes(s, p, factor)
 }
 
 /// Reflection at a metal of index `n + i·k` seen from a medium of index `outside`.
@@ -141,7 +141,7 @@ pub fn metal(cos_i: f64, outside: f64, n: f64, k: f64) -> Mueller {
     let c = Complex::real(cos_i);
     let s = (c - q) / (c + q);
     let p = (n2 * c - q) / (n2 * c + q);
-    Mueller::of(s, p, 1.0)
+    Mueller::from_amplitudes(s, p, 1.0)
 }
 
 /// Amplitudes of reflection of s and p.

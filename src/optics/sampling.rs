@@ -67,7 +67,7 @@ pub fn sphere([u, v]: [f64; 2]) -> Vector {
 pub fn cone(axis: Vector, cos_max: f64, [u, v]: [f64; 2]) -> Vector {
     // 1 - cos is kept, so that narrow cones lose no digits.
     let one_minus = u * (1.0 - cos_max);
-    around(axis, 1.0 - one_minus, (one_minus * (2.0 - one_minus)).sqrt(), v)
+    direction_about(axis, 1.0 - one_minus, (one_minus * (2.0 - one_minus)).sqrt(), v)
 }
 
 /// A direction with density `cos θ/π` per steradian about `n`: Lambert's law.
@@ -81,11 +81,11 @@ pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
 /// A direction with density `(m + 1)/2π · cosᵐ θ` per steradian about `axis`.
 pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
     let cos = (1.0 - u).powf(1.0 / (exponent + 1.0));
-    around(axis, cos, ((1.0 - cos) * (1.0 + cos)).sqrt(), v)
+    direction_about(axis, cos, ((1.0 - cos) * (1.0 + cos)).sqrt(), v)
 }
 
 /// The direction at an angle from `axis`, at azimuth `2π·turn`.
-pub(super) fn around(axis: Vector, cos: f64, sin: f64, turn: f64) -> Vector {
+pub(super) fn direction_about(axis: Vector, cos: f64, sin: f64, turn: f64) -> Vector {
     let (a, b) = orthonormal_pair(axis);
     let (s, c) = sin_cos_turns(turn);
     (axis * cos + (a * c + b * s) * sin).normalize()

@@ -1,6 +1,6 @@
 use super::abg::Abg;
-use super::error::{Error, checked};
-use super::sampling::{around, cosine_power, lambertian};
+use super::error::{Error, require};
+use super::sampling::{cosine_power, direction_about, lambertian};
 use crate::math::Vector;
 use std::f64::consts::PI;
 
@@ -40,10 +40,10 @@ pub enum Lobe {
 impl Scatter {
     /// Refuses a share outside `[0, 1]` and a lobe without meaning.
     pub fn new(share: f64, lobe: Lobe) -> Result<Self, Error> {
-        checked("the scattered share", share, (0.0..=1.0).contains(&share), "from 0 to 1")?;
+        require("the scattered share", share, (0.0..=1.0).contains(&share), "from 0 to 1")?;
         match lobe {
-            Lobe::Gaussian { sigma } => checked("sigma", sigma, sigma > 0.0, "a positive angle")?,
-            Lobe::Cosine { exponent } => checked("the exponent", exponent, exponent >= 0.0, "zero or more")?,
+            Lobe::Gaussian { sigma } => require("sigma", sigma, sigma > 0.0, "a positive angle")?,
+            Lobe::Cosine { exponent } => require("the exponent", exponent, exponent >= 0.0, "zero or more")?,
             _ => 0.0,
         };
         Ok(Self { share, lobe })
@@ -74,10 +74,10 @@ impl Lobe {
         match self {
             Self::Lambertian => Some(lambertian(n, u)),
             Self::Gaussian { sigma } => {
-                let angle = sigma * (-2.0 * (-u[0] * within_pi(*sigma)).ln_1p()).sqrt();
-                Some(folded(around(specular, angle.cos(), angle.sin(), u[1]), n))
+                let angle = sigma * (-2.0 * (-u[0] * share_below_pi(*sigma)).ln_1p()).sqrt();
+                Some(fold_to_side(direction_about(specular, angle.cos(), angle.sin(), u[1]), n))
             }
-            Self::Cosine { exponent } => Some(folded(cosine_power(specular, *exponent, u), n)),
+            Self::Cosine { exponent } => Some(fold_to_side(cosine_power(specular, *exponent, u), n)),
             Self::Abg(abg) => abg.sample(specular, n, u),
         }
     }
@@ -88,7 +88,7 @@ impl Lobe {
         if cos <= 0.0 {
             return 0.0;
         }
-        let both = |lobe: &dyn Fn(f64) -> f64| lobe(specular.dot(out)) + lobe(specular.dot(mirrored(out, n)));
+        let both = |lobe: &dyn Fn(f64) -> f64| lobe(specular.dot(out)) + lobe(specular.dot(mirror_image(out, n)));
         match self {
             Self::Lambertian => cos / PI,
             Self::Gaussian { sigma } => both(&|c| gaussian(c, *sigma)),
@@ -101,7 +101,7 @@ impl Lobe {
 }
 
 /// Share of the flat Gaussian that lies within an angle of π.
-fn within_pi(sigma: f64) -> f64 {
+fn share_below_pi(sigma: f64) -> f64 {
     -(-PI * PI / (2.0 * sigma * sigma)).exp_m1()
 }
 
@@ -110,15 +110,15 @@ fn gaussian(cos: f64, sigma: f64) -> f64 {
     let angle = cos.clamp(-1.0, 1.0).acos();
     let stretch = if angle < 1e-4 { 1.0 } else { angle / angle.sin().max(f64::MIN_POSITIVE) };
     let flat = (-angle * angle / (2.0 * sigma * sigma)).exp() / (2.0 * PI * sigma * sigma);
-    flat * stretch / within_pi(sigma)
+    flat * stretch / share_below_pi(sigma)
 }
 
-fn mirrored(d: Vector, n: Vector) -> Vector {
+fn mirror_image(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
-fn folded(d: Vector, n: Vector) -> Vector {
-    if d.dot(n) < 0.0 { mirrored(d, n) } else { d }
+fn fold_to_side(d: Vector, n: Vector) -> Vector {
+    if d.dot(n) < 0.0 { mirror_image(d, n) } else { d }
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 use super::cie;
-use super::error::{Error, ErrorKind, checked};
+use super::error::{Error, ErrorKind, require};
 use super::intensity::linear_quantile;
 use super::table::Table;
 
@@ -77,15 +77,15 @@ impl Spectrum {
                 Wavelengths::continuous(table)
             }
             Self::BlackBody { kelvin, range_nm: [a, b] } => {
-                checked("the temperature", *kelvin, *kelvin > 0.0, "positive, in kelvin")?;
-                checked("the first wavelength", *a, *a >= 1.0, "at least 1 nm")?;
-                checked("the last wavelength", *b, b > a && *b <= 1e6, "above the first and at most 1e6 nm")?;
+                require("the temperature", *kelvin, *kelvin > 0.0, "positive, in kelvin")?;
+                require("the first wavelength", *a, *a >= 1.0, "at least 1 nm")?;
+                require("the last wavelength", *b, b > a && *b <= 1e6, "above the first and at most 1e6 nm")?;
                 Wavelengths::continuous(Table::sampled([*a, *b], steps(*b - *a), |nm| planck(nm, *kelvin)))
             }
             Self::WhiteLed(led) => {
-                checked("the blue share", led.blue_share, (0.0..=1.0).contains(&led.blue_share), "from 0 to 1")?;
+                require("the blue share", led.blue_share, (0.0..=1.0).contains(&led.blue_share), "from 0 to 1")?;
                 for nm in [led.blue_nm, led.phosphor_nm, led.blue_width_nm, led.phosphor_width_nm] {
-                    checked("a wavelength or width of the LED", nm, nm > 0.0 && nm < 1e4, "positive, in nm")?;
+                    require("a wavelength or width of the LED", nm, nm > 0.0 && nm < 1e4, "positive, in nm")?;
                 }
                 let parts = [
                     (led.blue_nm, led.blue_width_nm, led.blue_share),
@@ -134,8 +134,8 @@ impl Wavelengths {
         let mut sum = 0.0;
         let mut sums = Vec::with_capacity(lines.len());
         for &[nm, power] in lines {
-            checked("a wavelength", nm, nm > 0.0, "positive, in nm")?;
-            sum += checked("the power of a line", power, power >= 0.0, "zero or more")?;
+            require("a wavelength", nm, nm > 0.0, "positive, in nm")?;
+            sum += require("the power of a line", power, power >= 0.0, "zero or more")?;
             sums.push(sum);
         }
         Self::with_power(Kind::Lines(lines.iter().map(|l| l[0]).collect()), sums)
@@ -144,8 +144,8 @@ impl Wavelengths {
     fn continuous(table: Table) -> Result<Self, Error> {
         let points: Vec<[f64; 2]> = table.points().map(|(x, y)| [x, y]).collect();
         let [low, _] = table.extremes();
-        checked("the power of a spectrum", low, low >= 0.0, "zero or more at every wavelength")?;
-        checked("the first wavelength", points[0][0], points[0][0] > 0.0, "positive, in nm")?;
+        require("the power of a spectrum", low, low >= 0.0, "zero or more at every wavelength")?;
+        require("the first wavelength", points[0][0], points[0][0] > 0.0, "positive, in nm")?;
         let mut sums = vec![0.0];
         for p in points.windows(2) {
             sums.push(sums[sums.len() - 1] + 0.5 * (p[1][0] - p[0][0]) * (p[0][1] + p[1][1]));
@@ -237,7 +237,7 @@ impl Wavelengths {
 
     /// The same light by its lumens in place of its watts: what wavelengths are drawn from where power is counted in lumens. The product
     /// with V(λ) is taken every nanometre and at every point of the spectrum.
-    pub fn seen(&self) -> Result<Self, Error> {
+    pub fn photometric(&self) -> Result<Self, Error> {
         match &self.kind {
             Kind::Lines(nm) => {
                 let before = std::iter::once(0.0).chain(self.sums.iter().copied());

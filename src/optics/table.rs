@@ -1,4 +1,4 @@
-use super::error::{Error, ErrorKind, checked};
+use super::error::{Error, ErrorKind, require};
 
 /// A function of wavelength (or of an angle) given at points, linear between them, constant beyond the ends.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,7 +16,7 @@ impl Table {
         }
         check_increasing(what, &x)?;
         for &value in &y {
-            checked(what, value, true, "a finite number")?;
+            require(what, value, true, "a finite number")?;
         }
         Ok(Self { x, y })
     }
@@ -29,7 +29,7 @@ impl Table {
     }
 
     /// The value at `x`.
-    pub fn at(&self, x: f64) -> f64 {
+    pub fn value(&self, x: f64) -> f64 {
         let (i, s) = bracket(&self.x, x);
         if s == 0.0 { self.y[i] } else { self.y[i] + s * (self.y[i + 1] - self.y[i]) }
     }
@@ -58,7 +58,7 @@ impl Table {
 
 pub(super) fn check_increasing(what: &'static str, x: &[f64]) -> Result<(), Error> {
     for (i, &value) in x.iter().enumerate() {
-        checked(what, value, true, "a finite number")?;
+        require(what, value, true, "a finite number")?;
         if i > 0 && value <= x[i - 1] {
             return Err(ErrorKind::NotIncreasing { what, row: i + 1 }.into());
         }
@@ -85,8 +85,8 @@ mod tests {
     #[test]
     fn linear_inside_and_constant_beyond() {
         let t = Table::new("index", [(400.0, 1.5), (500.0, 1.4), (700.0, 1.2)]).unwrap();
-        assert_eq!((t.at(300.0), t.at(400.0), t.at(900.0)), (1.5, 1.5, 1.2));
-        assert!((t.at(450.0) - 1.45).abs() < 1e-15 && (t.at(600.0) - 1.3).abs() < 1e-15);
+        assert_eq!((t.value(300.0), t.value(400.0), t.value(900.0)), (1.5, 1.5, 1.2));
+        assert!((t.value(450.0) - 1.45).abs() < 1e-15 && (t.value(600.0) - 1.3).abs() < 1e-15);
         assert_eq!(t.range(), [400.0, 700.0]);
         assert!(!t.is_constant() && Table::new("x", [(1.0, 2.0)]).unwrap().is_constant());
     }

@@ -170,8 +170,8 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
             }
             // The stretch around the place: whole rays from far outside would bury the model.
             let range = [(first - 0.15 * diagonal).max(0.0), last + 0.04 * diagonal];
-            lines.push(range.map(|t| d.ray.at(t)));
-            places.push(d.ray.at(first));
+            lines.push(range.map(|t| d.ray.point_at(t)));
+            places.push(d.ray.point_at(first));
             shown += 1;
         }
         let name = format!("{} ({})", kind.name, grouped(kind.count));

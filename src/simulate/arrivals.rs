@@ -25,7 +25,12 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             let (ray, end) = (Ray::new(a.point, direction), reach(a, b, receiver.absorbs));
             let mut after = 0.0;
             while let Some(t) = receiver.crossing(&ray, after, end) {
-                rays.push(LightRay { origin: ray.at(t), direction, power: b.power * share, wavelength_nm: None });
+                rays.push(LightRay {
+                    origin: ray.point_at(t),
+                    direction,
+                    power: b.power * share,
+                    wavelength_nm: None,
+                });
                 after = t;
             }
         }

@@ -170,7 +170,7 @@ impl Receiver {
                     let sides = box_corners.map(|c| (c - frame.origin).dot(frame.z));
                     sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0)
                 };
-                !(Aabb::around(corners).intersection(*region).is_empty() || apart(region.corners()))
+                !(Aabb::from_points(corners).intersection(*region).is_empty() || apart(region.corners()))
             }
             Shape::Sphere { frame, radius } => {
                 let far = region.corners().map(|c| (c - frame.origin).length()).into_iter().fold(0.0, f64::max);
@@ -194,7 +194,7 @@ impl Receiver {
                 if !(t > after && t < before) {
                     return None;
                 }
-                let p = ray.at(t) - frame.origin;
+                let p = ray.point_at(t) - frame.origin;
                 (p.dot(frame.x).abs() <= half[0] && p.dot(frame.y).abs() <= half[1]).then_some(t)
             }
             Shape::Sphere { frame, radius } => {

@@ -220,8 +220,8 @@ mod tests {
         assert_eq!(arbitrate(&mesh, &down, Some(&lower), Some(&upper)), Verdict::Second);
         assert_eq!(arbitrate(&mesh, &down, Some(&upper), None), Verdict::First);
         assert_eq!(arbitrate(&mesh, &beside, Some(&upper), None), Verdict::Second);
-        assert_eq!(arbitrate(&mesh, &down.within(0.0, 1.0), None, Some(&upper)), Verdict::First);
-        assert_eq!(arbitrate(&mesh, &down.within(2.5, 9.0), Some(&upper), Some(&lower)), Verdict::Second);
+        assert_eq!(arbitrate(&mesh, &down.with_range(0.0, 1.0), None, Some(&upper)), Verdict::First);
+        assert_eq!(arbitrate(&mesh, &down.with_range(2.5, 9.0), Some(&upper), Some(&lower)), Verdict::Second);
     }
 
     #[test]

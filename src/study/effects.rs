@@ -80,7 +80,7 @@ pub fn effects(
         let (t, called, rays, own) = ran(&with(*kernel))?;
         let able = match kernel {
             KernelChoice::Full => Effects::ALL,
-            _ => added.map_or(needed, |e| needed.with(e)),
+            _ => added.map_or(needed, |e| needed.with_effect(e)),
         };
         Some(Row {
             scene: name.into(),

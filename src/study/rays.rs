@@ -141,7 +141,7 @@ impl<'a> Bounces<'a> {
                 Some(hit) => {
                     let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
                     let n = hit.geometric_normal * side;
-                    Ray::new(ray.at(hit.t) + n * self.lift, random.hemisphere(n))
+                    Ray::new(ray.point_at(hit.t) + n * self.lift, random.hemisphere(n))
                 }
                 None => self.first.ray(path * BOUNCES + k),
             };

@@ -36,10 +36,11 @@ pub fn placed(mut model: Model, frame: &Frame) -> Model {
 /// the largest distance at equal parameters over 30 samples of each facet, plus 15 %: measured, not proved.
 pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
     let divisions = divisions.max(1);
-    let bounds = Aabb::around(model.placed_faces().filter_map(|p| p.face.map(|f| (p, f))).flat_map(|(p, f)| {
-        let b = f.surface.bounds().corners();
-        b.map(|c| p.placement.point(c))
-    }));
+    let bounds =
+        Aabb::from_points(model.placed_faces().filter_map(|p| p.face.map(|f| (p, f))).flat_map(|(p, f)| {
+            let b = f.surface.bounds().corners();
+            b.map(|c| p.placement.point(c))
+        }));
     let cell = (WELD * bounds.diagonal()).max(f64::MIN_POSITIVE);
     let mut weld = Weld { origin: bounds.min, cell, seen: FxHashMap::default() };
     let mut mesh = FacetMesh::default();

@@ -147,7 +147,7 @@ impl Maker {
 fn shell_bounds(shell: &Shell, edges: &[Edge]) -> Aabb {
     let used = shell.faces.iter().flat_map(|f| &f.loops).flat_map(|l| &l.uses).filter_map(|u| u.edge);
     let curves = used.map(|id| edges[id.0 as usize].curve.bounds());
-    curves.chain(shell.faces.iter().map(|f| f.surface.bounds())).fold(Aabb::around([]), Aabb::union)
+    curves.chain(shell.faces.iter().map(|f| f.surface.bounds())).fold(Aabb::from_points([]), Aabb::union)
 }
 
 /// Whether the normals of a closed shell point outward, by a vote: where it reaches farthest in a direction, an outward

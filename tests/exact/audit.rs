@@ -50,7 +50,7 @@ fn compare(name: &str, model: &Model, rays: impl Iterator<Item = Ray>) -> Tally 
 
 fn aimed(surface: &Surface, seed: u64, n: usize) -> Vec<Ray> {
     let mut s = Stream(seed);
-    let b = Aabb::around(surface.points.iter().map(|p| p.project()));
+    let b = Aabb::from_points(surface.points.iter().map(|p| p.project()));
     (0..n).map(|_| s.ray(b.center(), 0.5 * b.size())).collect()
 }
 

@@ -25,10 +25,10 @@ fn random_rays_on_a_sphere() {
         match answer.hit {
             Some(hit) => {
                 assert!(closest <= 50.0 + 1e-9);
-                assert!((ray.at(hit.t).length() - 50.0).abs() < 1e-12, "residual");
+                assert!((ray.point_at(hit.t).length() - 50.0).abs() < 1e-12, "residual");
                 if closest < 49.9 {
                     assert!((hit.t - (-b - (2500.0 - closest * closest).sqrt())).abs() < 1e-10, "the entry");
-                    assert!((hit.normal - ray.at(hit.t) / 50.0).length() < 1e-12);
+                    assert!((hit.normal - ray.point_at(hit.t) / 50.0).length() < 1e-12);
                 }
             }
             None => assert!(closest >= 50.0 - 1e-12, "missed at {closest}"),
@@ -60,7 +60,7 @@ fn grazing_a_sphere_is_decided_or_flagged() {
                 if let Some(hit) = answer.hit {
                     let b = 50.0 + true_offset;
                     let t = 150.0 - ((50.0 - b) * (50.0 + b)).max(0.0).sqrt();
-                    assert!((hit.t - t).abs() < 1e-6 && (ray.at(hit.t).length() - 50.0).abs() < 1e-12);
+                    assert!((hit.t - t).abs() < 1e-6 && (ray.point_at(hit.t).length() - 50.0).abs() < 1e-12);
                 }
             }
         }
@@ -76,7 +76,7 @@ fn a_ray_that_leaves_a_sphere_finds_the_other_side() {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
         let first = exact.intersect(&ray, &mut Cost::default()).expect("aimed well inside");
         let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
-        let mut o = ray.at(first.t);
+        let mut o = ray.point_at(first.t);
         let inward = -o.normalize();
         // Every third leaves almost along the surface: a chord of 2e-4 to 6 mm.
         let d = if k % 3 == 0 {
@@ -87,7 +87,7 @@ fn a_ray_that_leaves_a_sphere_finds_the_other_side() {
             if d.dot(inward) < 0.0 { -d } else { d }
         };
         o += s.direction() * 1e-14;
-        let ray = Ray::new(o, d).leaving(from);
+        let ray = Ray::new(o, d).with_departure(from);
         let chord = -2.0 * o.dot(d);
         let answer = exact.first(&ray, &mut Cost::default());
         if answer.certainty != Certainty::Certified {
@@ -108,12 +108,12 @@ fn a_ray_that_leaves_a_sphere_outward_meets_nothing() {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
         let first = exact.intersect(&ray, &mut Cost::default()).expect("aimed well inside");
         let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
-        let o = ray.at(first.t) + s.direction() * 1e-14;
+        let o = ray.point_at(first.t) + s.direction() * 1e-14;
         let mut d = s.direction();
         if d.dot(o) < 0.0 {
             d = -d;
         }
-        let hit = exact.intersect(&Ray::new(o, d).leaving(from), &mut Cost::default());
+        let hit = exact.intersect(&Ray::new(o, d).with_departure(from), &mut Cost::default());
         assert!(hit.is_none(), "{hit:?} at {}", d.dot(o) / 50.0);
     }
 }
@@ -132,7 +132,7 @@ fn crossings_of_a_torus_satisfy_its_equation_and_are_even() {
             let hits = exact.crossings(&ray, &mut Cost::default());
             assert!(hits.len().is_multiple_of(2) && hits.len() <= 4, "{} crossings", hits.len());
             for hit in &hits {
-                assert!(f(ray.at(hit.t)).abs() < 1e-11);
+                assert!(f(ray.point_at(hit.t)).abs() < 1e-11);
             }
             // Between crossings the sign of the equation does not change.
             let mut edges: Vec<f64> = hits.iter().map(|h| h.t).collect();
@@ -142,8 +142,12 @@ fn crossings_of_a_torus_satisfy_its_equation_and_are_even() {
                 let width = pair[1] - pair[0];
                 for step in 1..20 {
                     let t = pair[0] + width * step as f64 / 20.0;
-                    let inside = f(ray.at(t)) < 0.0;
-                    assert!(inside == (k % 2 == 1) || f(ray.at(t)).abs() < 1e-9, "sheet {k} of {}", edges.len());
+                    let inside = f(ray.point_at(t)) < 0.0;
+                    assert!(
+                        inside == (k % 2 == 1) || f(ray.point_at(t)).abs() < 1e-9,
+                        "sheet {k} of {}",
+                        edges.len()
+                    );
                 }
             }
             let first = exact.intersect(&ray, &mut Cost::default());

@@ -40,7 +40,7 @@ struct Found {
 
 fn bounds(model: &Model) -> Aabb {
     model.placed_faces().filter_map(|p| p.face.map(|f| (f, p.placement))).fold(Aabb::EMPTY, |b, (f, place)| {
-        b.union(Aabb::around(f.surface.points.iter().map(|p| place.point(p.project()))))
+        b.union(Aabb::from_points(f.surface.points.iter().map(|p| place.point(p.project()))))
     })
 }
 

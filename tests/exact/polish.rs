@@ -118,7 +118,7 @@ fn a_departure_from_the_spline_is_never_lost() {
                 continue;
             }
             let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
-            let o: Point = ray.at(first.t);
+            let o: Point = ray.point_at(first.t);
             let along: Vector = first.normal.cross(s.direction()).normalize();
             let side = if s.next() < 0.5 { -1.0 } else { 1.0 };
             let d = if k % 3 == 0 {
@@ -126,7 +126,7 @@ fn a_departure_from_the_spline_is_never_lost() {
             } else {
                 s.direction()
             };
-            let ray = Ray::new(o, d).leaving(from);
+            let ray = Ray::new(o, d).with_departure(from);
             asked += 1;
             let (a, b) = (polished.intersect(&ray, &mut Cost::default()), exact.first(&ray, &mut Cost::default()));
             if a.is_some_and(|h| h.t < 1e-6 && b.hit.is_none_or(|x| x.t > 1e-6)) {
@@ -172,7 +172,7 @@ fn short_flat_rays_meet_the_sphere() {
         let out = random.direction();
         let along = out.cross(random.direction()).normalize();
         let d = (along - 0.1 * out).normalize();
-        let ray = Ray::new(Point::ZERO + 20.0 * out - 1e-3 * d, d).within(0.0, 2e-3).leaving(from);
+        let ray = Ray::new(Point::ZERO + 20.0 * out - 1e-3 * d, d).with_range(0.0, 2e-3).with_departure(from);
         let hit = polished.intersect(&ray, &mut Cost::default());
         assert!(hit.is_some_and(|h| (h.t - 1e-3).abs() < 1e-9 && h.face == FaceId(0)), "{ray:?} {hit:?}");
     }

@@ -53,7 +53,7 @@ fn rays_about(size: f64, count: usize, seed: u64) -> Vec<Ray> {
             let far = [0.5, 1.0, 3.0, 1e4][k % 4];
             let origin = r.direction() * (size * far);
             let target = Point::new(r.within(-size, size), r.within(-size, size), r.within(-size, size));
-            Ray::through(origin, target).unwrap()
+            Ray::from_points(origin, target).unwrap()
         })
         .collect()
 }
@@ -64,7 +64,7 @@ fn nearest_hit_is_that_of_trying_all_facets() {
     let mut rays = rays_about(10.0, 4000, 11);
     for (k, ray) in rays.iter_mut().enumerate() {
         match k % 5 {
-            0 => *ray = ray.within(4.0, 9.0),
+            0 => *ray = ray.with_range(4.0, 9.0),
             1 => *ray = Ray::new(ray.origin, [Vector::X, -Vector::Y, Vector::Z][k % 3]),
             _ => {}
         }
@@ -178,7 +178,11 @@ fn grazing_rays_that_start_on_edges_stay_inside() {
 }
 
 fn leave(ray: Ray, hit: &Hit, direction: Vector) -> Ray {
-    Ray::new(ray.at(hit.t), direction).leaving(Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv })
+    Ray::new(ray.point_at(hit.t), direction).with_departure(Departure {
+        face: hit.face,
+        primitive: hit.primitive,
+        uv: hit.uv,
+    })
 }
 
 #[test]
@@ -233,7 +237,7 @@ fn a_ray_leaving_a_convex_body_meets_nothing() {
             let from = Departure { face: mesh.facets[f].face, primitive: f as u32, uv: Default::default() };
             // The blown-up cube has quads folded inward or outward by up to this much: start directions above.
             if direction.dot(normal) > 0.1 {
-                rays.push(Ray::new(start, direction).leaving(from));
+                rays.push(Ray::new(start, direction).with_departure(from));
             }
         }
     }
@@ -278,15 +282,15 @@ fn t_range_is_honoured_to_the_bit() {
     let t = ask(&mesh, &[down])[0].unwrap().t;
     assert!((t - 0.7).abs() < 1e-15);
     let rays = [
-        down.within(0.0, t),
-        down.within(t, 2.0),
-        down.within(0.0, t.next_down()),
-        down.within(t.next_up(), 2.0),
-        Ray::new(Point::new(0.1, 0.2, -0.7), -Vector::Z).within(-1.0, 5.0),
+        down.with_range(0.0, t),
+        down.with_range(t, 2.0),
+        down.with_range(0.0, t.next_down()),
+        down.with_range(t.next_up(), 2.0),
+        Ray::new(Point::new(0.1, 0.2, -0.7), -Vector::Z).with_range(-1.0, 5.0),
         Ray::new(Point::new(f64::NAN, 0.0, 1.0), -Vector::Z),
         Ray::new(Point::new(0.1, 0.2, 1.0), Vector::ZERO),
-        down.within(f64::NAN, 5.0),
-        down.within(2.0, 1.0),
+        down.with_range(f64::NAN, 5.0),
+        down.with_range(2.0, 1.0),
     ];
     let hits = ask(&mesh, &rays);
     let t_of = |i: usize| hits[i].map(|h| h.t);

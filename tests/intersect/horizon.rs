@@ -29,13 +29,13 @@ fn leaving(mesh: &FacetMesh, dice: &mut Random) -> Ray {
         direction = (direction - normal * (direction.dot(normal) * (1.0 - 0.1 * dice.unit()))).normalize();
     }
     let from = Departure { face: FaceId(0), primitive: facet as u32, uv: Uv::ZERO };
-    Ray::new(origin, direction).leaving(from)
+    Ray::new(origin, direction).with_departure(from)
 }
 
 /// The same, but all rays of a facet run nearly the same way, which differs from facet to facet.
 fn in_a_bundle(mesh: &FacetMesh, dice: &mut Random) -> Ray {
     let ray = leaving(mesh, dice);
-    let facet = ray.from.map_or(0, |from| from.primitive);
+    let facet = ray.departure.map_or(0, |from| from.primitive);
     let bundle = Random(u64::from(facet)).direction();
     Ray { direction: (bundle + dice.direction() * 0.2).normalize(), ..ray }
 }
@@ -132,7 +132,7 @@ fn a_folded_facet_is_met_by_what_leaves_its_other_half() {
             continue;
         }
         let departure = Departure { face: FaceId(0), primitive: 0, uv: Uv::ZERO };
-        let ray = Ray::new(from, (to - from).normalize()).leaving(departure);
+        let ray = Ray::new(from, (to - from).normalize()).with_departure(departure);
         let tree = Octree::build(&mesh, &octree::Settings::default());
         let judge = Bvh::build(&mesh, &bvh::Settings::default());
         let mut batch = [None; 2];

@@ -71,7 +71,7 @@ fn place(mesh: &FacetMesh, dice: &mut Random) -> Point {
 fn rays_from_a_point() {
     let mut dice = Random(11);
     for (name, mesh) in meshes() {
-        let bounds = lampyris::math::Aabb::around(mesh.positions.iter().copied().filter(|p| p.is_finite()));
+        let bounds = lampyris::math::Aabb::from_points(mesh.positions.iter().copied().filter(|p| p.is_finite()));
         let (middle, size) =
             if bounds.is_empty() { (Point::ZERO, 1.0) } else { (bounds.center(), bounds.diagonal()) };
         let mut sources =
@@ -81,7 +81,7 @@ fn rays_from_a_point() {
         for from in sources {
             let mut rays = Vec::new();
             for k in 0..1500 {
-                let aimed = Ray::through(from, place(&mesh, &mut dice));
+                let aimed = Ray::from_points(from, place(&mesh, &mut dice));
                 let any = Ray::new(from, dice.direction());
                 let axis = [Vector::X, -Vector::Y, Vector::Z, Vector::new(1.0, 1.0, -1.0).normalize()][k % 4];
                 rays.extend([aimed.unwrap_or(any), any]);
@@ -99,7 +99,7 @@ fn rays_from_a_point() {
 fn rays_along_a_direction() {
     let mut dice = Random(12);
     for (name, mesh) in meshes() {
-        let bounds = lampyris::math::Aabb::around(mesh.positions.iter().copied().filter(|p| p.is_finite()));
+        let bounds = lampyris::math::Aabb::from_points(mesh.positions.iter().copied().filter(|p| p.is_finite()));
         let (middle, size) =
             if bounds.is_empty() { (Point::ZERO, 1.0) } else { (bounds.center(), bounds.diagonal()) };
         let mut directions = vec![Vector::Z, -Vector::X];

@@ -242,7 +242,7 @@ pub(crate) fn paths(tree: &dyn Intersector, sources: &[Point], count: usize) -> 
             let n = hit.geometric_normal * if r.unit() < 0.6 { side } else { -side };
             let direction = (n + r.direction() * 0.999).normalize();
             let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-            ray = Ray::new(ray.at(hit.t), direction).leaving(from);
+            ray = Ray::new(ray.point_at(hit.t), direction).with_departure(from);
         }
     }
     rays.truncate(count);

@@ -34,7 +34,7 @@ fn follow(scene: &dyn Intersector, start: Ray, acts: &[Act]) -> Option<(Ray, f64
         };
         way += hit.t;
         let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-        ray = Ray::new(ray.at(hit.t), direction).leaving(from);
+        ray = Ray::new(ray.point_at(hit.t), direction).with_departure(from);
     }
     Some((ray, way, certain))
 }
@@ -115,12 +115,12 @@ fn a_paraboloid_focuses_parallel_light_and_makes_it() {
         // All ways from the plane z = 100 to the focus are 100 + f.
         assert!((way + (focus - end.origin).length() - 125.0).abs() < 1e-9);
     });
-    let out =
-        aperture(59.0, 500).map(|(x, y)| Ray::through(focus, Point::new(x, y, (x * x + y * y) / 100.0)).unwrap());
+    let out = aperture(59.0, 500)
+        .map(|(x, y)| Ray::from_points(focus, Point::new(x, y, (x * x + y * y) / 100.0)).unwrap());
     every(&scene, out, &[Act::Mirror], |_, end, _| assert!((end.direction - Vector::Z).length() < 1e-11));
     // A disk of radius 1 at the focus: the beam's half angle near the vertex, and at h = 50 across the plane of incidence.
     for (at, source, expected) in [(1e-6, Vector::X, 2.2906), (50.0, Vector::Y, 1.1458)] {
-        let start = Ray::through(focus + source, Point::new(at, 0.0, at * at / 100.0)).unwrap();
+        let start = Ray::from_points(focus + source, Point::new(at, 0.0, at * at / 100.0)).unwrap();
         let (end, ..) = follow(&scene, start, &[Act::Mirror]).unwrap();
         assert!((end.direction.angle_between(Vector::Z).to_degrees() - expected).abs() < 1e-4);
     }
@@ -223,7 +223,7 @@ fn a_ball_lens_crosses_the_axis_where_it_should() {
         assert!(miss(end, Point::new(h / (2.0 * (i - r)).sin(), 0.0, 0.0)) < 1e-9);
     });
     // N-BK7, D = 10 mm: the effective focal length from the sine of the angle, the crossing from the centre.
-    let n = catalogue::medium("N-BK7").unwrap().index.at(line::D);
+    let n = catalogue::medium("N-BK7").unwrap().index.value(line::D);
     let (end, ..) = follow(&scene, along(1e-3), &[Act::Refract(1.0 / n), Act::Refract(n)]).unwrap();
     let focal = 1e-3 / end.direction.cross(Vector::X).length();
     assert!((focal - 7.337461).abs() < 1e-5, "{focal}");
@@ -241,7 +241,7 @@ fn thick_lenses_have_their_focal_lengths_near_the_axis() {
     let (front, back) = (turned(&conic(50.0, 0.0, 0.0, 10.0)), turned(&conic(-50.0, 0.0, 5.0, 10.0)));
     let (focal, back_focal) = paraxial(front, back, 5.0, 1.5);
     assert!((focal - 50.847458).abs() < 1e-6 && (back_focal - 49.152542).abs() < 1e-6, "{focal} {back_focal}");
-    let n = catalogue::medium("N-BK7").unwrap().index.at(line::D);
+    let n = catalogue::medium("N-BK7").unwrap().index.value(line::D);
     let (focal, _) = paraxial(turned(&conic(51.5, 0.0, 0.0, 12.0)), disk(4.0, 12.0), 4.0, n);
     assert!((focal - 99.651696).abs() < 2e-5, "{focal}");
 }
@@ -256,7 +256,7 @@ impl Intersector for Facets<'_> {
     fn intersect(&self, ray: &Ray, _: &mut Cost) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         for (i, facet) in self.mesh.facets.iter().enumerate() {
-            if ray.from.is_some_and(|f| f.primitive == i as u32) {
+            if ray.departure.is_some_and(|f| f.primitive == i as u32) {
                 continue;
             }
             let p = self.mesh.corners(i);

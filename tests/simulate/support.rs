@@ -99,7 +99,7 @@ impl Shape {
                     return None;
                 }
                 let t = (frame.origin - ray.origin).dot(frame.z) / along;
-                let p = frame.local_point(ray.at(t));
+                let p = frame.local_point(ray.point_at(t));
                 let inside = p.x.abs() <= half[0] && p.y.abs() <= half[1];
                 (inside && t >= ray.t_min && t <= ray.t_max).then_some((t, frame.z))
             }
@@ -114,7 +114,7 @@ impl Shape {
                     [-b - root, -b + root]
                 };
                 let t = roots.into_iter().find(|&t| t > 0.0 && t >= ray.t_min && t <= ray.t_max)?;
-                let n = (ray.at(t) - centre) / radius;
+                let n = (ray.point_at(t) - centre) / radius;
                 Some((t, if outward { n } else { -n }.normalize()))
             }
         }
@@ -125,7 +125,7 @@ impl Intersector for World {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         cost.rays += 1;
         let hit = |(i, s): (usize, &Shape)| {
-            let leaving = ray.from.is_some_and(|d| d.primitive == i as u32);
+            let leaving = ray.departure.is_some_and(|d| d.primitive == i as u32);
             s.hit(ray, leaving).map(|(t, normal)| Hit {
                 t,
                 normal,

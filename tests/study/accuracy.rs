@@ -150,7 +150,7 @@ fn polished_hits_and_normals_are_the_true_ones() {
                 fallen += 1;
                 continue;
             }
-            let (height, normal) = truth(ray.at(hit.t));
+            let (height, normal) = truth(ray.point_at(hit.t));
             off = off.max((height - level).abs());
             turned = turned.max(hit.normal.cross(normal).length());
         }

@@ -75,12 +75,12 @@ fn an_open_shell_differs_at_its_border() {
     let whole = Balls(vec![(Point::ZERO, 50.0)]);
     let dome = Changed(&whole, |ray: &Ray, first: Option<Hit>| {
         let first = first?;
-        if ray.at(first.t).z >= 0.0 {
+        if ray.point_at(first.t).z >= 0.0 {
             return Some(first);
         }
         // The second crossing, by symmetry about the point nearest to the centre.
         let t = -2.0 * ray.origin.dot(ray.direction) - first.t;
-        let n = ray.at(t) / 50.0;
+        let n = ray.point_at(t) / 50.0;
         (t >= ray.t_min && n.z >= 0.0).then_some(Hit { t, normal: n, geometric_normal: n, ..first })
     });
     let facets = Brute(&mesh);

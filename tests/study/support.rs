@@ -34,7 +34,7 @@ fn facet_hit(mesh: &FacetMesh, i: usize, ray: &Ray, normals: NormalMode, best: &
             continue;
         }
         // The point that the ray leaves, on whichever facets share it.
-        if ray.from.is_some() && t < 1e-12 * (1.0 + ray.origin.length()) {
+        if ray.departure.is_some() && t < 1e-12 * (1.0 + ray.origin.length()) {
             continue;
         }
         // Weights of the corners in the facet's own parameters (0,0), (1,0), (1,1), (0,1).
@@ -97,7 +97,7 @@ impl Intersector for Balls {
                 if t < ray.t_min || t > best.map_or(ray.t_max, |h| h.t) {
                     continue;
                 }
-                let n = (ray.at(t) - centre).normalize();
+                let n = (ray.point_at(t) - centre).normalize();
                 best = Some(Hit {
                     t,
                     normal: n,
@@ -167,7 +167,7 @@ impl<'a> Boxes<'a> {
     }
 
     fn build(&mut self, begin: usize, end: usize) -> usize {
-        let bounds = Aabb::around(self.order[begin..end].iter().flat_map(|&f| self.mesh.corners(f as usize)));
+        let bounds = Aabb::from_points(self.order[begin..end].iter().flat_map(|&f| self.mesh.corners(f as usize)));
         let at = self.nodes.len();
         let leaf = (end - begin <= 4).then_some((begin, end - begin));
         self.nodes.push(Node { bounds: bounds.grown(1e-9 * (1.0 + bounds.diagonal())), leaf, children: [0; 2] });
@@ -198,7 +198,7 @@ impl Intersector for Boxes<'_> {
         let mut stack = vec![0];
         while let Some(at) = stack.pop() {
             let node = &self.nodes[at];
-            let reach = ray.within(ray.t_min, best.map_or(ray.t_max, |h| h.t));
+            let reach = ray.with_range(ray.t_min, best.map_or(ray.t_max, |h| h.t));
             if node.bounds.clip(&reach).is_none() {
                 continue;
             }
@@ -233,11 +233,11 @@ impl Intersector for Bowl {
         let c = o.x * o.x + o.y * o.y - f * o.z;
         let (near, far) = quadratic_roots(a, b, c);
         let inside = |t: f64| {
-            let p = ray.at(t);
+            let p = ray.point_at(t);
             t >= ray.t_min && t <= ray.t_max && p.x.abs() <= self.half && p.y.abs() <= self.half
         };
         let t = [near, far].into_iter().flatten().find(|&t| inside(t))?;
-        let p = ray.at(t);
+        let p = ray.point_at(t);
         let n = Vector::new(-2.0 * p.x / f, -2.0 * p.y / f, 1.0).normalize();
         let uv = Uv::new(p.x, p.y);
         Some(Hit {

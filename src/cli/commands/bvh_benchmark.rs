@@ -185,7 +185,7 @@ fn edge_rays(mesh: &crate::mesh::FacetMesh, bounds: &crate::math::Aabb, seed: u6
             }
             let corners = mesh.corners(k.wrapping_mul(7919) % facets);
             let target = if k % 2 == 0 { corners[k % 4] } else { 0.5 * (corners[k % 4] + corners[(k + 1) % 4]) };
-            Ray::through(ray.origin, target)
+            Ray::from_points(ray.origin, target)
         })
         .collect()
 }

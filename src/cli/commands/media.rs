@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 const SHOWN_WAVELENGTH_NM: f64 = line::D;
 
 pub(crate) fn run(console: &Console) -> Result<Completion, Failure> {
-    let index = |name: &str| Some(catalogue::medium(name)?.index.at(SHOWN_WAVELENGTH_NM));
+    let index = |name: &str| Some(catalogue::medium(name)?.index.value(SHOWN_WAVELENGTH_NM));
     if console.json {
         let media: Vec<Value> = catalogue::names()
             .map(|name| {

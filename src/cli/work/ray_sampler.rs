@@ -42,7 +42,7 @@ impl<'a> RaySampler<'a> {
 
 /// The ray a little above the surface that it left; `None` where there is no surface.
 fn lift_off(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
-    let Some(departure) = ray.from else { return Some(ray) };
+    let Some(departure) = ray.departure else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;
     let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
     let side = if normal.dot(ray.direction) < 0.0 { -lift } else { lift };

@@ -114,7 +114,7 @@ impl Query {
         self.t_max = ray.t_max;
         self.limit = ray.t_max;
         self.departure = None;
-        if let Some(from) = ray.from {
+        if let Some(from) = ray.departure {
             self.departure = DeparturePoint::new(ray, from.face, from.uv, geometry);
         }
         self.best = None;

@@ -169,7 +169,7 @@ mod tests {
         };
         for round in 0..2000 {
             let boxes: Vec<_> = (0..5 + round % 4)
-                .map(|_| crate::math::Aabb::around([(); 2].map(|()| Point::new(next(), next(), next()))))
+                .map(|_| crate::math::Aabb::from_points([(); 2].map(|()| Point::new(next(), next(), next()))))
                 .collect();
             let tree = Tree::build(&boxes);
             let d = Vector::new(next(), next(), if round % 7 == 0 { 0.0 } else { next() }).normalize();

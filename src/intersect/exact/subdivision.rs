@@ -81,7 +81,7 @@ pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> Vec<Patc
         let (lo, hi) = extent(&part.as_ref()?.net);
         Some([patch.center + lo, patch.center + hi])
     });
-    let scene_area = Aabb::around(corners.flatten()).half_area();
+    let scene_area = Aabb::from_points(corners.flatten()).half_area();
     parts
         .into_par_iter()
         .enumerate()

@@ -55,7 +55,7 @@ impl<'a> Traditional<'a> {
                 let record = *exact.geometry.by_id.get(&placed.id)? as usize;
                 let surface = &placed.face?.surface;
                 let points = surface.points.iter().map(|p| placed.placement.point(p.project()));
-                let bounds = Aabb::around(points);
+                let bounds = Aabb::from_points(points);
                 let grid = &exact.geometry.grids[exact.geometry.faces[record].grid as usize];
                 let [us, vs] = [0, 1].map(|d| match seeds {
                     Seeds::Middle => {
@@ -119,10 +119,10 @@ impl Intersector for Traditional<'_> {
         }
         found.sort_by(|a, b| a.1.t.total_cmp(&b.1.t));
         let leaving = |face: FaceId, p: &SurfacePoint| {
-            ray.from.is_some_and(|f| {
+            ray.departure.is_some_and(|f| {
                 f.face == face
                     && p.t.abs() < OWN_POINT
-                    && self.exact.distance_at(face, f.uv, ray.at(p.t)).is_some_and(|d| d < OWN_POINT)
+                    && self.exact.distance_at(face, f.uv, ray.point_at(p.t)).is_some_and(|d| d < OWN_POINT)
             })
         };
         let first = found.into_iter().find(|(face, p)| p.t >= ray.t_min && p.t <= ray.t_max && !leaving(*face, p));

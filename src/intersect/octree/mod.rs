@@ -207,7 +207,7 @@ impl Intersector for Octree<'_> {
 
     #[inline]
     fn escapes(&self, ray: &Ray) -> bool {
-        let (Some(horizons), Some(from)) = (self.horizons.get(), ray.from) else { return false };
+        let (Some(horizons), Some(from)) = (self.horizons.get(), ray.departure) else { return false };
         horizons.is_free(&self.tree, from.primitive as usize, ray.direction)
     }
 

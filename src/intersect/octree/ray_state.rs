@@ -78,7 +78,7 @@ impl RayState {
     pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
         self.unmet_facet = tree.unmet_facet(ray);
         let lifted;
-        let ray = if ray.from.is_some() & (self.unmet_facet == u32::MAX) {
+        let ray = if ray.departure.is_some() & (self.unmet_facet == u32::MAX) {
             lifted = grazing(tree, ray);
             &lifted
         } else {

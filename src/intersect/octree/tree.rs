@@ -49,7 +49,7 @@ impl<'m> Tree<'m> {
     /// The facet that a ray leaves where it is known not to meet it again, else one that no block has.
     #[inline(always)]
     pub(super) fn unmet_facet(&self, ray: &Ray) -> u32 {
-        let Some(from) = ray.from else { return u32::MAX };
+        let Some(from) = ray.departure else { return u32::MAX };
         match self.slopes.get(from.primitive as usize) {
             Some(slopes) if slopes.leaves(ray.direction) => from.primitive,
             _ => u32::MAX,

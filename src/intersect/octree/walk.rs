@@ -202,7 +202,7 @@ fn walk_batch<L: Lanes>(
             hits[s.index] = s.best.hit();
             if let Some(&place) = order.get(next) {
                 let place = usize::from(place);
-                if let Some(from) = order.get(next + AHEAD).and_then(|&place| rays[usize::from(place)].from) {
+                if let Some(from) = order.get(next + AHEAD).and_then(|&place| rays[usize::from(place)].departure) {
                     prefetch(&tree.slopes, from.primitive as usize);
                 }
                 s.start(tree, root, &rays[place], place);

@@ -154,7 +154,7 @@ impl Scene {
         }
         let notes = notes::beyond_tables(self, &chosen, &spectra);
         let faces_box = model.placed_faces().map(|f| nearest::bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
-        let region = faces_box.union(Aabb::around(emitters.iter().flat_map(Emitter::reach)));
+        let region = faces_box.union(Aabb::from_points(emitters.iter().flat_map(Emitter::reach)));
         let region = if region.is_empty() { region } else { region.grown(1e-3 * region.diagonal()) };
         let mut bound = BoundScene {
             scene: self.clone(),

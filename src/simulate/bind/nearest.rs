@@ -74,7 +74,7 @@ pub(super) fn bounds(f: &PlacedFace<'_>) -> Aabb {
         (None, Some(t)) => t.mesh.bounds(),
         (None, None) => Aabb::EMPTY,
     };
-    if local.is_empty() { local } else { Aabb::around(local.corners().map(|c| f.placement.point(c))) }
+    if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
 }
 
 /// The trimming loops as polygons in the parameter plane.

@@ -99,9 +99,9 @@ fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut at = Ray { t_max: f64::INFINITY, ..*ray };
     for _ in 0..DEEP {
         let Some(hit) = context.intersector.intersect(&at, &mut Cost::default()) else { break };
-        let (point, d) = (at.at(hit.t), at.direction);
+        let (point, d) = (at.point_at(hit.t), at.direction);
         let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-        at = Ray::new(point, d).leaving(from);
+        at = Ray::new(point, d).with_departure(from);
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         crossed.cross(face.body, along < 0.0);
@@ -110,7 +110,7 @@ fn left_by(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         }
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
         let reach = context.bound.scene.run.glue_mm / along.abs().max(1e-3);
-        let probe = Ray::new(point - d * reach, d).within(0.0, 2.0 * reach).leaving(from);
+        let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(from);
         let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let entering = d.dot(second.geometric_normal) < 0.0;
         let other = context.bound.faces.get(second.face.index());
@@ -137,7 +137,7 @@ pub(super) fn regained<C: Carry>(context: &Context<'_>, carry: &C, ray: &Ray, en
         return None;
     }
     let middle = 0.5 * (ray.t_min + end.min(ray.t_min + 1.0));
-    let found = carry.instead(&bodies(context, &Ray::new(ray.at(middle), ray.direction)))?;
+    let found = carry.instead(&bodies(context, &Ray::new(ray.point_at(middle), ray.direction)))?;
     (found.body() != carry.body()).then_some(found)
 }
 
@@ -155,7 +155,7 @@ pub(super) fn behind(context: &Context<'_>, ray: &Ray) -> Ray {
 pub(super) fn laid(context: &Context<'_>, ray: &Ray) -> Option<Ray> {
     let (reach, d) = (context.bound.scene.run.glue_mm, ray.direction);
     let before = Ray::new(ray.origin - d * reach, d);
-    let mut probe = before.within(0.0, 2.0 * reach);
+    let mut probe = before.with_range(0.0, 2.0 * reach);
     let (mut found, mut goes_in, mut comes_out) = (false, false, false);
     // Of two faces at one place the other comes next, and then the first once more.
     for _ in 0..FACES {
@@ -168,7 +168,7 @@ pub(super) fn laid(context: &Context<'_>, ray: &Ray) -> Option<Ray> {
         found |= face.sealed || face.body != AMBIENT;
         let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
         let rounding = 1e-9 + 1e-12 * ray.origin.abs().max_element();
-        probe = Ray::new(probe.at(hit.t), d).within(-rounding, probe.t_max - hit.t).leaving(from);
+        probe = Ray::new(probe.point_at(hit.t), d).with_range(-rounding, probe.t_max - hit.t).with_departure(from);
     }
     // Over an edge a ray goes in and out at once.
     found.then(|| if goes_in && !comes_out { before } else { behind(context, ray) })

@@ -50,7 +50,7 @@ pub(super) fn late<'h, C: Carry>(
     }
     let mut end = ray.t_max;
     if let Some(h) = hit {
-        if context.region.contains(ray.origin) && context.region.contains(ray.at(h.t)) {
+        if context.region.contains(ray.origin) && context.region.contains(ray.point_at(h.t)) {
             return hit;
         }
         end = h.t;
@@ -73,7 +73,7 @@ pub(super) fn pass<C: Carry>(context: &Context<'_>, path: &Path<C>, ray: &Ray, e
         let (mut after, end) = (ray.t_min + in_front(ray, 0.0), end + in_front(ray, end.min(1e12)));
         // A sphere may be crossed twice.
         while let Some(t) = context.bound.receivers[r as usize].crossing(ray, after, end) {
-            receive(context, path, r, ray.at(t), local);
+            receive(context, path, r, ray.point_at(t), local);
             after = t;
         }
     }

@@ -40,7 +40,7 @@ fn beside(context: &Context<'_>, ray: &Ray, hit: &Hit, point: Point) -> Ray {
     let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
     let reach = context.bound.scene.run.glue_mm / cos;
     let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    Ray::new(point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(from)
+    Ray::new(point - ray.direction * reach, ray.direction).with_range(0.0, 2.0 * reach).with_departure(from)
 }
 
 /// Faces within the glue distance among which the partner is looked for.
@@ -73,7 +73,7 @@ fn met<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<Item = (Hi
 #[inline(never)]
 pub(super) fn beyond(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
     let mut behind = 0.0;
-    for (found, _) in met(context, next.within(0.0, reach)) {
+    for (found, _) in met(context, next.with_range(0.0, reach)) {
         if found.geometric_normal.dot(normal).abs() <= 0.5 {
             return behind;
         }
@@ -98,7 +98,7 @@ fn partner(
         let against = found.geometric_normal.dot(hit.geometric_normal) < -0.5;
         other.touching && other.body != face.body && opposite && against
     })?;
-    Some((found, other, probe.at(found.t)))
+    Some((found, other, probe.point_at(found.t)))
 }
 
 /// Which of two faces at one place says what happens there, when not both are bare: the one that is not, of two such the one that
@@ -130,13 +130,13 @@ pub(super) fn lit_from(context: &Context<'_>, face: FaceId, normal: Vector, ray:
     let optics = context.bound.faces.get(face.index()).filter(|f| f.against && f.body == AMBIENT)?;
     let reach = context.bound.scene.run.glue_mm / ray.direction.dot(normal).abs().max(1e-3);
     let back = ray.origin - ray.direction * reach;
-    let probe = Ray { from: ray.from, ..Ray::new(back, ray.direction).within(0.0, 2.0 * reach) };
+    let probe = Ray { departure: ray.departure, ..Ray::new(back, ray.direction).with_range(0.0, 2.0 * reach) };
     let on_it = |(found, other): (Hit, FaceOptics)| {
         other.against && other.body != optics.body && found.geometric_normal.dot(normal) < -0.5
     };
     met(context, probe).any(on_it).then(|| {
         ray.t_min = beyond(context, ray, normal, reach);
-        Ray::new(ray.at(ray.t_min), ray.direction)
+        Ray::new(ray.point_at(ray.t_min), ray.direction)
     })
 }
 
@@ -155,11 +155,13 @@ pub(super) fn contact(
 ) -> Option<(Hit, FaceOptics, Point)> {
     let probe = match face.sealed {
         // Only light that has just left another face can have slipped in.
-        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction).within(0.0, SLIP).leaving(ray.from?),
+        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction)
+            .with_range(0.0, SLIP)
+            .with_departure(ray.departure?),
         false => beside(context, ray, hit, point),
     };
     let found = context.intersector.intersect(&probe, &mut Cost::default())?;
     let other = *context.bound.faces.get(found.face.index())?;
     let entering = ray.direction.dot(found.geometric_normal) < 0.0;
-    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.at(found.t)))
+    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.point_at(found.t)))
 }

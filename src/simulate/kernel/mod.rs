@@ -344,21 +344,22 @@ fn start<C: Carry>(
 #[inline(never)]
 fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in [1.0, 0.1, 0.01, 1e-3] {
-        let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
+        let probe = Ray::new(ray.origin + normal * reach, -normal).with_range(0.0, 2.0 * reach);
         let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
-        let mut point = probe.at(hit.t);
+        let mut point = probe.point_at(hit.t);
         if hit.face != face {
             // A face of a body that lies on it may come first.
             let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-            let behind = Ray::new(point, -normal).within(0.0, context.bound.scene.run.glue_mm).leaving(from);
+            let behind =
+                Ray::new(point, -normal).with_range(0.0, context.bound.scene.run.glue_mm).with_departure(from);
             let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };
-            (point, hit) = (behind.at(next.t), next);
+            (point, hit) = (behind.point_at(next.t), next);
         }
         if hit.face == face {
             let from = Departure { face, primitive: hit.primitive, uv: hit.uv };
             let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
             let going = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
-            *ray = Ray::new(point, going).leaving(from);
+            *ray = Ray::new(point, going).with_departure(from);
             return below;
         }
     }

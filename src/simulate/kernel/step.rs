@@ -49,7 +49,7 @@ pub(super) fn step<C: Carry>(
         leave(context, path, ray, local);
         return false;
     };
-    let point = ray.at(hit.t);
+    let point = ray.point_at(hit.t);
     path.length += hit.t;
     let Some(&face) = context.bound.faces.get(hit.face.index()) else {
         lose(path, ray, Cause::NotANumber, Some(hit.face), local);
@@ -151,7 +151,7 @@ pub(super) fn onward<C: Carry>(
     let (hit, point) = (meeting.hit, meeting.point);
     let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
     path.bounce += 1;
-    let mut next = Ray::new(point, going).leaving(from);
+    let mut next = Ray::new(point, going).with_departure(from);
     if C::MEDIA && meeting.skip.get() > 0.0 {
         let reach = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
         next.t_min = contact::beyond(context, &next, hit.geometric_normal, reach);
@@ -230,7 +230,7 @@ fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, l
 #[inline(never)]
 fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
     let Some(scatter) = &context.bound.bodies[path.carry.body() as usize].scatter else { return false };
-    let point = ray.at(ray.t_max);
+    let point = ray.point_at(ray.t_max);
     let numbers = key(context, path).pair(Purpose::BulkDirection);
     path.length += ray.t_max;
     stray(path);
@@ -247,7 +247,7 @@ fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, l
 #[inline(always)]
 fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: &mut Local) {
     if path.receiver != NO_RECEIVER {
-        let point = ray.at(ray.t_max);
+        let point = ray.point_at(ray.t_max);
         if C::MEDIA && around::is_out(context, &path.carry, ray, point) {
             record(context, path, point, Event::Lost, local);
             return lose(path, ray, Cause::NoExit, None, local);
@@ -261,7 +261,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         match around::regained(context, &path.carry, ray, f64::INFINITY, false) {
             Some(found) if found.body() == AMBIENT => path.carry = found,
             _ => {
-                record(context, path, ray.at(1.0), Event::Lost, local);
+                record(context, path, ray.point_at(1.0), Event::Lost, local);
                 return lose(path, ray, Cause::NoExit, None, local);
             }
         }
@@ -276,7 +276,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
             }
         }
     }
-    record(context, path, ray.at(context.plan.reach), Event::Escaped, local);
+    record(context, path, ray.point_at(context.plan.reach), Event::Escaped, local);
     let end = if caught { &mut local.ends.received } else { &mut local.ends.escaped };
     *end += count(path.quanta);
 }

@@ -126,7 +126,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
             return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
         }
         let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
-        let n = medium.index.at(scene.run.wavelength_nm);
+        let n = medium.index.value(scene.run.wavelength_nm);
         if !(0.1..=10.0).contains(&n) {
             let message =
                 format!("the index of '{}' at {} nm is {n}, not from 0.1 to 10", m.name, scene.run.wavelength_nm);

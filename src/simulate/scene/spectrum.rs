@@ -89,9 +89,9 @@ impl SpectrumKey {
         let watts = self.optics()?.sampler().map_err(|e| e.to_string())?;
         match unit {
             PowerUnit::Watt => Ok(watts),
-            PowerUnit::Lumen => {
-                watts.seen().map_err(|_| "this run counts lumens, and the eye sees nothing of this spectrum".into())
-            }
+            PowerUnit::Lumen => watts
+                .photometric()
+                .map_err(|_| "this run counts lumens, and the eye sees nothing of this spectrum".into()),
         }
     }
 }

@@ -16,7 +16,7 @@ const EDGE: usize = 6;
 /// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
 pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
     let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(polygons).collect();
-    let around = Aabb::around(faces.iter().map(|f| f.surface.evaluate(middle(f))));
+    let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(middle(f))));
     if around.is_empty() {
         return false;
     }

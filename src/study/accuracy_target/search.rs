@@ -47,7 +47,7 @@ pub fn meet_target(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> AccuracyPlan {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
-    let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
     let uniform = |seed: u64, count: u64| {
         let source = Uniform::new(&bounds, seed, count);
         source.rays(0..source.len())
@@ -140,7 +140,7 @@ fn brief(x: f64) -> String {
 /// 0.2 mm, the coarse end of what users target for, or 1/500 of a small model.
 fn coarse(model: &Model) -> f64 {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
-    let bounds = Aabb::around(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
     (bounds.diagonal() / SMALL_MODEL).clamp(FINEST_COARSE, COARSEST)
 }
 

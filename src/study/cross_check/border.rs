@@ -36,7 +36,7 @@ impl Border {
         // A straight line of parameters may be a helix of many turns in space.
         samples = straightened(samples, |t| surface.evaluate(curve.evaluate(t)));
         let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
-        let bounds = Aabb::around(samples.iter().map(|s| s.1)).grown(0.25 * longest);
+        let bounds = Aabb::from_points(samples.iter().map(|s| s.1)).grown(0.25 * longest);
         Self { curve, samples, bounds }
     }
 

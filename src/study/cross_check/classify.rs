@@ -42,7 +42,7 @@ impl<'a> Classifier<'a> {
         }
         let surfaces = placed.iter().map(|_| OnceLock::new()).collect();
         let bounds = mesh.bounds();
-        let reach = Aabb::around([bounds.min.abs(), bounds.max.abs()]).max;
+        let reach = Aabb::from_points([bounds.min.abs(), bounds.max.abs()]).max;
         let size = if bounds.is_empty() { 1.0 } else { reach.length() + bounds.diagonal() };
         Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
     }
@@ -66,8 +66,8 @@ impl<'a> Classifier<'a> {
     fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
         let near = |&i: &u32| {
             let sag = self.sag(i);
-            let bounds = Aabb::around(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
-            let everywhere = ray.within(f64::NEG_INFINITY, f64::INFINITY);
+            let bounds = Aabb::from_points(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
+            let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
             bounds.clip(&everywhere).map(|_| sag)
         };
         let Some(all) = self.facets.get(face.index()) else { return self.fallback };
@@ -156,7 +156,7 @@ impl<'a> Classifier<'a> {
         }
         if let Some(o) = other.filter(|o| o.face != first.face) {
             let both = band + self.band(o.face, ray, surface.gap);
-            if surface.foot(ray.at(o.t), first.uv, ray.direction).offset.abs() <= both {
+            if surface.foot(ray.point_at(o.t), first.uv, ray.direction).offset.abs() <= both {
                 return Cause::Coincident;
             }
         }

@@ -177,7 +177,7 @@ impl PlacedSurface {
 
     /// Walks from `t` in both directions for as long as the ray stays within `band` of the surface.
     pub(super) fn stretch(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> Option<BandInterval> {
-        let start = self.foot(ray.at(t), guess, ray.direction);
+        let start = self.foot(ray.point_at(t), guess, ray.direction);
         if start.offset.abs() > band {
             return None;
         }
@@ -211,7 +211,7 @@ impl PlacedSurface {
                 for _ in 0..4 {
                     at = before + sign * step;
                     at = if end == 0 { at.max(limit) } else { at.min(limit) };
-                    foot = self.foot(ray.at(at), last.uv, ray.direction);
+                    foot = self.foot(ray.point_at(at), last.uv, ray.direction);
                     if foot.point.distance(last.point) <= longest {
                         break;
                     }
@@ -317,7 +317,7 @@ mod tests {
             };
             let uses = (0..4).map(side).collect();
             let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(surface.clone()) };
-            let forward = ray.within(-1.0, 1.0);
+            let forward = ray.with_range(-1.0, 1.0);
             let stretch = whole(&face).stretch(&forward, 0.0, Uv::new(start, 0.0), band).expect("in the band");
             assert!(stretch.border, "end {end}");
         }

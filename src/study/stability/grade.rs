@@ -92,7 +92,7 @@ impl Scene<'_> {
     fn ray(&self, local: &Ray) -> Ray {
         let range = |t: f64| t * self.frame.scale;
         Ray::new(self.frame.point(local.origin), self.frame.direction(local.direction).normalize())
-            .within(range(local.t_min), range(local.t_max))
+            .with_range(range(local.t_min), range(local.t_max))
     }
 
     /// Largest sag of the facets, in the case's own millimetres.
@@ -180,12 +180,12 @@ impl Grader<'_> {
     }
 
     fn on_surface(&self, ray: &Ray, hit: &Hit, resolution: f64) -> bool {
-        (self.scene.case.distance)(ray.at(self.local_t(hit))).abs() <= 64.0 * resolution + ON_SURFACE
+        (self.scene.case.distance)(ray.point_at(self.local_t(hit))).abs() <= 64.0 * resolution + ON_SURFACE
     }
 
     fn in_band(&self, ray: &Ray, t: f64) -> bool {
         let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, t);
-        (self.scene.case.distance)(ray.at(t)).abs() <= self.band + slack
+        (self.scene.case.distance)(ray.point_at(t)).abs() <= self.band + slack
     }
 
     fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
@@ -197,10 +197,10 @@ impl Grader<'_> {
         }
         let Some(true_t) = truth.t else { return true };
         // Between the true hit and a later one the ray must not have been through the whole band.
-        let start = (self.scene.case.distance)(ray.at(true_t - 2.0 * self.band - slack)).signum();
+        let start = (self.scene.case.distance)(ray.point_at(true_t - 2.0 * self.band - slack)).signum();
         let through = |i: usize| {
             let at = true_t + (t - true_t) * i as f64 / STEPS as f64;
-            start * (self.scene.case.distance)(ray.at(at)) < -self.band - slack
+            start * (self.scene.case.distance)(ray.point_at(at)) < -self.band - slack
         };
         t <= true_t || !(1..STEPS).any(through)
     }
@@ -211,10 +211,13 @@ impl Grader<'_> {
         let mut hits: Vec<Hit> = Vec::new();
         while hits.len() <= truths.len() + 2 {
             let Some(h) = self.ask(&next) else { break };
-            let p = next.at(h.t);
+            let p = next.point_at(h.t);
             hits.push(Hit { t: (p - origin).dot(next.direction), ..h });
-            next =
-                Ray::new(p, next.direction).leaving(Departure { face: h.face, primitive: h.primitive, uv: h.uv });
+            next = Ray::new(p, next.direction).with_departure(Departure {
+                face: h.face,
+                primitive: h.primitive,
+                uv: h.uv,
+            });
         }
         let resolution = self.scene.resolution(ray, truths.last().and_then(|t| t.t).unwrap_or(0.0));
         let right = match self.geometry {
@@ -245,10 +248,10 @@ impl Grader<'_> {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
         let Some(h) = self.ask(&first) else { return Grade::Wrong };
-        let origin = frame.local_point(first.at(h.t));
+        let origin = frame.local_point(first.point_at(h.t));
         let local = Ray::new(origin, direction);
         let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
-        let second = Ray::new(first.at(h.t), frame.direction(direction).normalize()).leaving(from);
+        let second = Ray::new(first.point_at(h.t), frame.direction(direction).normalize()).with_departure(from);
         let true_t = -2.0 * origin.dot(direction);
         let cos = (origin.dot(direction) / radius).abs();
         let truth = Truth::hit(true_t, cos, radius * cos * cos * 0.5);
@@ -288,14 +291,14 @@ impl Grader<'_> {
             let d = ray_here.direction;
             let turned = (d - h.geometric_normal * (2.0 * d.dot(h.geometric_normal))).normalize();
             let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
-            ray_here = Ray::new(ray_here.at(h.t), turned).leaving(from);
+            ray_here = Ray::new(ray_here.point_at(h.t), turned).with_departure(from);
         }
         // Unfolded, the path is straight; folding each coordinate back gives the true end.
         let fold = |x: f64, l: f64| {
             let y = x.rem_euclid(2.0 * l);
             if y > l { 2.0 * l - y } else { y }
         };
-        let straight = ray.at(path);
+        let straight = ray.point_at(path);
         let end = Point::new(fold(straight.x, size.x), fold(straight.y, size.y), fold(straight.z, size.z));
         let off = frame.local_point(ray_here.origin).distance(end);
         let rounding = reflections as f64 * 16.0 * self.scene.resolution(ray, size.length());

@@ -197,7 +197,7 @@ fn on_surface() -> Case {
             let b = toward.origin.dot(toward.direction);
             -b + (b * b + R * R - toward.origin.length_squared()).sqrt()
         };
-        let n = toward.at(half) / R;
+        let n = toward.point_at(half) / R;
         // A third of the chords is shorter than 6 mm.
         let flat = if i % 3 == 0 { random.between(0.005, 0.06) } else { random.between(0.06, 1.0) };
         let (a, c) = orthonormal_pair(n);

@@ -220,7 +220,7 @@ impl AuditFace {
             }
         }
         own.into_iter().find(|h| {
-            let leaving = ray.from.is_some_and(|f| f.face == h.face && h.t.abs() < SMEARED);
+            let leaving = ray.departure.is_some_and(|f| f.face == h.face && h.t.abs() < SMEARED);
             !leaving && h.t >= ray.t_min && h.t <= ray.t_max
         })
     }

@@ -150,7 +150,7 @@ impl Base {
                     let block = &tree.blocks[index];
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
                         let corners = block.positions[k].map(|p| mesh.positions[p as usize]);
-                        if higher(&slopes, &self.rise_of_box(&Aabb::around(corners))) {
+                        if higher(&slopes, &self.rise_of_box(&Aabb::from_points(corners))) {
                             let rise = self.rise(&corners);
                             slopes = std::array::from_fn(|k| slopes[k].max(rise[k]));
                         }

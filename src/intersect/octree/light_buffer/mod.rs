@@ -229,7 +229,7 @@ impl LightBuffer {
 /// The buffer that shows a ray; `last` is tried first.
 #[inline(always)]
 fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usize> {
-    if ray.from.is_some() | (ray.t_min != 0.0) {
+    if ray.departure.is_some() | (ray.t_min != 0.0) {
         return None;
     }
     if buffers[last].view.shows(ray) {
