@@ -1,12 +1,12 @@
 //! Offset surfaces: exact where the basis is analytic, otherwise a bicubic fitted to 1e-6 mm; of an extrusion only its profile is
 //! fitted, since the offset is an extrusion too and has no end.
 //!
-//! The fit interpolates position, both first and the mixed derivative (a C¹ bicubic Hermite spline) on a grid over the
-//! basis' own domain that is refined until the middles of all cells agree. Known weakness: an offset beyond a radius of
+//! The fit interpolates position, both first and the mixed derivative (a bicubic Hermite spline) on a grid over the basis' own domain
+//! that is refined until the middles of all cells agree. At the knots of the basis it has derivatives of its own on each side. Known weakness: an offset beyond a radius of
 //! curvature folds; it is fitted as it is.
 
 use super::tolerances::{
-    CLOSED_SHARE, DIFFERENCE_STEP, INSIDE_SHARE, PARALLEL_DERIVATIVES, VANISHING_RATIO, WORST_FIT_MM,
+    CLOSED_SHARE, DIFFERENCE_STEP, PARALLEL_DERIVATIVES, POLE_STEP, SIDE_SHARE, VANISHING_RATIO, WORST_FIT_MM,
 };
 use super::{Chart, Kind, SplineChart};
 use crate::math::{Homogeneous, Point, Uv, Vector};
@@ -138,26 +138,112 @@ fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector,
     Some((s.point + distance * unit, s.du + distance * nu, s.dv + distance * nv))
 }
 
-fn jet(basis: &Surface, distance: f64, uv: Uv, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Option<Jet> {
-    // At a pole the limit from just inside.
-    let inner = Uv::new(
-        uv.x.clamp(u0 + INSIDE_SHARE * (u1 - u0), u1 - INSIDE_SHARE * (u1 - u0)),
-        uv.y.clamp(v0 + INSIDE_SHARE * (v1 - v0), v1 - INSIDE_SHARE * (v1 - v0)),
-    );
-    let (at, (point, du, dv)) = match first_order(basis, distance, uv) {
-        Some(found) => (uv, found),
-        None => (inner, first_order(basis, distance, inner)?),
+/// The jet at a grid point, as it is on one side of the grid lines (-1, 1) or, where there is no corner, on them (0).
+fn jet(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2]) -> Option<Jet> {
+    let domain = basis.domain();
+    let extent = Uv::new(domain[0][1] - domain[0][0], domain[1][1] - domain[1][0]);
+    let Some((point, ..)) = first_order(basis, distance, uv) else {
+        return jet_at_pole(basis, distance, uv, sides, extent);
     };
-    let step = DIFFERENCE_STEP * (v1 - v0);
-    let (lo, hi) = ((at.y - step).max(v0), (at.y + step).min(v1));
+    let at = uv + extent * Uv::from_array(sides) * SIDE_SHARE;
+    let (_, du, dv) = first_order(basis, distance, at)?;
+    // The mixed derivative by differences of du, without looking over the line.
+    let step = DIFFERENCE_STEP * extent.y;
+    let lo = if sides[1] > 0.0 { at.y } else { (at.y - step).max(domain[1][0]) };
+    let hi = if sides[1] < 0.0 { at.y } else { (at.y + step).min(domain[1][1]) };
     let below = first_order(basis, distance, Uv::new(at.x, lo)).map_or(du, |d| d.1);
     let above = first_order(basis, distance, Uv::new(at.x, hi)).map_or(du, |d| d.1);
     Some(Jet { point, du, dv, duv: (above - below) / (hi - lo) })
 }
 
+/// The jet at a collapsed row: the limit normal, and derivatives extrapolated linearly from two places inside.
+fn jet_at_pole(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2], extent: Uv) -> Option<Jet> {
+    let domain = basis.domain();
+    let s = basis.derivatives(uv);
+    // Inside lies across the row, along which the surface stands still.
+    let inward = if s.du.length() * extent.x < s.dv.length() * extent.y { 1 } else { 0 };
+    let along = 1 - inward;
+    let middle = 0.5 * (domain[inward][0] + domain[inward][1]);
+    let step = POLE_STEP * extent[inward] * (middle - uv[inward]).signum();
+    let mut place = uv;
+    place[along] += SIDE_SHARE * extent[along] * sides[along];
+    place[inward] += step;
+    let (_, du1, dv1) = first_order(basis, distance, place)?;
+    place[inward] += step;
+    let (_, du2, dv2) = first_order(basis, distance, place)?;
+    let mixed = if inward == 1 { du2 - du1 } else { dv2 - dv1 };
+    Some(Jet {
+        point: s.point + distance * basis.normal(uv)?,
+        du: 2.0 * du1 - du2,
+        dv: 2.0 * dv1 - dv2,
+        duv: mixed / step,
+    })
+}
+
+/// Grid lines in one direction. At the knots of the basis, the offset of a C¹ spline has a corner in its derivatives.
+struct GridLines {
+    at: Vec<f64>,
+    is_knot: Vec<bool>,
+}
+
+/// A row of control points beside or on a grid line: how far off, and on which side of a corner.
+#[derive(Clone, Copy)]
+struct ControlRow {
+    line: usize,
+    off: f64,
+    side: f64,
+}
+
+impl GridLines {
+    /// The knots of the basis with `per_span - 1` lines between each two.
+    fn new(breaks: &[f64], per_span: usize) -> Self {
+        let mut lines = Self { at: Vec::new(), is_knot: Vec::new() };
+        for w in breaks.windows(2) {
+            for k in 0..per_span {
+                lines.at.push(w[0] + (w[1] - w[0]) * k as f64 / per_span as f64);
+                lines.is_knot.push(k == 0);
+            }
+        }
+        lines.at.extend(breaks.last());
+        lines.is_knot.push(true);
+        lines
+    }
+
+    /// A third of the neighbouring cells off each line, and on the lines that may be corners.
+    fn control_rows(&self) -> Vec<ControlRow> {
+        let mut rows = Vec::with_capacity(3 * self.at.len());
+        for (line, &x) in self.at.iter().enumerate() {
+            let corner = self.is_knot[line];
+            let side = f64::from(u8::from(corner));
+            if line > 0 {
+                rows.push(ControlRow { line, off: (self.at[line - 1] - x) / 3.0, side: -side });
+            }
+            if corner {
+                // On the line itself; at the ends from inside.
+                let side = if line == 0 { 1.0 } else { -1.0 };
+                rows.push(ControlRow { line, off: 0.0, side });
+            }
+            if let Some(next) = self.at.get(line + 1) {
+                rows.push(ControlRow { line, off: (next - x) / 3.0, side });
+            }
+        }
+        rows
+    }
+
+    fn knots(&self) -> Vec<f64> {
+        let last = self.at.len() - 1;
+        let mut knots = Vec::with_capacity(3 * self.at.len() + 2);
+        for (line, &x) in self.at.iter().enumerate() {
+            let end = line == 0 || line == last;
+            let times = if end { 4 } else { 2 + usize::from(self.is_knot[line]) };
+            knots.extend(std::iter::repeat_n(x, times));
+        }
+        knots
+    }
+}
+
 /// The bicubic Hermite spline of the offset, and its error.
 fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
-    let domain = basis.domain();
     // Knots of the basis stay grid lines, so that its breaks stay breaks.
     let breaks = |d: usize| {
         let mut b = basis.knots[d][basis.degree[d]..=basis.counts()[d]].to_vec();
@@ -167,24 +253,18 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     let base = [breaks(0), breaks(1)];
     let mut per_span = 2usize;
     loop {
-        let lines = [0, 1].map(|d| {
-            let mut l: Vec<f64> = Vec::new();
-            for w in base[d].windows(2) {
-                l.extend((0..per_span).map(|k| w[0] + (w[1] - w[0]) * k as f64 / per_span as f64));
-            }
-            l.push(domain[d][1]);
-            l
-        });
-        let surface = hermite(basis, distance, domain, &lines)?;
+        let lines = [0, 1].map(|d| GridLines::new(&base[d], per_span));
+        let surface = hermite(basis, distance, &lines)?;
         let mut error = 0f64;
-        for u in lines[0].windows(2) {
-            for v in lines[1].windows(2) {
+        for u in lines[0].at.windows(2) {
+            for v in lines[1].at.windows(2) {
                 let uv = Uv::new(0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]));
                 let (p, ..) = first_order(basis, distance, uv)?;
                 error = error.max((surface.evaluate(uv) - p).length());
             }
         }
-        let full = lines.iter().any(|l| 2 * l.len() > MAX_CELLS.max(2 * base[0].len().max(base[1].len())));
+        let longest = lines.iter().map(|l| l.at.len()).max()?;
+        let full = 2 * longest > MAX_CELLS.max(2 * base[0].len().max(base[1].len()));
         if error <= TOLERANCE || full {
             return (error <= WORST_FIT_MM).then_some((surface, error));
         }
@@ -192,39 +272,17 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     }
 }
 
-fn hermite(basis: &Surface, distance: f64, domain: [[f64; 2]; 2], lines: &[Vec<f64>; 2]) -> Option<Surface> {
-    let [us, vs] = lines;
-    // Along each direction a node gives two control points, at minus and plus a third of the neighbouring cells.
-    let offsets = |l: &[f64], i: usize| -> Vec<f64> {
-        let mut o = Vec::with_capacity(2);
-        if i > 0 {
-            o.push(-(l[i] - l[i - 1]) / 3.0);
-        } else {
-            o.push(0.0);
-        }
-        o.push(if i + 1 < l.len() { (l[i + 1] - l[i]) / 3.0 } else { 0.0 });
-        o
-    };
-    let mut points = Vec::with_capacity(4 * us.len() * vs.len());
-    for (i, &u) in us.iter().enumerate() {
-        let row: Vec<Jet> =
-            vs.iter().map(|&v| jet(basis, distance, Uv::new(u, v), domain)).collect::<Option<_>>()?;
-        for a in offsets(us, i) {
-            for (j, jet) in row.iter().enumerate() {
-                for b in offsets(vs, j) {
-                    let p = jet.point + a * jet.du + b * jet.dv + (a * b) * jet.duv;
-                    points.push(Homogeneous::new(p.x, p.y, p.z, 1.0));
-                }
-            }
+fn hermite(basis: &Surface, distance: f64, lines: &[GridLines; 2]) -> Option<Surface> {
+    let [rows, columns] = [lines[0].control_rows(), lines[1].control_rows()];
+    let mut points = Vec::with_capacity(rows.len() * columns.len());
+    for row in &rows {
+        let u = lines[0].at[row.line];
+        for column in &columns {
+            let uv = Uv::new(u, lines[1].at[column.line]);
+            let jet = jet(basis, distance, uv, [row.side, column.side])?;
+            let p = jet.point + row.off * jet.du + column.off * jet.dv + (row.off * column.off) * jet.duv;
+            points.push(Homogeneous::new(p.x, p.y, p.z, 1.0));
         }
     }
-    let knots = [0, 1].map(|d| {
-        let l = &lines[d];
-        let last = l.len() - 1;
-        let mut k = vec![l[0]; 4];
-        k.extend(l[1..last].iter().flat_map(|&x| [x, x]));
-        k.extend([l[last]; 4]);
-        k
-    });
-    Some(Surface { degree: [3, 3], knots, points })
+    Some(Surface { degree: [3, 3], knots: [lines[0].knots(), lines[1].knots()], points })
 }
