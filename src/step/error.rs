@@ -30,7 +30,7 @@ pub enum ErrorKind {
     },
     /// Assemblies that place more than the settings allow.
     #[error(
-        "{file}: its assemblies place {count} products and shapes, more than {limit}; raise the limit if that is meant, or export fewer"
+        "{file}: its assemblies place {count} products and shapes or more, beyond {limit}; raise the limit if that is meant, or export fewer"
     )]
     TooManyPlaced {
         /// Name of the file.

@@ -10,6 +10,7 @@ use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
+use crate::formats;
 use crate::math::Frame;
 use crate::model::{Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -31,8 +32,8 @@ pub struct Import {
 /// When the file cannot be read or is no Part 21 text. Faces that cannot be converted are no error, see
 /// [`ImportReport::refusals`].
 pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
-    let bytes =
-        std::fs::read(path).map_err(|source| Error::new(ErrorKind::Io { path: path.to_path_buf(), source }))?;
+    let bytes = formats::read_bytes(path)
+        .map_err(|source| Error::new(ErrorKind::Io { path: path.to_path_buf(), source }))?;
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     read_bytes(&name, &bytes, settings)
 }
@@ -98,11 +99,13 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
     let (units, fallback) = read_units(file, settings, &mut report.units);
     let assembly = Assembly::read(file, units, fallback);
     // Thirty kilobytes can place a part 2⁴⁰ times: what is counted first need not be expanded.
+    let limit = settings.max_placed;
+    let too_many = |count: u64| Error::new(ErrorKind::TooManyPlaced { file: name.into(), count, limit });
     let count = assembly.count();
-    if count > settings.max_placed {
-        return Err(Error::new(ErrorKind::TooManyPlaced { file: name.into(), count, limit: settings.max_placed }));
+    if count > limit {
+        return Err(too_many(count));
     }
-    let (placed, assembly) = assembly.walk();
+    let (placed, assembly) = assembly.walk(limit).map_err(too_many)?;
     for (id, reason) in &assembly.left_out {
         // Those without shapes would have given nothing.
         let mut items = ShapeItems::default();

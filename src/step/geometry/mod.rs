@@ -21,6 +21,9 @@ use self::units::Units;
 use crate::math::{Frame, Point, Vector};
 use crate::step::part21::{Entity, File};
 
+/// Farthest coordinate, mm: a million kilometres, where doubles are 1e-4 mm apart.
+pub(crate) const FARTHEST_MM: f64 = 1e12;
+
 /// Why a piece of geometry cannot be had: the entity and the reason.
 #[derive(Clone, Debug)]
 pub(crate) struct Refusal {
@@ -74,11 +77,18 @@ impl<'f, 'a> Geometry<'f, 'a> {
     pub(crate) fn point(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
         let xs = e.attributes("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
-        match xs.as_deref() {
-            Some([x, y, z]) => Ok(self.units.length * Point::new(*x, *y, *z)),
-            Some([x, y]) => Ok(self.units.length * Point::new(*x, *y, 0.0)),
-            _ => Err(Refusal::new(e, "is no point with three coordinates")),
+        let point = match xs.as_deref() {
+            Some([x, y, z]) => self.units.length * Point::new(*x, *y, *z),
+            Some([x, y]) => self.units.length * Point::new(*x, *y, 0.0),
+            _ => return Err(Refusal::new(e, "is no point with three coordinates")),
+        };
+        if !(point.abs().max_element() <= FARTHEST_MM) {
+            return Err(Refusal::new(
+                e,
+                format!("a coordinate is beyond {FARTHEST_MM:e} mm, where rounding eats shapes"),
+            ));
         }
+        Ok(point)
     }
 
     /// A VERTEX_POINT, mm.

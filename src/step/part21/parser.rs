@@ -3,6 +3,7 @@
 use super::{Fault, File, Index, Instance, Record, Span, Value, number::number};
 use crate::step::{Error, ErrorKind};
 use rustc_hash::FxHashMap;
+use std::collections::hash_map::Entry;
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.
 const MAX_DEPTH: usize = 32;
@@ -34,7 +35,12 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
-    let index = index(&p.instances);
+    let (index, repeated) = index(&p.instances);
+    for position in repeated {
+        let instance = p.instances[position];
+        let start = p.records[instance.first as usize].name.start as usize;
+        p.note(start, Some(instance.id), "its number stands for an earlier instance already; this one is left out");
+    }
     Ok(File {
         source,
         values: p.values,
@@ -48,19 +54,32 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     })
 }
 
-fn index(instances: &[Instance]) -> Index {
-    let largest = instances.iter().map(|i| i.id).max().unwrap_or(0);
+/// Finds instances by their numbers, the first where several have one; positions of the others.
+fn index(instances: &[Instance]) -> (Index, Vec<usize>) {
+    let largest = instances.iter().map(|i| i.id).fold(0, u64::max);
+    let mut repeated = Vec::new();
     if largest <= 4 * instances.len() as u64 + 1024 {
         let mut table = vec![0; largest as usize + 1];
         for (k, i) in instances.iter().enumerate() {
-            table[i.id as usize] = k as u32 + 1;
+            let slot = &mut table[i.id as usize];
+            if *slot == 0 {
+                *slot = k as u32 + 1;
+            } else {
+                repeated.push(k);
+            }
         }
-        Index::Dense(table)
-    } else {
-        let mut map = FxHashMap::default();
-        map.extend(instances.iter().enumerate().map(|(k, i)| (i.id, k as u32)));
-        Index::Sparse(map)
+        return (Index::Dense(table), repeated);
     }
+    let mut map = FxHashMap::default();
+    for (k, i) in instances.iter().enumerate() {
+        match map.entry(i.id) {
+            Entry::Vacant(slot) => {
+                slot.insert(k as u32);
+            }
+            Entry::Occupied(_) => repeated.push(k),
+        }
+    }
+    (Index::Sparse(map), repeated)
 }
 
 struct Parser<'a> {
@@ -134,13 +153,7 @@ impl Parser<'_> {
     #[cold]
     fn fault(&mut self, start: usize, id: Option<u64>, what: &'static str) {
         self.stack.clear();
-        self.fault_count += 1;
-        if self.faults.len() < MAX_FAULTS {
-            let (from, line) = self.lines;
-            let newlines = self.source[from..start].iter().filter(|&&b| b == b'\n').count();
-            self.lines = (start, line + newlines);
-            self.faults.push(Fault { line: line + newlines, id, what });
-        }
+        self.note(start, id, what);
         // Behind the next ';' that ends a line or a statement; an open text must not swallow the statements after it.
         let mut i = start;
         while let Some(offset) = self.source[i..].iter().position(|&b| b == b';') {
@@ -157,6 +170,18 @@ impl Parser<'_> {
         self.rewound += self.at.saturating_sub(next);
         // More than 8 passes over the file: it is damaged on purpose.
         self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };
+    }
+
+    /// Lists a fault with its line.
+    fn note(&mut self, start: usize, id: Option<u64>, what: &'static str) {
+        self.fault_count += 1;
+        if self.faults.len() < MAX_FAULTS {
+            // Faults come in the order of the file but for numbers used twice, which are found at the end.
+            let (from, line) = if self.lines.0 <= start { self.lines } else { (0, 1) };
+            let newlines = self.source[from..start].iter().filter(|&&b| b == b'\n').count();
+            self.lines = (start, line + newlines);
+            self.faults.push(Fault { line: line + newlines, id, what });
+        }
     }
 
     /// Whitespace, comments and print directives.

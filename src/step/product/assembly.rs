@@ -5,8 +5,8 @@
 //! What holds shapes and is reached by no product is placed where it is.
 
 use crate::math::Frame;
-use crate::step::geometry::Geometry;
 use crate::step::geometry::units::Units;
+use crate::step::geometry::{FARTHEST_MM, Geometry};
 use crate::step::part21::{Args, Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -59,8 +59,13 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Things that could not be placed.
     pub(crate) problems: Vec<String>,
     placed: Vec<PlacedRepresentation>,
+    /// Products and representations visited, and how many may be: cycles of products multiply beyond what can be counted before.
+    visited: u64,
+    limit: u64,
     reached: FxHashSet<u64>,
     in_orphans: bool,
+    /// Products that were found to contain themselves.
+    cyclic: FxHashSet<u64>,
     /// Representations of what is no product (shape aspects, datums, …), and the entity that they describe.
     aspects: FxHashMap<u64, u64>,
     /// What products reach; orphans do not place it again.
@@ -82,8 +87,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
             left_out: Vec::new(),
             problems: Vec::new(),
             placed: Vec::new(),
+            visited: 0,
+            limit: 0,
             reached: FxHashSet::default(),
             in_orphans: false,
+            cyclic: FxHashSet::default(),
             aspects: FxHashMap::default(),
             by_products: FxHashSet::default(),
         };
@@ -224,8 +232,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
         placed.max(largest.unwrap_or(1))
     }
 
-    /// Every placed representation, in the order of the file.
-    pub(crate) fn walk(mut self) -> (Vec<PlacedRepresentation>, Self) {
+    /// Every placed representation, in the order of the file; what was visited when that became more than `limit`.
+    pub(crate) fn walk(mut self, limit: u64) -> Result<(Vec<PlacedRepresentation>, Self), u64> {
+        self.limit = limit;
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
         let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
         products.sort_unstable();
@@ -242,7 +251,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
         }
         self.place_orphans();
-        (std::mem::take(&mut self.placed), self)
+        if self.visited > limit { Err(self.visited) } else { Ok((std::mem::take(&mut self.placed), self)) }
     }
 
     /// Representations with shapes that no product reaches.
@@ -291,8 +300,14 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path: &mut Vec<u64>,
         owners: &[u64],
     ) {
+        self.visited += 1;
+        if self.visited > self.limit {
+            return;
+        }
         if path.len() >= MAX_DEPTH || path.contains(&definition) {
-            self.problems.push(format!("#{definition}: products contain each other"));
+            if self.cyclic.insert(definition) {
+                self.problems.push(format!("#{definition}: products contain each other"));
+            }
             return;
         }
         path.push(definition);
@@ -336,7 +351,17 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path: &mut Vec<u64>,
         owners: &[u64],
     ) {
-        if path.len() >= MAX_DEPTH || path.contains(&id) || self.by_products.contains(&id) {
+        self.visited += 1;
+        let exhausted = self.visited > self.limit || path.len() >= MAX_DEPTH;
+        if exhausted || path.contains(&id) || self.by_products.contains(&id) {
+            return;
+        }
+        if !(placement.origin.abs().max_element() <= FARTHEST_MM) {
+            if self.reached.insert(id) {
+                self.problems.push(format!(
+                    "#{id}: stands beyond {FARTHEST_MM:e} mm, where rounding eats shapes; it is left out"
+                ));
+            }
             return;
         }
         if let Some(purpose) = self.purpose_besides_shape(id) {
