@@ -1,8 +1,13 @@
+//! The rays that recorded paths brought to a receiver.
+
 use super::bind::BoundScene;
-use super::kernel::{Event, PathVertex};
+use super::outcome::{Event, PathVertex};
 use super::results::Results;
 use crate::formats::LightRay;
 use crate::math::Ray;
+
+/// Share of its length by which a segment that ends on a receiver may fall short of it: 10^6 times the rounding of its vertices.
+const ROUNDING: f64 = 1e-9;
 
 /// The rays of the recorded paths that a plane or sphere counted: where they met it, where they go, and the power they stand for.
 ///
@@ -22,7 +27,7 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             {
                 continue;
             }
-            let (ray, end) = (Ray::new(a.point, direction), reach(a, b, receiver.absorbs));
+            let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
             let mut after = 0.0;
             while let Some(t) = receiver.crossing(&ray, after, end) {
                 rays.push(LightRay {
@@ -40,11 +45,11 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
 
 /// How far a segment may meet a receiver: to its end, one that leaves the scene for ever. One that ends on a receiver ends
 /// there but for rounding.
-fn reach(a: &PathVertex, b: &PathVertex, absorbs: bool) -> f64 {
+fn segment_end(a: &PathVertex, b: &PathVertex, absorbs: bool) -> f64 {
     let length = (b.point - a.point).length();
     match b.event {
         Event::Escaped => f64::INFINITY,
-        Event::Received if absorbs => length * (1.0 + 1e-9),
+        Event::Received if absorbs => length * (1.0 + ROUNDING),
         _ => length,
     }
 }

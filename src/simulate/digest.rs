@@ -1,6 +1,6 @@
 //! A hash of all tallies, as a fingerprint of a result.
 
-use super::kernel::Tallies;
+use super::tallies::Tallies;
 use super::tally::Sum;
 
 /// FNV-1a with 128 bits (Fowler, Noll, Vo): not meant against forgery, only to show that two results are the same.
@@ -10,33 +10,33 @@ impl Fnv {
     const START: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
 
     /// The hash of these pieces; where one ends and the next begins counts.
-    pub(crate) fn of(pieces: &[&[u8]]) -> u128 {
+    pub(crate) fn hash(pieces: &[&[u8]]) -> u128 {
         let mut h = Self(Self::START);
         for piece in pieces {
-            h.eat(&(piece.len() as u64).to_le_bytes());
-            h.eat(piece);
+            h.absorb(&(piece.len() as u64).to_le_bytes());
+            h.absorb(piece);
         }
         h.0
     }
 
-    fn eat(&mut self, bytes: &[u8]) {
+    fn absorb(&mut self, bytes: &[u8]) {
         for &b in bytes {
             self.0 = (self.0 ^ u128::from(b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013B);
         }
     }
 
     fn sums(&mut self, sums: &[Sum]) {
-        self.eat(&(sums.len() as u64).to_le_bytes());
+        self.absorb(&(sums.len() as u64).to_le_bytes());
         for (i, s) in sums.iter().enumerate().filter(|(_, s)| **s != Sum::default()) {
-            self.eat(&(i as u64).to_le_bytes());
-            self.eat(&s.total.to_le_bytes());
-            self.eat(&s.squares.to_le_bytes());
+            self.absorb(&(i as u64).to_le_bytes());
+            self.absorb(&s.total.to_le_bytes());
+            self.absorb(&s.squares.to_le_bytes());
         }
     }
 }
 
 /// The hash of all sums and counts, as 32 hexadecimal digits.
-pub(crate) fn of(t: &Tallies) -> String {
+pub(crate) fn digest(t: &Tallies) -> String {
     let mut h = Fnv(Fnv::START);
     t.cells.iter().for_each(|c| h.sums(c));
     h.sums(&t.receivers);
@@ -44,14 +44,14 @@ pub(crate) fn of(t: &Tallies) -> String {
     h.sums(&t.bulk);
     h.sums(&t.ends);
     for m in &t.moments {
-        m.first.iter().for_each(|x| h.eat(&x.to_le_bytes()));
-        m.second.iter().for_each(|x| h.eat(&x.to_le_bytes()));
-        h.eat(&m.farthest.to_le_bytes());
+        m.first.iter().for_each(|x| h.absorb(&x.to_le_bytes()));
+        m.second.iter().for_each(|x| h.absorb(&x.to_le_bytes()));
+        h.absorb(&m.farthest.to_le_bytes());
     }
-    t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| h.eat(&x.to_le_bytes()));
+    t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| h.absorb(&x.to_le_bytes()));
     t.channels.iter().for_each(|c| h.sums(c));
     let c = &t.counts;
-    [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off].iter().for_each(|x| h.eat(&x.to_le_bytes()));
+    [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off].iter().for_each(|x| h.absorb(&x.to_le_bytes()));
     format!("{:032x}", h.0)
 }
 
@@ -63,7 +63,7 @@ mod tests {
     fn the_hash_is_fnv_1a() {
         // Published test vector of the 128-bit variant.
         let mut h = Fnv(Fnv::START);
-        h.eat(b"a");
+        h.absorb(b"a");
         assert_eq!(h.0, 0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);
     }
 
@@ -72,9 +72,9 @@ mod tests {
         let base = Tallies { faces: vec![Sum::default(); 3], ..Tallies::default() };
         let mut other = base.clone();
         other.faces[1].add_replicate(1);
-        assert_ne!(of(&base), of(&other));
+        assert_ne!(digest(&base), digest(&other));
         other = base.clone();
         other.counts.segments = 1;
-        assert_ne!(of(&base), of(&other));
+        assert_ne!(digest(&base), digest(&other));
     }
 }

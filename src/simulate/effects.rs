@@ -1,6 +1,8 @@
 //! Which effects a scene calls for, why, and which kernel that needs.
 
-use super::bind::{AMBIENT, Body, BoundScene, Coated, Surface};
+use super::bind::BoundScene;
+use super::body::{AMBIENT, Body};
+use super::surfaces::{Coated, FaceOptics, Surface};
 use crate::optics::{Coating, Effect, Effects};
 use serde::Serialize;
 
@@ -44,15 +46,19 @@ pub(crate) enum KernelKind {
 
 impl KernelKind {
     /// The smallest kernel that can do these effects where bodies stand apart.
-    pub(crate) fn of(effects: Effects) -> Self {
+    pub(crate) fn for_effects(effects: Effects) -> Self {
         let media = [Effect::Refraction, Effect::Fresnel, Effect::BulkAbsorption, Effect::BulkScatter];
         let faces = [Effect::SurfaceScatter, Effect::Coating];
-        match () {
-            () if effects.contains(Effect::Polarisation) => Self::Full,
-            () if effects.contains(Effect::Dispersion) => Self::Coloured,
-            () if media.iter().any(|e| effects.contains(*e)) => Self::Clear,
-            () if faces.iter().any(|e| effects.contains(*e)) => Self::Opaque,
-            () => Self::Mirror,
+        if effects.contains(Effect::Polarisation) {
+            Self::Full
+        } else if effects.contains(Effect::Dispersion) {
+            Self::Coloured
+        } else if media.iter().any(|e| effects.contains(*e)) {
+            Self::Clear
+        } else if faces.iter().any(|e| effects.contains(*e)) {
+            Self::Opaque
+        } else {
+            Self::Mirror
         }
     }
 
@@ -71,28 +77,24 @@ impl KernelKind {
 impl Effects {
     /// The effects that a scene calls for, from its materials on faces in use, its sources and its receivers.
     pub fn required_by(scene: &BoundScene) -> Self {
-        required(scene).effects
+        Required::new(scene).effects
     }
 }
 
 impl Required {
     /// What a scene calls for, with every reason, without running it.
-    pub fn by(scene: &BoundScene) -> Self {
+    pub fn new(scene: &BoundScene) -> Self {
         required(scene)
     }
 }
 
-pub(crate) fn required(bound: &BoundScene) -> Required {
+fn required(bound: &BoundScene) -> Required {
     let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()
     };
     let coated = |wanted: &dyn Fn(&Coated) -> bool| used(&|s| matches!(s, Surface::Coated(c) if wanted(c)));
     let mirrors = used(&|s| matches!(s, Surface::Mirror(_)));
-    let lets_in = |f: &&super::bind::FaceOptics| match &bound.surfaces[f.surface as usize] {
-        Surface::Interface => f.body != AMBIENT,
-        Surface::Coated(c) => f.body != AMBIENT && !c.opaque,
-        _ => false,
-    };
+    let lets_in = |f: &&FaceOptics| f.body != AMBIENT && !bound.surfaces[f.surface as usize].is_opaque();
     let interfaces = bound.faces.iter().filter(lets_in).count();
     let bare = used(&|s| matches!(s, Surface::Interface)).min(interfaces) + coated(&|c| c.coating == Coating::Bare);
     let metals = coated(&|c| matches!(c.coating, Coating::Metal { .. }));
@@ -153,7 +155,7 @@ pub(crate) fn required(bound: &BoundScene) -> Required {
         (true, false) => KernelKind::Clear,
         (true, true) => KernelKind::Nested,
     };
-    required.kernel = KernelKind::of(required.effects).max(media);
+    required.kernel = KernelKind::for_effects(required.effects).max(media);
     required
 }
 
@@ -169,9 +171,10 @@ fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
         return (true, format!("the index or absorption of '{name}' depends on wavelength"));
     }
     let coloured = |s: &Surface| matches!(s, Surface::Coated(c) if c.coating.is_dispersive());
-    match bound.faces.iter().any(|f| coloured(&bound.surfaces[f.surface as usize])) {
-        true => (true, "a coating depends on wavelength".into()),
-        false => (false, "no index, absorption or coating depends on wavelength".into()),
+    if bound.faces.iter().any(|f| coloured(&bound.surfaces[f.surface as usize])) {
+        (true, "a coating depends on wavelength".into())
+    } else {
+        (false, "no index, absorption or coating depends on wavelength".into())
     }
 }
 

@@ -4,37 +4,37 @@
 //! from core to core after each replicate, one thread at a time.
 
 use super::bind::BoundScene;
-use super::kernel::{Context, Local};
-use super::portion::Portion;
-use super::run::Hooks;
+use super::hooks::Hooks;
+use super::partial_run::PartialRun;
+use super::tallies::ReplicateTally;
 use crate::intersect::Cost;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
 
 /// Cells of all receivers, faces and bodies up to which each thread has sums of its own: 32 MB.
-const MOST_OWN: usize = 1 << 20;
+const MOST_THREAD_CELLS: usize = 1 << 20;
 
 /// What all threads have handed over.
-pub(super) struct Gather<'a> {
-    total: Mutex<(Portion, Cost)>,
+pub(super) struct Gathering<'a> {
+    total: Mutex<(PartialRun, Cost)>,
     hooks: &'a Hooks<'a>,
     start: Instant,
     /// Seconds of earlier runs.
     spent: f64,
 }
 
-impl<'a> Gather<'a> {
-    pub(super) fn new(before: Portion, hooks: &'a Hooks<'a>, start: Instant) -> Self {
+impl<'a> Gathering<'a> {
+    pub(super) fn new(before: PartialRun, hooks: &'a Hooks<'a>, start: Instant) -> Self {
         let spent = before.seconds;
         Self { total: Mutex::new((before, Cost::default())), hooks, start, spent }
     }
 
-    fn lock(&self) -> MutexGuard<'_, (Portion, Cost)> {
+    fn lock(&self) -> MutexGuard<'_, (PartialRun, Cost)> {
         self.total.lock().unwrap_or_else(|e| e.into_inner())
     }
 
     /// Adds to what all have gathered, and tells.
-    fn add(&self, add: impl FnOnce(&mut Portion), cost: Cost) {
+    fn add(&self, add: impl FnOnce(&mut PartialRun), cost: Cost) {
         let mut sums = self.lock();
         add(&mut sums.0);
         sums.0.seconds = self.spent + self.start.elapsed().as_secs_f64();
@@ -45,59 +45,59 @@ impl<'a> Gather<'a> {
     }
 
     /// All of it.
-    pub(super) fn into_whole(self) -> (Portion, Cost) {
-        let (mut portion, cost) = self.total.into_inner().unwrap_or_else(|e| e.into_inner());
-        portion.tallies.sort();
-        portion.seconds = self.spent + self.start.elapsed().as_secs_f64();
-        (portion, cost)
+    pub(super) fn into_partial_run(self) -> (PartialRun, Cost) {
+        let (mut partial, cost) = self.total.into_inner().unwrap_or_else(|e| e.into_inner());
+        partial.tallies.sort_paths();
+        partial.seconds = self.spent + self.start.elapsed().as_secs_f64();
+        (partial, cost)
     }
 }
 
 /// The sums of one thread.
-pub(super) struct Own<'a, 'g> {
-    all: &'g Gather<'a>,
+pub(super) struct ThreadSums<'a, 'g> {
+    all: &'g Gathering<'a>,
     bound: &'g BoundScene,
     /// None where one set of sums has to do.
-    portion: Option<Portion>,
+    partial: Option<PartialRun>,
     replicates: u32,
     cost: Cost,
     handed: Instant,
 }
 
-impl<'a, 'g> Own<'a, 'g> {
-    pub(super) fn new(all: &'g Gather<'a>, bound: &'g BoundScene, replicates: u32) -> Self {
+impl<'a, 'g> ThreadSums<'a, 'g> {
+    pub(super) fn new(all: &'g Gathering<'a>, bound: &'g BoundScene, replicates: u32) -> Self {
         let receivers: usize = bound.receivers.iter().map(|r| r.sum_count()).sum();
-        let small = receivers + bound.faces.len() + bound.bodies.len() <= MOST_OWN;
-        let portion = small.then(|| Portion::none(bound, replicates));
-        Self { all, bound, portion, replicates, cost: Cost::default(), handed: Instant::now() }
+        let fits = receivers + bound.faces.len() + bound.bodies.len() <= MOST_THREAD_CELLS;
+        let partial = fits.then(|| PartialRun::empty(bound, replicates));
+        Self { all, bound, partial, replicates, cost: Cost::default(), handed: Instant::now() }
     }
 
     /// Takes in what a whole replicate gathered, and empties it.
-    pub(super) fn take(&mut self, replicate: u32, local: &mut Local, context: &Context<'_>, cost: Cost) {
-        match &mut self.portion {
-            Some(portion) => {
-                portion.take(replicate, local, context);
+    pub(super) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, cost: Cost) {
+        match &mut self.partial {
+            Some(partial) => {
+                partial.take(replicate, tally, self.bound);
                 self.cost += cost;
                 if self.all.hooks.finished.is_some() && self.handed.elapsed() >= self.all.hooks.every {
                     self.hand_over();
-                    self.portion = Some(Portion::none(self.bound, self.replicates));
+                    self.partial = Some(PartialRun::empty(self.bound, self.replicates));
                 }
             }
-            None => self.all.add(|total| total.take(replicate, local, context), cost),
+            None => self.all.add(|total| total.take(replicate, tally, self.bound), cost),
         }
     }
 
     fn hand_over(&mut self) {
-        if let Some(portion) = self.portion.take()
-            && !portion.done.is_empty()
+        if let Some(partial) = self.partial.take()
+            && !partial.done.is_empty()
         {
-            self.all.add(|total| total.add(&portion), std::mem::take(&mut self.cost));
+            self.all.add(|total| total.add(&partial), std::mem::take(&mut self.cost));
         }
         self.handed = Instant::now();
     }
 }
 
-impl Drop for Own<'_, '_> {
+impl Drop for ThreadSums<'_, '_> {
     fn drop(&mut self) {
         self.hand_over();
     }

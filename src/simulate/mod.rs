@@ -1,46 +1,61 @@
 //! Light through a scene: sources, media, receivers, the path kernel, random streams and tallies.
 //!
-//! Forward non-sequential Monte Carlo on any [`Intersector`](crate::intersect::Intersector): wavefronts of rays, unpolarised
-//! Fresnel and total internal reflection at interfaces, mirrors, absorbers. A [`Scene`] is read from TOML, bound to a model
-//! ([`Scene::bind`]) and simulated ([`simulate()`]).
+//! Forward non-sequential Monte Carlo on any [`Intersector`](crate::intersect::Intersector): wavefronts of rays, refraction, Fresnel and
+//! total internal reflection at interfaces, mirrors, coatings, scatter and absorbers, unpolarised unless a scene asks for
+//! polarisation. A [`Scene`] is read from TOML, bound to a model ([`Scene::bind`]) and simulated ([`simulate()`]).
 //!
 //! Sources: Philox (Salmon et al., SC 2011); Sobol nets (Joe and Kuo 2008) with hashed Owen scrambling (Burley 2020); laws from
 //! [`crate::optics`].
 //! Guarantee: the same bits for any number of threads, batch size and shards, and for the smallest kernel that a scene needs as for
-//! the one that can do everything; energy closes to the last quantum (9e-13 of a ray); no start offset anywhere; every ray that is
-//! lost is kept with its cause.
+//! the one that can do everything; energy closes to the last quantum (9e-13 of a ray); a ray starts exactly where it left a face, and
+//! is moved by the glue distance only where two faces are one; every ray that is lost is kept with its cause.
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
+//!
+//! Inner modules, each of which sees only those before it: `error`, `random`, `tally`, `scene`, `assemble`, `receiver`, `settings`,
+//! `outcome`, `surfaces`, `body`, `trim_loops`, `emitter`, `bind`, `run_notes`, `plan`, `tallies`, `digest`, `partial_run`, `hooks`,
+//! `effects`, `kernel`, `dispatch`, `recorder`, `gather`, `results`, `run`, `verify`, `arrivals`.
 
 mod arrivals;
 mod assemble;
 mod bind;
+mod body;
 mod digest;
+mod dispatch;
 mod effects;
 mod emitter;
 mod error;
 mod gather;
+mod hooks;
 mod kernel;
+mod outcome;
+mod partial_run;
 mod plan;
-mod portion;
 pub mod random;
 mod receiver;
 mod recorder;
 mod results;
 mod run;
+mod run_notes;
 pub mod scene;
+mod settings;
+mod surfaces;
+mod tallies;
 mod tally;
+mod trim_loops;
 mod verify;
 
 pub use arrivals::arrivals;
 pub use bind::BoundScene;
+pub use dispatch::kernel_name;
 pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};
-pub use kernel::{Cause, Counts, Event, LostRay, PathSink, PathVertex, Tallies};
-pub use portion::{Fingerprint, Portion};
+pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
+pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
+pub use partial_run::{Fingerprint, PartialRun};
 pub use results::{Absorbed, ChannelResult, EffectsUsed, Power, ReceiverResult, Results, Seconds};
-pub use run::{
-    Hooks, KernelChoice, Progress, RunSettings, Traced, kernel_name, replay, replicates, simulate, trace,
-};
+pub use run::{replay, replicates, simulate, trace};
 pub use scene::Scene;
-pub use tally::{Moments, QUANTA, Spread, Sum};
+pub use settings::{KernelChoice, RunSettings};
+pub use tallies::{ReplicateTally, Tallies};
+pub use tally::{MomentSpread, Moments, QUANTA, Sum};
 pub use verify::{Verification, verify_pruning};

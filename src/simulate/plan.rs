@@ -1,11 +1,20 @@
 //! Which rays a run traces: how many of each source, in which replicate, of what power, and which of them are recorded.
 
 use super::bind::BoundScene;
-use super::run::RunSettings;
+use super::settings::RunSettings;
 use super::tally::QUANTA;
 
 /// Where one ray in so many and one more is recorded, or fewer, they are traced once more: that costs less than a kernel that records.
 const FEW: u64 = 63;
+
+/// How far a ray that escapes is drawn, mm.
+const DRAWN_LENGTH: f64 = 100.0;
+
+/// Fewest rays of a replicate, so that a small run still has an error to state.
+const FEWEST_RAYS: u64 = 16;
+
+/// Most rays of a replicate, 2^21 or some more, whose quanta a word of 64 bits can hold.
+const MOST_RAYS_LOG2: u32 = 21;
 
 /// The rays of one source.
 #[derive(Clone, Copy, Debug)]
@@ -33,18 +42,19 @@ pub(crate) struct Plan {
     pub(crate) quantum: f64,
     pub(crate) emitted: f64,
     /// Every 2ᵏ-th ray is recorded; none when absent.
-    pub(super) record_mask: Option<u64>,
+    record_mask: Option<u64>,
     /// Every 2ᵏ-th ray is kept where all are recorded.
     sample_mask: Option<u64>,
     /// How far an escaping ray is drawn, mm.
-    pub(crate) reach: f64,
+    pub(crate) drawn_length: f64,
 }
 
 impl Plan {
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
         // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
-        let (mut share, mut given) = (0.0, 0);
+        let mut share = 0.0;
+        let mut given = 0;
         let counts: Vec<u64> = bound
             .emitters
             .iter()
@@ -70,19 +80,31 @@ impl Plan {
                 share
             })
             .collect();
-        // At least 16 rays of the run in each replicate, so that a small run still has an error to state, and at most some
-        // 2²², whose quanta a word of 64 bits can hold.
-        let replicates = settings.replicates.clamp(2, (rays / 16).clamp(2, 1 << 16) as u32);
-        let replicates = replicates.max((rays >> 21) as u32);
+        let replicates = settings.replicates.clamp(2, (rays / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
+        let replicates = replicates.max((rays >> MOST_RAYS_LOG2) as u32);
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
         let quantum = emitted / (rays as f64 * QUANTA);
-        Self { shares, replicates, rays, quantum, emitted, record_mask, sample_mask: record_mask, reach: 100.0 }
+        Self {
+            shares,
+            replicates,
+            rays,
+            quantum,
+            emitted,
+            record_mask,
+            sample_mask: record_mask,
+            drawn_length: DRAWN_LENGTH,
+        }
     }
 
     #[inline]
     pub(crate) fn records(&self, ray: u64) -> bool {
         self.record_mask.is_some_and(|m| ray & m == 0)
+    }
+
+    /// Has every ray recorded.
+    pub(super) fn record_all(&mut self) {
+        self.record_mask = Some(0);
     }
 
     /// Whether any ray is recorded.
@@ -102,11 +124,12 @@ impl Plan {
 
     /// The rays of a replicate that are recorded.
     pub(super) fn recorded(&self, replicate: u32) -> impl Iterator<Item = u64> {
-        let of = move |share: &SourceShare, step: u64| {
+        let recorded_of = move |share: &SourceShare, step: u64| {
             let [from, to] = share.range(replicate, self.replicates);
             (from.next_multiple_of(step)..to).step_by(step as usize)
         };
-        self.record_mask.into_iter().flat_map(move |m| self.shares.iter().flat_map(move |share| of(share, m + 1)))
+        let step = self.record_mask.map(|m| m + 1);
+        step.into_iter().flat_map(move |step| self.shares.iter().flat_map(move |share| recorded_of(share, step)))
     }
 
     /// Whether the path of a ray belongs to the sample that is kept.
@@ -115,7 +138,7 @@ impl Plan {
     }
 
     /// The source and the replicate of a ray; `None` when the run has no such ray.
-    pub(crate) fn place(&self, ray: u64) -> Option<(usize, u32)> {
+    pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
         let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
         let share = &self.shares[source];
         let guess = u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays);

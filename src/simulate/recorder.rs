@@ -3,30 +3,31 @@
 //! Random numbers are keyed by ray, so it takes the same path again, bit by bit. The run itself then needs no kernel that can record:
 //! to record 2,000 paths of a reflector cost all its four million rays 5 % of their time.
 
+use super::dispatch;
 use super::effects::KernelKind;
-use super::kernel::{Context, Local, Which};
-use super::run::dispatch;
+use super::kernel::{Context, RaySelection};
+use super::tallies::ReplicateTally;
 
 /// Traces the rays that are recorded.
 pub(super) struct Recorder<'c, 'a> {
     context: &'c Context<'a>,
     kind: KernelKind,
     /// Where their light ends, which was counted already.
-    local: Local,
+    tally: ReplicateTally,
 }
 
 impl<'c, 'a> Recorder<'c, 'a> {
     /// For a run whose plan says which rays are recorded.
     pub(super) fn new(context: &'c Context<'a>, kind: KernelKind) -> Self {
-        Self { context, kind, local: Local::new(context.bound) }
+        Self { context, kind, tally: ReplicateTally::new(context.bound) }
     }
 
-    /// Gives `to` the recorded paths of a replicate.
-    pub(super) fn record(&mut self, replicate: u32, to: &mut Local) {
+    /// Adds the recorded paths of a replicate to its tally.
+    pub(super) fn record(&mut self, replicate: u32, tally: &mut ReplicateTally) {
         for ray in self.context.plan.recorded(replicate) {
-            dispatch(self.kind, self.context, Which::Ray(ray), &mut self.local);
+            dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
         }
-        to.paths.append(&mut self.local.paths);
-        self.local.forget();
+        tally.paths.append(&mut self.tally.paths);
+        self.tally.clear();
     }
 }

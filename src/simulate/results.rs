@@ -1,12 +1,16 @@
 //! What a simulation found out, in the units of the scene; it serialises to the `trace --json` object.
 
 use super::bind::BoundScene;
-use super::effects::Because;
-use super::kernel::{Counts, LostRay, PathVertex, Tallies};
+use super::digest::digest;
+use super::dispatch::kernel_kind;
+use super::effects::{Because, Required};
+use super::hooks::Traced;
+use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
-use super::run::{RunSettings, Traced};
 use super::scene::{FarFieldType, PowerUnit};
+use super::settings::RunSettings;
+use super::tallies::Tallies;
 use super::tally::Sum;
 use crate::intersect::Cost;
 use serde::{Serialize, Serializer};
@@ -200,11 +204,12 @@ fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S:
 
 impl Results {
     /// The results of a run, or of the part of it that was traced.
-    pub fn of(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
+    pub fn new(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
         let plan = Plan::new(bound, settings);
-        let (required, kernel) = (super::effects::required(bound), super::run::kernel_of(bound, settings));
-        let Traced { portion, cost, threads } = traced;
-        let (mut tallies, trace) = (portion.tallies, portion.seconds);
+        let required = Required::new(bound);
+        let Traced { partial, cost, threads } = traced;
+        let trace = partial.seconds;
+        let mut tallies = partial.tallies;
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
         let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
@@ -214,7 +219,7 @@ impl Results {
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
         let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;
-        let digest = super::digest::of(&tallies);
+        let digest = digest(&tallies);
         Self {
             rays,
             seconds: Seconds { trace, ..Seconds::default() },
@@ -225,7 +230,7 @@ impl Results {
             effects: EffectsUsed {
                 simulated: required.simulated.clone(),
                 not_simulated: required.not_simulated.clone(),
-                kernel: kernel.name(),
+                kernel: kernel_kind(bound, settings).name(),
             },
             notes,
             power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },

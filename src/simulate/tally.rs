@@ -23,19 +23,19 @@ const SHIFT: f64 = 6_755_399_441_055_744.0;
 /// The nearest whole number. One addition below 2⁵¹: `f64::round` is a call for the baseline of x86-64, 3 ns each of the five on a
 /// path that is received.
 #[inline(always)]
-pub(crate) fn whole(x: f64) -> f64 {
+pub(crate) fn round_quanta(x: f64) -> f64 {
     if x.abs() < 2_251_799_813_685_248.0 { (x + SHIFT) - SHIFT } else { x.round() }
 }
 
 /// A whole number of quanta as an integer; a cast to a signed integer is one instruction, to an unsigned one ten.
 #[inline(always)]
-pub(crate) fn count(quanta: f64) -> u64 {
+pub(crate) fn quanta_as_integer(quanta: f64) -> u64 {
     quanta as i64 as u64
 }
 
 /// The whole number nearest to one below 2⁵¹, as an integer: a conversion with all its cases would be eight instructions more.
 #[inline(always)]
-fn near(x: f64) -> i64 {
+fn nearest_integer(x: f64) -> i64 {
     (x + SHIFT).to_bits().wrapping_sub(SHIFT.to_bits()) as i64
 }
 
@@ -70,6 +70,9 @@ impl Sum {
     }
 }
 
+/// Cells ahead of the one that is added whose memory is asked for.
+const PREFETCH_AHEAD: usize = 16;
+
 /// A grid of sums: many cells, most of them untouched in any one replicate.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grid {
@@ -77,7 +80,7 @@ pub(crate) struct Grid {
     /// The cells that hold something, of which the first `count` mean something; as long as the cells and one more.
     touched: Vec<u32>,
     count: usize,
-    /// What [`Self::add_soon`] has still to add, and where.
+    /// What [`Self::add_deferred`] has still to add, and where.
     waiting: (usize, f64),
 }
 
@@ -89,7 +92,7 @@ impl Grid {
     /// Without a branch on whether the cell is empty: half the cells of a picture are, and to wait for the answer was 7 % of a run.
     #[inline]
     pub(crate) fn add(&mut self, cell: usize, quanta: f64) {
-        let quanta = count(quanta);
+        let quanta = quanta_as_integer(quanta);
         let c = &mut self.cells[cell];
         self.touched[self.count] = cell as u32;
         self.count += usize::from((*c == 0) & (quanta > 0));
@@ -97,12 +100,12 @@ impl Grid {
     }
 
     /// The same for a grid larger than the nearest cache: asks for the memory of the cell, and adds when the next one comes. What
-    /// waits is part of what [`Self::flush`] moves, not of what the others tell. To add at once was 10 % of the kernel's time.
+    /// waits is part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of the kernel's time.
     #[inline(always)]
-    pub(crate) fn add_soon(&mut self, cell: usize, quanta: f64) {
+    pub(crate) fn add_deferred(&mut self, cell: usize, quanta: f64) {
         prefetch(&self.cells, cell);
-        let (before, there) = std::mem::replace(&mut self.waiting, (cell, quanta));
-        self.add(before, there);
+        let (earlier_cell, earlier_quanta) = std::mem::replace(&mut self.waiting, (cell, quanta));
+        self.add(earlier_cell, earlier_quanta);
     }
 
     /// Every cell that was touched, with what it holds.
@@ -114,8 +117,16 @@ impl Grid {
         self.cells[cell]
     }
 
+    /// Adds what [`Self::add_deferred`] has still to add.
+    pub(crate) fn add_pending(&mut self) {
+        if !self.cells.is_empty() {
+            let (cell, quanta) = std::mem::take(&mut self.waiting);
+            self.add(cell, quanta);
+        }
+    }
+
     /// Empties it.
-    pub(crate) fn forget(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.waiting = (0, 0.0);
         for &cell in &self.touched[..self.count] {
             self.cells[cell as usize] = 0;
@@ -125,14 +136,11 @@ impl Grid {
 
     /// Moves what the replicate gathered to the sums of the run.
     pub(crate) fn flush(&mut self, sums: &mut [Sum]) {
-        if !self.cells.is_empty() {
-            let (cell, quanta) = std::mem::take(&mut self.waiting);
-            self.add(cell, quanta);
-        }
+        self.add_pending();
         let touched = &self.touched[..self.count];
         for (k, &cell) in touched.iter().enumerate() {
             // The sums of a picture of 200 × 200 cells take a megabyte.
-            if let Some(&later) = touched.get(k + 16) {
+            if let Some(&later) = touched.get(k + PREFETCH_AHEAD) {
                 prefetch(sums, later as usize);
                 prefetch(&self.cells, later as usize);
             }
@@ -165,14 +173,14 @@ impl Moments {
     /// Adds `quanta` at `x`, `y` in units of the half sides, both within ±1; `radius2` as a share of the half side squared.
     #[inline]
     pub(crate) fn add(&mut self, quanta: f64, [x, y]: [f64; 2], radius2: f64) {
-        let w = count(quanta);
-        let (x2, y2) = (near(x * x * GRAIN) as u64, near(y * y * GRAIN) as u64);
+        let w = quanta_as_integer(quanta);
+        let (x2, y2) = (nearest_integer(x * x * GRAIN) as u64, nearest_integer(y * y * GRAIN) as u64);
         // Signed by signed is one multiplication.
-        self.first[0] += i128::from(w as i64) * i128::from(near(x * GRAIN));
-        self.first[1] += i128::from(w as i64) * i128::from(near(y * GRAIN));
+        self.first[0] += i128::from(w as i64) * i128::from(nearest_integer(x * GRAIN));
+        self.first[1] += i128::from(w as i64) * i128::from(nearest_integer(y * GRAIN));
         self.second[0] += u128::from(w) * u128::from(x2);
         self.second[1] += u128::from(w) * u128::from(y2);
-        self.farthest = self.farthest.max(count(radius2 * (1u64 << 60) as f64));
+        self.farthest = self.farthest.max(quanta_as_integer(radius2 * (1u64 << 60) as f64));
     }
 
     /// Adds the moments of other rays.
@@ -185,7 +193,7 @@ impl Moments {
     }
 
     /// First and second moments of both coordinates in one list; no sum of a run reaches 2¹²⁷.
-    fn all(&self) -> [i128; 4] {
+    fn as_list(&self) -> [i128; 4] {
         let [x, y] = self.second.map(|s| i128::try_from(s).unwrap_or(i128::MAX));
         [self.first[0], self.first[1], x, y]
     }
@@ -207,7 +215,7 @@ impl Moments {
 /// How power and moments go together from replicate to replicate: what the errors of mean positions and spot sizes are worked out
 /// from. Products of numbers cut to 51 and 59 bits, exact, so that these errors are order-free as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Spread {
+pub struct MomentSpread {
     /// For both coordinates of the first moments, then of the second: Σ m·p and Σ m² over replicates.
     pub products: [[i128; 2]; 4],
 }
@@ -215,11 +223,11 @@ pub struct Spread {
 /// Bits that a moment is cut by: a coordinate's 32 and two more.
 const CUT_MOMENT: u32 = 34;
 
-impl Spread {
+impl MomentSpread {
     /// Adds what one whole replicate gathered.
     pub fn add_replicate(&mut self, quanta: u64, m: &Moments) {
         let power = i128::from(quanta >> CUT);
-        for (sums, moment) in self.products.iter_mut().zip(m.all()) {
+        for (sums, moment) in self.products.iter_mut().zip(m.as_list()) {
             let moment = moment >> CUT_MOMENT;
             sums[0] = sums[0].saturating_add(moment * power);
             sums[1] = sums[1].saturating_add(moment.saturating_mul(moment));
@@ -238,7 +246,7 @@ impl Spread {
         let total = power.total.max(1) as f64;
         let unit = [f64::from(1u32 << CUT), 2f64.powi(CUT_MOMENT as i32) / GRAIN];
         let squares = power.squares as f64 * unit[0] * unit[0];
-        let moments = m.all();
+        let moments = m.as_list();
         std::array::from_fn(|i| {
             let mean = moments[i] as f64 / GRAIN / total;
             let [with_power, with_self] = self.products[i].map(|x| x as f64 * unit[1]);
@@ -284,7 +292,7 @@ mod tests {
     /// Two replicates of equal power, at 0.5 and at 0.25: mean 0.375 ± 0.125, mean square 0.15625 ± 0.09375.
     #[test]
     fn errors_of_means_are_those_of_ratios() {
-        let (mut whole, mut spread, mut power) = (Moments::default(), Spread::default(), Sum::default());
+        let (mut whole, mut spread, mut power) = (Moments::default(), MomentSpread::default(), Sum::default());
         for x in [0.5, 0.25] {
             let mut m = Moments::default();
             m.add(QUANTA, [x, 0.0], x * x);

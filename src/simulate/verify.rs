@@ -1,8 +1,10 @@
 //! The proof that leaving effects out changes nothing.
 
 use super::bind::BoundScene;
+use super::hooks::Progress;
 use super::results::Results;
-use super::run::{KernelChoice, Progress, RunSettings, prepare, simulate};
+use super::run::{prepare, simulate};
+use super::settings::{KernelChoice, RunSettings};
 use crate::intersect::Intersector;
 use serde::Serialize;
 

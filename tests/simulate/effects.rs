@@ -281,7 +281,7 @@ fn only_what_happens_is_said_to_be_simulated() {
         world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
         let text = format!("[[source]]\nat = [5, 4, 3]\n[[material]]\npart = 'box'\n{material}\n");
         let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
-        let required = Required::by(&scene.bind(&world.model).unwrap());
+        let required = Required::new(&scene.bind(&world.model).unwrap());
         required.simulated.iter().map(|b| format!("{:?}", b.effect)).collect()
     };
     for (material, expected) in [

@@ -12,7 +12,7 @@ use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
 use crate::cli::work::shards::replicates_of_shard;
 use crate::cli::work::tally_file::{TallyHeader, fingerprint};
 use crate::cli::work::{input_files, lost_rays, results_folder};
-use crate::simulate::Portion;
+use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -34,7 +34,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
     let first = first_part(command, &patience, console)?;
-    let header: TallyHeader = Portion::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
+    let header: TallyHeader = PartialRun::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
     let (scene, loaded) = input_files::scene_file(&scene_path, console).map_err(|failure| match command.scene {
         Some(_) => failure,
@@ -143,7 +143,7 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// The sum of all parts, each of which must be of the run that the first one's header names.
-fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Result<Portion, Failure> {
+fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Result<PartialRun, Failure> {
     let expected = fingerprint(prepared)?.0;
     let check = |h: &TallyHeader| {
         if h.fingerprint == expected {
@@ -155,9 +155,9 @@ fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Res
             format!("it is part of another run ({}) than the first one", h.command)
         })
     };
-    let mut sum: Option<Portion> = None;
+    let mut sum: Option<PartialRun> = None;
     for path in files {
-        let part = Portion::read(&read(path)?, check, &prepared.bound).map_err(|m| unreadable(path, m))?;
+        let part = PartialRun::read(&read(path)?, check, &prepared.bound).map_err(|m| unreadable(path, m))?;
         match &mut sum {
             Some(sum) => sum.merge(&part).map_err(|m| unreadable(path, m))?,
             None => sum = Some(part),
@@ -167,7 +167,7 @@ fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Res
 }
 
 /// Which shards are not there.
-fn missing_parts(whole: &Portion, shard: Option<[u32; 2]>) -> String {
+fn missing_parts(whole: &PartialRun, shard: Option<[u32; 2]>) -> String {
     let absent = |r: &u32| whole.done.binary_search(r).is_err();
     let count = (0..whole.replicates).filter(absent).count();
     let mut text = format!("{count} of the {} replicates of the run are missing", whole.replicates);

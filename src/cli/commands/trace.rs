@@ -16,7 +16,7 @@ use crate::cli::work::path_file::PathFile;
 use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
 use crate::cli::work::{accuracy_target, input_files, lost_rays, results_folder, shards};
 use crate::report::{bytes, grouped, seconds};
-use crate::simulate::Portion;
+use crate::simulate::PartialRun;
 use serde_json::json;
 use std::path::Path;
 
@@ -122,7 +122,7 @@ fn trace_whole(
         });
     }
 
-    let save = |p: &Portion| checkpoint.save_when_due(p);
+    let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
         finished: traced.is_none().then_some(&save),
@@ -247,7 +247,7 @@ fn trace_shard(
     if !command.extra.resume {
         refuse_overwriting(&checkpoint.file)?;
     }
-    let save = |p: &Portion| checkpoint.save_when_due(p);
+    let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let request = TraceRequest {
         from,
         shard: Some(shard),
@@ -272,7 +272,12 @@ fn trace_shard(
 }
 
 /// Says what a finished shard holds.
-fn say_shard(file: &Path, portion: &Portion, [index, count]: [u32; 2], console: &Console) -> Result<(), Failure> {
+fn say_shard(
+    file: &Path,
+    portion: &PartialRun,
+    [index, count]: [u32; 2],
+    console: &Console,
+) -> Result<(), Failure> {
     let counts = &portion.tallies.counts;
     if console.json {
         let document = json!({"shard": [index + 1, count], "replicates": portion.done.len(),
@@ -295,7 +300,7 @@ fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result
     let mesh = &prepared.tessellation.mesh;
     let loaded = prepared.job.loaded;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
-    let effects = crate::simulate::Required::by(&prepared.bound);
+    let effects = crate::simulate::Required::new(&prepared.bound);
     if console.json {
         let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),

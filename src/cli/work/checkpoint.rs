@@ -6,7 +6,7 @@ use super::tally_file::{TallyHeader, fingerprint};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::write_atomic;
-use crate::simulate::Portion;
+use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -55,7 +55,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// When the file cannot be read, is damaged or is of another run.
-    pub(crate) fn read(&self) -> Result<Option<Portion>, Failure> {
+    pub(crate) fn read(&self) -> Result<Option<PartialRun>, Failure> {
         let bytes = match std::fs::read(&self.file) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -69,14 +69,14 @@ impl<'a> Checkpoint<'a> {
                 Err(format!("it was left by another run: {}", h.command))
             }
         };
-        Portion::read(&bytes, same, &self.prepared.bound).map(Some).map_err(|m| {
+        PartialRun::read(&bytes, same, &self.prepared.bound).map(Some).map_err(|m| {
             Failure::arguments(format!("{}: cannot go on from here: {m}", self.file.display()))
                 .with_help("run with the same scene, files, options and program, or into another place with -o")
         })
     }
 
     /// Saves the run, when it is time to.
-    pub(crate) fn save_when_due(&self, portion: &Portion) {
+    pub(crate) fn save_when_due(&self, portion: &PartialRun) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if last.elapsed() < self.every {
             return;
@@ -89,7 +89,7 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Saves the run now.
-    pub(crate) fn save(&self, portion: &Portion) -> Result<(), Failure> {
+    pub(crate) fn save(&self, portion: &PartialRun) -> Result<(), Failure> {
         make_folder(&folder_of(&self.file))?;
         Ok(write_atomic(&self.file, |w| portion.write(&self.header, w))?)
     }
@@ -98,7 +98,7 @@ impl<'a> Checkpoint<'a> {
     ///
     /// # Errors
     /// When none of the places can be written.
-    pub(crate) fn save_anywhere(&self, portion: &Portion) -> Result<PathBuf, Failure> {
+    pub(crate) fn save_anywhere(&self, portion: &PartialRun) -> Result<PathBuf, Failure> {
         let reason = match self.save(portion) {
             Ok(()) => return Ok(self.file.clone()),
             Err(failure) => failure,
@@ -109,7 +109,7 @@ impl<'a> Checkpoint<'a> {
     }
 
     /// Why a run stopped before its end, and how to go on from what was saved of it.
-    pub(crate) fn stopped(&self, portion: &Portion, because: &str) -> Failure {
+    pub(crate) fn stopped(&self, portion: &PartialRun, because: &str) -> Failure {
         let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
         match self.save_anywhere(portion) {
             Ok(file) if file == self.file => {
@@ -140,7 +140,7 @@ pub(crate) fn refuse_overwriting(file: &Path) -> Result<(), Failure> {
     if !file.exists() {
         return Ok(());
     }
-    let header = std::fs::read(file).ok().and_then(|bytes| Portion::header::<TallyHeader>(&bytes).ok());
+    let header = std::fs::read(file).ok().and_then(|bytes| PartialRun::header::<TallyHeader>(&bytes).ok());
     let whose = header.map_or(String::new(), |h| format!(" ({})", h.command));
     let failure = Failure::arguments(format!("{}: an interrupted run{whose} is saved there", file.display()));
     Err(failure.with_help("--resume goes on with it; else give another place with -o, or remove the file"))

@@ -10,7 +10,7 @@ use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::simulate::{Portion, Results, RunSettings, Verification, replay, verify_pruning};
+use crate::simulate::{PartialRun, Results, RunSettings, Verification, replay, verify_pruning};
 use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
 use crate::study::geometric_error::{GeometricError, geometric_error};
 
@@ -37,7 +37,7 @@ pub(crate) struct SceneResults {
     /// The pruned kernel against the full one, when asked for.
     pub(crate) verification: Option<Verification>,
     /// The sums that the results were made of, to be saved where they cannot be written; none of a verified run.
-    pub(crate) sums: Option<Portion>,
+    pub(crate) sums: Option<PartialRun>,
 }
 
 /// Traces the scene, and asks some of its rays again of BVH and spline.
@@ -48,7 +48,7 @@ pub(crate) fn trace_and_check(
     prepared: &PreparedScene,
     request: TraceRequest,
     console: &Console,
-) -> Result<SceneResults, Box<Portion>> {
+) -> Result<SceneResults, Box<PartialRun>> {
     prepared.with_intersector(console, |intersector, build_seconds| {
         let settings = prepared.run_settings();
         let (mut results, verification, sums) = if request.verify_pruning {
@@ -56,11 +56,11 @@ pub(crate) fn trace_and_check(
             (results, Some(verification), None)
         } else {
             let traced = prepared.run(intersector, &settings, request, console);
-            if !traced.portion.is_whole() {
-                return Err(Box::new(traced.portion));
+            if !traced.partial.is_whole() {
+                return Err(Box::new(traced.partial));
             }
-            let sums = traced.portion.clone();
-            (Results::of(&prepared.bound, &settings, traced), None, Some(sums))
+            let sums = traced.partial.clone();
+            (Results::new(&prepared.bound, &settings, traced), None, Some(sums))
         };
         // What was done before tracing.
         results.seconds.read = prepared.job.loaded.seconds;

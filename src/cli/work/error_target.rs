@@ -8,7 +8,7 @@ use crate::cli::arguments::suggest;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::report::{figures, grouped};
-use crate::simulate::{Portion, ReceiverResult, Results, Scene};
+use crate::simulate::{PartialRun, ReceiverResult, Results, Scene};
 use serde::Serialize;
 
 /// Rays of the first run.
@@ -75,7 +75,7 @@ impl ErrorTarget {
     }
 
     /// Traces until the error is small enough, the most rays are traced, or a signal asks to stop: then not all is traced.
-    pub(crate) fn trace(&self, prepared: &mut PreparedScene, console: &Console) -> (Portion, TargetResult) {
+    pub(crate) fn trace(&self, prepared: &mut PreparedScene, console: &Console) -> (PartialRun, TargetResult) {
         let most = prepared.job.tracing.rays.unwrap_or(MOST_RAYS);
         let mut rays = FIRST_RAYS.min(most);
         loop {
@@ -108,13 +108,13 @@ impl ErrorTarget {
         }
     }
 
-    fn attempt(&self, prepared: &PreparedScene, console: &Console) -> (Portion, Option<f64>) {
+    fn attempt(&self, prepared: &PreparedScene, console: &Console) -> (PartialRun, Option<f64>) {
         let settings = prepared.run_settings();
         prepared.with_intersector(console, |intersector, _| {
             let request = TraceRequest { is_saveable: true, ..TraceRequest::default() };
             let traced = prepared.run(intersector, &settings, request, console);
-            let portion = traced.portion.clone();
-            (portion, self.error(&Results::of(&prepared.bound, &settings, traced)))
+            let portion = traced.partial.clone();
+            (portion, self.error(&Results::new(&prepared.bound, &settings, traced)))
         })
     }
 

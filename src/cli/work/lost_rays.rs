@@ -7,7 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::formats::{csv_quoted_text, write_atomic};
 use crate::report::figures;
-use crate::simulate::{Cause, LostRay, Results};
+use crate::simulate::{LostCause, LostRay, Results};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -96,12 +96,14 @@ fn reasons(results: &Results, prepared: &PreparedScene) -> String {
     format!("{counted}{}", reasons.join("; "))
 }
 
-fn meaning(cause: Cause) -> &'static str {
+fn meaning(cause: LostCause) -> &'static str {
     match cause {
-        Cause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
-        Cause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
-        Cause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
-        Cause::TooDeep => "were in more than 7 bodies at once, as after entering an open shell again and again,",
+        LostCause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
+        LostCause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
+        LostCause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
+        LostCause::TooDeep => {
+            "were in more than 7 bodies at once, as after entering an open shell again and again,"
+        }
         _ => "had a distance or direction that is no number",
     }
 }

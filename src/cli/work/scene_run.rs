@@ -12,7 +12,7 @@ use crate::cli::failure::Failure;
 use crate::cli::interruption::{self, SaveableRun};
 use crate::intersect::Intersector;
 use crate::simulate::{
-    BoundScene, Hooks, PathSink, PathVertex, Portion, Progress, RunSettings, Scene, Traced, trace,
+    BoundScene, Hooks, PartialRun, PathSink, PathVertex, Progress, RunSettings, Scene, Traced, trace,
 };
 use crate::study::accuracy_target::AccuracyPlan;
 use crate::study::default_accuracy::Chosen;
@@ -54,11 +54,11 @@ pub(crate) struct TraceRequest<'a> {
     /// With the full kernel too.
     pub(crate) verify_pruning: bool,
     /// What is done already.
-    pub(crate) from: Option<Portion>,
+    pub(crate) from: Option<PartialRun>,
     /// Which part of how many, from 0.
     pub(crate) shard: Option<[u32; 2]>,
     /// Told of all that is done, each thread after so long.
-    pub(crate) finished: Option<&'a (dyn Fn(&Portion) + Sync)>,
+    pub(crate) finished: Option<&'a (dyn Fn(&PartialRun) + Sync)>,
     pub(crate) every: Duration,
     /// Whether what is traced is saved when a signal asks the run to stop.
     pub(crate) is_saveable: bool,
@@ -121,9 +121,9 @@ impl PreparedScene<'_> {
     }
 
     /// Traces the replicates that are asked for and gives their sums.
-    pub(crate) fn trace_part(&self, request: TraceRequest, console: &Console) -> Portion {
+    pub(crate) fn trace_part(&self, request: TraceRequest, console: &Console) -> PartialRun {
         let settings = RunSettings { shard: request.shard.unwrap_or([0, 1]), ..self.run_settings() };
-        self.with_intersector(console, |intersector, _| self.run(intersector, &settings, request, console).portion)
+        self.with_intersector(console, |intersector, _| self.run(intersector, &settings, request, console).partial)
     }
 
     /// Builds the intersector of the run for `work`, which also gets the seconds that it took.
@@ -157,10 +157,10 @@ impl PreparedScene<'_> {
         };
         let take = request.paths.map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
         let hooks = Hooks {
-            progress: &progress,
             finished: request.finished,
             every: request.every,
             paths: take.as_ref().map(|take| take as PathSink<'_>),
+            ..Hooks::with_progress(&progress)
         };
         let traced = trace(&self.bound, intersector, settings, request.from, &hooks);
         bar.finish_and_clear();

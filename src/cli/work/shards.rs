@@ -2,7 +2,7 @@
 
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::simulate::Portion;
+use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 
 /// More shards than any cluster starts; a typing error beyond it is refused.
@@ -116,7 +116,7 @@ pub(crate) fn replicates_of_shard(replicates: u32, [index, count]: [u32; 2]) -> 
 }
 
 /// Whether all replicates of the shard are done.
-pub(crate) fn is_complete(portion: &Portion, shard: [u32; 2]) -> bool {
+pub(crate) fn is_complete(portion: &PartialRun, shard: [u32; 2]) -> bool {
     replicates_of_shard(portion.replicates, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 

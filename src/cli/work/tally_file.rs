@@ -126,5 +126,5 @@ pub(crate) fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Failu
         pieces.push(read);
     }
     let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
-    Ok(Fingerprint::of(&pieces))
+    Ok(Fingerprint::new(&pieces))
 }

@@ -1,12 +1,18 @@
-use super::nearest::{Nearest, bounds};
-use super::{AMBIENT, Chosen, Light};
-use crate::math::{Aabb, Point, Uv};
-use crate::model::{Model, PlacedFace};
-use crate::optics::{self, Absorption, BulkScatter, Index};
+//! The bodies of a model with the media that the rules give them.
+
+use super::chosen::ChosenRules;
+use super::nearest::face_bounds;
+use super::notes::is_open;
+use crate::math::Aabb;
+use crate::model::Model;
+use crate::optics;
+use crate::simulate::body::{AMBIENT, Body};
 use crate::simulate::scene::{Key, Scene, medium};
+use crate::simulate::surfaces::SceneLight;
 use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 
+<<<<<<< HEAD
 /// Something with a medium inside.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Body {
@@ -77,15 +83,17 @@ impl Body {
     }
 }
 
+=======
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
 /// The bodies (one for each instance and medium), the body of each face, and whether bodies may touch or nest.
 ///
 /// An instance with two media, given by face, makes two bodies. Bodies whose boxes are farther apart than the glue distance
 /// can neither touch nor nest.
-pub(super) fn find(
+pub(super) fn find_bodies(
     scene: &Scene,
     model: &Model,
-    chosen: &Chosen,
-    light: &Light,
+    chosen: &ChosenRules,
+    light: &SceneLight,
 ) -> Result<(Vec<Body>, Vec<u16>, bool), Error> {
     let ambient = match &scene.ambient {
         Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
@@ -104,7 +112,7 @@ pub(super) fn find(
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
                 let instance = model.label(f.instance);
                 let body = Body::new(medium::find(scene, name, &at)?, instance, light);
-                if !(body.index > 0.0 && body.index.is_finite()) {
+                if !body.has_valid_index() {
                     let message = format!("'{name}' has no index at {} nm", light.wavelength);
                     return Err(scene.error(ErrorKind::Value, &at, message));
                 }
@@ -113,8 +121,8 @@ pub(super) fn find(
                 bodies.len() - 1
             }
         };
-        bodies[body].open |= super::notes::is_open(&f, model);
-        bodies[body].bounds = bodies[body].bounds.union(bounds(&f));
+        bodies[body].open |= is_open(&f, model);
+        bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
         of_face[f.id.index()] = body as u16;
     }
     if bodies.len() > usize::from(u16::MAX) {
@@ -132,7 +140,7 @@ pub(super) fn find(
 
 /// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
 /// body to light, and as long as the box around them all.
-pub(super) fn give_patience(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
+pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
     let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
     fn first(united: &mut [u16], mut body: u16) -> u16 {
         while united[body as usize] != body {
@@ -143,7 +151,7 @@ pub(super) fn give_patience(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2
     }
     for &[a, b] in pairs {
         let [one, other] = [a, b].map(|k| &bodies[k as usize]);
-        if one.index == other.index && one.dispersive == other.dispersive {
+        if one.matches_index(other) {
             let [a, b] = [a, b].map(|k| first(&mut united, k));
             united[a.max(b) as usize] = a.min(b);
         }
@@ -157,110 +165,7 @@ pub(super) fn give_patience(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2
         let (bounds, absorbs) = whole[k];
         // Where the body absorbs, a path ends by its power.
         if !(absorbs || bounds.is_empty()) {
-            body.patience = scene.run.caught_after * bounds.diagonal();
+            body.trapped_length = scene.run.caught_after * bounds.diagonal();
         }
     }
-}
-
-/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
-pub(super) fn touching(scene: &Scene, model: &Model, of_face: &[u16]) -> (Vec<bool>, Vec<[u16; 2]>) {
-    let boxed = |f: crate::model::PlacedFace<'_>| (f.id.index(), bounds(&f).grown(0.5 * scene.run.glue_mm));
-    let mut faces: Vec<(usize, Aabb)> =
-        model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
-    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
-    let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
-    for (i, (a, box_a)) in faces.iter().enumerate() {
-        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
-            if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
-                (touching[*a], touching[*b]) = (true, true);
-                pairs.push([of_face[*a], of_face[*b]]);
-            }
-        }
-        pairs.dedup();
-    }
-    (touching, pairs)
-}
-
-/// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.
-pub(super) fn twins(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
-    let mut twins = vec![false; of_face.len()];
-    let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
-        .filter(|f| of_face[f.id.index()] != AMBIENT && model.part(f.part).shells.len() > 1)
-        .map(|f| (f.id.index(), f.shell, f))
-        .collect();
-    faces.sort_by_key(|(id, ..)| of_face[*id]);
-    for body in faces.chunk_by(|a, b| of_face[a.0] == of_face[b.0]) {
-        let boxed = |f: &PlacedFace<'_>| bounds(f).grown(0.5 * scene.run.glue_mm);
-        let mut body: Vec<(usize, Option<usize>, Aabb)> = body.iter().map(|(i, s, f)| (*i, *s, boxed(f))).collect();
-        body.sort_by(|a, b| a.2.min.x.total_cmp(&b.2.min.x));
-        for (i, (a, shell, box_a)) in body.iter().enumerate() {
-            for (b, other, box_b) in body[i + 1..].iter().take_while(|(.., b)| b.min.x <= box_a.max.x) {
-                if shell != other && !box_a.intersection(*box_b).is_empty() {
-                    (twins[*a], twins[*b]) = (true, true);
-                }
-            }
-        }
-    }
-    twins
-}
-
-/// Questions of distance after which faces whose boxes meet are taken to touch: some seconds of work.
-const MOST_ASKED: usize = 50_000;
-/// Samples across a face in each parameter.
-const SAMPLES: usize = 5;
-
-/// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
-pub(super) fn against(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[bool]) -> Vec<bool> {
-    let mut against = vec![false; of_face.len()];
-    if of_face.iter().all(|b| *b == AMBIENT) || !opaque.contains(&true) {
-        return against;
-    }
-    let placed: Vec<PlacedFace<'_>> = model.placed_faces().collect();
-    let glue = scene.run.glue_mm;
-    let box_of = |f: &PlacedFace<'_>| bounds(f).grown(0.5 * glue);
-    let mut faces: Vec<(usize, Aabb)> = (placed.iter())
-        .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
-        .map(|f| (f.id.index(), box_of(f)))
-        .collect();
-    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
-    let mut nearest = Nearest::new(model);
-    let mut samples: Vec<Option<Vec<Point>>> = vec![None; placed.len()];
-    let mut asked = 0;
-    for (i, (a, box_a)) in faces.iter().enumerate() {
-        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
-            let mixed = (of_face[*a] == AMBIENT) != (of_face[*b] == AMBIENT);
-            if !mixed || (against[*a] && against[*b]) || box_a.intersection(*box_b).is_empty() {
-                continue;
-            }
-            let mut touch = false;
-            for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
-                let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
-                let near = around.grown(glue);
-                for p in points.iter().filter(|p| near.contains(**p)) {
-                    asked += 1;
-                    touch |= asked > MOST_ASKED || nearest.distance(other, *p) <= glue;
-                    if touch {
-                        break;
-                    }
-                }
-            }
-            if touch {
-                (against[*a], against[*b]) = (true, true);
-            }
-        }
-    }
-    against
-}
-
-/// Points inside the loops of a face, mm.
-fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
-    let Some(face) = f.face else { return Vec::new() };
-    let loops = super::polygons(face);
-    let [[u0, u1], [v0, v1]] = face.surface.domain();
-    let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
-    (0..SAMPLES * SAMPLES)
-        .map(|k| Uv::new(at(k / SAMPLES, u0, u1), at(k % SAMPLES, v0, v1)))
-        .filter(|&uv| super::inside(&loops, uv))
-        .map(|uv| f.placement.point(face.surface.evaluate(uv)))
-        .collect()
 }

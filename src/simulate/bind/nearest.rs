@@ -1,5 +1,8 @@
+//! The face nearest to a point.
+
 use crate::math::{Aabb, Point, Uv};
 use crate::model::{Face, Model, PlacedFace};
+use crate::simulate::trim_loops::{is_inside, trim_polygons};
 
 /// Finds the face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton.
 ///
@@ -11,13 +14,24 @@ pub(super) struct Nearest<'a> {
     loops: Vec<Option<Vec<Vec<Uv>>>>,
 }
 
-/// Samples across a face in each direction, and along each edge of a loop.
+/// Samples across a face in each direction.
 const SAMPLES: usize = 24;
+
+/// Share of its distance that a rounded box may lie too far away.
+const BOX_ROUNDING: f64 = 1e-9;
+
+/// Steps of Gauss–Newton. It contracts by distance over radius of curvature: so many are enough for points nearer than 0.8 of it, and
+/// points on the face take five.
+const MOST_STEPS: usize = 100;
+
+/// Determinant of the normal equations, over its largest possible value, below which both derivatives point the same way: 1e-7 rad
+/// apart, where solving would lose all digits.
+const SINGULAR: f64 = 1e-14;
 
 impl<'a> Nearest<'a> {
     pub(super) fn new(model: &'a Model) -> Self {
         let faces: Vec<_> = model.placed_faces().collect();
-        let bounds = faces.iter().map(bounds).collect();
+        let bounds = faces.iter().map(face_bounds).collect();
         let loops = vec![None; faces.len()];
         Self { faces, bounds, loops }
     }
@@ -34,8 +48,7 @@ impl<'a> Nearest<'a> {
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: Option<(f64, usize)> = None;
         for (low, c) in order {
-            // 1e-9 of the distance: a rounded box may lie that much too far.
-            if best.is_some_and(|(d, _)| low * (1.0 - 1e-9) > d) {
+            if best.is_some_and(|(d, _)| low * (1.0 - BOX_ROUNDING) > d) {
                 break;
             }
             let d = self.distance(c, p);
@@ -52,13 +65,13 @@ impl<'a> Nearest<'a> {
         let local = placed.placement.local_point(p);
         let in_part = match (placed.face, placed.tessellated) {
             (Some(face), _) => {
-                let loops = self.loops[index].get_or_insert_with(|| polygons(face));
-                to_face(face, loops, local)
+                let loops = self.loops[index].get_or_insert_with(|| trim_polygons(face));
+                distance_to_face(face, loops, local)
             }
             (None, Some(t)) => (0..t.mesh.facets.len())
                 .flat_map(|f| {
                     let [a, b, c, d] = t.mesh.corners(f);
-                    [to_triangle(local, [a, b, c]), to_triangle(local, [a, c, d])]
+                    [distance_to_triangle(local, [a, b, c]), distance_to_triangle(local, [a, c, d])]
                 })
                 .fold(f64::INFINITY, f64::min),
             (None, None) => f64::INFINITY,
@@ -68,7 +81,7 @@ impl<'a> Nearest<'a> {
 }
 
 /// A box around a placed face.
-pub(super) fn bounds(f: &PlacedFace<'_>) -> Aabb {
+pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
     let local = match (f.face, f.tessellated) {
         (Some(face), _) => face.surface.bounds(),
         (None, Some(t)) => t.mesh.bounds(),
@@ -77,33 +90,7 @@ pub(super) fn bounds(f: &PlacedFace<'_>) -> Aabb {
     if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
 }
 
-/// The trimming loops as polygons in the parameter plane.
-pub(crate) fn polygons(face: &Face) -> Vec<Vec<Uv>> {
-    let points = |u: &crate::model::EdgeUse| {
-        let [a, b] = u.uv.domain();
-        let reversed = u.reversed;
-        (0..SAMPLES)
-            .map(move |i| {
-                let s = i as f64 / SAMPLES as f64;
-                a + (b - a) * if reversed { 1.0 - s } else { s }
-            })
-            .map(|t| u.uv.evaluate(t))
-            .collect::<Vec<_>>()
-    };
-    face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
-}
-
-/// Whether a parameter point lies inside the loops: an odd number of crossings.
-pub(crate) fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
-    let crossings = loops
-        .iter()
-        .flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])))
-        .filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
-        .count();
-    loops.is_empty() || crossings % 2 == 1
-}
-
-fn to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
+fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
     let s = &face.surface;
     let [[u0, u1], [v0, v1]] = s.domain();
     let away = |uv: Uv| s.evaluate(uv).distance(p);
@@ -113,19 +100,17 @@ fn to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
         Uv::new(at(i / SAMPLES, u0, u1), at(i % SAMPLES, v0, v1))
     });
     let start = grid
-        .filter(|&uv| inside(loops, uv))
+        .filter(|&uv| is_inside(loops, uv))
         .map(|uv| (away(uv), uv))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .or_else(|| loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)));
     let Some((mut best, mut uv)) = start else { return border };
-    // Gauss–Newton contracts by distance over radius of curvature: 100 steps are enough for points nearer than 0.8 of it, and
-    // points on the face take five.
-    for _ in 0..100 {
+    for _ in 0..MOST_STEPS {
         let d = s.derivatives(uv);
         let r = p - d.point;
         let (a, b, c) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
         let det = a * c - b * b;
-        if det.is_nan() || det <= 1e-14 * a * c {
+        if det.is_nan() || det <= SINGULAR * a * c {
             break;
         }
         let (g, h) = (d.du.dot(r), d.dv.dot(r));
@@ -134,7 +119,7 @@ fn to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
             break;
         }
         uv = next;
-        if inside(loops, uv) {
+        if is_inside(loops, uv) {
             best = best.min(away(uv));
         }
     }
@@ -142,7 +127,7 @@ fn to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
 }
 
 /// Distance from a point to a triangle: to the plane when the foot lies inside, else to the nearest edge.
-fn to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
+fn distance_to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
     let n = (b - a).cross(c - a);
     let within = |a: Point, b: Point| (b - a).cross(p - a).dot(n) >= 0.0;
     if n.length_squared() > 0.0 && within(a, b) && within(b, c) && within(c, a) {

@@ -1,34 +1,19 @@
 //! What someone who reads the results must know about the scene: bodies that are open or too thin, and light of wavelengths that a table or a
 //! formula was not made for.
 
-use super::{AMBIENT, BoundScene, Chosen, Loaded};
+use super::bound_scene::BoundScene;
+use super::chosen::ChosenRules;
 use crate::model::{Model, PlacedFace};
 use crate::optics::catalogue;
-use crate::simulate::kernel::{Cause, Counts, LostRay};
+use crate::simulate::body::AMBIENT;
 use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
-/// First and last wavelength of each source, nm.
-pub(super) fn wavelengths(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
-    let run = [scene.run.wavelength_nm; 2];
-    let range = |i: &f64| [*i, *i];
-    (scene.sources.iter().zip(loaded))
-        .map(|(source, loaded)| match (&source.spectrum, loaded) {
-            (Some(key), _) => key.wavelengths(scene.run.unit).map_or(run, |s| s.range_nm()),
-            (None, Some(Loaded::Rays(list))) => {
-                let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
-                all.fold(None, |r: Option<[f64; 2]>, nm| {
-                    r.map_or(Some(range(&nm)), |[a, b]| Some([a.min(nm), b.max(nm)]))
-                })
-                .unwrap_or(run)
-            }
-            _ => run,
-        })
-        .collect()
-}
+/// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
+const ROUNDING: f64 = 1e-9;
 
 /// Something that is known between two wavelengths alone.
-struct Known {
+struct KnownRange {
     what: String,
     range: [f64; 2],
     /// What is taken beyond them.
@@ -39,14 +24,14 @@ const ENDS: &str = "its first and last values are used there";
 const FORMULA: &str = "the formula is used all the same there";
 
 /// One sentence for each table in use that some source's light lies outside of.
-pub(super) fn beyond_tables(scene: &Scene, chosen: &Chosen, light: &[[f64; 2]]) -> Vec<String> {
+pub(super) fn beyond_tables(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]]) -> Vec<String> {
     let media = chosen.iter().filter_map(|(_, rule)| scene.materials.get((*rule)?)?.medium.as_deref());
     let media: BTreeSet<&str> = media.chain(scene.ambient.as_deref()).collect();
     let surfaces: BTreeSet<usize> = chosen.iter().filter_map(|(rule, _)| *rule).collect();
-    let mut known: Vec<Known> = media.iter().flat_map(|name| of_medium(scene, name)).collect();
+    let mut known: Vec<KnownRange> = media.iter().flat_map(|name| medium_ranges(scene, name)).collect();
     for rule in surfaces {
         let Some(material) = scene.materials.get(rule) else { continue };
-        known.extend(of_surface(material).map(|(key, range)| Known {
+        known.extend(surface_ranges(material).map(|(key, range)| KnownRange {
             what: format!("`{key}` of [[material]] {}", rule + 1),
             range,
             beyond: ENDS,
@@ -55,9 +40,9 @@ pub(super) fn beyond_tables(scene: &Scene, chosen: &Chosen, light: &[[f64; 2]]) 
     known.iter().filter_map(|k| sentence(scene, k, light)).collect()
 }
 
-fn sentence(scene: &Scene, known: &Known, light: &[[f64; 2]]) -> Option<String> {
+fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<String> {
     let [from, to] = known.range;
-    let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - 1e-9) || *b > to * (1.0 + 1e-9);
+    let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
     let whose = match scene.sources.get(source).map(|s| s.name.as_str()) {
         Some(name) if !name.is_empty() => format!("the source '{name}'"),
@@ -73,10 +58,10 @@ fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
     Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))
 }
 
-fn of_medium(scene: &Scene, name: &str) -> Vec<Known> {
+fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let mut known = Vec::new();
     let mut add = |what: String, range: Option<[f64; 2]>, beyond| {
-        known.extend(range.map(|range| Known { what, range, beyond }))
+        known.extend(range.map(|range| KnownRange { what, range, beyond }))
     };
     let own = scene.media.iter().find(|m| m.name == name);
     let entry = own.map_or(Some(name), |m| m.catalogue.as_deref());
@@ -94,7 +79,7 @@ fn of_medium(scene: &Scene, name: &str) -> Vec<Known> {
     known
 }
 
-fn of_surface(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
+fn surface_ranges(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
     let coating = m.coating.as_ref().and_then(|rows| ends(rows.iter().filter_map(|r| r.get(1).copied())));
     let reflectance = match &m.reflectance {
         Some(Reflectance::ByAngleAndWavelength(rows)) => ends(rows.iter().map(|r| r[1])),
@@ -134,7 +119,7 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
 pub(super) fn films(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u16| bound.bodies[usize::from(k)].bounds.size().min_element();
-    let touching: BTreeSet<u16> = bound.faces.iter().filter(|f| f.touching).map(|f| f.body).collect();
+    let touching: BTreeSet<u16> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
     let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
     let [name, medium] = bound.body(film)?;
@@ -144,50 +129,4 @@ pub(super) fn films(bound: &BoundScene) -> Option<String> {
          are one: light may pass it by or be lost; set glue_mm to {:.0e}",
         0.1 * thick
     ))
-}
-
-impl BoundScene {
-    /// One sentence about bodies of different media that a run found to overlap.
-    pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
-        let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
-        let times = counts.overlaps;
-        // Beside edges where bodies touch rounding may pass for it: in one scene once in 10^6 segments.
-        (times > counts.segments / 10_000).then(|| {
-            format!(
-                "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {times} times by light; there it is \
-                 taken to be in the body that it came into last, so what is right depends on its way: cut one out of the other in the \
-                 model, or give finer facets where solids touch in curved faces"
-            )
-        })
-    }
-
-    /// One sentence about lost light: where most of it was, and why.
-    pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
-        let mut places: BTreeMap<(u16, Option<&str>, Cause), usize> = BTreeMap::new();
-        for l in ledger {
-            let at = l.face.and_then(|f| self.instance(f));
-            *places.entry((l.body, at, l.cause)).or_default() += 1;
-        }
-        let ((body, at, cause), number) = places.into_iter().rev().max_by_key(|(_, number)| *number)?;
-        let why = match cause {
-            Cause::NoExit => {
-                "it left the scene inside a body, by a gap between faces, an open mesh or a missing face"
-            }
-            Cause::ImpossibleMedium => {
-                "it came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
-            }
-            Cause::InsideSolid => "it came to a closed opaque solid from inside, as from a source that lies in it",
-            Cause::TooDeep => "more bodies lie in each other than a ray can carry",
-            Cause::NotANumber => "its place or direction is no number",
-        };
-        let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
-            (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
-            (None, Some(name)) => format!("at '{name}'"),
-            (None, None) => "outside all bodies".into(),
-        };
-        Some(format!(
-            "{lost} paths were lost; {number} of the {} on record {place}: {why}; `trace --replay lost_rays.csv` shows their ways",
-            ledger.len()
-        ))
-    }
 }

@@ -1,7 +1,8 @@
 //! Faces by what light meets on them.
 
-use super::{BoundScene, Surface};
+use super::bound_scene::BoundScene;
 use crate::math::FaceId;
+use crate::simulate::surfaces::Surface;
 
 impl BoundScene {
     /// What a face can be for light, as [`BoundScene::faces_in_role`] takes it.

@@ -1,11 +1,20 @@
+//! The faces of a model that a rule of the scene means.
+
 use super::nearest::Nearest;
 use crate::math::Point;
 use crate::model::{Model, PlacedFace};
+use crate::simulate::emitter::Area;
 use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, suggest};
 use crate::simulate::{Error, ErrorKind};
 
+/// Difference up to which two shares of a colour are the same: half a step of `#rrggbb`, 1/255.
+const COLOUR_STEP: f64 = 2e-3;
+
+/// Messages give places in steps of a thousandth of a millimetre.
+const DECIMALS: f64 = 1e3;
+
 /// Whether a name fits a pattern in which `*` stands for anything.
-pub(super) fn fits(pattern: &str, name: &str) -> bool {
+fn fits(pattern: &str, name: &str) -> bool {
     let mut pieces = pattern.split('*');
     let Some(mut rest) = name.strip_prefix(pieces.next().unwrap_or("")) else { return false };
     let mut last = None;
@@ -40,7 +49,7 @@ pub(super) fn faces(
             && any_fits(&rule.face, f.name())
             && rule.entity.as_ref().is_none_or(|e| f.entity().is_some_and(|id| e.as_slice().contains(&id)))
             && colour.is_none_or(|c| {
-                f.colour(model).is_some_and(|have| have.0.iter().zip(c).all(|(a, b)| (a - b).abs() < 2e-3))
+                f.colour(model).is_some_and(|have| have.0.iter().zip(c).all(|(a, b)| (a - b).abs() < COLOUR_STEP))
             })
     };
     let candidates: Vec<usize> = model.placed_faces().filter(selected).map(|f| f.id.index()).collect();
@@ -62,7 +71,7 @@ pub(super) fn faces(
             let message =
                 format!("{p:?} is {distance:.4} mm from the nearest face, farther away than the model is large");
             let error = scene.error(ErrorKind::NoMatch, &path("at"), message);
-            let [a, b] = [bounds.min, bounds.max].map(|p| p.to_array().map(|x| (x * 1e3).round() / 1e3));
+            let [a, b] = [bounds.min, bounds.max].map(|p| p.to_array().map(|x| (x * DECIMALS).round() / DECIMALS));
             return Err(error.help(format!("the faces that are meant lie between {a:?} and {b:?}, mm")));
         }
         chosen.push(face);
@@ -70,7 +79,7 @@ pub(super) fn faces(
     Ok(chosen)
 }
 
-pub(super) fn each_name_means_something(
+fn each_name_means_something(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
@@ -97,8 +106,43 @@ pub(super) fn each_name_means_something(
     Ok(())
 }
 
+/// The faces that a source shines from.
+pub(super) fn luminous_area(scene: &Scene, index: usize, model: &Model) -> Result<Option<Area>, Error> {
+    let Some(on) = &scene.sources[index].on else { return Ok(None) };
+    let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
+    let chosen = faces(scene, &base, on, model, &mut Nearest::new(model))?;
+    match Area::new(model, &chosen) {
+        Some(area) => Ok(Some(area)),
+        None => Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from")),
+    }
+}
+
+/// The faces whose absorbed power a receiver counts.
+pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Result<Vec<u32>, Error> {
+    let receiver = &scene.receivers[index];
+    let rule = FaceSelector {
+        part: receiver.part.clone(),
+        instance: receiver.instance.clone(),
+        ..FaceSelector::default()
+    };
+    each_name_means_something(scene, &[Key::Name("receiver"), Key::Index(index)], &rule, model)?;
+    let faces: Vec<u32> = model
+        .placed_faces()
+        .filter(|f| any_fits(&rule.part, &model.part(f.part).name))
+        .filter(|f| any_fits(&rule.instance, &model.instances[f.instance].name))
+        .map(|f| f.id.0)
+        .collect();
+    if faces.is_empty() {
+        let at = [Key::Name("receiver"), Key::Index(index)];
+        let error = scene.error(ErrorKind::NoMatch, &at, "this receiver matches no face of the model");
+        let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
+        return Err(error.help(advice("", names.collect())));
+    }
+    Ok(faces)
+}
+
 /// The nearest name, or what names there are.
-pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
+fn advice(word: &str, mut names: Vec<&str>) -> String {
     if let Some(near) = suggest::nearest(word, names.iter().copied().filter(|n| !n.is_empty())) {
         return format!("did you mean '{near}'?");
     }

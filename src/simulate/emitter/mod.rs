@@ -1,23 +1,38 @@
 //! Sources in the form that makes rays.
+//!
+//! Inner modules, each of which sees only those before it: `measured`, `stream`, `area`, `shape`, this file, `packet`,
+//! `simd_dispatch`, `sampler`.
 
 mod area;
-mod file;
-mod sheaf;
+mod measured;
+mod packet;
+mod sampler;
+mod shape;
+mod simd_dispatch;
 mod stream;
-mod wide;
 
-use super::bind::{Body, Light};
+use super::body::Body;
+use super::receiver::far_axes;
 use super::scene::{self, Scene, SourceKind};
+use super::surfaces::SceneLight;
 use super::{Error, ErrorKind};
 use crate::formats::PhotometricType;
 use crate::intersect::Beam;
 use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
-use crate::optics::{IntensitySampler, Spectrum, Wavelengths};
+use crate::optics::{Spectrum, Wavelengths};
 pub(crate) use area::Area;
-pub(crate) use file::{Loaded, load};
+pub(crate) use measured::{Loaded, load};
+pub(crate) use sampler::RaySampler;
+use shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, direction_about_axis, point_on_rectangle, radius_on_disc};
 use smallvec::SmallVec;
-pub(crate) use stream::{Stream, Ticket};
+pub(crate) use stream::{RayIndex, Stream};
+
+/// Rays made at a time.
+const PACKET: usize = 64;
+
+/// A number of each ray of a packet.
+type PacketNumbers = [f64; PACKET];
 
 /// A source ready to emit.
 #[derive(Clone, Debug)]
@@ -27,7 +42,7 @@ pub(crate) struct Emitter {
     /// Bodies around it, outermost first.
     pub(crate) inside: SmallVec<[u16; 4]>,
     /// Whether the scene says so; geometry tells otherwise.
-    pub(crate) stated: bool,
+    pub(crate) media_stated: bool,
     /// Its spectrum, when the scene has several wavelengths.
     wavelengths: Option<Wavelengths>,
     /// Direction of the electric field of polarised light.
@@ -37,29 +52,9 @@ pub(crate) struct Emitter {
     lobe: Lobe,
 }
 
-#[derive(Clone, Debug)]
-enum Shape {
-    Point,
-    Faces(Area),
-    /// Origins and directions of measured rays.
-    List(file::RayList),
-    Disc(f64),
-    Rectangle([f64; 2]),
-}
-
-#[derive(Clone, Debug)]
-enum Lobe {
-    Measured(IntensitySampler),
-    /// Even within a cone of that cosine; -1 for all directions.
-    Cone(f64),
-    Collimated,
-    /// Intensity ∝ cosⁿ; `1/(n+1)` is kept.
-    Cosine(f64),
-}
-
 /// What a ray has besides itself as it leaves its source.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Leaving {
+pub(crate) struct Emission {
     /// The face it leaves, with the face's outward normal there.
     pub(crate) from: Option<(FaceId, Vector)>,
     /// Wavelength, nm; absent when the scene has but one.
@@ -71,7 +66,7 @@ impl Emitter {
         scene: &Scene,
         i: usize,
         bodies: &[Body],
-        light: &Light,
+        light: &SceneLight,
         loaded: Option<Loaded>,
         area: Option<Area>,
     ) -> Result<Self, Error> {
@@ -89,7 +84,7 @@ impl Emitter {
         let mut lobe = match s.kind {
             SourceKind::Cone => Lobe::Cone(s.half_angle_deg.unwrap_or(180.0).to_radians().cos()),
             SourceKind::Collimated => Lobe::Collimated,
-            SourceKind::Lambertian => Lobe::Cosine(0.5),
+            SourceKind::Lambertian => Lobe::Cosine(LAMBERTIAN),
             SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
             _ => Lobe::Cone(-1.0),
         };
@@ -102,7 +97,7 @@ impl Emitter {
                     frame.y = -frame.y;
                 } else {
                     // To positive H, to positive V, forward: as far fields have it.
-                    frame = super::receiver::far_axes(at, direction, s.x.map_or(Vector::Y, Vector::from_array));
+                    frame = far_axes(at, direction, s.x.map_or(Vector::Y, Vector::from_array));
                 }
                 (lobe, own_power) = (Lobe::Measured(sampler), flux);
             }
@@ -112,20 +107,6 @@ impl Emitter {
                 shape = Shape::List(list);
             }
             None => {}
-        }
-        let mut inside = SmallVec::new();
-        for instance in s.inside.iter().flat_map(|n| n.as_slice()) {
-            let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
-                let at = [scene::Key::Name("source"), scene::Key::Index(i), scene::Key::Name("inside")];
-                let message = format!("no instance called '{instance}' has a medium");
-                let names: Vec<&str> = bodies.iter().skip(1).map(|b| b.name.as_str()).collect();
-                let advice = match names.is_empty() {
-                    true => "no instance has a `medium`; leave `inside` out".into(),
-                    false => scene::suggest::any(instance, &names),
-                };
-                return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
-            };
-            inside.push(body as u16 + 1);
         }
         let wavelengths = match (&s.spectrum, light.coloured) {
             (_, false) => None,
@@ -140,18 +121,19 @@ impl Emitter {
             polarised,
             power,
             rays: s.rays,
-            inside,
-            stated: s.inside.is_some(),
+            inside: stated_media(scene, i, bodies)?,
+            media_stated: s.inside.is_some(),
             frame,
             shape,
             lobe,
         })
     }
 
-    /// Which pairs of numbers it asks for.
-    pub(crate) fn pairs(&self) -> [bool; 3] {
-        let (list, point) = (matches!(self.shape, Shape::List(_)), matches!(self.shape, Shape::Point));
-        [!(list || point), !(list || matches!(self.lobe, Lobe::Collimated)), self.wavelengths.is_some()]
+    /// Which pairs of numbers it draws from the net: for the place, the direction, the wavelength.
+    fn needed_pairs(&self) -> [bool; 3] {
+        let list = matches!(self.shape, Shape::List(_));
+        let collimated = matches!(self.lobe, Lobe::Collimated);
+        [self.shape.is_extended(), !(list || collimated), self.wavelengths.is_some()]
     }
 
     /// What its rays have in common.
@@ -167,7 +149,7 @@ impl Emitter {
     }
 
     /// Points around the places it shines from, faces and lists of rays left out.
-    pub(crate) fn reach(&self) -> [Point; 2] {
+    pub(crate) fn extent(&self) -> [Point; 2] {
         let size = match &self.shape {
             Shape::Disc(radius) => *radius,
             Shape::Rectangle([a, b]) => a.hypot(*b),
@@ -176,105 +158,78 @@ impl Emitter {
         [self.frame.origin - Vector::splat(size), self.frame.origin + Vector::splat(size)]
     }
 
-    /// Puts the ray to start after `started` others of this source and replicate into `ray`; the first of them has the number `first`
-    /// in the run. By reference: a whole ray that is written in pieces and copied at once was waited for, 15 % of the kernel's time.
     #[inline(always)]
-    pub(crate) fn next(&self, stream: &mut Stream, first: u64, started: u32, ray: &mut Ray) -> (Ticket, Leaving) {
-        let index = stream.prepare(self, started);
-        let ticket = Ticket { ray: first + u64::from(index), index };
-        let Some((origin, direction)) = stream.ready(started) else {
-            return (ticket, self.emit(stream, ticket, ray));
-        };
-        *ray = Ray::new(origin, direction);
-        (ticket, Leaving { from: None, wavelength: self.wavelength(stream, ticket) })
-    }
-
-    /// Puts the ray of an index in this source and replicate, the one ray that is started, into `ray`.
-    pub(crate) fn alone(&self, stream: &mut Stream, first: u64, index: u32, ray: &mut Ray) -> (Ticket, Leaving) {
-        let ticket = Ticket { ray: first + u64::from(index), index: stream.prepare_alone(index) };
-        (ticket, self.emit(stream, ticket, ray))
-    }
-
-    #[inline(always)]
-    fn wavelength(&self, stream: &Stream, ticket: Ticket) -> Option<f64> {
+    fn wavelength(&self, stream: &Stream, index: RayIndex) -> Option<f64> {
         let wavelengths = self.wavelengths.as_ref()?;
-        Some(wavelengths.sample(stream.pair(ticket, 2)[0]))
+        Some(wavelengths.sample(stream.pair(index, 2)[0]))
     }
 
     /// A ray of this source.
     #[inline(never)]
-    fn emit(&self, stream: &Stream, ticket: Ticket, ray: &mut Ray) -> Leaving {
+    fn emit(&self, stream: &Stream, index: RayIndex, ray: &mut Ray) -> Emission {
         let f = &self.frame;
-        let mut leaving = Leaving { from: None, wavelength: self.wavelength(stream, ticket) };
+        let mut emission = Emission { from: None, wavelength: self.wavelength(stream, index) };
         *ray = Ray::new(f.origin, f.z);
         let mut axes = [f.x, f.y, f.z];
         match &self.shape {
             Shape::Point => {}
             Shape::Disc(radius) => {
-                let [u, v] = stream.pair(ticket, 0);
-                let (r, (sin, cos)) = (radius_on_disc(*radius, u), sin_cos_turns(v));
+                let [u, v] = stream.pair(index, 0);
+                let r = radius_on_disc(*radius, u);
+                let (sin, cos) = sin_cos_turns(v);
                 ray.origin = f.origin + f.x * (r * cos) + f.y * (r * sin);
             }
             Shape::Rectangle(half) => {
-                let [x, y] = on_rectangle(*half, stream.pair(ticket, 0));
+                let [x, y] = point_on_rectangle(*half, stream.pair(index, 0));
                 ray.origin = f.origin + f.x * x + f.y * y;
             }
             Shape::Faces(area) => {
-                let (point, normal, face) = area.point(stream, ticket);
+                let (point, normal, face) = area.point(stream, index);
                 let (x, y) = orthonormal_pair(normal);
                 ray.origin = point;
-                leaving.from = Some((face, normal));
+                emission.from = Some((face, normal));
                 axes = [x, y, normal];
             }
             Shape::List(list) => {
-                let r = list.at(stream.systematic(ticket));
+                let r = list.ray_at_share(stream.systematic(index));
                 *ray = Ray::new(f.point(r.origin), f.direction(r.direction));
-                leaving.wavelength = leaving.wavelength.or(r.wavelength_nm);
-                return leaving;
+                emission.wavelength = emission.wavelength.or(r.wavelength_nm);
+                return emission;
             }
         }
         ray.direction = match &self.lobe {
             Lobe::Collimated => axes[2],
             Lobe::Cone(limit) => {
-                let [u, v] = stream.pair(ticket, 1);
-                turned(axes, cosine_of_cone(*limit, u), v)
+                let [u, v] = stream.pair(index, 1);
+                direction_about_axis(axes, cosine_in_cone(*limit, u), v)
             }
             Lobe::Cosine(exponent) => {
-                let [u, v] = stream.pair(ticket, 1);
+                let [u, v] = stream.pair(index, 1);
                 let u = 1.0 - u;
-                turned(axes, if *exponent == 0.5 { u.sqrt() } else { u.powf(*exponent) }, v)
+                direction_about_axis(axes, if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) }, v)
             }
-            Lobe::Measured(sampler) => f.direction(sampler.sample(stream.pair(ticket, 1))),
+            Lobe::Measured(sampler) => f.direction(sampler.sample(stream.pair(index, 1))),
         };
-        leaving
+        emission
     }
 }
 
-/// How far from its middle a point of a disc lies.
-#[inline(always)]
-fn radius_on_disc(radius: f64, u: f64) -> f64 {
-    radius * u.sqrt()
-}
-
-/// The coordinates of a point of a rectangle, from half its sides.
-#[inline(always)]
-fn on_rectangle([a, b]: [f64; 2], [u, v]: [f64; 2]) -> [f64; 2] {
-    [a * (2.0 * u - 1.0), b * (2.0 * v - 1.0)]
-}
-
-/// Cosine to the axis of a cone whose rim has the cosine `limit`.
-#[inline(always)]
-fn cosine_of_cone(limit: f64, u: f64) -> f64 {
-    1.0 - u * (1.0 - limit)
-}
-
-#[inline(always)]
-fn sine_of(cosine: f64) -> f64 {
-    ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
-}
-
-/// The direction with this cosine to the last of three axes, turned around it by a share `v` of a whole turn.
-fn turned(axes: [Vector; 3], cos_theta: f64, v: f64) -> Vector {
-    let (sin_theta, (sin, cos)) = (sine_of(cos_theta), sin_cos_turns(v));
-    axes[0] * (sin_theta * cos) + axes[1] * (sin_theta * sin) + axes[2] * cos_theta
+/// The bodies that a source is said to lie in, outermost first.
+fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVec<[u16; 4]>, Error> {
+    let mut media = SmallVec::new();
+    for instance in scene.sources[source].inside.iter().flat_map(|n| n.as_slice()) {
+        let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
+            let at = [scene::Key::Name("source"), scene::Key::Index(source), scene::Key::Name("inside")];
+            let message = format!("no instance called '{instance}' has a medium");
+            let names: Vec<&str> = bodies.iter().skip(1).map(|b| b.name.as_str()).collect();
+            let advice = if names.is_empty() {
+                "no instance has a `medium`; leave `inside` out".into()
+            } else {
+                scene::suggest::nearest_or_all(instance, &names)
+            };
+            return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
+        };
+        media.push(body as u16 + 1);
+    }
+    Ok(media)
 }

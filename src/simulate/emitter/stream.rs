@@ -1,25 +1,29 @@
-use super::sheaf::{Numbers, SHEAF, Sheaf};
-use super::{Emitter, wide};
-use crate::math::{Point, Vector};
+//! The random numbers of one source in one replicate, and the order in which its rays start.
+
+use super::{PACKET, PacketNumbers};
 use crate::simulate::random::{self, Key, Purpose};
 use crate::simulate::scene::Sampling;
 
-/// Bits of a cell along each side of the square in which rays are put in order, and rays in a chunk: one for each cell.
+/// Bits of a cell along each side of the square in which rays are put in order.
 const CELL_BITS: u32 = 6;
+/// Rays in a chunk: one for each cell.
 const CHUNK: usize = 1 << (2 * CELL_BITS);
 
 /// The lowest bits of a number with a gap after each.
 #[inline(always)]
-fn spread(x: u32) -> u32 {
+fn interleaved(x: u32) -> u32 {
     let x = (x | x << 4) & 0x0f0f;
     let x = (x | x << 2) & 0x3333;
     (x | x << 1) & 0x5555
 }
 
-/// The middle of a step of 2⁻³².
+/// Width of the steps that a 32-bit number counts, 2⁻³².
+const STEP: f64 = 1.0 / 4_294_967_296.0;
+
+/// The middle of a step of the unit interval.
 #[inline(always)]
 fn unit(number: u32) -> f64 {
-    (f64::from(number) + 0.5) * (1.0 / 4_294_967_296.0)
+    (f64::from(number) + 0.5) * STEP
 }
 
 /// Where the numbers of one source in one replicate come from.
@@ -38,15 +42,15 @@ pub(crate) struct Stream {
     order: Vec<u32>,
     pairs: [bool; 3],
     numbers: [Vec<u32>; random::DIMENSIONS],
-    /// The rays that start now, where the source can make many at a time.
-    pub(super) sheaf: Option<Box<Sheaf>>,
 }
 
-/// A ray of a source: its number in the run, and in its source and replicate.
+/// A ray of a source.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ticket {
-    pub(crate) ray: u64,
-    pub(crate) index: u32,
+pub(crate) struct RayIndex {
+    /// Number in the run.
+    pub(crate) in_run: u64,
+    /// Number among the rays of its source in its replicate.
+    pub(crate) in_stream: u32,
 }
 
 impl Stream {
@@ -61,63 +65,82 @@ impl Stream {
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
         let rays = rays.min(u64::from(u32::MAX)) as u32;
-        let (order, pairs, numbers) = (Vec::new(), [true; 3], Default::default());
-        Self { seed, sampling, scrambles, replicate, replicates, rays, order, pairs, numbers, sheaf: None }
+        let numbers = Default::default();
+        Self {
+            seed,
+            sampling,
+            scrambles,
+            replicate,
+            replicates,
+            rays,
+            order: Vec::new(),
+            pairs: [true; 3],
+            numbers,
+        }
     }
 
-    /// The same stream with the numbers of a source alone.
-    pub(crate) fn of(self, emitter: &Emitter) -> Self {
-        let pairs = emitter.pairs();
-        let sheaves = self.sampling == Sampling::Sobol && pairs != [false; 3] && emitter.makes_sheaves();
-        Self { pairs, sheaf: sheaves.then(Sheaf::empty), ..self }
+    /// The same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
+    pub(super) fn with_pairs(self, pairs: [bool; 3]) -> Self {
+        Self { pairs, ..self }
     }
 
-    /// The ray to start after `started` others of this source and replicate, its numbers made ready.
+    pub(super) fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Whether any number of the net is asked for.
+    #[inline(always)]
+    pub(super) fn needs_numbers(&self) -> bool {
+        self.pairs != [false; 3]
+    }
+
+    /// Whether rays start in chunks and out of turn.
+    #[inline(always)]
+    fn is_chunked(&self) -> bool {
+        self.sampling == Sampling::Sobol && self.needs_numbers()
+    }
+
+    /// Whether [`Self::refill`] is due before the ray that starts after `started` others.
+    #[inline(always)]
+    pub(super) fn is_refill_due(&self, started: u32) -> bool {
+        self.is_chunked() && (started as usize).is_multiple_of(PACKET)
+    }
+
+    /// The ray to start after `started` others of this source and replicate.
     ///
     /// Rays of a net start in chunks, each along a Z-curve through their directions, or places if all have one direction: rays that
     /// follow each other meet the same nodes and facets.
     #[inline(always)]
-    pub(super) fn prepare(&mut self, emitter: &Emitter, started: u32) -> u32 {
-        if self.sampling == Sampling::Random || self.pairs == [false; 3] {
+    pub(super) fn index_to_start(&self, started: u32) -> u32 {
+        if !self.is_chunked() {
             return started;
         }
         let k = started as usize % CHUNK;
-        if k.is_multiple_of(SHEAF) {
-            wide::prepare(emitter, self, started);
-        }
         started - k as u32 + self.order[k]
     }
 
-    /// That ray, where it is made already.
+    /// Makes ready the numbers that are needed from the `started`-th ray on.
     #[inline(always)]
-    pub(super) fn ready(&self, started: u32) -> Option<(Point, Vector)> {
-        let sheaf = self.sheaf.as_ref()?;
-        Some(sheaf.ray(started as usize))
-    }
-
-    /// Makes ready what is needed from the `started`-th ray on.
-    #[inline(always)]
-    pub(super) fn refill(&mut self, emitter: &Emitter, started: u32) {
+    pub(super) fn refill(&mut self, started: u32) {
         if (started as usize).is_multiple_of(CHUNK) {
-            self.chunk(started);
+            self.fill_chunk(started);
         }
-        emitter.make(self, started);
     }
 
-    /// Makes ready the numbers of one ray, which is the one to start.
-    pub(crate) fn prepare_alone(&mut self, index: u32) -> u32 {
+    /// Makes ready the numbers of one ray alone.
+    pub(super) fn prepare_single(&mut self, index: u32) {
         if self.sampling == Sampling::Sobol {
             for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
                 self.numbers[d].resize(CHUNK, 0);
                 self.numbers[d][index as usize % CHUNK] = random::scrambled(index, d, self.scrambles[d]);
             }
         }
-        index
     }
 
-    /// Loops, not closures, which would be compiled without the caller's instruction set.
+    /// Makes the numbers of a chunk and the order in which its rays start. Loops, not closures, which would be compiled without the
+    /// caller's instruction set.
     #[inline(always)]
-    fn chunk(&mut self, first: u32) {
+    fn fill_chunk(&mut self, first: u32) {
         for d in 0..random::DIMENSIONS {
             if !self.pairs[d / 2] {
                 continue;
@@ -131,7 +154,7 @@ impl Stream {
         let along = if self.pairs[1] { 2 } else { 0 };
         let mut cells = [0u16; CHUNK];
         for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
-            *cell = (spread(x >> (32 - CELL_BITS)) | spread(y >> (32 - CELL_BITS)) << 1) as u16;
+            *cell = (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16;
         }
         // Counting sort: most cells hold one ray of a chunk.
         let mut ends = [0u16; CHUNK];
@@ -154,12 +177,12 @@ impl Stream {
     /// The numbers of a pair for the rays that start from the `started`-th on; of no meaning beyond the last of them, and for a pair
     /// that the source does not ask for.
     #[inline(always)]
-    pub(super) fn pairs_from(&self, started: u32, pair: usize) -> [Numbers; 2] {
-        let mut pairs = [[0.0; SHEAF]; 2];
+    pub(super) fn pairs_from(&self, started: u32, pair: usize) -> [PacketNumbers; 2] {
+        let mut pairs = [[0.0; PACKET]; 2];
         if self.pairs[pair] {
             let order = &self.order[started as usize % CHUNK..];
             for (numbers, from) in pairs.iter_mut().zip(&self.numbers[2 * pair..]) {
-                let mut raw = [0u32; SHEAF];
+                let mut raw = [0u32; PACKET];
                 for (x, k) in raw.iter_mut().zip(order) {
                     *x = from[*k as usize];
                 }
@@ -171,13 +194,13 @@ impl Stream {
         pairs
     }
 
-    /// Two numbers in `[0, 1)` of the prepared ticket: pair 0 for the place, 1 for the direction, 2 for the wavelength.
+    /// Two numbers in `[0, 1)` of a prepared ray: pair 0 for the place, 1 for the direction, 2 for the wavelength.
     #[inline]
-    pub(crate) fn pair(&self, ticket: Ticket, pair: u32) -> [f64; 2] {
+    pub(crate) fn pair(&self, index: RayIndex, pair: u32) -> [f64; 2] {
         match self.sampling {
-            Sampling::Random => self.random(ticket, pair),
+            Sampling::Random => self.random(index, pair),
             Sampling::Sobol => {
-                let k = ticket.index as usize % CHUNK;
+                let k = index.in_stream as usize % CHUNK;
                 let number = |d: usize| unit(self.numbers[d][k]);
                 [number(2 * pair as usize), number(2 * pair as usize + 1)]
             }
@@ -185,14 +208,14 @@ impl Stream {
     }
 
     /// Further pairs of independent numbers, from 3.
-    pub(crate) fn random(&self, ticket: Ticket, pair: u32) -> [f64; 2] {
-        Key { seed: self.seed, ray: ticket.ray, branch: 0, bounce: pair }.pair(Purpose::Source)
+    pub(crate) fn random(&self, index: RayIndex, pair: u32) -> [f64; 2] {
+        Key { seed: self.seed, ray: index.in_run, branch: 0, bounce: pair }.pair(Purpose::Source)
     }
 
     /// A number in `[0, 1)` that runs evenly through all rays of the source, each replicate taking every `replicates`-th step.
-    pub(crate) fn systematic(&self, ticket: Ticket) -> f64 {
-        let jitter = self.random(ticket, 3)[0];
-        let step = f64::from(ticket.index) + (f64::from(self.replicate) + jitter) / f64::from(self.replicates);
+    pub(crate) fn systematic(&self, index: RayIndex) -> f64 {
+        let jitter = self.random(index, 3)[0];
+        let step = f64::from(index.in_stream) + (f64::from(self.replicate) + jitter) / f64::from(self.replicates);
         (step / f64::from(self.rays.max(1))).min(1.0 - f64::EPSILON)
     }
 }

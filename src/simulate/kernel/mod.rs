@@ -1,19 +1,32 @@
 //! The path kernel: wavefronts of rays through an intersector, one `match` on the surface at each hit.
 //!
 //! A replicate is traced in batches that are topped up with new rays as paths end, so that the intersector always has many
-//! rays to interleave. What a ray carries is a type parameter ([`Carry`]): a scene without media does not pay for
-//! them. Everything else is arithmetic behind the `match`.
+//! rays to interleave. What a ray carries is a type parameter ([`payload::RayPayload`]): a scene without media does not pay for
+//! them. Everything else is arithmetic behind the `match`. A surface returns what becomes of light ([`interaction::Interaction`]); the
+//! tracer books it.
+//!
+//! Inner modules, each of which sees only those before it: `payload`, `tolerances`, `context`, `path`, `contact`, `media_at`, `start`,
+//! `starting_media`, `interaction`, `crossing`, `surface`, `tracer`, `receivers`, `step`, `emission`, `wavefront`, `simd_dispatch`.
 
-mod around;
-mod arrive;
-mod carry;
 mod contact;
-mod local;
-mod rough;
+mod context;
+mod crossing;
+mod emission;
+mod interaction;
+mod media_at;
+mod path;
+pub(crate) mod payload;
+mod receivers;
+mod simd_dispatch;
+mod start;
+mod starting_media;
 mod step;
 mod surface;
-mod wide;
+mod tolerances;
+mod tracer;
+mod wavefront;
 
+<<<<<<< HEAD
 pub(crate) use around::{Around, sources as around_sources};
 pub(crate) use carry::{Carry, Coloured, Everything, Mirrors, Nothing, OneBody, Plain, Stack};
 pub(crate) use local::Local;
@@ -365,3 +378,8 @@ fn settle(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) ->
     }
     false
 }
+=======
+pub(crate) use context::Context;
+pub(crate) use path::RaySelection;
+pub(crate) use simd_dispatch::trace;
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)

@@ -1,51 +1,55 @@
-use super::arrive::{aim, deposit, late, pass, receive};
-use super::{Carry, Cause, Context, Event, Local, LostRay, NO_RECEIVER, Path, PathVertex, SCATTERS, key};
-use super::{around, contact, surface};
+//! One step of a path: over its segment, through what it meets, and into the next segment. What a surface or a limit does to its light
+//! is booked here, and nowhere else.
+
+use super::contact::{ContactSurface, FaceHit, contact_surface, end_of_contact, opaque_contact};
+use super::interaction::{Division, Interaction, SurfaceInteraction};
+use super::media_at::{has_left_by_opening, recover_media};
+use super::path::{NO_RECEIVER, Path, SCATTERS};
+use super::payload::RayPayload;
+use super::receivers::{clip_outside, clip_segment};
+use super::surface::interact;
+use super::tolerances::way_through_glue;
+use super::tracer::Tracer;
 use crate::intersect::Hit;
-use crate::math::{Departure, FaceId, Point, Ray, Vector};
+use crate::math::{Ray, Vector};
 use crate::optics::polarised::Stokes;
-use crate::simulate::bind::{AMBIENT, FaceOptics, Surface};
+use crate::simulate::body::AMBIENT;
+use crate::simulate::outcome::{Event, LostCause};
 use crate::simulate::random::Purpose;
-use crate::simulate::tally::{QUANTA, count, whole};
-use std::cell::Cell;
+use crate::simulate::scene::Interfaces;
+use crate::simulate::surfaces::FaceOptics;
+use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
-/// Notes a vertex of a path that is recorded.
-#[inline(always)]
-pub(super) fn record<C: Carry>(
-    context: &Context<'_>,
-    path: &Path<C>,
-    point: Point,
-    event: Event,
-    local: &mut Local,
-) {
-    if !C::PLAIN && context.plan.records(path.ray) {
-        let (ray, branch, bounce) = (path.ray, path.branch, path.bounce);
-        local.paths.push(PathVertex { ray, branch, bounce, point, power: path.quanta / QUANTA, event });
-    }
-}
-
-/// Carries a path over its segment and through what it meets; false when the path ends.
-#[inline(always)]
-pub(super) fn step<C: Carry>(
-    context: &Context<'_>,
-    path: &mut Path<C>,
-    ray: &mut Ray,
-    hit: Option<&Hit>,
-    local: &mut Local,
-    pending: &mut Vec<(Path<C>, Ray)>,
-) -> bool {
-    let hit = late(context, path, ray, hit);
-    let end = hit.map_or(ray.t_max, |h| h.t);
-    if !C::PLAIN && !context.passing.is_empty() {
-        pass(context, path, ray, end, local);
-    }
-    if C::MEDIA && (end.is_finite() || path.carry.body() == AMBIENT) {
-        attenuate(context, path, end, local);
-    }
-    let Some(hit) = hit else {
-        if C::MEDIA && path.receiver == SCATTERS {
-            return scatter(context, path, ray, local);
+impl<C: RayPayload> Tracer<'_, '_, C> {
+    /// Takes a path over its segment and through what it meets; false when the path ends.
+    #[inline(always)]
+    pub(super) fn step(&mut self, path: &mut Path<C>, ray: &mut Ray, hit: Option<&Hit>) -> bool {
+        let context = self.context;
+        let hit = clip_outside(context, path, ray, hit);
+        self.cover_segment(path, ray, hit.map_or(ray.t_max, |h| h.t));
+        let Some(hit) = hit else {
+            if C::MEDIA && path.receiver == SCATTERS {
+                return self.scatter_in_body(path, ray);
+            }
+            self.end_without_face(path, ray);
+            return false;
+        };
+        let point = ray.at(hit.t);
+        path.length += hit.t;
+        let face = context.bound.faces.get(hit.face.index());
+        let Some(&face) = face.filter(|_| hit.t.is_finite() && hit.normal.is_finite()) else {
+            self.lose(path, ray, LostCause::NotANumber, Some(hit.face));
+            return false;
+        };
+        let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
+        let mut at =
+            SurfaceInteraction { hit, face, entering, point, skip: 0.0, corrected_normals: 0, overlap: None };
+        // Of faces at one place another may say what happens.
+        let mut partner = None;
+        if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body) {
+            partner = self.resolve_contact(ray, &mut at);
         }
+<<<<<<< HEAD
         leave(context, path, ray, local);
         return false;
     };
@@ -87,47 +91,65 @@ pub(super) fn step<C: Carry>(
         Surface::Absorber => {
             record(context, path, point, Event::Absorbed, local);
             local.absorb(hit.face, path.quanta);
+=======
+        if let Some(partner) = &partner {
+            at.hit = &partner.hit;
+            at.face = partner.face;
+            at.point = partner.point;
+        }
+        if at.face.opaque_solid && !at.entering {
+            self.record(path, at.point, Event::Lost);
+            self.lose(path, ray, LostCause::InsideSolid, Some(at.hit.face));
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
             return false;
         }
-        Surface::Mirror(share) => {
-            stray(path);
-            Some(surface::mirror(context, *share, path, ray.direction, &meeting, local))
+        if C::MEDIA && at.face.medium_on_opaque && at.face.body == AMBIENT && path.payload.body() != AMBIENT {
+            // Light that comes back from an opaque face does not meet the face of its own body on it once more.
+            at.skip = context.glue_mm();
         }
-        Surface::Interface if C::MEDIA && face.body != AMBIENT => {
-            surface::interface(context, path, ray, &meeting, local, pending)
-        }
-        // A bare face without a medium behind it is not there for light.
-        Surface::Interface => Some(ray.direction),
-        Surface::Coated(c) if C::COATED => {
-            stray(path);
-            surface::coated(context, c, path, ray, &meeting, local, pending)
-        }
-        Surface::Coated(_) => unreachable!("scenes with such faces have a kernel for them"),
-    };
-    match going {
-        Some(going) => onward(context, path, ray, &meeting, going, local),
-        None => false,
+        self.apply(path, ray, &mut at)
     }
-}
 
-/// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
-#[inline(always)]
-pub(super) fn go<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
-    if path.receiver == SCATTERS {
-        return false;
+    /// What a segment does to light on its way to its end.
+    #[inline(always)]
+    fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) {
+        if !C::ENDS_ONLY && !self.context.passing.is_empty() {
+            self.count_passing(path, ray, end);
+        }
+        if C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT) {
+            self.absorb_in_body(path, end);
+        }
     }
-    local.counts.segments += 1;
-    late(context, path, ray, None);
-    if !C::PLAIN && !context.passing.is_empty() {
-        pass(context, path, ray, ray.t_max, local);
-    }
-    if C::MEDIA && (ray.t_max.is_finite() || path.carry.body() == AMBIENT) {
-        attenuate(context, path, ray.t_max, local);
-    }
-    leave(context, path, ray, local);
-    true
-}
 
+    /// Finds which of several faces at one place says what happens, where that is not the one that was hit.
+    #[inline(always)]
+    fn resolve_contact(&self, ray: &Ray, at: &mut SurfaceInteraction<'_>) -> Option<FaceHit> {
+        let context = self.context;
+        let FaceOptics { opaque_solid, medium_on_opaque, touches_body, body, .. } = at.face;
+        // Light that leaves its body into an opaque face on it meets that face.
+        if !at.entering && (opaque_solid || medium_on_opaque && body != AMBIENT) {
+            let opaque = opaque_contact(context, ray, &at.face_hit());
+            if opaque.is_some() {
+                at.entering = true;
+                return opaque;
+            }
+        }
+        // Of two touching bodies the one with a surface of its own says what happens.
+        if context.bound.coated_contacts && touches_body {
+            match contact_surface(context, ray, &at.face_hit()) {
+                ContactSurface::Bare => {}
+                ContactSurface::Own => at.skip = context.glue_mm(),
+                ContactSurface::Partner(partner) => {
+                    at.entering = !at.entering;
+                    at.skip = context.glue_mm();
+                    return Some(partner);
+                }
+            }
+        }
+        None
+    }
+
+<<<<<<< HEAD
 /// A ray meets a face.
 pub(super) struct Meeting<'a> {
     pub(super) hit: &'a Hit,
@@ -155,63 +177,147 @@ pub(super) fn onward<C: Carry>(
     if C::MEDIA && meeting.skip.get() > 0.0 {
         let reach = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
         next.t_min = contact::beyond(context, &next, hit.geometric_normal, reach);
+=======
+    /// Books what a surface does to the light of a path, and starts what goes on; false when the path ends.
+    #[inline(always)]
+    fn apply(&mut self, path: &mut Path<C>, ray: &mut Ray, at: &mut SurfaceInteraction<'_>) -> bool {
+        let direction = match interact(self.context, path, ray, at) {
+            Interaction::Absorb => {
+                self.record(path, at.point, Event::Absorbed);
+                self.absorb_in_face(path, at.hit.face, 0.0);
+                None
+            }
+            Interaction::Pass { payload } => {
+                path.payload = payload;
+                Some(ray.direction)
+            }
+            Interaction::Reflect { kept, direction, payload } => {
+                path.release();
+                self.record(path, at.point, Event::Reflected);
+                self.absorb_in_face(path, at.hit.face, kept);
+                path.payload = payload;
+                Some(direction)
+            }
+            Interaction::ReflectTotally { direction, payload } => {
+                self.record(path, at.point, Event::Reflected);
+                path.payload = payload;
+                Some(direction)
+            }
+            Interaction::Divide(division) => Some(self.divide(path, ray, at, &division)),
+            Interaction::Trap => {
+                self.cut_off_trapped(path, at.point);
+                None
+            }
+            Interaction::Lose(cause) => {
+                self.record(path, at.point, Event::Lost);
+                self.lose(path, ray, cause, Some(at.hit.face));
+                None
+            }
+        };
+        self.tally.counts.corrected_normals += u64::from(at.corrected_normals);
+        if let Some(pair) = at.overlap {
+            self.tally.counts.add_overlap(pair, 1);
+        }
+        match direction {
+            Some(direction) => self.leave_face(path, ray, at, direction),
+            None => false,
+        }
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
     }
-    proceed(context, path, ray, next, local)
-}
 
-/// Takes the next ray of a path, unless a limit cuts the path off.
-#[inline(always)]
-fn proceed<C: Carry>(
-    context: &Context<'_>,
-    path: &mut Path<C>,
-    ray: &mut Ray,
-    next: Ray,
-    local: &mut Local,
-) -> bool {
-    let s = context.settings;
-    if path.bounce >= s.max_bounces
-        || path.length > s.max_length_mm
-        || path.quanta <= s.power_floor * path.first
-        || path.quanta < 1.0
-    {
-        cut_off(context, path, next.origin, local);
-        return false;
+    /// Goes one of both ways on from a partly reflecting face, or both; the direction to go on in.
+    #[inline(always)]
+    fn divide(
+        &mut self,
+        path: &mut Path<C>,
+        ray: &Ray,
+        at: &mut SurfaceInteraction<'_>,
+        division: &Division<'_, C>,
+    ) -> Vector {
+        let context = self.context;
+        let settings = context.settings;
+        if division.releases {
+            path.release();
+        }
+        if division.kept < path.quanta {
+            self.absorb_in_face(path, at.hit.face, division.kept);
+        }
+        let splits =
+            settings.interfaces == Interfaces::Split && path.quanta > settings.split_floor * path.first_quanta;
+        let reflects = if splits {
+            !self.split(path, ray, at, division)
+        } else {
+            path.key(context).unit(Purpose::Interface) < division.share
+        };
+        if reflects {
+            self.record(path, at.point, Event::Reflected);
+            division.reflect(context, path, ray.direction, at)
+        } else {
+            self.record(path, at.point, Event::Transmitted);
+            division.transmit(context, path, ray.direction, at)
+        }
     }
-    *ray = next;
-    aim(context, path, ray);
-    true
-}
 
-/// Ends a path at a limit.
-#[cold]
-fn cut_off<C: Carry>(context: &Context<'_>, path: &Path<C>, at: Point, local: &mut Local) {
-    if path.quanta > 0.0 {
-        local.ends.cut_off += count(path.quanta);
-        local.counts.cut_off += 1;
-        record(context, path, at, Event::CutOff, local);
+    /// Splits off what is reflected, if it is anything; whether something is left to be transmitted.
+    #[inline(never)]
+    fn split(
+        &mut self,
+        path: &mut Path<C>,
+        ray: &Ray,
+        at: &mut SurfaceInteraction<'_>,
+        division: &Division<'_, C>,
+    ) -> bool {
+        let reflected = round_quanta(path.quanta * division.share);
+        if reflected >= 1.0 && reflected < path.quanta {
+            let mut child = Path { quanta: reflected, branch: path.split_branch(), ..*path };
+            let mut child_ray = *ray;
+            self.record(&child, at.point, Event::Split);
+            let direction = division.reflect(self.context, &mut child, ray.direction, at);
+            if self.leave_face(&mut child, &mut child_ray, at, direction) {
+                self.pending.push((child, child_ray));
+            }
+            path.quanta -= reflected;
+            return true;
+        }
+        reflected != path.quanta
     }
-}
 
-/// Notes that a path has just met what is no total reflection.
-#[inline(always)]
-pub(super) fn stray<C: Carry>(path: &mut Path<C>) {
-    if C::MEDIA {
-        path.free = path.length as f32;
+    /// Starts the next segment at a face; false when a limit cuts the path off.
+    #[inline(always)]
+    fn leave_face(
+        &mut self,
+        path: &mut Path<C>,
+        ray: &mut Ray,
+        at: &SurfaceInteraction<'_>,
+        direction: Vector,
+    ) -> bool {
+        path.bounce += 1;
+        let mut next = Ray::new(at.point, direction).leaving(at.departure());
+        if C::MEDIA && at.skip > 0.0 {
+            let reach = way_through_glue(at.skip, direction.dot(at.hit.geometric_normal));
+            next.t_min = end_of_contact(self.context, &next, at.hit.geometric_normal, reach);
+        }
+        self.start_segment(path, ray, next)
     }
-}
 
-/// Whether a path that has just been reflected totally goes round in its body for ever; it ends here then.
-#[inline(always)]
-pub(super) fn caught<C: Carry>(context: &Context<'_>, path: &Path<C>, at: Point, local: &mut Local) -> bool {
-    let body = &context.bound.bodies[path.carry.body() as usize];
-    let caught = path.length - f64::from(path.free) > body.patience;
-    if caught {
-        local.counts.caught += u64::from(path.quanta > 0.0);
-        cut_off(context, path, at, local);
+    /// Takes the next ray of a path, unless a limit cuts the path off.
+    #[inline(always)]
+    fn start_segment(&mut self, path: &mut Path<C>, ray: &mut Ray, next: Ray) -> bool {
+        let s = self.context.settings;
+        let exhausted = path.bounce >= s.max_bounces
+            || path.length > s.max_length_mm
+            || path.quanta <= s.power_floor * path.first_quanta
+            || path.quanta < 1.0;
+        if exhausted {
+            self.cut_off(path, next.origin);
+            return false;
+        }
+        *ray = next;
+        clip_segment(self.context, path, ray);
+        true
     }
-    caught
-}
 
+<<<<<<< HEAD
 /// Beer's law over the segment, for bodies that absorb.
 #[inline(always)]
 fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, local: &mut Local) {
@@ -251,12 +357,27 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         if C::MEDIA && around::is_out(context, &path.carry, ray, point) {
             record(context, path, point, Event::Lost, local);
             return lose(path, ray, Cause::NoExit, None, local);
+=======
+    /// Scattering inside a body.
+    #[inline(never)]
+    fn scatter_in_body(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
+        let context = self.context;
+        let body = path.payload.body();
+        let Some(scatter) = &context.bound.bodies[body as usize].scatter else { return false };
+        let point = ray.at(ray.t_max);
+        let numbers = path.key(context).pair(Purpose::BulkDirection);
+        path.length += ray.t_max;
+        path.release();
+        path.bounce += 1;
+        self.record(path, point, Event::Scattered);
+        let direction = scatter.sample(ray.direction, numbers);
+        if let Some(stokes) = path.payload.stokes_mut() {
+            *stokes = Stokes::unpolarised(1.0, direction);
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
         }
-        record(context, path, point, Event::Received, local);
-        local.ends.received += count(path.quanta);
-        receive(context, path, path.receiver, point, local);
-        return;
+        self.start_segment(path, ray, Ray::new(point, direction))
     }
+<<<<<<< HEAD
     if C::MEDIA && path.carry.body() != AMBIENT {
         match around::regained(context, &path.carry, ray, f64::INFINITY, false) {
             Some(found) if found.body() == AMBIENT => path.carry = found,
@@ -280,18 +401,49 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
     let end = if caught { &mut local.ends.received } else { &mut local.ends.escaped };
     *end += count(path.quanta);
 }
+=======
+>>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
 
-#[cold]
-pub(super) fn lose<C: Carry>(path: &Path<C>, ray: &Ray, cause: Cause, face: Option<FaceId>, local: &mut Local) {
-    local.lose(LostRay {
-        ray: path.ray,
-        branch: path.branch,
-        bounce: path.bounce,
-        cause,
-        quanta: count(path.quanta),
-        origin: ray.origin,
-        direction: ray.direction,
-        face: face.map(|f| f.0),
-        body: path.carry.body(),
-    });
+    /// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
+    #[inline(always)]
+    pub(super) fn finish_escaping(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
+        if path.receiver == SCATTERS {
+            return false;
+        }
+        self.tally.counts.segments += 1;
+        clip_outside(self.context, path, ray, None);
+        self.cover_segment(path, ray, ray.t_max);
+        self.end_without_face(path, ray);
+        true
+    }
+
+    /// The end of a path that meets no face: on a receiver, in the far field, or lost inside a body.
+    #[inline(always)]
+    fn end_without_face(&mut self, path: &mut Path<C>, ray: &Ray) {
+        let context = self.context;
+        if path.receiver != NO_RECEIVER {
+            let point = ray.at(ray.t_max);
+            if C::MEDIA && has_left_by_opening(context, &path.payload, ray, point) {
+                self.record(path, point, Event::Lost);
+                return self.lose(path, ray, LostCause::NoExit, None);
+            }
+            self.record(path, point, Event::Received);
+            self.tally.ends.received += quanta_as_integer(path.quanta);
+            self.count_at(path, path.receiver, point);
+            return;
+        }
+        if C::MEDIA && path.payload.body() != AMBIENT {
+            match recover_media(context, &path.payload, ray, f64::INFINITY, false) {
+                Some(recovered) if recovered.body() == AMBIENT => path.payload = recovered,
+                _ => {
+                    self.record(path, ray.at(1.0), Event::Lost);
+                    return self.lose(path, ray, LostCause::NoExit, None);
+                }
+            }
+        }
+        let received = self.count_far(path, ray);
+        self.record(path, ray.at(context.plan.drawn_length), Event::Escaped);
+        let end = if received { &mut self.tally.ends.received } else { &mut self.tally.ends.escaped };
+        *end += quanta_as_integer(path.quanta);
+    }
 }

@@ -1,3 +1,5 @@
+//! The name that was probably meant.
+
 /// The candidate nearest to a word, if it is near enough to be a slip of the pen.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
@@ -10,7 +12,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
 }
 
 /// The nearest name, or all of them.
-pub(crate) fn any(word: &str, names: &[&str]) -> String {
+pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     match nearest(word, names.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
         None => format!("there are: {}", names[..names.len().min(12)].join(", ")),

@@ -1,9 +1,8 @@
 //! A run taken apart into its replicates: what each of them brought to every receiver and every cell.
 
 use crate::intersect::Intersector;
-use crate::simulate::{BoundScene, Hooks, Moments, Portion, Results, RunSettings, replicates, trace};
+use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, replicates, trace};
 use std::sync::Mutex;
-use std::time::Duration;
 
 /// What one replicate brought to one receiver: quanta, and their moments in half sides.
 #[derive(Clone, Debug, Default)]
@@ -32,7 +31,7 @@ struct Totals {
 
 impl Totals {
     /// Takes over the sums of a portion and gives what the one replicate that is new brought to each receiver.
-    fn advance(&mut self, portion: &Portion, cells: &[usize]) -> Option<(u32, Vec<ReplicateSums>)> {
+    fn advance(&mut self, portion: &PartialRun, cells: &[usize]) -> Option<(u32, Vec<ReplicateSums>)> {
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
         let tallies = &portion.tallies;
         self.power.resize(tallies.receivers.len(), 0);
@@ -72,15 +71,15 @@ pub(in crate::study) fn trace_replicates(
     let count = replicates(bound, settings) as usize;
     let cells: Vec<usize> = bound.receivers.iter().map(|r| r.cell_count()).collect();
     let state = Mutex::new((Totals::default(), vec![Vec::new(); count]));
-    let finished = |portion: &Portion| {
+    let finished = |portion: &PartialRun| {
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
         let (totals, by_replicate) = &mut *state;
         if let Some((new, sums)) = totals.advance(portion, &cells) {
             by_replicate[new as usize] = sums;
         }
     };
-    let hooks = Hooks { progress: &|_| true, finished: Some(&finished), every: Duration::ZERO, paths: None };
-    let results = Results::of(bound, settings, trace(bound, intersector, settings, None, &hooks));
+    let hooks = Hooks { finished: Some(&finished), ..Hooks::with_progress(&|_| true) };
+    let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
     let (_, replicates) = state.into_inner().unwrap_or_else(|e| e.into_inner());
     ReplicatedRun { results, replicates }
 }

@@ -6,7 +6,8 @@
 
 use super::bind::BoundScene;
 use super::digest::Fnv;
-use super::kernel::{Context, Counts, Local, LostRay, PathVertex, Tallies};
+use super::outcome::{Counts, LostRay, PathVertex};
+use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -14,7 +15,7 @@ use std::io::{self, Write};
 
 /// The replicates of a run that are done.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Portion {
+pub struct PartialRun {
     /// Replicates of the whole run.
     pub replicates: u32,
     /// Those that are done, rising.
@@ -27,15 +28,15 @@ pub struct Portion {
 
 const MAGIC: &[u8] = b"lampyris tally 4\n";
 
-impl Portion {
-    pub(crate) fn none(bound: &BoundScene, replicates: u32) -> Self {
+impl PartialRun {
+    pub(crate) fn empty(bound: &BoundScene, replicates: u32) -> Self {
         Self { replicates, tallies: Tallies::new(bound), ..Self::default() }
     }
 
-    pub(crate) fn take(&mut self, replicate: u32, local: &mut Local, context: &Context<'_>) {
+    pub(crate) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, bound: &BoundScene) {
         let place = self.done.binary_search(&replicate).unwrap_or_else(|place| place);
         self.done.insert(place, replicate);
-        self.tallies.take(local, context);
+        self.tallies.take(tally, bound);
     }
 
     /// Whether every replicate of the run is done.
@@ -102,7 +103,7 @@ impl Portion {
         let paths: Vec<_> = t.paths.iter().map(|v| (bare(v), bits(&[v.point]), v.power.to_bits())).collect();
         block(&mut out, &serde_json::to_vec(&paths)?);
         to.write_all(&out)?;
-        to.write_all(&Fnv::of(&[&out]).to_le_bytes())
+        to.write_all(&Fnv::hash(&[&out]).to_le_bytes())
     }
 
     /// Reads the file for a scene, after `check` has found the header good.
@@ -116,7 +117,7 @@ impl Portion {
     ) -> Result<Self, String> {
         let (header, mut r) = open::<H>(bytes)?;
         check(&header)?;
-        let mut p = Self::none(bound, r.u32()?);
+        let mut p = Self::empty(bound, r.u32()?);
         let done = r.u32()?;
         if done > p.replicates {
             return Err("it has more replicates than its run".into());
@@ -185,8 +186,8 @@ pub struct Fingerprint(pub String);
 
 impl Fingerprint {
     /// Of these pieces, in this order.
-    pub fn of(pieces: &[&[u8]]) -> Self {
-        Self(format!("{:032x}", Fnv::of(pieces)))
+    pub fn new(pieces: &[&[u8]]) -> Self {
+        Self(format!("{:032x}", Fnv::hash(pieces)))
     }
 }
 
@@ -222,7 +223,7 @@ fn sums(out: &mut Vec<u8>, sums: &[Sum]) {
 fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
     let (rest, sum) = rest.split_last_chunk::<16>().ok_or("the file is cut short")?;
-    if Fnv::of(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
+    if Fnv::hash(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
         return Err("the file is damaged or cut short: its checksum is wrong".into());
     }
     let mut reader = Reader(rest);

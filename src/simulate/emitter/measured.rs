@@ -1,3 +1,5 @@
+//! Sources that were measured: luminous intensities and lists of rays, read from files.
+
 use crate::formats::{LightRay, PhotometricType, read_data1, read_eulumdat, read_ies, read_rays};
 use crate::optics::IntensitySampler;
 use crate::simulate::scene::{Key, Scene, Source, SourceKind};
@@ -11,7 +13,7 @@ pub(crate) enum Loaded {
     Rays(RayList),
 }
 
-/// Measured rays, to be drawn in proportion to their power.
+/// Measured rays, to be drawn in proportion to their power; at least one, and one with power.
 #[derive(Clone, Debug)]
 pub(crate) struct RayList {
     pub(crate) rays: Vec<LightRay>,
@@ -21,11 +23,11 @@ pub(crate) struct RayList {
 
 impl RayList {
     pub(crate) fn power(&self) -> f64 {
-        self.sums.last().copied().unwrap_or(0.0)
+        self.sums[self.sums.len() - 1]
     }
 
     /// The ray at a share of the summed power.
-    pub(crate) fn at(&self, share: f64) -> &LightRay {
+    pub(crate) fn ray_at_share(&self, share: f64) -> &LightRay {
         let at = share * self.power();
         &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
     }
@@ -49,9 +51,10 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
             sum
         };
         let sums: Vec<f64> = rays.iter().map(add).collect();
-        match sum > 0.0 {
-            true => Ok(Some(Loaded::Rays(RayList { rays, sums }))),
-            false => Err(scene.error(ErrorKind::Value, &at, "the rays of this list carry no power")),
+        if sum > 0.0 {
+            Ok(Some(Loaded::Rays(RayList { rays, sums })))
+        } else {
+            Err(scene.error(ErrorKind::Value, &at, "the rays of this list carry no power"))
         }
     };
     match source.kind {

@@ -1,41 +1,44 @@
 //! Rays of a source made many at a time: the arithmetic of one, in loops over arrays that run in vectors.
 
+use super::shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, point_on_rectangle, radius_on_disc, sine_from_cosine};
 use super::stream::Stream;
-use super::{Emitter, Lobe, Shape, cosine_of_cone, on_rectangle, radius_on_disc, sine_of};
+use super::{Emitter, PACKET, PacketNumbers};
 use crate::math::{Point, Vector};
 use crate::optics::sampling::sin_cos_turns;
 
-/// Rays made at a time.
-pub(super) const SHEAF: usize = 64;
-
-/// A number of each ray.
-pub(super) type Numbers = [f64; SHEAF];
-
 /// Rays that start one after another.
 #[derive(Clone, Debug)]
-pub(super) struct Sheaf {
-    origins: [Numbers; 3],
-    directions: [Numbers; 3],
+pub(super) struct RayPacket {
+    origins: [PacketNumbers; 3],
+    directions: [PacketNumbers; 3],
 }
 
-impl Sheaf {
-    pub(super) fn empty() -> Box<Self> {
-        Box::new(Self { origins: [[0.0; SHEAF]; 3], directions: [[0.0; SHEAF]; 3] })
+impl RayPacket {
+    pub(super) fn boxed() -> Box<Self> {
+        Box::new(Self { origins: [[0.0; PACKET]; 3], directions: [[0.0; PACKET]; 3] })
     }
 
-    /// Where the ray at one place starts, and where it goes.
+    /// Origin and direction of the ray at one place.
     #[inline(always)]
     pub(super) fn ray(&self, k: usize) -> (Point, Vector) {
-        let (k, [x, y, z], [a, b, c]) = (k % SHEAF, &self.origins, &self.directions);
+        let k = k % PACKET;
+        let ([x, y, z], [a, b, c]) = (&self.origins, &self.directions);
         (Point::new(x[k], y[k], z[k]), Vector::new(a[k], b[k], c[k]))
+    }
+
+    /// Makes the rays that start from the `started`-th on.
+    #[inline(always)]
+    pub(super) fn fill(&mut self, emitter: &Emitter, stream: &Stream, started: u32) {
+        emitter.fill_origins(stream.pairs_from(started, 0), &mut self.origins);
+        emitter.fill_directions(stream.pairs_from(started, 1), &mut self.directions);
     }
 }
 
 /// Sines and cosines of whole turns.
 #[inline(always)]
-fn sines(turns: &Numbers) -> [Numbers; 2] {
-    let [mut sin, mut cos] = [[0.0; SHEAF]; 2];
-    for k in 0..SHEAF {
+fn sines_and_cosines(turns: &PacketNumbers) -> [PacketNumbers; 2] {
+    let [mut sin, mut cos] = [[0.0; PACKET]; 2];
+    for k in 0..PACKET {
         (sin[k], cos[k]) = sin_cos_turns(turns[k]);
     }
     [sin, cos]
@@ -43,9 +46,9 @@ fn sines(turns: &Numbers) -> [Numbers; 2] {
 
 /// Products of two numbers of each ray.
 #[inline(always)]
-fn products(a: &Numbers, b: &Numbers) -> Numbers {
-    let mut products = [0.0; SHEAF];
-    for k in 0..SHEAF {
+fn products(a: &PacketNumbers, b: &PacketNumbers) -> PacketNumbers {
+    let mut products = [0.0; PACKET];
+    for k in 0..PACKET {
         products[k] = a[k] * b[k];
     }
     products
@@ -53,111 +56,103 @@ fn products(a: &Numbers, b: &Numbers) -> Numbers {
 
 /// A number times one of each ray.
 #[inline(always)]
-fn scaled(a: f64, b: &Numbers) -> Numbers {
-    products(&[a; SHEAF], b)
+fn scaled(a: f64, b: &PacketNumbers) -> PacketNumbers {
+    products(&[a; PACKET], b)
 }
 
 /// Adds a number of each ray times a vector.
 #[inline(always)]
-fn add(sums: &mut [Numbers; 3], vector: Vector, numbers: &Numbers) {
+fn add_multiples(sums: &mut [PacketNumbers; 3], vector: Vector, numbers: &PacketNumbers) {
     for axis in 0..3 {
         let (sums, part) = (&mut sums[axis], vector[axis]);
-        for k in 0..SHEAF {
+        for k in 0..PACKET {
             sums[k] += part * numbers[k];
         }
     }
 }
 
 impl Emitter {
-    /// Whether its rays can be made so.
-    pub(super) fn makes_sheaves(&self) -> bool {
-        let of_shape = matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
-        of_shape
+    /// Whether its rays can be made in packets.
+    pub(super) fn fits_packets(&self) -> bool {
+        let simple_shape = matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
+        simple_shape
             && match self.lobe {
                 Lobe::Cone(_) | Lobe::Collimated => true,
-                Lobe::Cosine(exponent) => exponent == 0.5,
+                Lobe::Cosine(exponent) => exponent == LAMBERTIAN,
                 Lobe::Measured(_) => false,
             }
     }
 
-    /// Makes the rays that start from the `started`-th on.
     #[inline(always)]
-    pub(super) fn make(&self, stream: &mut Stream, started: u32) {
-        let Some(mut sheaf) = stream.sheaf.take() else { return };
-        self.place(stream.pairs_from(started, 0), &mut sheaf.origins);
-        self.direct(stream.pairs_from(started, 1), &mut sheaf.directions);
-        stream.sheaf = Some(sheaf);
-    }
-
-    #[inline(always)]
-    fn place(&self, [u, v]: [Numbers; 2], origins: &mut [Numbers; 3]) {
+    fn fill_origins(&self, [u, v]: [PacketNumbers; 2], origins: &mut [PacketNumbers; 3]) {
         let f = self.frame;
         let [mut x, mut y] = [u, v];
         match self.shape {
             Shape::Disc(radius) => {
-                let [sin, cos] = sines(&v);
+                let [sin, cos] = sines_and_cosines(&v);
                 let mut r = u;
-                for k in 0..SHEAF {
+                for k in 0..PACKET {
                     r[k] = radius_on_disc(radius, u[k]);
                 }
                 (x, y) = (products(&r, &cos), products(&r, &sin));
             }
             Shape::Rectangle(half) => {
-                for k in 0..SHEAF {
-                    [x[k], y[k]] = on_rectangle(half, [u[k], v[k]]);
+                for k in 0..PACKET {
+                    [x[k], y[k]] = point_on_rectangle(half, [u[k], v[k]]);
                 }
             }
             Shape::Point | Shape::Faces(_) | Shape::List(_) => {}
         }
-        *origins = [[f.origin.x; SHEAF], [f.origin.y; SHEAF], [f.origin.z; SHEAF]];
+        *origins = [[f.origin.x; PACKET], [f.origin.y; PACKET], [f.origin.z; PACKET]];
         if !matches!(self.shape, Shape::Point) {
-            add(origins, f.x, &x);
-            add(origins, f.y, &y);
+            add_multiples(origins, f.x, &x);
+            add_multiples(origins, f.y, &y);
         }
     }
 
     #[inline(always)]
-    fn direct(&self, [u, v]: [Numbers; 2], directions: &mut [Numbers; 3]) {
+    fn fill_directions(&self, [u, v]: [PacketNumbers; 2], directions: &mut [PacketNumbers; 3]) {
         let f = self.frame;
         let mut cos_theta = u;
         match self.lobe {
             Lobe::Cone(limit) => {
-                for k in 0..SHEAF {
-                    cos_theta[k] = cosine_of_cone(limit, u[k]);
+                for k in 0..PACKET {
+                    cos_theta[k] = cosine_in_cone(limit, u[k]);
                 }
             }
             Lobe::Cosine(_) => {
-                for k in 0..SHEAF {
+                for k in 0..PACKET {
                     cos_theta[k] = (1.0 - u[k]).sqrt();
                 }
             }
             Lobe::Collimated | Lobe::Measured(_) => {
-                *directions = [[f.z.x; SHEAF], [f.z.y; SHEAF], [f.z.z; SHEAF]];
+                *directions = [[f.z.x; PACKET], [f.z.y; PACKET], [f.z.z; PACKET]];
                 return;
             }
         }
         let mut sin_theta = cos_theta;
-        for k in 0..SHEAF {
-            sin_theta[k] = sine_of(cos_theta[k]);
+        for k in 0..PACKET {
+            sin_theta[k] = sine_from_cosine(cos_theta[k]);
         }
-        let [sin, cos] = sines(&v);
+        let [sin, cos] = sines_and_cosines(&v);
         let [x, y] = [products(&sin_theta, &cos), products(&sin_theta, &sin)];
         *directions = [scaled(f.x.x, &x), scaled(f.x.y, &x), scaled(f.x.z, &x)];
-        add(directions, f.y, &y);
-        add(directions, f.z, &cos_theta);
+        add_multiples(directions, f.y, &y);
+        add_multiples(directions, f.z, &cos_theta);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::sampler::RaySampler;
     use super::*;
     use crate::math::{Frame, Ray};
     use crate::simulate::scene::Sampling;
     use smallvec::SmallVec;
 
-    /// A ray that is traced once more alone must be the one that was traced among others.
+    /// A ray that is traced once more by itself must be the one that was traced in the batch.
     #[test]
-    fn a_ray_is_the_same_alone_and_among_others() {
+    fn a_single_ray_is_that_of_the_batch() {
         let frame = Frame::from_axis(Point::new(1.0, -2.0, 3.0), Vector::new(0.36, 0.48, -0.8), None);
         let shapes = [Shape::Point, Shape::Disc(15.0), Shape::Rectangle([0.5, 2.0])];
         let lobes = [Lobe::Cone(-1.0), Lobe::Cone(0.7), Lobe::Collimated, Lobe::Cosine(0.5), Lobe::Cosine(0.2)];
@@ -167,7 +162,7 @@ mod tests {
                 power: 1.0,
                 rays: None,
                 inside,
-                stated: false,
+                media_stated: false,
                 wavelengths,
                 polarised,
                 frame,
@@ -175,15 +170,15 @@ mod tests {
                 lobe,
             };
             let rays = 5000;
-            let stream = || Stream::new(7, Sampling::Sobol, [3, 128], 0, rays).of(&emitter);
-            let (mut among, mut alone) = (stream(), stream());
+            let sampler = || RaySampler::new(&emitter, Stream::new(7, Sampling::Sobol, [3, 128], 0, rays), 100);
+            let (mut batch, mut single) = (sampler(), sampler());
             let [mut a, mut b] = [Ray::new(Point::ZERO, Vector::Z); 2];
             let mut seen = vec![false; rays as usize];
             for started in 0..rays as u32 {
-                let (ticket, _) = emitter.next(&mut among, 100, started, &mut a);
-                seen[ticket.index as usize] = true;
+                let (index, _) = batch.next_ray(&emitter, started, &mut a);
+                seen[index.in_stream as usize] = true;
                 if started % 7 == 0 {
-                    assert_eq!(emitter.alone(&mut alone, 100, ticket.index, &mut b).0.ray, ticket.ray);
+                    assert_eq!(single.single_ray(&emitter, index.in_stream, &mut b).0.in_run, index.in_run);
                     let bits = |r: &Ray| [r.origin, r.direction].map(|v| v.to_array().map(f64::to_bits));
                     assert_eq!(bits(&a), bits(&b), "{emitter:?}");
                     assert!(a.direction.is_normalized());

@@ -1,0 +1,69 @@
+//! A scene bound to a model.
+
+use crate::math::{Aabb, FaceId};
+use crate::simulate::body::{AMBIENT, Body};
+use crate::simulate::emitter::Emitter;
+use crate::simulate::receiver::Receiver;
+use crate::simulate::scene::Scene;
+use crate::simulate::surfaces::{FaceOptics, SceneLight, Surface};
+
+/// A scene whose rules have found their faces: everything a simulation needs but the intersector.
+#[derive(Clone, Debug)]
+pub struct BoundScene {
+    pub(crate) scene: Scene,
+    pub(crate) faces: Vec<FaceOptics>,
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) light: SceneLight,
+    /// Whether bodies may touch or lie inside each other, so that paths need a stack of media.
+    pub(crate) nested: bool,
+    /// Whether a face that may lie on one of another body has a surface of its own.
+    pub(crate) coated_contacts: bool,
+    pub(crate) emitters: Vec<Emitter>,
+    pub(crate) receivers: Vec<Receiver>,
+    /// Around all faces and the places of the sources, with room to spare.
+    pub(crate) region: Aabb,
+    /// Names of the instances, and the instance of each face.
+    pub(crate) instances: Vec<String>,
+    pub(crate) instance_of_face: Vec<u32>,
+    /// Sentences about what in the scene is open or beyond its tables.
+    pub(crate) notes: Vec<String>,
+}
+
+impl BoundScene {
+    /// The instance and the medium of a body, as lost rays name it.
+    pub fn body(&self, body: u16) -> Option<[&str; 2]> {
+        self.bodies.get(usize::from(body)).map(|b| [b.name.as_str(), b.medium.as_str()])
+    }
+
+    /// What someone who reads the results must know: bodies that are open, light beyond the wavelengths of a table.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The instance of a face, by the face's index in the model.
+    pub fn instance(&self, face: u32) -> Option<&str> {
+        let instance = *self.instance_of_face.get(face as usize)?;
+        self.instances.get(instance as usize).map(String::as_str)
+    }
+
+    /// The scene as it was read.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Whether any face lets light into a medium.
+    pub(crate) fn has_media(&self) -> bool {
+        let lets_in = |f: &FaceOptics| f.body != AMBIENT && !self.surfaces[f.surface as usize].is_opaque();
+        let ambient = &self.bodies[AMBIENT as usize];
+        self.faces.iter().any(lets_in)
+            || self.emitters.iter().any(|e| !e.inside.is_empty())
+            || ambient.absorbs()
+            || ambient.scatter.is_some()
+    }
+
+    /// Name of the instance that a face belongs to.
+    pub fn instance_of(&self, face: FaceId) -> &str {
+        self.instance_of_face.get(face.index()).map_or("", |&i| &self.instances[i as usize])
+    }
+}

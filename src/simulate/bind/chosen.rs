@@ -1,0 +1,48 @@
+//! Which rule of the scene gives each face its surface, and which its medium.
+
+use super::nearest::Nearest;
+use super::select;
+use crate::model::{Model, PlacedFace};
+use crate::simulate::Error;
+use crate::simulate::scene::{Key, Scene};
+use std::collections::HashMap;
+
+/// For each face the last rule that gives its surface, and the last that gives its medium.
+pub(super) type ChosenRules = Vec<(Option<usize>, Option<usize>)>;
+
+pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, Error> {
+    let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
+    let mut nearest = Nearest::new(model);
+    for (i, rule) in scene.materials.iter().enumerate() {
+        let base = [Key::Name("material"), Key::Index(i)];
+        for face in select::faces(scene, &base, &rule.faces(), model, &mut nearest)? {
+            if rule.surface.is_some() || rule.scatter.is_some() {
+                chosen[face].0 = Some(i);
+            }
+            if rule.medium.is_some() {
+                chosen[face].1 = Some(i);
+            }
+        }
+    }
+    spread_media_over_solids(scene, model, &mut chosen);
+    Ok(chosen)
+}
+
+/// A medium that was given to some faces of a solid is that of the whole solid, unless others of its faces have another.
+fn spread_media_over_solids(scene: &Scene, model: &Model, chosen: &mut ChosenRules) {
+    let medium = |rule: Option<usize>| rule.and_then(|r| scene.materials[r].medium.as_deref());
+    let mut solids: HashMap<(usize, usize), Option<usize>> = HashMap::new();
+    let key = |f: &PlacedFace<'_>| Some((f.instance, f.shell?));
+    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter()) {
+        let (Some(key), Some(rule)) = (key(&f), *rule) else { continue };
+        let one = solids.entry(key).or_insert(Some(rule));
+        if medium(*one) != medium(Some(rule)) {
+            *one = None;
+        }
+    }
+    for (f, (_, rule)) in model.placed_faces().zip(chosen.iter_mut()) {
+        if let (Some(key), None) = (key(&f), *rule) {
+            *rule = solids.get(&key).copied().flatten();
+        }
+    }
+}

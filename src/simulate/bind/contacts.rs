@@ -1,0 +1,111 @@
+//! Faces of two solids at one place: which faces may touch which.
+
+use super::nearest::{Nearest, face_bounds};
+use crate::math::{Aabb, Point, Uv};
+use crate::model::{Model, PlacedFace};
+use crate::simulate::body::AMBIENT;
+use crate::simulate::scene::Scene;
+use crate::simulate::trim_loops::{is_inside, trim_polygons};
+
+/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
+pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u16]) -> (Vec<bool>, Vec<[u16; 2]>) {
+    let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));
+    let mut faces: Vec<(usize, Aabb)> =
+        model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
+    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
+    for (i, (a, box_a)) in faces.iter().enumerate() {
+        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
+            if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
+                (touching[*a], touching[*b]) = (true, true);
+                pairs.push([of_face[*a], of_face[*b]]);
+            }
+        }
+        pairs.dedup();
+    }
+    (touching, pairs)
+}
+
+/// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.
+pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
+    let mut siblings = vec![false; of_face.len()];
+    let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
+        .filter(|f| of_face[f.id.index()] != AMBIENT && model.part(f.part).shells.len() > 1)
+        .map(|f| (f.id.index(), f.shell, f))
+        .collect();
+    faces.sort_by_key(|(id, ..)| of_face[*id]);
+    for body in faces.chunk_by(|a, b| of_face[a.0] == of_face[b.0]) {
+        let boxed = |f: &PlacedFace<'_>| face_bounds(f).grown(0.5 * scene.run.glue_mm);
+        let mut body: Vec<(usize, Option<usize>, Aabb)> = body.iter().map(|(i, s, f)| (*i, *s, boxed(f))).collect();
+        body.sort_by(|a, b| a.2.min.x.total_cmp(&b.2.min.x));
+        for (i, (a, shell, box_a)) in body.iter().enumerate() {
+            for (b, other, box_b) in body[i + 1..].iter().take_while(|(.., b)| b.min.x <= box_a.max.x) {
+                if shell != other && !box_a.intersection(*box_b).is_empty() {
+                    (siblings[*a], siblings[*b]) = (true, true);
+                }
+            }
+        }
+    }
+    siblings
+}
+
+/// Questions of distance after which faces whose boxes meet are taken to touch: some seconds of work.
+const MOST_DISTANCES: usize = 50_000;
+/// Samples across a face in each parameter.
+const SAMPLES: usize = 5;
+
+/// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
+pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[bool]) -> Vec<bool> {
+    let mut on_opaque = vec![false; of_face.len()];
+    if of_face.iter().all(|b| *b == AMBIENT) || !opaque.contains(&true) {
+        return on_opaque;
+    }
+    let placed: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    let glue = scene.run.glue_mm;
+    let box_of = |f: &PlacedFace<'_>| face_bounds(f).grown(0.5 * glue);
+    let mut faces: Vec<(usize, Aabb)> = (placed.iter())
+        .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
+        .map(|f| (f.id.index(), box_of(f)))
+        .collect();
+    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let mut nearest = Nearest::new(model);
+    let mut samples: Vec<Option<Vec<Point>>> = vec![None; placed.len()];
+    let mut distances = 0;
+    for (i, (a, box_a)) in faces.iter().enumerate() {
+        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
+            let mixed = (of_face[*a] == AMBIENT) != (of_face[*b] == AMBIENT);
+            if !mixed || (on_opaque[*a] && on_opaque[*b]) || box_a.intersection(*box_b).is_empty() {
+                continue;
+            }
+            let mut touch = false;
+            for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
+                let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
+                let near = around.grown(glue);
+                for p in points.iter().filter(|p| near.contains(**p)) {
+                    distances += 1;
+                    touch |= distances > MOST_DISTANCES || nearest.distance(other, *p) <= glue;
+                    if touch {
+                        break;
+                    }
+                }
+            }
+            if touch {
+                (on_opaque[*a], on_opaque[*b]) = (true, true);
+            }
+        }
+    }
+    on_opaque
+}
+
+/// Points inside the loops of a face, mm.
+fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
+    let Some(face) = f.face else { return Vec::new() };
+    let loops = trim_polygons(face);
+    let [[u0, u1], [v0, v1]] = face.surface.domain();
+    let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
+    (0..SAMPLES * SAMPLES)
+        .map(|k| Uv::new(at(k / SAMPLES, u0, u1), at(k % SAMPLES, v0, v1)))
+        .filter(|&uv| is_inside(&loops, uv))
+        .map(|uv| f.placement.point(face.surface.evaluate(uv)))
+        .collect()
+}

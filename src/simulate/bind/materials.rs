@@ -1,0 +1,60 @@
+//! Surfaces from the rules of the scene.
+
+use super::chosen::ChosenRules;
+use crate::model::Model;
+use crate::optics::{Coating, Scatter};
+use crate::simulate::body::AMBIENT;
+use crate::simulate::scene::{Key, Material, Scene, SurfaceKind};
+use crate::simulate::surfaces::{Coated, Surface};
+use crate::simulate::{Error, ErrorKind};
+
+/// The surface that a rule gives.
+pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
+    let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
+    let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
+    // What scatters nothing and reflects nothing is named neither rough nor a mirror.
+    let scatter = scatter.filter(Scatter::scatters);
+    Ok(match (kind, coating, scatter) {
+        (SurfaceKind::Absorber, ..) => Surface::Absorber,
+        (SurfaceKind::Mirror | SurfaceKind::Diffuse, Coating::Ideal { reflectance: 0.0, .. }, _) => {
+            Surface::Absorber
+        }
+        (_, Coating::Bare, None) => Surface::Interface,
+        (SurfaceKind::Mirror, Coating::Ideal { reflectance, .. }, None) => Surface::Mirror(reflectance),
+        (_, coating, scatter) => {
+            let opaque = coating.is_opaque();
+            Surface::Coated(Box::new(Coated { coating, scatter, opaque }))
+        }
+    })
+}
+
+/// The index of a surface in the table, to which it is added where it is not in it.
+pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u16 {
+    let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
+        surfaces.push(surface);
+        surfaces.len() - 1
+    });
+    found as u16
+}
+
+/// Faces that a rule calls interfaces need a medium behind them.
+pub(super) fn check_interfaces(
+    scene: &Scene,
+    model: &Model,
+    chosen: &ChosenRules,
+    bodies: &[u16],
+) -> Result<(), Error> {
+    for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(bodies) {
+        let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceKind::Interface)) else {
+            continue;
+        };
+        if body == AMBIENT {
+            let at = [Key::Name("material"), Key::Index(i), Key::Name("surface")];
+            let part = &model.part(f.part).name;
+            let error =
+                scene.error(ErrorKind::Value, &at, format!("an interface of '{part}', which has no medium"));
+            return Err(error.help("add `medium` to this rule, or to another one for the part"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! The wavelengths of the sources, and whether every medium has an index there.
+
+use crate::simulate::body::Body;
+use crate::simulate::emitter::Loaded;
+use crate::simulate::scene::{Key, Scene};
+use crate::simulate::surfaces::SceneLight;
+use crate::simulate::{Error, ErrorKind};
+
+/// Indices that a medium may have.
+const INDICES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
+/// Wavelengths of a continuous spectrum at which the index of each medium is looked at.
+const PROBES: u32 = 64;
+/// The last of them falls just short of the whole spectrum, whose end is drawn by no random number.
+const LAST_PROBE: f64 = 64.001;
+
+/// The wavelengths of all sources.
+pub(super) fn scene_light(scene: &Scene, loaded: &[Option<Loaded>]) -> SceneLight {
+    let lines = scene.sources.iter().zip(loaded).flat_map(|(s, loaded)| match (&s.spectrum, loaded) {
+        (Some(key), _) => vec![key.optics().ok().and_then(|s| s.single_line())],
+        (None, Some(Loaded::Rays(list))) => {
+            let mut all: Vec<f64> = list.rays.iter().filter_map(|r| r.wavelength_nm).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            match all[..] {
+                [] => vec![Some(scene.run.wavelength_nm)],
+                [one] => vec![Some(one)],
+                _ => vec![None],
+            }
+        }
+        _ => vec![Some(scene.run.wavelength_nm)],
+    });
+    let lines: Vec<Option<f64>> = lines.collect();
+    let first = lines.first().copied().flatten();
+    let coloured = first.is_none() || lines.iter().any(|l| *l != first);
+    SceneLight { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
+}
+
+/// First and last wavelength of each source, nm.
+pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
+    let run = [scene.run.wavelength_nm; 2];
+    let range = |i: &f64| [*i, *i];
+    (scene.sources.iter().zip(loaded))
+        .map(|(source, loaded)| match (&source.spectrum, loaded) {
+            (Some(key), _) => key.wavelengths(scene.run.unit).map_or(run, |s| s.range_nm()),
+            (None, Some(Loaded::Rays(list))) => {
+                let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
+                all.fold(None, |r: Option<[f64; 2]>, nm| {
+                    r.map_or(Some(range(&nm)), |[a, b]| Some([a.min(nm), b.max(nm)]))
+                })
+                .unwrap_or(run)
+            }
+            _ => run,
+        })
+        .collect()
+}
+
+/// Every medium must have an index at every wavelength of the sources.
+pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[Body]) -> Result<(), Error> {
+    for (i, (source, loaded)) in scene.sources.iter().zip(loaded).enumerate() {
+        let mut wavelengths: Vec<f64> = match (&source.spectrum, loaded) {
+            (Some(key), _) => {
+                let sampler = key.wavelengths(scene.run.unit).ok();
+                sampler
+                    .map_or_else(Vec::new, |s| (0..=PROBES).map(|k| s.sample(f64::from(k) / LAST_PROBE)).collect())
+            }
+            (None, Some(Loaded::Rays(list))) => list.rays.iter().filter_map(|r| r.wavelength_nm).collect(),
+            _ => vec![scene.run.wavelength_nm],
+        };
+        wavelengths.sort_by(f64::total_cmp);
+        wavelengths.dedup();
+        for nm in wavelengths {
+            let wrong = bodies.iter().find(|b| !INDICES.contains(&b.index(Some(nm))));
+            if let Some(body) = wrong {
+                let message = format!("'{}' has no index at {nm} nm, a wavelength of this source", body.medium);
+                let at = [Key::Name("source"), Key::Index(i), Key::Name("spectrum")];
+                let error = scene.error(ErrorKind::Value, &at, message);
+                return Err(error.help("give the medium an index there, or cut the spectrum"));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! Bodies: what has a medium inside, as the kernel asks for it.
+
+use super::surfaces::SceneLight;
+use crate::math::Aabb;
+use crate::optics::{self, Absorption, BulkScatter, Index};
+
+/// Body 0: what is around everything.
+pub(crate) const AMBIENT: u16 = 0;
+
+/// Something with a medium inside.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Body {
+    /// Index at the wavelength of the scene.
+    index: f64,
+    /// Index by wavelength, when the scene has several and they differ.
+    dispersive: Option<Index>,
+    /// Absorption coefficient at the wavelength of the scene, 1/mm.
+    absorption: f64,
+    /// Absorption by wavelength, when the scene has several and they differ.
+    coloured: Option<Absorption>,
+    /// Scattering inside.
+    pub(crate) scatter: Option<BulkScatter>,
+    /// Instance name.
+    pub(crate) name: String,
+    /// Name of the medium.
+    pub(crate) medium: String,
+    /// Length that light goes by total reflection alone before it is taken to be trapped, mm; infinite where it is absorbed.
+    pub(crate) trapped_length: f64,
+    /// A box around it, mm.
+    pub(crate) bounds: Aabb,
+    /// Whether it has faces in no closed shell.
+    pub(crate) open: bool,
+}
+
+impl Body {
+    pub(crate) fn new(m: optics::Medium, name: String, light: &SceneLight) -> Self {
+        Self {
+            index: m.index.at(light.wavelength),
+            dispersive: (light.coloured && m.index.is_dispersive()).then_some(m.index),
+            absorption: m.absorption.coefficient(light.wavelength),
+            coloured: (light.coloured && m.absorption.is_dispersive()).then_some(m.absorption),
+            scatter: m.scatter,
+            name,
+            medium: m.name,
+            trapped_length: f64::INFINITY,
+            bounds: Aabb::EMPTY,
+            open: false,
+        }
+    }
+
+    /// Refractive index; `wavelength` is absent where it does not matter.
+    #[inline]
+    pub(crate) fn index(&self, wavelength: Option<f64>) -> f64 {
+        match (&self.dispersive, wavelength) {
+            (Some(index), Some(nm)) => index.at(nm),
+            _ => self.index,
+        }
+    }
+
+    /// Absorption coefficient, 1/mm.
+    #[inline]
+    pub(crate) fn absorption(&self, wavelength: Option<f64>) -> f64 {
+        match (&self.coloured, wavelength) {
+            (Some(absorption), Some(nm)) => absorption.coefficient(nm),
+            _ => self.absorption,
+        }
+    }
+
+    /// Whether anything depends on the wavelength of a ray.
+    pub(crate) fn is_dispersive(&self) -> bool {
+        self.dispersive.is_some() || self.coloured.is_some()
+    }
+
+    /// Whether light is absorbed inside.
+    pub(crate) fn absorbs(&self) -> bool {
+        self.absorption > 0.0 || self.coloured.is_some()
+    }
+}
+
+impl Body {
+    /// Whether light of any wavelength crosses from one into the other without being bent.
+    pub(crate) fn matches_index(&self, other: &Self) -> bool {
+        self.index == other.index && self.dispersive == other.dispersive
+    }
+
+    /// Whether the index at the wavelength of the scene is a number that light can have.
+    pub(crate) fn has_valid_index(&self) -> bool {
+        self.index > 0.0 && self.index.is_finite()
+    }
+}

@@ -1,0 +1,71 @@
+//! Where on a source its rays start and which way they go: the formulas that one ray and a packet of rays share.
+
+use super::area::Area;
+use super::measured::RayList;
+use crate::math::Vector;
+use crate::optics::IntensitySampler;
+use crate::optics::sampling::sin_cos_turns;
+
+/// Where the rays of a source start.
+#[derive(Clone, Debug)]
+pub(super) enum Shape {
+    Point,
+    Faces(Area),
+    /// Origins and directions of measured rays.
+    List(RayList),
+    /// Radius, mm.
+    Disc(f64),
+    /// Half sides, mm.
+    Rectangle([f64; 2]),
+}
+
+/// Which way the rays of a source go.
+#[derive(Clone, Debug)]
+pub(super) enum Lobe {
+    Measured(IntensitySampler),
+    /// Uniform within a cone of that cosine; -1 for all directions.
+    Cone(f64),
+    Collimated,
+    /// Intensity ∝ cosⁿ; `1/(n+1)` is kept.
+    Cosine(f64),
+}
+
+/// `1/(n+1)` of Lambert's cosine, n = 1: its power is a square root.
+pub(super) const LAMBERTIAN: f64 = 0.5;
+
+impl Shape {
+    /// Whether a place is drawn for each ray.
+    pub(super) fn is_extended(&self) -> bool {
+        matches!(self, Self::Disc(_) | Self::Rectangle(_) | Self::Faces(_))
+    }
+}
+
+/// Distance from the middle of a disc for a uniform number: equal areas are equally likely.
+#[inline(always)]
+pub(super) fn radius_on_disc(radius: f64, u: f64) -> f64 {
+    radius * u.sqrt()
+}
+
+/// The coordinates of a point of a rectangle, from half its sides.
+#[inline(always)]
+pub(super) fn point_on_rectangle([a, b]: [f64; 2], [u, v]: [f64; 2]) -> [f64; 2] {
+    [a * (2.0 * u - 1.0), b * (2.0 * v - 1.0)]
+}
+
+/// Cosine to the axis of a cone whose rim has the cosine `limit`: equal solid angles are equally likely.
+#[inline(always)]
+pub(super) fn cosine_in_cone(limit: f64, u: f64) -> f64 {
+    1.0 - u * (1.0 - limit)
+}
+
+#[inline(always)]
+pub(super) fn sine_from_cosine(cosine: f64) -> f64 {
+    ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
+}
+
+/// The direction with this cosine to the last of three axes, at azimuth `v` of a whole turn.
+pub(super) fn direction_about_axis(axes: [Vector; 3], cos_theta: f64, v: f64) -> Vector {
+    let sin_theta = sine_from_cosine(cos_theta);
+    let (sin, cos) = sin_cos_turns(v);
+    axes[0] * (sin_theta * cos) + axes[1] * (sin_theta * sin) + axes[2] * cos_theta
+}

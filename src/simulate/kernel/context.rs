@@ -1,0 +1,105 @@
+//! What all replicates of a run share.
+
+use super::payload::RayPayload;
+use crate::intersect::Intersector;
+use crate::math::Aabb;
+use crate::simulate::bind::BoundScene;
+use crate::simulate::outcome::PathSink;
+use crate::simulate::plan::Plan;
+use crate::simulate::receiver::{Receiver, Shape};
+use crate::simulate::settings::RunSettings;
+use smallvec::SmallVec;
+
+/// Bodies, outermost first.
+pub(super) type Bodies = SmallVec<[u16; 4]>;
+
+/// What the rays of a source start in.
+#[derive(Clone, Debug)]
+pub(super) enum StartingMedia {
+    /// All in the same bodies.
+    Same(Bodies),
+    /// Each must be asked: the source lies on a surface, or reaches into a body.
+    PerRay,
+    /// The same, and the source may lie on a face of a solid, which its rays must start clear of.
+    OnFace,
+}
+
+/// What all replicates share.
+#[derive(Clone)]
+pub(crate) struct Context<'a> {
+    pub(crate) bound: &'a BoundScene,
+    pub(crate) intersector: &'a dyn Intersector,
+    pub(crate) settings: &'a RunSettings,
+    pub(crate) plan: Plan,
+    /// Takes the vertices of all paths as they come; without, a sample is kept.
+    pub(crate) paths: Option<PathSink<'a>>,
+    /// Receivers that stand among the faces and end light.
+    pub(super) blocking: Vec<u32>,
+    /// Receivers that end light and do not meet `region`.
+    pub(super) outside: Vec<u32>,
+    /// Receivers that count light passing through.
+    pub(super) passing: Vec<u32>,
+    /// Receivers of the far field.
+    pub(super) far: Vec<u32>,
+    /// A box around all faces and sources; only how fast a path is followed depends on it.
+    pub(super) region: Aabb,
+    /// What the rays of each source start in.
+    pub(super) starting_media: Vec<StartingMedia>,
+}
+
+impl<'a> Context<'a> {
+    /// A context that knows nothing yet about what its sources lie in.
+    pub(super) fn without_media(
+        bound: &'a BoundScene,
+        intersector: &'a dyn Intersector,
+        settings: &'a RunSettings,
+    ) -> Self {
+        let select = |wanted: &dyn Fn(&Receiver) -> bool| -> Vec<u32> {
+            (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
+        };
+        let region = bound.region;
+        let stands = |r: &Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
+        Self {
+            bound,
+            intersector,
+            settings,
+            plan: Plan::new(bound, settings),
+            paths: None,
+            blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
+            outside: select(&|r| r.absorbs && stands(r) && !r.meets(&region)),
+            passing: select(&|r| !r.absorbs && stands(r)),
+            far: select(&|r| matches!(r.shape, Shape::FarField { .. })),
+            region,
+            starting_media: Vec::new(),
+        }
+    }
+
+    /// The same for another plan of the same rays.
+    pub(crate) fn with_plan(&self, plan: Plan, settings: &'a RunSettings) -> Self {
+        Self { plan, settings, ..self.clone() }
+    }
+
+    /// Whether nothing is asked about a ray on its way but where it ends.
+    pub(crate) fn asks_ends_only(&self) -> bool {
+        let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;
+        self.passing.is_empty() && !self.plan.records_any() && !self.bound.receivers.iter().any(extra)
+    }
+
+    /// Whether the polarisation of rays is followed.
+    #[inline]
+    pub(super) fn polarised(&self) -> bool {
+        self.bound.scene.run.polarisation
+    }
+
+    /// Distance up to which faces of two solids are one, mm.
+    #[inline(always)]
+    pub(super) fn glue_mm(&self) -> f64 {
+        self.bound.scene.run.glue_mm
+    }
+
+    /// Refractive index of a body for the light of a ray.
+    #[inline(always)]
+    pub(super) fn index<C: RayPayload>(&self, body: u16, payload: &C) -> f64 {
+        self.bound.bodies[body as usize].index(payload.wavelength())
+    }
+}

@@ -1,0 +1,89 @@
+//! From one body into the next: the media on both sides of a face, where bodies touch or overlap too.
+
+use super::contact::{aligned_body, touches_sibling, touching_body};
+use super::context::Context;
+use super::interaction::SurfaceInteraction;
+use super::media_at::recover_media;
+use super::payload::RayPayload;
+use crate::math::Ray;
+use crate::simulate::outcome::LostCause;
+
+/// The payload of a ray on both sides of a face.
+pub(super) struct Crossing<C> {
+    /// Before the face: what it came with, unless it was found to be somewhere else.
+    pub(super) here: C,
+    pub(super) across: C,
+}
+
+/// The payload of a ray on both sides of a face; `Err` with the cause when it cannot be on the other.
+#[inline(always)]
+pub(super) fn cross<C: RayPayload>(
+    context: &Context<'_>,
+    payload: C,
+    ray: &Ray,
+    at: &mut SurfaceInteraction<'_>,
+) -> Result<Crossing<C>, LostCause> {
+    let leaves_sibling = at.face.touches_sibling && payload.cross(at.face.body, false).is_some();
+    if leaves_sibling && touches_sibling(context, ray, &at.face_hit()) {
+        // From one solid of a part into the next.
+        at.skip = context.glue_mm();
+        return Ok(Crossing { here: payload, across: payload });
+    }
+    let mut here = payload;
+    let mut across = payload.cross(at.face.body, at.entering);
+    if across.is_none()
+        && let Some(recovered) = recover_media(context, &payload, ray, at.hit.t, at.face.touches_body)
+        && let Some(beyond) = recovered.cross(at.face.body, at.entering)
+    {
+        (here, across) = (recovered, Some(beyond));
+    }
+    if at.face.touches_body {
+        cross_contact(context, ray, at, &mut here, &mut across);
+    }
+    match across {
+        Some(across) => Ok(Crossing { here, across }),
+        None if here.is_full() && at.entering => Err(LostCause::TooDeep),
+        None => Err(LostCause::ImpossibleMedium),
+    }
+}
+
+/// The same at a face that may lie on one of another body: both are crossed at once, whichever the ray met first.
+#[inline(always)]
+fn cross_contact<C: RayPayload>(
+    context: &Context<'_>,
+    ray: &Ray,
+    at: &mut SurfaceInteraction<'_>,
+    here: &mut C,
+    across: &mut Option<C>,
+) {
+    let place = at.face_hit();
+    if let Some(other) = touching_body(context, ray, &place) {
+        // Whichever way the light goes on, it has met both faces.
+        at.skip = context.glue_mm();
+        *across = match *across {
+            // Through both faces at once, whichever the ray met first.
+            Some(first) if !(at.entering && here.body() == at.face.body) => {
+                let both = first.cross(other, !at.entering).or_else(|| {
+                    // The other body is not where the light should be: it has passed an edge of three or more unseen.
+                    let recovered = recover_media(context, here, ray, at.hit.t, true)?;
+                    let both = recovered.cross(at.face.body, at.entering)?.cross(other, !at.entering)?;
+                    *here = recovered;
+                    Some(both)
+                });
+                Some(both.unwrap_or(first))
+            }
+            // The second face of an interface that was crossed at the first.
+            _ => Some(*here),
+        };
+    } else if let Some(other) = aligned_body(context, ray, &place) {
+        let [first, second] = [at.face.body.min(other), at.face.body.max(other)];
+        let both = here.cross(first, at.entering).and_then(|c| c.cross(second, at.entering));
+        let inside = here.cross(first, false).is_some();
+        // What looks the same way but is not passed here, as beyond an edge, is left alone.
+        if inside == here.cross(second, false).is_some() {
+            at.skip = context.glue_mm();
+            // The second of two faces that were passed at the first.
+            *across = if inside == at.entering { Some(*here) } else { both };
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Rays as they leave their sources, source by source.
+
+use super::contact::emit_into_contact;
+use super::context::{Context, StartingMedia};
+use super::media_at::media_at;
+use super::path::{Path, RaySelection};
+use super::payload::RayPayload;
+use super::receivers::clip_segment;
+use super::start::start_on_face;
+use super::starting_media::{start_behind_glue, start_clear_of_faces};
+use super::tracer::Tracer;
+use crate::math::Ray;
+use crate::optics::polarised::Stokes;
+use crate::simulate::emitter::{Emission, RaySampler, Stream};
+use crate::simulate::outcome::{Event, LostCause};
+use crate::simulate::tally::quanta_as_integer;
+
+/// Goes through the rays of one replicate, source by source.
+pub(super) struct SourceQueue {
+    replicate: u32,
+    source: usize,
+    /// Number in the run of the next ray, and of the first and past the last of this source in this replicate.
+    next: u64,
+    range: [u64; 2],
+    sampler: Option<RaySampler>,
+    /// The last source to go through.
+    last: usize,
+    /// Whether one ray alone is asked for, by its number.
+    single: bool,
+}
+
+impl SourceQueue {
+    pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
+        let last = context.plan.shares.len();
+        let single = matches!(rays, RaySelection::Ray(_));
+        let mut queue = Self { replicate: 0, source: 0, next: 0, range: [0, 0], sampler: None, last, single };
+        match rays {
+            RaySelection::Replicate(replicate) => {
+                queue.replicate = replicate;
+                queue.enter(context, 0);
+            }
+            RaySelection::Ray(ray) => {
+                queue.last = 0;
+                if let Some((source, replicate)) = context.plan.locate(ray) {
+                    queue.replicate = replicate;
+                    queue.enter(context, source);
+                    (queue.next, queue.range[1]) = (ray, ray + 1);
+                }
+            }
+        }
+        queue
+    }
+
+    fn enter(&mut self, context: &Context<'_>, source: usize) {
+        self.source = source;
+        let Some(share) = context.plan.shares.get(source) else { return };
+        self.range = share.range(self.replicate, context.plan.replicates);
+        self.next = self.range[0];
+        let s = context.settings;
+        let replicate = [self.replicate, context.plan.replicates];
+        let rays = self.range[1] - self.range[0];
+        let stream = Stream::new(s.seed, s.sampling, replicate, source as u32, rays);
+        self.sampler = Some(RaySampler::new(&context.bound.emitters[source], stream, self.range[0]));
+    }
+
+    /// Starts the next ray that can start; `false` at the end of the replicate.
+    #[inline(always)]
+    pub(super) fn start_next<C: RayPayload>(
+        &mut self,
+        tracer: &mut Tracer<'_, '_, C>,
+        path: &mut Path<C>,
+        ray: &mut Ray,
+    ) -> bool {
+        let context = tracer.context;
+        loop {
+            while self.next >= self.range[1] {
+                if self.source >= self.last {
+                    return false;
+                }
+                self.enter(context, self.source + 1);
+            }
+            let Some(sampler) = &mut self.sampler else { return false };
+            let emitter = &context.bound.emitters[self.source];
+            let started = (self.next - self.range[0]) as u32;
+            self.next += 1;
+            let (index, emission) = if self.single {
+                sampler.single_ray(emitter, started, ray)
+            } else {
+                sampler.next_ray(emitter, started, ray)
+            };
+            *path = Path::at_source(index.in_run, context.plan.shares[self.source].quanta, C::in_surroundings());
+            if tracer.start(self.source, &emission, path, ray) {
+                return true;
+            }
+        }
+    }
+}
+
+impl<C: RayPayload> Tracer<'_, '_, C> {
+    /// Puts a ray that leaves its source on its way; `false` when it cannot start.
+    #[inline(always)]
+    fn start(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {
+        let context = self.context;
+        let mut into_contact = None;
+        if let Some((face, normal)) = emission.from {
+            self.tally.counts.corrected_normals += u64::from(start_on_face(context, face, normal, ray));
+            into_contact = if C::MEDIA { emit_into_contact(context, face, normal, ray) } else { None };
+        }
+        self.tally.counts.rays += 1;
+        self.tally.ends.emitted += quanta_as_integer(path.quanta);
+        let Some(mut payload) = self.payload_at_start(source, into_contact.as_ref(), ray) else {
+            self.lose(path, ray, LostCause::TooDeep, None);
+            return false;
+        };
+        if C::COLOURED {
+            payload.set_light(emission.wavelength, || match context.bound.emitters[source].polarised {
+                Some(field) => Stokes::linear(1.0, ray.direction, field),
+                None => Stokes::unpolarised(1.0, ray.direction),
+            });
+        }
+        path.payload = payload;
+        self.record(path, ray.origin, Event::Emitted);
+        clip_segment(context, path, ray);
+        true
+    }
+
+    /// The media that a ray starts in; `None` when it cannot carry so many.
+    #[inline(always)]
+    fn payload_at_start(&self, source: usize, into_contact: Option<&Ray>, ray: &mut Ray) -> Option<C> {
+        let context = self.context;
+        match &context.starting_media[source] {
+            StartingMedia::Same(bodies) => C::inside(bodies),
+            StartingMedia::OnFace => {
+                // Through an edge or a corner a ray may pass without a hit.
+                *ray = start_clear_of_faces(context, ray).unwrap_or_else(|| start_behind_glue(context, ray));
+                let emitter = &context.bound.emitters[source];
+                if C::MEDIA && !emitter.media_stated {
+                    C::inside(&media_at(context, ray))
+                } else {
+                    C::inside(&emitter.inside)
+                }
+            }
+            StartingMedia::PerRay if C::MEDIA => C::inside(&media_at(context, into_contact.unwrap_or(ray))),
+            StartingMedia::PerRay => Some(C::in_surroundings()),
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! What happens to light at a face, in words that the tracer books.
+
+use super::contact::{FaceHit, departure};
+use super::context::Context;
+use super::path::Path;
+use super::payload::RayPayload;
+use crate::intersect::Hit;
+use crate::math::{Departure, Point, Vector};
+use crate::optics::polarised::{Mueller, Stokes};
+use crate::optics::{Scatter, reflect};
+use crate::simulate::outcome::LostCause;
+use crate::simulate::random::{Key, Purpose};
+use crate::simulate::surfaces::FaceOptics;
+
+/// A ray meets a face.
+pub(super) struct SurfaceInteraction<'a> {
+    pub(super) hit: &'a Hit,
+    pub(super) face: FaceOptics,
+    pub(super) entering: bool,
+    pub(super) point: Point,
+    /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
+    pub(super) skip: f64,
+    /// Times that the facet's normal had to be taken for the interpolated one.
+    pub(super) corrected_normals: u32,
+    /// Two bodies that are found to overlap here.
+    pub(super) overlap: Option<[u16; 2]>,
+}
+
+/// What a face does to light.
+pub(super) enum Interaction<'s, C> {
+    /// It ends here.
+    Absorb,
+    /// It goes straight on: the face is not there for light, or both sides are the same body.
+    Pass { payload: C },
+    /// So many quanta of it are reflected; the face absorbs the rest.
+    Reflect { kept: f64, direction: Vector, payload: C },
+    /// All of it is reflected, inside its body.
+    ReflectTotally { direction: Vector, payload: C },
+    /// It is partly reflected and partly transmitted.
+    Divide(Division<'s, C>),
+    /// It goes round by total reflection for ever.
+    Trap,
+    /// It cannot go on.
+    Lose(LostCause),
+}
+
+/// Both ways on from a partly reflecting face.
+pub(super) struct Division<'s, C> {
+    /// Quanta that go on, one way or the other; the face absorbs the rest.
+    pub(super) kept: f64,
+    /// Share of them that is reflected; the rest is transmitted.
+    pub(super) share: f64,
+    /// What reflection and transmission do to polarisation, where it is carried.
+    pub(super) matrices: Option<[Mueller; 2]>,
+    /// The normal on which both ways are based.
+    pub(super) normal: Vector,
+    /// The payload before the face, and the media behind it.
+    pub(super) payload: C,
+    pub(super) across: C,
+    pub(super) transmitted: Vector,
+    pub(super) scatter: Option<&'s Scatter>,
+    /// Whether light that is guided by total reflection is released here: not where it passes between bodies of one index.
+    pub(super) releases: bool,
+}
+
+/// A perfect conductor: s keeps its sign, p changes it, in the convention of [`Stokes`].
+pub(super) const CONDUCTOR: Mueller = Mueller { a: 1.0, b: 0.0, c: -1.0, e: 0.0 };
+
+impl SurfaceInteraction<'_> {
+    /// The normal to shade with and the cosine of incidence. A normal that looks away from the ray is replaced by the facet's.
+    #[inline(always)]
+    pub(super) fn shading_normal(&mut self, direction: Vector) -> (Vector, f64) {
+        let shaded = direction.dot(self.hit.normal);
+        let flat = direction.dot(self.hit.geometric_normal);
+        if shaded * flat > 0.0 {
+            (self.hit.normal, shaded.abs().min(1.0))
+        } else {
+            self.corrected_normals += 1;
+            (self.hit.geometric_normal, flat.abs().min(1.0))
+        }
+    }
+
+    /// The reflected direction, on the side of the facet the ray came from.
+    #[inline(always)]
+    pub(super) fn mirrored(&mut self, direction: Vector, normal: Vector) -> Vector {
+        let flat = self.hit.geometric_normal;
+        let r = reflect(direction, normal);
+        if r.dot(flat) * direction.dot(flat) < 0.0 {
+            return r;
+        }
+        self.corrected_normals += 1;
+        reflect(direction, flat)
+    }
+
+    /// The place as one that a ray leaves.
+    #[inline(always)]
+    pub(super) fn departure(&self) -> Departure {
+        departure(self.hit)
+    }
+
+    /// The hit with a copy of its own, for what looks for faces at the same place.
+    pub(super) fn face_hit(&self) -> FaceHit {
+        FaceHit { hit: *self.hit, face: self.face, point: self.point }
+    }
+}
+
+/// Passes the polarisation of a ray through an interface; its power stays 1.
+#[inline(always)]
+pub(super) fn turn_polarisation<C: RayPayload>(
+    context: &Context<'_>,
+    payload: &mut C,
+    m: &Mueller,
+    d: Vector,
+    n: Vector,
+) {
+    if let Some(stokes) = payload.stokes_mut() {
+        let after = stokes.through(m, d, n);
+        let unit = if after.i > 0.0 { after.scaled(1.0 / after.i) } else { Stokes::unpolarised(1.0, d) };
+        *stokes = if context.polarised() { unit } else { Stokes { i: 1.0, ..unit.depolarised() } };
+    }
+}
+
+impl<C: RayPayload> Division<'_, C> {
+    /// Takes what is reflected: gives the path its payload, and returns its direction.
+    #[inline(always)]
+    pub(super) fn reflect(
+        &self,
+        context: &Context<'_>,
+        path: &mut Path<C>,
+        d: Vector,
+        at: &mut SurfaceInteraction<'_>,
+    ) -> Vector {
+        path.payload = self.payload;
+        if let Some([r, _]) = &self.matrices {
+            turn_polarisation(context, &mut path.payload, r, d, self.normal);
+        }
+        let specular = at.mirrored(d, self.normal);
+        self.scattered(context, path, specular, at)
+    }
+
+    /// Takes what is transmitted: gives the path its payload, and returns its direction.
+    #[inline(always)]
+    pub(super) fn transmit(
+        &self,
+        context: &Context<'_>,
+        path: &mut Path<C>,
+        d: Vector,
+        at: &mut SurfaceInteraction<'_>,
+    ) -> Vector {
+        path.payload = self.payload;
+        if let Some([_, t]) = &self.matrices {
+            turn_polarisation(context, &mut path.payload, t, d, self.normal);
+        }
+        path.payload = path.payload.with_media_of(self.across);
+        self.scattered(context, path, self.transmitted, at)
+    }
+
+    /// The direction after scatter; `specular` where the surface is smooth.
+    #[inline(always)]
+    fn scattered(
+        &self,
+        context: &Context<'_>,
+        path: &mut Path<C>,
+        specular: Vector,
+        at: &mut SurfaceInteraction<'_>,
+    ) -> Vector {
+        match self.scatter {
+            Some(scatter) => scatter_at(scatter, path.key(context), &mut path.payload, [specular, self.normal], at),
+            None => specular,
+        }
+    }
+}
+
+/// The direction after scatter at a rough surface; `specular` when this light stays specular.
+#[inline(never)]
+fn scatter_at<C: RayPayload>(
+    scatter: &Scatter,
+    key: Key,
+    payload: &mut C,
+    [specular, normal]: [Vector; 2],
+    at: &mut SurfaceInteraction<'_>,
+) -> Vector {
+    let flat = at.hit.geometric_normal;
+    // Both normals on the side that the light leaves to.
+    let side = flat * specular.dot(flat).signum();
+    let normal = normal * normal.dot(side).signum();
+    let [u, v] = key.pair(Purpose::Scatter);
+    let Some(direction) = scatter.sample(specular, normal, [key.unit(Purpose::Lobe), u, v]) else {
+        return specular;
+    };
+    if let Some(stokes) = payload.stokes_mut() {
+        *stokes = Stokes::unpolarised(1.0, direction);
+    }
+    if direction.dot(side) > 0.0 {
+        return direction;
+    }
+    at.corrected_normals += 1;
+    reflect(direction, side)
+}

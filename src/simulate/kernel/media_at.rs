@@ -1,0 +1,160 @@
+//! The bodies around a point, from geometry: for sources that do not say what they lie in, and for light that has passed an edge unseen.
+
+use super::contact::departure;
+use super::context::{Bodies, Context};
+use super::payload::RayPayload;
+use super::tolerances::{ALIGNED, way_through_glue};
+use crate::intersect::Cost;
+use crate::math::{Point, Ray, orthonormal_pair};
+use crate::simulate::body::AMBIENT;
+use crate::simulate::surfaces::FaceOptics;
+
+/// Faces on the way out after which it is given up.
+const MOST_FACES: usize = 1000;
+
+/// How far a second and a third way out are turned off the first, as slopes along two axes across it: some degrees, far enough to pass
+/// an edge elsewhere, near enough to leave by the same bodies.
+const TILTS: [[f64; 2]; 2] = [[0.031, 0.017], [-0.013, 0.029]];
+
+/// Length into the segment, mm, at whose half the bodies are asked for: a place that is surely past the edge.
+const LONGEST_LOOK: f64 = 1.0;
+
+/// The bodies around the start of a ray.
+///
+/// Where solids touch, a way out that comes near an edge of three of them may miss one; then two ways of three decide.
+pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
+    let (first, certain) = bodies_left(context, ray);
+    if certain {
+        return first;
+    }
+    let (x, y) = orthonormal_pair(ray.direction);
+    let tilted = |[a, b]: [f64; 2]| {
+        let direction = (ray.direction + x * a + y * b).normalize();
+        bodies_left(context, &Ray { direction, ..*ray }).0
+    };
+    let second = tilted(TILTS[0]);
+    if second == first {
+        return first;
+    }
+    let third = tilted(TILTS[1]);
+    if third == second { second } else { first }
+}
+
+/// The bodies that a ray leaves on its straight way out without having entered them, and whether no two of them touched there.
+fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
+    let mut crossings = Crossings::default();
+    let mut certain = true;
+    let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
+    for _ in 0..MOST_FACES {
+        let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
+        let point = segment.at(hit.t);
+        let d = segment.direction;
+        segment = Ray::new(point, d).leaving(departure(&hit));
+        let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
+        let along = d.dot(hit.geometric_normal);
+        crossings.cross(face.body, along < 0.0);
+        if !(face.touches_body || face.medium_on_opaque || face.touches_sibling) {
+            continue;
+        }
+        // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
+        let reach = way_through_glue(context.glue_mm(), along);
+        let probe = Ray::new(point - d * reach, d).within(0.0, 2.0 * reach).leaving(departure(&hit));
+        let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        let entering = d.dot(second.geometric_normal) < 0.0;
+        let may_touch = |other: &&FaceOptics| {
+            if other.body == face.body {
+                other.touches_sibling && face.touches_sibling
+            } else {
+                other.touches_body && face.touches_body || other.medium_on_opaque && face.medium_on_opaque
+            }
+        };
+        // Overlapping bodies that end at one plane look the same way there, touching ones against each other.
+        let opposite = entering == (along >= 0.0);
+        let aligned = second.geometric_normal.dot(hit.geometric_normal) > ALIGNED;
+        let other = context.bound.faces.get(second.face.index()).filter(may_touch);
+        if let Some(other) = other.filter(|_| opposite || aligned) {
+            crossings.cross(other.body, entering);
+            segment.t_min = reach;
+            certain = false;
+        }
+    }
+    (crossings.bodies_around(), certain)
+}
+
+/// The payload of a ray with the media that geometry finds on its way to `end`, for a ray that carries media that cannot be. `None`
+/// where these are the same, or where neither it nor the face it comes to (`touching`) is where bodies touch: there alone it may have
+/// passed an edge of three or more of them unseen, within the glue distance that the crossing of two passes over.
+#[cold]
+pub(super) fn recover_media<C: RayPayload>(
+    context: &Context<'_>,
+    payload: &C,
+    ray: &Ray,
+    end: f64,
+    touching: bool,
+) -> Option<C> {
+    if !(context.bound.nested && (touching || ray.t_min > 0.0)) {
+        return None;
+    }
+    let middle = 0.5 * (ray.t_min + end.min(ray.t_min + LONGEST_LOOK));
+    let recovered = payload.moved_inside(&media_at(context, &Ray::new(ray.at(middle), ray.direction)))?;
+    (recovered.body() != payload.body()).then_some(recovered)
+}
+
+/// Whether light that a receiver would end has left its body by an opening: the body is open, and on the way on it is not left.
+#[inline]
+pub(super) fn has_left_by_opening<C: RayPayload>(
+    context: &Context<'_>,
+    payload: &C,
+    ray: &Ray,
+    point: Point,
+) -> bool {
+    let body = payload.body();
+    context.bound.bodies[body as usize].open && !media_at(context, &Ray::new(point, ray.direction)).contains(&body)
+}
+
+/// Faces of bodies crossed one after another on the way out.
+#[derive(Default)]
+struct Crossings {
+    left: Bodies,
+    entered: Bodies,
+}
+
+impl Crossings {
+    fn cross(&mut self, body: u16, entering: bool) {
+        if body == AMBIENT {
+            return;
+        }
+        match self.entered.iter().rposition(|b| *b == body) {
+            Some(k) if !entering => drop(self.entered.remove(k)),
+            None if !entering => self.left.push(body),
+            _ => self.entered.push(body),
+        }
+    }
+
+    fn bodies_around(mut self) -> Bodies {
+        // A solid that is turned inside out is left before it is entered.
+        self.left.retain(|b| !self.entered.contains(b));
+        self.left.reverse();
+        self.left
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_and_was_not_entered_is_around() {
+        let around = |crossings: &[(u16, bool)]| {
+            let mut c = Crossings::default();
+            crossings.iter().for_each(|&(body, entering)| c.cross(body, entering));
+            c.bodies_around().to_vec()
+        };
+        assert_eq!(around(&[(1, true), (1, false)]), Vec::<u16>::new());
+        assert_eq!(around(&[(2, false), (3, true), (3, false), (1, false)]), [1, 2]);
+        assert_eq!(around(&[(1, true), (2, true), (1, false), (2, false)]), Vec::<u16>::new());
+        // Inside out.
+        assert_eq!(around(&[(1, false), (1, true)]), Vec::<u16>::new());
+        assert_eq!(around(&[(AMBIENT, false)]), Vec::<u16>::new());
+    }
+}

@@ -1,0 +1,87 @@
+//! A path under way.
+
+use super::context::Context;
+use super::payload::RayPayload;
+use crate::simulate::random::Key;
+
+/// Which rays to trace.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum RaySelection {
+    /// All rays of a replicate.
+    Replicate(u32),
+    /// One ray of the run.
+    Ray(u64),
+}
+
+/// A path under way; its ray is kept apart, in the slice that the intersector reads.
+#[derive(Clone, Copy)]
+pub(super) struct Path<C> {
+    /// Number of its ray in the run.
+    pub(super) ray: u64,
+    /// Which of the paths that split off that ray.
+    pub(super) branch: u32,
+    /// Hits so far.
+    pub(super) bounce: u32,
+    /// Power, a whole number of quanta.
+    pub(super) quanta: f64,
+    /// Power at the source.
+    pub(super) first_quanta: f64,
+    /// mm so far.
+    pub(super) length: f64,
+    /// What ends the segment unless a face comes first: a receiver, [`NO_RECEIVER`] or [`SCATTERS`].
+    pub(super) receiver: u32,
+    /// Length up to the last hit that was no total reflection, mm.
+    pub(super) released_at: f32,
+    pub(super) payload: C,
+}
+
+/// No receiver ahead.
+pub(super) const NO_RECEIVER: u32 = u32::MAX;
+/// The ray scatters inside its body at the end of its segment.
+pub(super) const SCATTERS: u32 = u32::MAX - 1;
+
+impl<C: RayPayload> Path<C> {
+    /// A path that has not left its source.
+    pub(super) fn at_source(ray: u64, quanta: f64, payload: C) -> Self {
+        Self {
+            ray,
+            branch: 0,
+            bounce: 0,
+            quanta,
+            first_quanta: quanta,
+            length: 0.0,
+            receiver: NO_RECEIVER,
+            released_at: 0.0,
+            payload,
+        }
+    }
+
+    /// The key of the random numbers of its present vertex.
+    #[inline(always)]
+    pub(super) fn key(&self, context: &Context<'_>) -> Key {
+        Key { seed: context.settings.seed, ray: self.ray, branch: self.branch, bounce: self.bounce }
+    }
+
+    /// Notes that it has just met what is no total reflection.
+    #[inline(always)]
+    pub(super) fn release(&mut self) {
+        if C::MEDIA {
+            self.released_at = self.length as f32;
+        }
+    }
+
+    /// Whether it has gone in a body by total reflection alone for so long that it will go round there for ever.
+    #[inline(always)]
+    pub(super) fn is_trapped_in(&self, context: &Context<'_>, body: u16) -> bool {
+        self.length - f64::from(self.released_at) > context.bound.bodies[body as usize].trapped_length
+    }
+
+    /// The number of the path that splits off at its present vertex; it depends on the splits before alone, not on the order of
+    /// tracing.
+    pub(super) fn split_branch(&self) -> u32 {
+        let mixed = (self.branch ^ self.bounce.wrapping_mul(0x9e37_79b9))
+            .wrapping_add(0x7f4a_7c15)
+            .wrapping_mul(0x85eb_ca6b);
+        (mixed ^ mixed >> 15).max(1)
+    }
+}

@@ -1,0 +1,134 @@
+//! Receivers on the way of a ray.
+
+use super::context::Context;
+use super::path::{NO_RECEIVER, Path, SCATTERS};
+use super::payload::RayPayload;
+use super::tolerances::{LONGEST_SEGMENT, rounding};
+use super::tracer::Tracer;
+use crate::intersect::Hit;
+use crate::math::{Point, Ray};
+use crate::simulate::random::Purpose;
+use crate::simulate::receiver::{Receiver, Spot};
+use crate::simulate::tally::{quanta_as_integer, round_quanta};
+
+/// How far in front of a face a receiver that lies in it is met, mm: more than both are off by rounding.
+#[inline(always)]
+fn in_front(ray: &Ray, t: f64) -> f64 {
+    rounding(t + ray.origin.abs().max_element())
+}
+
+/// Ends the ray at its next scattering or at the nearest receiver that stops light and stands among the faces, unless a face comes
+/// first.
+#[inline(always)]
+pub(super) fn clip_segment<C: RayPayload>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray) {
+    path.receiver = NO_RECEIVER;
+    if C::MEDIA
+        && let Some(scatter) = &context.bound.bodies[path.payload.body() as usize].scatter
+    {
+        ray.t_max = scatter.free_path(path.key(context).unit(Purpose::Bulk));
+        path.receiver = SCATTERS;
+    }
+    for &r in &context.blocking {
+        if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, ray.t_max) {
+            // One that lies in a face is met before the face.
+            ray.t_max = (t - in_front(ray, t)).max(ray.t_min);
+            path.receiver = r;
+        }
+    }
+}
+
+/// Ends the ray at the nearest receiver that stops light and stands outside the scene's box, unless a face comes first.
+///
+/// A segment inside the box cannot meet one, so that rays from face to face are not asked: 1 test in place of 3 for each ray of a
+/// lens.
+#[inline(always)]
+pub(super) fn clip_outside<'h, C: RayPayload>(
+    context: &Context<'_>,
+    path: &mut Path<C>,
+    ray: &mut Ray,
+    hit: Option<&'h Hit>,
+) -> Option<&'h Hit> {
+    if context.outside.is_empty() {
+        return hit;
+    }
+    let mut end = ray.t_max;
+    if let Some(h) = hit {
+        if context.region.contains(ray.origin) && context.region.contains(ray.at(h.t)) {
+            return hit;
+        }
+        end = h.t;
+    }
+    let mut first = None;
+    for &r in &context.outside {
+        if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, end) {
+            (end, first) = (t, Some(r));
+        }
+    }
+    let Some(r) = first else { return hit };
+    ray.t_max = end;
+    path.receiver = r;
+    None
+}
+
+impl<C: RayPayload> Tracer<'_, '_, C> {
+    /// Counts the light on receivers that let it pass.
+    pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, end: f64) {
+        let context = self.context;
+        // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
+        let start = ray.t_min + in_front(ray, 0.0);
+        let end = end + in_front(ray, end.min(LONGEST_SEGMENT));
+        for &r in &context.passing {
+            // A sphere may be crossed twice.
+            let mut passed = start;
+            while let Some(t) = context.bound.receivers[r as usize].crossing(ray, passed, end) {
+                self.count_at(path, r, ray.at(t));
+                passed = t;
+            }
+        }
+    }
+
+    /// Counts light that meets a plane or sphere at a point.
+    #[inline(always)]
+    pub(super) fn count_at(&mut self, path: &Path<C>, r: u32, point: Point) {
+        let receiver = &self.context.bound.receivers[r as usize];
+        if !C::ENDS_ONLY && receiver.interactions.is_some_and(|n| n != path.bounce) {
+            return;
+        }
+        if let Some(spot) = receiver.spot(point) {
+            self.deposit(receiver, path, r, &spot);
+        }
+    }
+
+    /// Counts light that leaves the scene in the far field; whether any receiver takes it.
+    #[inline(always)]
+    pub(super) fn count_far(&mut self, path: &Path<C>, ray: &Ray) -> bool {
+        let context = self.context;
+        let mut received = false;
+        for &r in &context.far {
+            let receiver = &context.bound.receivers[r as usize];
+            if let Some(spot) = receiver.direction(ray.direction) {
+                received = true;
+                if C::ENDS_ONLY || receiver.interactions.is_none_or(|n| n == path.bounce) {
+                    self.deposit(receiver, path, r, &spot);
+                }
+            }
+        }
+        received
+    }
+
+    #[inline(always)]
+    fn deposit(&mut self, receiver: &Receiver, path: &Path<C>, r: u32, spot: &Spot) {
+        let r = r as usize;
+        let tally = &mut *self.tally;
+        tally.receivers[r].add_deferred(spot.cell, path.quanta);
+        tally.receiver_totals[r] += quanta_as_integer(path.quanta);
+        tally.moments[r].add(path.quanta, spot.at, spot.radius2);
+        if !C::ENDS_ONLY && receiver.channels.count() > 0 {
+            let cells = receiver.cell_count();
+            let nm = path.payload.wavelength().unwrap_or(self.context.bound.light.wavelength);
+            receiver.channels.weigh(nm, |channel, weight| {
+                tally.receivers[r].add((channel + 1) * cells + spot.cell, round_quanta(path.quanta * weight));
+            });
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! The first segment of a ray that leaves a face.
+
+use super::contact::departure;
+use super::context::Context;
+use crate::intersect::Cost;
+use crate::math::{FaceId, Ray, Vector};
+use crate::optics::reflect;
+
+/// Distances from the spline within which its face is looked for on the intersector, mm: as far as the largest sag that a user may
+/// ask for, nearer where another face is in between.
+const REACHES: [f64; 4] = [1.0, 0.1, 0.01, 1e-3];
+
+/// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it.
+///
+/// Facets lie up to their sag off the spline: a ray that started there could hit its own facet. A ray whose face is not found starts
+/// on the spline.
+///
+/// A ray that would go below the facet is turned to above it; tells whether it was.
+#[inline(never)]
+pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
+    for reach in REACHES {
+        let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
+        let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
+        let mut point = probe.at(hit.t);
+        if hit.face != face {
+            // A face of a body that lies on it may come first.
+            let behind = Ray::new(point, -normal).within(0.0, context.glue_mm()).leaving(departure(&hit));
+            let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };
+            (point, hit) = (behind.at(next.t), next);
+        }
+        if hit.face == face {
+            let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
+            let direction = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
+            *ray = Ray::new(point, direction).leaving(departure(&hit));
+            return below;
+        }
+    }
+    false
+}

@@ -1,0 +1,105 @@
+//! What the rays of each source start in.
+
+use super::contact::{departure, emit_into_contact};
+use super::context::{Bodies, Context, StartingMedia};
+use super::media_at::media_at;
+use super::start::start_on_face;
+use super::tolerances::rounding_at;
+use crate::intersect::{Cost, Intersector};
+use crate::math::{Point, Ray, Vector};
+use crate::simulate::bind::BoundScene;
+use crate::simulate::body::AMBIENT;
+use crate::simulate::emitter::{Emitter, RaySampler, Stream};
+use crate::simulate::plan::SourceShare;
+use crate::simulate::settings::RunSettings;
+
+/// Rays of a source that are asked before it is believed that all start in the same bodies.
+const PROBED_RAYS: u64 = 64;
+
+/// Faces at one place that the start of a ray is asked about.
+const MOST_FACES: usize = 6;
+
+impl<'a> Context<'a> {
+    /// What all replicates of a run share.
+    pub(crate) fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
+        let mut context = Self::without_media(bound, intersector, settings);
+        let sources = bound.emitters.iter().zip(&context.plan.shares).enumerate();
+        context.starting_media = sources.map(|(k, (e, share))| starting_media(&context, k, e, share)).collect();
+        context
+    }
+}
+
+/// What the rays of one source start in, from some of its rays.
+fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, share: &SourceShare) -> StartingMedia {
+    let stated = emitter.media_stated || !context.bound.has_media();
+    let replicates = context.plan.replicates;
+    let probed = PROBED_RAYS.min(u64::from(replicates));
+    let mut first: Option<Bodies> = None;
+    for k in 0..probed {
+        // One ray of each of so many replicates: they are spread over the whole of a ray list.
+        let replicate = (k * u64::from(replicates) / probed) as u32;
+        let [from, to] = share.range(replicate, replicates);
+        if from == to {
+            continue;
+        }
+        let s = context.settings;
+        let stream = Stream::new(s.seed, s.sampling, [replicate, replicates], source as u32, to - from);
+        let mut ray = Ray::new(Point::ZERO, Vector::Z);
+        let index = ((to - from) * k / PROBED_RAYS) as u32;
+        let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);
+        if emission.from.is_none() && start_clear_of_faces(context, &ray).is_some() {
+            return StartingMedia::OnFace;
+        }
+        if stated {
+            continue;
+        }
+        if let Some((face, normal)) = emission.from {
+            start_on_face(context, face, normal, &mut ray);
+            if emit_into_contact(context, face, normal, &mut ray).is_some() {
+                return StartingMedia::PerRay;
+            }
+        }
+        let media = media_at(context, &ray);
+        if first.get_or_insert_with(|| media.clone()) != &media {
+            return StartingMedia::PerRay;
+        }
+    }
+    StartingMedia::Same(first.unwrap_or_else(|| emitter.inside.clone()))
+}
+
+/// The same ray from one glue distance farther on.
+pub(super) fn start_behind_glue(context: &Context<'_>, ray: &Ray) -> Ray {
+    Ray::new(ray.origin + ray.direction * context.glue_mm(), ray.direction)
+}
+
+/// The ray of a source that lies exactly on faces of solids: it starts behind all of them, by the glue distance along its way; one
+/// that goes into an opaque solid starts before it. `None` where there is no such face.
+///
+/// As it came, rounding put starts on either side: of a disc on a die 85 % were lost, on a clear cube 2 %.
+/// Known weakness: at a corner of an opaque solid the third face is not seen, and too much of a point's light is taken to go in.
+#[cold]
+pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<Ray> {
+    let reach = context.glue_mm();
+    let d = ray.direction;
+    let before = Ray::new(ray.origin - d * reach, d);
+    let mut probe = before.within(0.0, 2.0 * reach);
+    let mut on_solid = false;
+    let mut enters_opaque = false;
+    let mut leaves_opaque = false;
+    // Of two faces at one place the other comes next, and then the first once more.
+    for _ in 0..MOST_FACES {
+        let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { break };
+        let face = context.bound.faces.get(hit.face.index())?;
+        if face.opaque_solid {
+            let entering = d.dot(hit.geometric_normal) < 0.0;
+            enters_opaque |= entering;
+            leaves_opaque |= !entering;
+        }
+        on_solid |= face.opaque_solid || face.body != AMBIENT;
+        let rounding = rounding_at(ray.origin);
+        probe = Ray::new(probe.at(hit.t), d).within(-rounding, probe.t_max - hit.t).leaving(departure(&hit));
+    }
+    // Over an edge a ray goes in and out at once.
+    let into_opaque = enters_opaque && !leaves_opaque;
+    on_solid.then(|| if into_opaque { before } else { start_behind_glue(context, ray) })
+}

@@ -1,0 +1,38 @@
+//! Lengths and cosines within which the kernel takes two places, or two directions, for one.
+
+use crate::math::Point;
+
+/// Rounding of a place near the origin, mm: far more than its last digit, far less than any facet.
+const ROUNDING_MM: f64 = 1e-9;
+
+/// Rounding of a place, as a share of its largest coordinate: 10^4 last digits of an `f64`, what is lost on the way through a few
+/// placements and a division by a cosine.
+const ROUNDING_SHARE: f64 = 1e-12;
+
+/// Largest distance to the end of a segment that rounding is reckoned from, mm: a segment that leaves the scene has none.
+pub(super) const LONGEST_SEGMENT: f64 = 1e12;
+
+/// How far from its true place, mm, a point this far from the origin may be by rounding.
+#[inline(always)]
+pub(super) fn rounding(distance: f64) -> f64 {
+    ROUNDING_MM + ROUNDING_SHARE * distance
+}
+
+/// How far from its true place, mm, a point may be by rounding.
+#[inline(always)]
+pub(super) fn rounding_at(point: Point) -> f64 {
+    rounding(point.abs().max_element())
+}
+
+/// The way of a ray through a layer of the glue distance, mm, for the cosine between them. Below a cosine of 1e-3 (0.06° off the
+/// face) it grows no further: a ray that grazes a face more than that would reach a millimetre for the default of 1 µm.
+#[inline(always)]
+pub(super) fn way_through_glue(glue_mm: f64, cosine: f64) -> f64 {
+    glue_mm / cosine.abs().max(LEAST_COSINE)
+}
+
+const LEAST_COSINE: f64 = 1e-3;
+
+/// Cosine above which two normals at one place look the same way, and below whose negative they look at each other: 60°, between
+/// faces that lie on each other (0°, facets some degrees) and those that meet at an edge (90°).
+pub(super) const ALIGNED: f64 = 0.5;

@@ -1,0 +1,82 @@
+//! The books of a traced path: everything that is noted about it is noted here.
+
+use super::context::Context;
+use super::path::Path;
+use super::payload::RayPayload;
+use crate::math::{FaceId, Point, Ray};
+use crate::simulate::outcome::{Event, LostCause, LostRay, PathVertex};
+use crate::simulate::tallies::ReplicateTally;
+use crate::simulate::tally::{QUANTA, quanta_as_integer, round_quanta};
+
+/// Follows paths and books where their light ends.
+pub(super) struct Tracer<'t, 'a, C> {
+    pub(super) context: &'t Context<'a>,
+    pub(super) tally: &'t mut ReplicateTally,
+    /// Paths that split off and wait for room in the wavefront.
+    pub(super) pending: Vec<(Path<C>, Ray)>,
+}
+
+impl<C: RayPayload> Tracer<'_, '_, C> {
+    /// Notes a vertex of a path that is recorded.
+    #[inline(always)]
+    pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event) {
+        if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
+            let Path { ray, branch, bounce, .. } = *path;
+            self.tally.paths.push(PathVertex { ray, branch, bounce, point, power: path.quanta / QUANTA, event });
+        }
+    }
+
+    /// Books what a face takes of a path, which goes on with `kept` quanta.
+    #[inline(always)]
+    pub(super) fn absorb_in_face(&mut self, path: &mut Path<C>, face: FaceId, kept: f64) {
+        self.tally.absorb(face, path.quanta - kept);
+        path.quanta = kept;
+    }
+
+    /// Beer's law over the segment, for bodies that absorb.
+    #[inline(always)]
+    pub(super) fn absorb_in_body(&mut self, path: &mut Path<C>, length: f64) {
+        let body = path.payload.body();
+        let alpha = self.context.bound.bodies[body as usize].absorption(path.payload.wavelength());
+        if alpha > 0.0 {
+            let kept = round_quanta(path.quanta * (-alpha * length).exp());
+            let taken = path.quanta - kept;
+            self.tally.ends.absorbed += quanta_as_integer(taken);
+            self.tally.bulk.add(body as usize, taken);
+            path.quanta = kept;
+        }
+    }
+
+    /// Ends a path at a limit.
+    #[cold]
+    pub(super) fn cut_off(&mut self, path: &Path<C>, point: Point) {
+        if path.quanta > 0.0 {
+            self.tally.ends.cut_off += quanta_as_integer(path.quanta);
+            self.tally.counts.cut_off += 1;
+            self.record(path, point, Event::CutOff);
+        }
+    }
+
+    /// Ends a path that goes round in its body for ever.
+    #[cold]
+    pub(super) fn cut_off_trapped(&mut self, path: &Path<C>, point: Point) {
+        self.tally.counts.caught += u64::from(path.quanta > 0.0);
+        self.cut_off(path, point);
+    }
+
+    /// Ends a path that cannot go on.
+    #[cold]
+    pub(super) fn lose(&mut self, path: &Path<C>, ray: &Ray, cause: LostCause, face: Option<FaceId>) {
+        self.tally.lose(LostRay {
+            ray: path.ray,
+            branch: path.branch,
+            bounce: path.bounce,
+            cause,
+            quanta: quanta_as_integer(path.quanta),
+            origin: ray.origin,
+            direction: ray.direction,
+            face: face.map(|f| f.0),
+            body: path.payload.body(),
+        });
+    }
+}

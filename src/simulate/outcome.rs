@@ -1,0 +1,132 @@
+//! What can become of light: the events of a path, the causes of a loss, and what is counted.
+
+use crate::math::{Point, Vector};
+use serde::{Deserialize, Serialize};
+
+/// Why a ray was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum LostCause {
+    /// It left the scene while inside a medium: a crack, or an open shell with a medium.
+    NoExit,
+    /// It left a body that it was not inside of, or entered one while inside another that stands apart.
+    ImpossibleMedium,
+    /// It hit a closed opaque solid from inside.
+    InsideSolid,
+    /// More bodies inside each other than a ray can carry.
+    TooDeep,
+    /// A direction or distance that is not a number.
+    NotANumber,
+}
+
+/// A ray that was lost, with all that is needed to trace it again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LostRay {
+    /// Index of the ray.
+    pub ray: u64,
+    /// Which path of a ray that was split.
+    pub branch: u32,
+    /// Hits before it was lost.
+    pub bounce: u32,
+    /// Why.
+    pub cause: LostCause,
+    /// Its power, in quanta.
+    pub quanta: u64,
+    /// Start of its last segment, mm.
+    pub origin: Point,
+    /// Direction of its last segment.
+    pub direction: Vector,
+    /// The face where it happened, if it was at one.
+    pub face: Option<u32>,
+    /// The body it was in, as [`BoundScene::body`](crate::simulate::BoundScene::body) names it; 0 for the surroundings.
+    pub body: u16,
+}
+
+/// A vertex of a recorded path.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathVertex {
+    /// Index of the ray.
+    pub ray: u64,
+    /// Which path of a ray that was split; a new branch starts where it split off.
+    pub branch: u32,
+    /// Hits before this vertex.
+    pub bounce: u32,
+    /// Where, mm.
+    pub point: Point,
+    /// Power that arrives here, as a share of an average ray.
+    pub power: f64,
+    /// What happens here.
+    pub event: Event,
+}
+
+/// Takes vertices of paths as they come, from any thread.
+pub type PathSink<'a> = &'a (dyn Fn(&[PathVertex]) + Sync);
+
+/// What happens at a vertex of a path. Files of numbers count from 0 in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Event {
+    /// It starts at a source.
+    Emitted,
+    /// It splits off another path.
+    Split,
+    /// Reflected at a face.
+    Reflected,
+    /// Transmitted at a face.
+    Transmitted,
+    /// Scattered at a face.
+    Scattered,
+    /// It ends in a face or medium.
+    Absorbed,
+    /// It ends on a receiver.
+    Received,
+    /// It leaves the scene.
+    Escaped,
+    /// It is cut off by a limit.
+    CutOff,
+    /// It is lost.
+    Lost,
+}
+
+/// Things that happened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Rays that left a source.
+    pub rays: u64,
+    /// Nearest-hit queries, the last of each path included.
+    pub segments: u64,
+    /// Hits whose interpolated normal would have sent the ray through the wrong side, and that used the facet's own instead.
+    pub corrected_normals: u64,
+    /// Paths that were lost.
+    pub lost: u64,
+    /// Paths that a limit cut off.
+    pub cut_off: u64,
+    /// Those of them that went round by total reflection without end.
+    pub caught: u64,
+    /// Times that light left a body below the one it had come into later, of another index: two bodies that overlap.
+    pub overlaps: u64,
+    /// The two bodies of one of them, those of the lowest numbers; zeros where there are none.
+    pub overlapping: [u16; 2],
+}
+
+impl Counts {
+    pub(crate) fn add(&mut self, o: &Self) {
+        self.rays += o.rays;
+        self.segments += o.segments;
+        self.corrected_normals += o.corrected_normals;
+        self.lost += o.lost;
+        self.cut_off += o.cut_off;
+        self.caught += o.caught;
+        self.add_overlap(o.overlapping, o.overlaps);
+    }
+
+    /// Notes that these bodies overlap, met so many times.
+    pub(crate) fn add_overlap(&mut self, pair: [u16; 2], times: u64) {
+        self.overlaps += times;
+        if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {
+            self.overlapping = pair;
+        }
+    }
+}

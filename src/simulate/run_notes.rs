@@ -1,0 +1,57 @@
+//! What someone who reads the results must know about a run: light that was lost, bodies that overlap.
+
+use super::bind::BoundScene;
+use super::body::AMBIENT;
+use super::outcome::{Counts, LostCause, LostRay};
+use std::collections::BTreeMap;
+
+/// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
+/// one scene once in 10^6 segments.
+const OVERLAP_SEGMENTS: u64 = 10_000;
+
+impl BoundScene {
+    /// One sentence about bodies of different media that a run found to overlap.
+    pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
+        let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
+        let times = counts.overlaps;
+        (times > counts.segments / OVERLAP_SEGMENTS).then(|| {
+            format!(
+                "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {times} times by light; there it is \
+                 taken to be in the body that it came into last, so what is right depends on its way: cut one out of the other in the \
+                 model, or give finer facets where solids touch in curved faces"
+            )
+        })
+    }
+
+    /// One sentence about lost light: where most of it was, and why.
+    pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
+        let mut places: BTreeMap<(u16, Option<&str>, LostCause), usize> = BTreeMap::new();
+        for l in ledger {
+            let at = l.face.and_then(|f| self.instance(f));
+            *places.entry((l.body, at, l.cause)).or_default() += 1;
+        }
+        let ((body, at, cause), number) = places.into_iter().rev().max_by_key(|(_, number)| *number)?;
+        let why = match cause {
+            LostCause::NoExit => {
+                "it left the scene inside a body, by a gap between faces, an open mesh or a missing face"
+            }
+            LostCause::ImpossibleMedium => {
+                "it came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
+            }
+            LostCause::InsideSolid => {
+                "it came to a closed opaque solid from inside, as from a source that lies in it"
+            }
+            LostCause::TooDeep => "more bodies lie in each other than a ray can carry",
+            LostCause::NotANumber => "its place or direction is no number",
+        };
+        let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
+            (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
+            (None, Some(name)) => format!("at '{name}'"),
+            (None, None) => "outside all bodies".into(),
+        };
+        Some(format!(
+            "{lost} paths were lost; {number} of the {} on record {place}: {why}; `trace --replay lost_rays.csv` shows their ways",
+            ledger.len()
+        ))
+    }
+}

@@ -1,0 +1,79 @@
+//! What a simulation is run with.
+
+use super::scene::{Interfaces, Run, Sampling};
+use crate::optics::Effects;
+
+/// Rays in one wavefront: enough for the intersector to interleave, few enough that rays, paths and hits stay in the second cache.
+const WAVEFRONT: usize = 1024;
+
+/// What a simulation is run with: the scene's own settings, which the command may override, and how to spread the work.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSettings {
+    /// Number of rays that leave the sources.
+    pub rays: u64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// How sources are sampled.
+    pub sampling: Sampling,
+    /// What happens at a partly reflecting interface.
+    pub interfaces: Interfaces,
+    /// Below this share of its first power a ray is no longer split.
+    pub split_floor: f64,
+    /// Hits after which a path is cut off.
+    pub max_bounces: u32,
+    /// Length after which a path is cut off, mm.
+    pub max_length_mm: f64,
+    /// Share of its first power below which a path is cut off.
+    pub power_floor: f64,
+    /// Independent parts the run is divided into.
+    pub replicates: u32,
+    /// Threads; 0 for as many as the machine has. Changes no bit of a result.
+    pub threads: usize,
+    /// Rays in one wavefront. Changes no bit of a result.
+    pub batch: usize,
+    /// About how many paths to record.
+    pub path_samples: u64,
+    /// Which kernel to use: the smallest that the scene needs, or the one that can do everything. Changes no bit of a result.
+    pub kernel: KernelChoice,
+    /// Which part of the replicates to run: the `i`-th of `n`, from 0.
+    pub shard: [u32; 2],
+}
+
+/// Which kernel to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KernelChoice {
+    /// The smallest that the scene needs.
+    #[default]
+    Pruned,
+    /// The smallest that the scene needs and that could do these effects too.
+    With(Effects),
+    /// The one that can do everything.
+    Full,
+}
+
+impl From<&Run> for RunSettings {
+    fn from(r: &Run) -> Self {
+        Self {
+            rays: r.rays,
+            seed: r.seed,
+            sampling: r.sampling,
+            interfaces: r.interfaces,
+            split_floor: r.split_floor,
+            max_bounces: r.max_bounces,
+            max_length_mm: r.max_length_mm,
+            power_floor: r.power_floor,
+            replicates: r.replicates,
+            threads: 0,
+            batch: WAVEFRONT,
+            path_samples: 0,
+            kernel: KernelChoice::Pruned,
+            shard: [0, 1],
+        }
+    }
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self::from(&Run::default())
+    }
+}

@@ -1,0 +1,234 @@
+//! Where light ended: the tally of one replicate, and the sums over replicates.
+
+use super::bind::BoundScene;
+use super::outcome::{Counts, LostRay, PathSink, PathVertex};
+use super::plan::Plan;
+use super::receiver::Shape;
+use super::tally::{Grid, MomentSpread, Moments, Sum, quanta_as_integer};
+use crate::math::FaceId;
+use serde::{Deserialize, Serialize};
+
+/// Most lost rays that are kept; those of the lowest index.
+pub(crate) const LEDGER: usize = 1000;
+
+/// What one replicate gathered.
+#[derive(Debug)]
+pub struct ReplicateTally {
+    pub(crate) receivers: Vec<Grid>,
+    pub(crate) receiver_totals: Vec<u64>,
+    pub(crate) moments: Vec<Moments>,
+    pub(crate) absorbed: Grid,
+    pub(crate) bulk: Grid,
+    pub(crate) ends: Ends,
+    pub(crate) counts: Counts,
+    pub(crate) ledger: Vec<LostRay>,
+    pub(crate) paths: Vec<PathVertex>,
+    /// What is kept of the paths when all of them are streamed.
+    pub(crate) sample: Vec<PathVertex>,
+}
+
+/// Power by how it ended, quanta of one replicate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Ends {
+    pub(crate) emitted: u64,
+    pub(crate) received: u64,
+    pub(crate) absorbed: u64,
+    pub(crate) escaped: u64,
+    pub(crate) cut_off: u64,
+    pub(crate) lost: u64,
+}
+
+impl ReplicateTally {
+    pub(crate) fn new(bound: &BoundScene) -> Self {
+        Self {
+            receivers: bound.receivers.iter().map(|r| Grid::new(r.sum_count())).collect(),
+            receiver_totals: vec![0; bound.receivers.len()],
+            moments: vec![Moments::default(); bound.receivers.len()],
+            absorbed: Grid::new(bound.faces.len()),
+            bulk: Grid::new(bound.bodies.len()),
+            ends: Ends::default(),
+            counts: Counts::default(),
+            ledger: Vec::new(),
+            paths: Vec::new(),
+            sample: Vec::new(),
+        }
+    }
+
+    /// Empties it, as [`Tallies::take`] does, of what nobody asks about.
+    pub(crate) fn clear(&mut self) {
+        self.receivers.iter_mut().chain([&mut self.absorbed, &mut self.bulk]).for_each(Grid::clear);
+        self.receiver_totals.fill(0);
+        self.moments.fill(Moments::default());
+        self.ends = Ends::default();
+        self.counts = Counts::default();
+        self.ledger.clear();
+        self.paths.clear();
+        self.sample.clear();
+    }
+
+    /// Brings it into the state in which it can be read: receivers of absorbed power are filled, and nothing waits to be added.
+    pub(crate) fn finish(&mut self, bound: &BoundScene) {
+        for (i, receiver) in bound.receivers.iter().enumerate() {
+            if let Shape::Absorbed { faces } = &receiver.shape {
+                let sum: u64 = faces.iter().map(|&f| self.absorbed.get(f as usize)).sum();
+                self.receivers[i].add(0, sum as f64);
+                self.receiver_totals[i] += sum;
+            }
+            self.receivers[i].add_pending();
+        }
+    }
+
+    /// Hands the vertices gathered so far to whoever wants them all, and keeps the sample.
+    pub(crate) fn stream_paths(&mut self, sink: PathSink<'_>, plan: &Plan) {
+        sink(&self.paths);
+        self.sample.extend(self.paths.drain(..).filter(|v| plan.samples(v.ray)));
+    }
+
+    /// Power of a receiver, in quanta.
+    pub fn power(&self, receiver: usize) -> u64 {
+        self.receiver_totals[receiver]
+    }
+
+    /// Where light fell on a receiver.
+    pub fn moments(&self, receiver: usize) -> &Moments {
+        &self.moments[receiver]
+    }
+
+    /// The cells of a receiver that hold something, each once and in no particular order, with their quanta; those of its channels
+    /// follow those of its power.
+    pub fn cells(&self, receiver: usize) -> impl Iterator<Item = (usize, u64)> {
+        self.receivers[receiver].touched()
+    }
+
+    #[inline]
+    pub(crate) fn absorb(&mut self, face: FaceId, quanta: f64) {
+        self.ends.absorbed += quanta_as_integer(quanta);
+        self.absorbed.add(face.index(), quanta);
+    }
+
+    #[cold]
+    pub(crate) fn lose(&mut self, lost: LostRay) {
+        self.ends.lost += lost.quanta;
+        self.counts.lost += 1;
+        self.ledger.push(lost);
+        if self.ledger.len() >= 2 * LEDGER {
+            trim_ledger(&mut self.ledger);
+        }
+    }
+}
+
+/// Keeps the lost rays of the lowest index.
+fn trim_ledger(ledger: &mut Vec<LostRay>) {
+    ledger.sort_by_key(|l| (l.ray, l.branch));
+    ledger.truncate(LEDGER);
+}
+
+/// All sums of a run, or of the replicates of one shard.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tallies {
+    /// Number of replicates summed.
+    pub replicates: u32,
+    /// Cells of each receiver.
+    pub cells: Vec<Vec<Sum>>,
+    /// Power of each receiver.
+    pub receivers: Vec<Sum>,
+    /// Where light fell on each receiver.
+    pub moments: Vec<Moments>,
+    /// How that differs between replicates.
+    pub spreads: Vec<MomentSpread>,
+    /// All cells of each channel of each receiver together.
+    pub channels: Vec<Vec<Sum>>,
+    /// Power absorbed on each placed face.
+    pub faces: Vec<Sum>,
+    /// Power absorbed on each instance: its faces share the replicates' ups and downs, so their errors do not simply add up.
+    pub instances: Vec<Sum>,
+    /// Power absorbed inside each body, the surroundings first.
+    pub bulk: Vec<Sum>,
+    /// Emitted, received, absorbed, escaped, cut off, lost.
+    pub ends: [Sum; 6],
+    /// Things counted.
+    pub counts: Counts,
+    /// The lost rays of the lowest index.
+    pub ledger: Vec<LostRay>,
+    /// Vertices of the recorded paths.
+    pub paths: Vec<PathVertex>,
+}
+
+impl Tallies {
+    pub(crate) fn new(bound: &BoundScene) -> Self {
+        Self {
+            cells: bound.receivers.iter().map(|r| vec![Sum::default(); r.sum_count()]).collect(),
+            receivers: vec![Sum::default(); bound.receivers.len()],
+            moments: vec![Moments::default(); bound.receivers.len()],
+            spreads: vec![MomentSpread::default(); bound.receivers.len()],
+            channels: bound.receivers.iter().map(|r| vec![Sum::default(); r.channels.count()]).collect(),
+            faces: vec![Sum::default(); bound.faces.len()],
+            instances: vec![Sum::default(); bound.instances.len()],
+            bulk: vec![Sum::default(); bound.bodies.len()],
+            ..Self::default()
+        }
+    }
+
+    /// Takes in what a whole replicate gathered, once it is [finished](ReplicateTally::finish), and empties it.
+    pub(crate) fn take(&mut self, replicate: &mut ReplicateTally, bound: &BoundScene) {
+        self.replicates += 1;
+        for (i, receiver) in bound.receivers.iter().enumerate() {
+            let mut channels = vec![0; self.channels[i].len()];
+            if !channels.is_empty() {
+                let further = replicate.receivers[i].touched().filter(|(cell, _)| *cell >= receiver.cell_count());
+                further.for_each(|(cell, quanta)| channels[cell / receiver.cell_count() - 1] += quanta);
+            }
+            self.channels[i].iter_mut().zip(channels).for_each(|(sum, quanta)| sum.add_replicate(quanta));
+            replicate.receivers[i].flush(&mut self.cells[i]);
+            let (power, moments) =
+                (std::mem::take(&mut replicate.receiver_totals[i]), std::mem::take(&mut replicate.moments[i]));
+            self.receivers[i].add_replicate(power);
+            self.spreads[i].add_replicate(power, &moments);
+            self.moments[i].merge(&moments);
+        }
+        let mut instances = vec![0; self.instances.len()];
+        replicate.absorbed.touched().for_each(|(face, quanta)| {
+            instances[bound.instance_of_face[face] as usize] += quanta;
+        });
+        let filled = self.instances.iter_mut().zip(instances).filter(|(_, quanta)| *quanta > 0);
+        filled.for_each(|(sum, quanta)| sum.add_replicate(quanta));
+        replicate.absorbed.flush(&mut self.faces);
+        replicate.bulk.flush(&mut self.bulk);
+        let e = std::mem::take(&mut replicate.ends);
+        let ends = [e.emitted, e.received, e.absorbed, e.escaped, e.cut_off, e.lost];
+        self.ends.iter_mut().zip(ends).for_each(|(s, e)| s.add_replicate(e));
+        self.counts.add(&std::mem::take(&mut replicate.counts));
+        self.ledger.append(&mut replicate.ledger);
+        trim_ledger(&mut self.ledger);
+        self.paths.append(&mut replicate.sample);
+        self.paths.append(&mut replicate.paths);
+    }
+
+    /// Adds the sums of other replicates of the same run.
+    pub fn merge(&mut self, o: &Self) {
+        self.replicates += o.replicates;
+        self.cells.iter_mut().zip(&o.cells).for_each(|(a, b)| merge_sums(a, b));
+        merge_sums(&mut self.receivers, &o.receivers);
+        self.moments.iter_mut().zip(&o.moments).for_each(|(a, b)| a.merge(b));
+        self.spreads.iter_mut().zip(&o.spreads).for_each(|(a, b)| a.merge(b));
+        self.channels.iter_mut().zip(&o.channels).for_each(|(a, b)| merge_sums(a, b));
+        merge_sums(&mut self.faces, &o.faces);
+        merge_sums(&mut self.instances, &o.instances);
+        merge_sums(&mut self.bulk, &o.bulk);
+        self.ends.iter_mut().zip(&o.ends).for_each(|(a, b)| a.merge(b));
+        self.counts.add(&o.counts);
+        self.ledger.extend(o.ledger.iter().cloned());
+        trim_ledger(&mut self.ledger);
+        self.paths.extend(o.paths.iter().cloned());
+        self.sort_paths();
+    }
+
+    /// Brings what was gathered in any order into the one order.
+    pub(crate) fn sort_paths(&mut self) {
+        self.paths.sort_by_key(|v| (v.ray, v.branch, v.bounce, v.event));
+    }
+}
+
+fn merge_sums(into: &mut [Sum], from: &[Sum]) {
+    into.iter_mut().zip(from).for_each(|(a, b)| a.merge(b));
+}
