@@ -1,3 +1,5 @@
+//! Errors of scenes: which file, which line, which key, and what to do.
+
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -21,7 +23,7 @@ pub enum ErrorKind {
 
 /// Why a scene cannot be simulated: names the file, the key, and what to do.
 #[derive(Clone, Debug, thiserror::Error)]
-#[error("{}{message}{}", self.place(), self.help.as_ref().map(|h| format!("; {h}")).unwrap_or_default())]
+#[error("{}{message}{}", self.place(), self.advice_clause())]
 pub struct Error {
     kind: ErrorKind,
     message: String,
@@ -41,7 +43,7 @@ impl Error {
         self
     }
 
-    pub(crate) fn at(mut self, file: &str, text: &Arc<str>, span: Option<Range<usize>>) -> Self {
+    pub(crate) fn located(mut self, file: &str, text: &Arc<str>, span: Option<Range<usize>>) -> Self {
         self.file = file.into();
         self.text = Some(text.clone());
         self.span = span;
@@ -84,6 +86,10 @@ impl Error {
         let before = text.get(..span.start)?;
         let line = before.matches('\n').count() + 1;
         Some((line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1))
+    }
+
+    fn advice_clause(&self) -> String {
+        self.help.as_ref().map_or_else(String::new, |h| format!("; {h}"))
     }
 
     fn place(&self) -> String {

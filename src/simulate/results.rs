@@ -15,6 +15,12 @@ use super::tally::Sum;
 use crate::intersect::Cost;
 use serde::{Serialize, Serializer};
 
+/// Square millimetres to a square metre.
+const MM2_PER_M2: f64 = 1e6;
+
+/// Rates are told in millions.
+const MILLION: f64 = 1e6;
+
 /// Results of a simulation.
 ///
 /// Powers are in the unit of the sources (watts or lumens).
@@ -224,8 +230,8 @@ impl Results {
             rays,
             seconds: Seconds { trace, ..Seconds::default() },
             segments,
-            mrays_per_s: rays as f64 / trace / 1e6,
-            msegments_per_s: segments as f64 / trace / 1e6,
+            mrays_per_s: rays as f64 / trace / MILLION,
+            msegments_per_s: segments as f64 / trace / MILLION,
             threads,
             effects: EffectsUsed {
                 simulated: required.simulated.clone(),
@@ -288,8 +294,8 @@ impl ReceiverResult {
         let lumen = unit == PowerUnit::Lumen;
         let (per_area, per_angle) = if lumen { ("lx", "cd") } else { ("W/m2", "W/sr") };
         let (kind, unit, scale, (half, middle), angles) = match &r.shape {
-            Shape::Plane { half, .. } => ("plane", per_area, 1e6, (*half, [0.0; 2]), None),
-            Shape::Sphere { .. } => ("sphere", per_area, 1e6, ([180.0, 90.0], [0.0; 2]), None),
+            Shape::Plane { half, .. } => ("plane", per_area, MM2_PER_M2, (*half, [0.0; 2]), None),
+            Shape::Sphere { .. } => ("sphere", per_area, MM2_PER_M2, ([180.0, 90.0], [0.0; 2]), None),
             Shape::FarField { angles, low, high, .. } => {
                 ("far_field", per_angle, 1.0, degrees(*low, *high), Some(*angles))
             }

@@ -92,6 +92,7 @@ impl Area {
             }
         }
         let Some((luminous, uv)) = last else { return (Point::ZERO, Vector::Z, FaceId(0)) };
+        // At a pole, a point without area, the spline may have no normal.
         let normal = luminous.face.surface.normal(uv).unwrap_or(Vector::Z);
         let outward = if luminous.face.reversed { -normal } else { normal };
         let place = &luminous.placement;

@@ -28,12 +28,6 @@ use shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, direction_about_axis, point
 use smallvec::SmallVec;
 pub(crate) use stream::{RayIndex, Stream};
 
-/// Rays made at a time.
-const PACKET: usize = 64;
-
-/// A number of each ray of a packet.
-type PacketNumbers = [f64; PACKET];
-
 /// A source ready to emit.
 #[derive(Clone, Debug)]
 pub(crate) struct Emitter {

@@ -1,8 +1,8 @@
 //! Rays of a source made many at a time: the arithmetic of one, in loops over arrays that run in vectors.
 
+use super::Emitter;
 use super::shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, point_on_rectangle, radius_on_disc, sine_from_cosine};
-use super::stream::Stream;
-use super::{Emitter, PACKET, PacketNumbers};
+use super::stream::{PACKET, PacketNumbers, Stream};
 use crate::math::{Point, Vector};
 use crate::optics::sampling::sin_cos_turns;
 

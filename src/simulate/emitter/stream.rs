@@ -1,8 +1,13 @@
 //! The random numbers of one source in one replicate, and the order in which its rays start.
 
-use super::{PACKET, PacketNumbers};
 use crate::simulate::random::{self, Key, Purpose};
 use crate::simulate::scene::Sampling;
+
+/// Rays made at a time.
+pub(super) const PACKET: usize = 64;
+
+/// A number of each ray of a packet.
+pub(super) type PacketNumbers = [f64; PACKET];
 
 /// Bits of a cell along each side of the square in which rays are put in order.
 const CELL_BITS: u32 = 6;

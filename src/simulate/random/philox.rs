@@ -1,3 +1,5 @@
+//! The Philox counter-based random number generator.
+
 /// Ten rounds of Philox 4×32: 128 random bits from a 128-bit counter and a 64-bit key.
 ///
 /// Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. Passes BigCrush; stateless, so any

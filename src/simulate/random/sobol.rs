@@ -1,3 +1,5 @@
+//! Sobol nets with hashed Owen scrambling.
+
 use std::sync::LazyLock;
 
 /// Dimensions of the sequence: two for the place, two for the direction, one for the wavelength, one spare.

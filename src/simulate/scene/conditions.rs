@@ -48,8 +48,8 @@ pub(super) fn add(schema: &mut Value) {
         (
             "Accuracy",
             json!({"properties": {
-                "intersector": {"pattern": either(&["octree", "bvh2", "cwbvh", "exact"])},
-                "normals": {"pattern": either(&["flat", "nearest", "bilinear", "cubic", "exact"])},
+                "intersector": {"pattern": any_case_pattern(&["octree", "bvh2", "cwbvh", "exact"])},
+                "normals": {"pattern": any_case_pattern(&["flat", "nearest", "bilinear", "cubic", "exact"])},
                 "angle_deg": {"exclusiveMinimum": 0, "exclusiveMaximum": 90},
             }}),
         ),
@@ -63,11 +63,9 @@ pub(super) fn add(schema: &mut Value) {
 }
 
 /// A pattern for any of these words in any case.
-fn either(words: &[&str]) -> String {
-    let letter = |c: char| match c.is_ascii_alphabetic() {
-        true => format!("[{c}{}]", c.to_ascii_uppercase()),
-        false => c.to_string(),
-    };
+fn any_case_pattern(words: &[&str]) -> String {
+    let letter =
+        |c: char| if c.is_ascii_alphabetic() { format!("[{c}{}]", c.to_ascii_uppercase()) } else { c.to_string() };
     let words: Vec<String> = words.iter().map(|w| w.chars().map(letter).collect()).collect();
     format!("^({})$", words.join("|"))
 }

@@ -5,13 +5,16 @@ use serde::Deserializer;
 use serde::de::{Error, SeqAccess, Unexpected, Visitor};
 use std::fmt;
 
+/// Whole numbers up to this one are exact where they are written as `1e6`: just below 2⁵³.
+const LARGEST_COUNT: f64 = 9e15;
+
 /// A whole number, which may be written as `1e6`.
 pub(super) fn count<'de, D: Deserializer<'de>>(d: D) -> Result<u64, D::Error> {
     d.deserialize_any(Count)
 }
 
 /// The same where the key may be missing.
-pub(super) fn count_if_any<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u64>, D::Error> {
+pub(super) fn optional_count<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u64>, D::Error> {
     d.deserialize_any(Count).map(Some)
 }
 
@@ -22,7 +25,7 @@ pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>,
 
 /// What a schema says of a whole number that may be written as `1e6`.
 pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": 9e15})
+    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
 }
 
 /// What a schema says of two numbers, or one for both.
@@ -45,9 +48,10 @@ impl Visitor<'_> for Count {
         Ok(n)
     }
     fn visit_f64<E: Error>(self, x: f64) -> Result<u64, E> {
-        match x.fract() == 0.0 && (0.0..9e15).contains(&x) {
-            true => Ok(x as u64),
-            false => Err(E::invalid_value(Unexpected::Float(x), &self)),
+        if x.fract() == 0.0 && (0.0..LARGEST_COUNT).contains(&x) {
+            Ok(x as u64)
+        } else {
+            Err(E::invalid_value(Unexpected::Float(x), &self))
         }
     }
 }

@@ -1,3 +1,5 @@
+//! Where in a scene file something is wrong, and what was probably meant.
+
 use super::{Key, suggest};
 use crate::simulate::{Error, ErrorKind};
 use std::ops::Range;
@@ -178,5 +180,5 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
     } else {
         typed(message, e.span().map_or("", |span| key_of(text, span.start)))
     };
-    error.at(file, text, e.span())
+    error.located(file, text, e.span())
 }

@@ -1,3 +1,5 @@
+//! The keys `[[model]]` and `[[material]]`: CAD files, and what their faces are made of.
+
 use super::{Error, ErrorKind, Key, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

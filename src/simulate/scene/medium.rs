@@ -1,3 +1,5 @@
+//! The key `[[medium]]`: transparent media.
+
 use super::{Key, Scene, suggest};
 use crate::optics::{self, Absorption, BulkScatter, Index, Table, catalogue};
 use crate::simulate::{Error, ErrorKind};

@@ -117,9 +117,10 @@ impl Scene {
         let shared: Arc<str> = text.into();
         let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax(&e, file_name, &shared))?;
         scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
-        let understood = serde_json::to_value(&scene).unwrap_or_default();
+        let understood = serde_json::to_value(&scene)
+            .map_err(|e| Error::new(ErrorKind::Syntax, e.to_string()).located(file_name, &shared, None))?;
         if let Some((span, message)) = locate::lengths(text, &understood) {
-            return Err(Error::new(ErrorKind::Syntax, message).at(file_name, &shared, Some(span)));
+            return Err(Error::new(ErrorKind::Syntax, message).located(file_name, &shared, Some(span)));
         }
         scene.check()?;
         Ok(scene)
@@ -141,7 +142,7 @@ impl Scene {
     pub(crate) fn error(&self, kind: ErrorKind, path: &[Key<'_>], message: impl Into<String>) -> Error {
         let error = Error::new(kind, message);
         match &self.origin.text {
-            Some(text) => error.at(&self.origin.file, text, self.span(path)),
+            Some(text) => error.located(&self.origin.file, text, self.span(path)),
             None => error,
         }
     }
@@ -167,10 +168,11 @@ impl Scene {
         self.check_receiver_names()?;
         let sums: u64 = self.receivers.iter().map(Receiver::sums).sum();
         if sums > MOST_SUMS {
-            let largest = (0..self.receivers.len()).max_by_key(|&i| self.receivers[i].sums()).unwrap_or(0);
-            let at = [Key::Name("receiver"), Key::Index(largest), Key::Name("cells")];
+            let largest = (0..self.receivers.len()).max_by_key(|&i| self.receivers[i].sums());
+            let at = largest.map(|i| [Key::Name("receiver"), Key::Index(i), Key::Name("cells")]);
+            let at: &[Key<'_>] = at.as_ref().map_or(&[], |at| at);
             let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
-            return Err(self.error(ErrorKind::Value, &at, message).help("use fewer `cells` or fewer `bins_nm`"));
+            return Err(self.error(ErrorKind::Value, at, message).help("use fewer `cells` or fewer `bins_nm`"));
         }
         Ok(())
     }

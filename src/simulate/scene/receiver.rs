@@ -1,3 +1,5 @@
+//! The key `[[receiver]]`: where light is counted.
+
 use super::{Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;

@@ -1,7 +1,30 @@
+//! The keys `[run]` and `[accuracy]`: settings of a run, and how models are faceted and traced.
+
 use super::{Key, Scene, lenient, suggest};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// The helium d line, at which catalogues give n_d, nm.
+const HELIUM_D_NM: f64 = 587.5618;
+
+/// A kilometre: longer than any path that is not trapped, mm.
+const LONGEST_PATH_MM: f64 = 1e9;
+
+/// Share of its first power below which a path is cut off: a thousand such paths are a thousandth of one ray.
+const POWER_FLOOR: f64 = 1e-6;
+
+/// Share of its first power below which a ray is no longer split: reflections of reflections of reflections.
+const SPLIT_FLOOR: f64 = 1e-3;
+
+/// A micrometre: more than CAD systems leave between faces that touch, less than any gap that is meant.
+const GLUE_MM: f64 = 1e-3;
+
+/// Glue distances that may be asked for, mm: from the rounding of places to what would close real gaps.
+const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
+
+/// Wavelengths that may be asked for, nm: from X-rays to a millimetre.
+const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Settings of the run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
@@ -54,15 +77,15 @@ impl Default for Run {
             seed: 1,
             sampling: Sampling::Sobol,
             interfaces: Interfaces::Roulette,
-            split_floor: 1e-3,
+            split_floor: SPLIT_FLOOR,
             polarisation: false,
-            wavelength_nm: 587.5618,
+            wavelength_nm: HELIUM_D_NM,
             unit: PowerUnit::Watt,
             max_bounces: 20_000,
             caught_after: 200.0,
-            max_length_mm: 1e9,
-            power_floor: 1e-6,
-            glue_mm: 1e-3,
+            max_length_mm: LONGEST_PATH_MM,
+            power_floor: POWER_FLOOR,
+            glue_mm: GLUE_MM,
             replicates: 128,
         }
     }
@@ -160,8 +183,8 @@ impl Run {
             r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
             r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
-            r if !(1.0..=1e6).contains(&r.wavelength_nm) => fail("wavelength_nm", "must be from 1 to 1e6"),
-            r if !(1e-9..=1.0).contains(&r.glue_mm) => {
+            r if !WAVELENGTHS_NM.contains(&r.wavelength_nm) => fail("wavelength_nm", "must be from 1 to 1e6"),
+            r if !GLUES_MM.contains(&r.glue_mm) => {
                 fail("glue_mm", "must be from 1e-9 to 1: faces at the same place are always one interface")
             }
             r if r.caught_after.is_nan() || r.caught_after < 1.0 => fail("caught_after", "must be at least 1"),

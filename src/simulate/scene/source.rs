@@ -1,3 +1,5 @@
+//! The key `[[source]]`: where light comes from.
+
 use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
@@ -49,7 +51,7 @@ pub struct Source {
     /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays; by its share of the power otherwise.
-    #[serde(deserialize_with = "lenient::count_if_any")]
+    #[serde(deserialize_with = "lenient::optional_count")]
     #[schemars(schema_with = "lenient::count_schema")]
     pub rays: Option<u64>,
 }
@@ -105,90 +107,129 @@ pub enum SourceKind {
 
 impl Source {
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
-        let fail = |key: &str, message: String| {
+        let fault = (self.power_fault())
+            .or_else(|| self.file_fault())
+            .or_else(|| self.geometry_fault())
+            .or_else(|| self.light_fault(scene))
+            .or_else(|| self.lobe_fault());
+        if let Some((key, message)) = fault {
             let at = [Key::Name("source"), Key::Index(index), Key::Name(key)];
-            Err(scene.error(ErrorKind::Value, &at, message))
-        };
-        let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
-        if let Some(power) = self.power
-            && !(1e-30..=1e30).contains(&power)
-        {
-            let message = match power > 0.0 {
-                true => format!("a power of {power:e} is not within 1e-30 and 1e30"),
-                false => format!("a power of {power} is not positive"),
-            };
-            return fail("power", message);
-        }
-        let from_file =
-            matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat | SourceKind::Rays | SourceKind::Data1);
-        if from_file != self.file.is_some() {
-            let message =
-                if from_file { "this kind of source needs `file`" } else { "`file` belongs to another kind" };
-            return fail("file", message.into());
-        }
-        if self.on.is_some() && from_file {
-            return fail("on", "a measured source does not shine from faces".into());
-        }
-        if self.on.is_some() && (self.radius.is_some() || self.size.is_some()) {
-            return fail("on", "faces that shine have neither `radius` nor `size`".into());
-        }
-        let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
-        if list && (self.radius.is_some() || self.size.is_some()) {
-            let key = if self.radius.is_some() { "radius" } else { "size" };
-            return fail(key, format!("a ray list has its own places: `{key}` belongs to another kind of source"));
+            return Err(scene.error(ErrorKind::Value, &at, message));
         }
         let photometric = matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
         if photometric && self.power.is_none() && scene.run.unit != PowerUnit::Lumen {
-            let error = scene.error(
-                ErrorKind::Value,
-                &[Key::Name("source"), Key::Index(index), Key::Name("file")],
-                "this file gives lumens, but the run counts watts",
-            );
+            let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];
+            let error = scene.error(ErrorKind::Value, &at, "this file gives lumens, but the run counts watts");
             return Err(error.help("set `unit = \"lm\"` in [run], or give the source's `power` in watts"));
         }
-        if self.polarised.is_some_and(|p| !finite(&p) || p.iter().all(|x| *x == 0.0)) {
-            return fail("polarised", "`polarised` must be the direction of the electric field".into());
+        Ok(())
+    }
+
+    fn power_fault(&self) -> Fault {
+        match self.power {
+            Some(power) if POWERS.contains(&power) => None,
+            Some(power) if power > 0.0 => {
+                Some(("power", format!("a power of {power:e} is not within 1e-30 and 1e30")))
+            }
+            Some(power) => Some(("power", format!("a power of {power} is not positive"))),
+            None => None,
         }
-        if self.x.is_some_and(|x| !finite(&x) || x.iter().all(|x| *x == 0.0)) {
-            return fail("x", "`x` must be a direction".into());
+    }
+
+    /// What is wrong with the file of a source, or with keys that a source with a file has not.
+    fn file_fault(&self) -> Fault {
+        let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
+        let measured = list || matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
+        let sized = self.radius.is_some() || self.size.is_some();
+        if measured && self.file.is_none() {
+            return Some(("file", "this kind of source needs `file`".into()));
         }
-        if !finite(&self.at) {
-            return fail("at", "not a point".into());
+        if !measured && self.file.is_some() {
+            return Some(("file", "`file` belongs to another kind".into()));
         }
-        if !finite(&self.direction) || self.direction.iter().all(|x| *x == 0.0) {
-            return fail("direction", "not a direction".into());
+        if self.on.is_some() && measured {
+            return Some(("on", "a measured source does not shine from faces".into()));
+        }
+        if self.on.is_some() && sized {
+            return Some(("on", "faces that shine have neither `radius` nor `size`".into()));
+        }
+        if list && sized {
+            let key = if self.radius.is_some() { "radius" } else { "size" };
+            return Some((
+                key,
+                format!("a ray list has its own places: `{key}` belongs to another kind of source"),
+            ));
+        }
+        None
+    }
+
+    /// What is wrong with the place, the directions or the extent.
+    fn geometry_fault(&self) -> Fault {
+        let is_finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
+        let is_direction = |v: &[f64; 3]| is_finite(v) && v.iter().any(|x| *x != 0.0);
+        let is_length = |x: &f64| *x > 0.0 && x.is_finite();
+        if self.polarised.is_some_and(|p| !is_direction(&p)) {
+            return Some(("polarised", "`polarised` must be the direction of the electric field".into()));
+        }
+        if self.x.is_some_and(|x| !is_direction(&x)) {
+            return Some(("x", "`x` must be a direction".into()));
+        }
+        if !is_finite(&self.at) {
+            return Some(("at", "not a point".into()));
+        }
+        if !is_direction(&self.direction) {
+            return Some(("direction", "not a direction".into()));
         }
         if self.radius.is_some() && self.size.is_some() {
-            return fail("size", "a source has a `radius` or a `size`, not both".into());
+            return Some(("size", "a source has a `radius` or a `size`, not both".into()));
         }
-        if self.radius.is_some_and(|r| !(r > 0.0 && r.is_finite())) {
-            return fail("radius", "`radius` must be positive".into());
+        if self.radius.is_some_and(|r| !is_length(&r)) {
+            return Some(("radius", "`radius` must be positive".into()));
         }
-        if self.size.is_some_and(|s| !s.iter().all(|x| *x > 0.0 && x.is_finite())) {
-            return fail("size", "both sides of `size` must be positive".into());
+        if self.size.is_some_and(|s| !s.iter().all(is_length)) {
+            return Some(("size", "both sides of `size` must be positive".into()));
         }
+        None
+    }
+
+    /// What is wrong with the number of rays, the spectrum or the polarisation.
+    fn light_fault(&self, scene: &Scene) -> Fault {
         if self.rays == Some(0) {
-            return fail("rays", "`rays` must be positive".into());
+            return Some(("rays", "`rays` must be positive".into()));
         }
         if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(scene.run.unit)) {
-            return fail("spectrum", message);
+            return Some(("spectrum", message));
         }
         if self.polarised.is_some() && !scene.run.polarisation {
-            return fail("polarised", "polarised light needs `polarisation = true` in [run]".into());
+            return Some(("polarised", "polarised light needs `polarisation = true` in [run]".into()));
         }
+        None
+    }
+
+    /// What is wrong with the keys of the lobe.
+    fn lobe_fault(&self) -> Fault {
         match (self.kind, self.half_angle_deg, self.exponent) {
             (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}
             (SourceKind::Cone, ..) => {
-                return fail("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into());
+                return Some(("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into()));
             }
-            (_, Some(_), _) => return fail("half_angle_deg", "`half_angle_deg` belongs to a cone".into()),
+            (_, Some(_), _) => return Some(("half_angle_deg", "`half_angle_deg` belongs to a cone".into())),
             _ => {}
         }
         match (self.kind, self.exponent) {
-            (SourceKind::Cosine, Some(n)) if (0.0..=1e6).contains(&n) => Ok(()),
-            (SourceKind::Cosine, _) => fail("exponent", "a cosine source needs `exponent` in 0 to 1e6".into()),
-            (_, Some(_)) => fail("exponent", "`exponent` belongs to a cosine source".into()),
-            _ => Ok(()),
+            (SourceKind::Cosine, Some(n)) if (0.0..=LARGEST_EXPONENT).contains(&n) => None,
+            (SourceKind::Cosine, _) => Some(("exponent", "a cosine source needs `exponent` in 0 to 1e6".into())),
+            (_, Some(_)) => Some(("exponent", "`exponent` belongs to a cosine source".into())),
+            _ => None,
         }
     }
 }
+
+/// A key with what is wrong with it.
+type Fault = Option<(&'static str, String)>;
+
+/// Powers that a source may have, in the unit of the run: sums over rays neither overflow nor vanish.
+const POWERS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+
+/// Largest exponent of a cosine lobe: 0.08° wide, below which a collimated source is meant.
+const LARGEST_EXPONENT: f64 = 1e6;

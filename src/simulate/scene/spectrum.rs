@@ -1,3 +1,5 @@
+//! The key `spectrum` of a source.
+
 use super::PowerUnit;
 use crate::optics::{Spectrum, Table, Wavelengths, WhiteLed};
 use schemars::JsonSchema;

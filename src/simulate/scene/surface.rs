@@ -1,7 +1,12 @@
+//! Materials in the form that the laws of light read: coatings and scatter.
+
 use super::{Key, LobeKind, Material, Reflectance, Scene, SurfaceKind, medium};
 use crate::optics::fresnel::Power;
 use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
 use crate::simulate::{Error, ErrorKind};
+
+/// Sum of both parts of a complex index above which a slip of the decimal point is meant.
+const LARGEST_INDEX: f64 = 1e3;
 
 impl Material {
     /// The surface as a coating and a scatter, for all kinds but `absorber`; what is wrong with it otherwise, and at which key.
@@ -11,7 +16,7 @@ impl Material {
             SurfaceKind::Absorber => Coating::ideal(0.0, 0.0).map_err(|e| ("surface", e.to_string())),
             SurfaceKind::Interface => Ok(Coating::Bare),
             SurfaceKind::Metal => match self.metal {
-                Some([n, k]) if n > 0.0 && k >= 0.0 && n + k < 1e3 => Ok(Coating::Metal { n, k }),
+                Some([n, k]) if n > 0.0 && k >= 0.0 && n + k < LARGEST_INDEX => Ok(Coating::Metal { n, k }),
                 _ => Err(("metal", "a metal needs `metal = [n, k]`, n positive".into())),
             },
             SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
@@ -20,28 +25,30 @@ impl Material {
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
             },
         }?;
-        let misplaced = |key, given: bool, allowed: bool, whose: &str| match given && !allowed {
-            true => Err((key, format!("`{key}` belongs to {whose}"))),
-            false => Ok(()),
-        };
-        let (mirror, coated) =
-            (matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse), kind == SurfaceKind::Coating);
-        misplaced(
-            "reflectance",
-            self.reflectance.is_some(),
-            mirror || coated,
-            "`surface` mirror, diffuse or coating",
-        )?;
-        misplaced("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`")?;
-        misplaced("coating", self.coating.is_some(), coated, "`surface = \"coating\"`")?;
-        misplaced("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`")?;
-        let scatters = !matches!(kind, SurfaceKind::Diffuse | SurfaceKind::Absorber);
-        misplaced("scatter", self.scatter.is_some(), scatters, "a surface that is neither diffuse nor black")?;
+        self.check_keys(kind)?;
         let scatter = match kind {
             SurfaceKind::Diffuse => Some(Scatter { share: 1.0, lobe: Lobe::Lambertian }),
             _ => self.scatter().map_err(|e| ("scatter", e))?,
         };
         Ok((coating, scatter))
+    }
+
+    /// Every key must belong to this kind of surface.
+    fn check_keys(&self, kind: SurfaceKind) -> Result<(), (&'static str, String)> {
+        let mirror = matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse);
+        let coated = kind == SurfaceKind::Coating;
+        let scatters = !matches!(kind, SurfaceKind::Diffuse | SurfaceKind::Absorber);
+        let keys = [
+            ("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating"),
+            ("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`"),
+            ("coating", self.coating.is_some(), coated, "`surface = \"coating\"`"),
+            ("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`"),
+            ("scatter", self.scatter.is_some(), scatters, "a surface that is neither diffuse nor black"),
+        ];
+        match keys.into_iter().find(|(_, given, allowed, _)| *given && !allowed) {
+            Some((key, _, _, owner)) => Err((key, format!("`{key}` belongs to {owner}"))),
+            None => Ok(()),
+        }
     }
 
     fn scatter(&self) -> Result<Option<Scatter>, String> {
