@@ -1,7 +1,7 @@
 //! A scene bound to a model: what every placed face does to light, as tables indexed by [`FaceId`](crate::math::FaceId).
 //!
-//! Inner modules, each of which sees only those before it: `nearest`, `select`, `chosen`, `bound_scene`, `notes`, `wavelengths`,
-//! `bodies`, `contacts`, `materials`, `role`, and this file, which binds.
+//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `chosen`,
+//! `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
 
 mod bodies;
 mod bound_scene;
