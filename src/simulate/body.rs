@@ -35,7 +35,7 @@ pub(crate) struct Body {
 impl Body {
     pub(crate) fn new(m: optics::Medium, name: String, light: &SceneLight) -> Self {
         Self {
-            index: m.index.at(light.wavelength),
+            index: m.index.value(light.wavelength),
             dispersive: (light.coloured && m.index.is_dispersive()).then_some(m.index),
             absorption: m.absorption.coefficient(light.wavelength),
             coloured: (light.coloured && m.absorption.is_dispersive()).then_some(m.absorption),
@@ -52,7 +52,7 @@ impl Body {
     #[inline]
     pub(crate) fn index(&self, wavelength: Option<f64>) -> f64 {
         match (&self.dispersive, wavelength) {
-            (Some(index), Some(nm)) => index.at(nm),
+            (Some(index), Some(nm)) => index.value(nm),
             _ => self.index,
         }
     }

@@ -60,25 +60,10 @@ impl Scene {
             let area = select::luminous_area(self, i, model)?;
             emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?);
         }
-<<<<<<< HEAD
-        let mut receivers = Vec::new();
-        for (i, r) in self.receivers.iter().enumerate() {
-            let faces = match r.kind {
-                ReceiverKind::Absorbed => absorbing_faces(self, i, &r.part, &r.instance, model)?,
-                _ => Vec::new(),
-            };
-            receivers.push(Receiver::new(r, faces));
-        }
-        let notes = notes::beyond_tables(self, &chosen, &spectra);
-        let faces_box = model.placed_faces().map(|f| nearest::bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
-        let region = faces_box.union(Aabb::from_points(emitters.iter().flat_map(Emitter::reach)));
-        let region = if region.is_empty() { region } else { region.grown(1e-3 * region.diagonal()) };
-=======
         let receivers = bind_receivers(self, model)?;
         let faces_box = model.placed_faces().map(|f| nearest::face_bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
-        let region = faces_box.union(Aabb::around(emitters.iter().flat_map(Emitter::extent)));
+        let region = faces_box.union(Aabb::from_points(emitters.iter().flat_map(Emitter::extent)));
         let region = if region.is_empty() { region } else { region.grown(REGION_MARGIN * region.diagonal()) };
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
         let mut bound = BoundScene {
             scene: self.clone(),
             nested: nested || faces.iter().any(|f| f.touches_sibling),

@@ -60,17 +60,11 @@ pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Op
 }
 
 /// The piece of a ray around its hit that lies within the glue distance of the face, that face left out.
-<<<<<<< HEAD
-fn beside(context: &Context<'_>, ray: &Ray, hit: &Hit, point: Point) -> Ray {
-    let cos = ray.direction.dot(hit.geometric_normal).abs().max(1e-3);
-    let reach = context.bound.scene.run.glue_mm / cos;
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    Ray::new(point - ray.direction * reach, ray.direction).with_range(0.0, 2.0 * reach).with_departure(from)
-=======
 fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
     let reach = way_through_glue(context.glue_mm(), ray.direction.dot(at.hit.geometric_normal));
-    Ray::new(at.point - ray.direction * reach, ray.direction).within(0.0, 2.0 * reach).leaving(at.departure())
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
+    Ray::new(at.point - ray.direction * reach, ray.direction)
+        .with_range(0.0, 2.0 * reach)
+        .with_departure(at.departure())
 }
 
 /// Faces within the glue distance among which the partner is looked for.
@@ -101,19 +95,11 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
 /// but not past a face that stands across, as beside an edge. Without that, 4 % of what is trapped in eight touching bricks got out
 /// between their faces in 200 times their length.
 #[inline(never)]
-<<<<<<< HEAD
-pub(super) fn beyond(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
-    let mut behind = 0.0;
-    for (found, _) in met(context, next.with_range(0.0, reach)) {
-        if found.geometric_normal.dot(normal).abs() <= 0.5 {
-            return behind;
-=======
 pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
     let mut passed = 0.0;
-    for (found, _) in faces_along(context, next.within(0.0, reach)) {
+    for (found, _) in faces_along(context, next.with_range(0.0, reach)) {
         if found.geometric_normal.dot(normal).abs() <= ALIGNED {
             return passed;
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
         }
         passed = found.t.next_up();
     }
@@ -130,11 +116,7 @@ fn touching_face(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceH
         let against = found.geometric_normal.dot(at.hit.geometric_normal) < -ALIGNED;
         other.touches_body && other.body != at.face.body && opposite && against
     })?;
-<<<<<<< HEAD
-    Some((found, other, probe.point_at(found.t)))
-=======
-    Some(FaceHit { hit, face, point: probe.at(hit.t) })
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
+    Some(FaceHit { hit, face, point: probe.point_at(hit.t) })
 }
 
 /// Which of two faces at one place says what happens there.
@@ -170,24 +152,14 @@ pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vec
     let optics = context.bound.faces.get(face.index()).filter(|f| f.medium_on_opaque && f.body == AMBIENT)?;
     let reach = way_through_glue(context.glue_mm(), ray.direction.dot(normal));
     let back = ray.origin - ray.direction * reach;
-<<<<<<< HEAD
     let probe = Ray { departure: ray.departure, ..Ray::new(back, ray.direction).with_range(0.0, 2.0 * reach) };
-    let on_it = |(found, other): (Hit, FaceOptics)| {
-        other.against && other.body != optics.body && found.geometric_normal.dot(normal) < -0.5
-    };
-    met(context, probe).any(on_it).then(|| {
-        ray.t_min = beyond(context, ray, normal, reach);
-        Ray::new(ray.point_at(ray.t_min), ray.direction)
-=======
-    let probe = Ray { from: ray.from, ..Ray::new(back, ray.direction).within(0.0, 2.0 * reach) };
     let lies_on_it = |(found, other): (Hit, FaceOptics)| {
         let against = found.geometric_normal.dot(normal) < -ALIGNED;
         other.medium_on_opaque && other.body != optics.body && against
     };
     faces_along(context, probe).any(lies_on_it).then(|| {
         ray.t_min = end_of_contact(context, ray, normal, reach);
-        Ray::new(ray.at(ray.t_min), ray.direction)
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
+        Ray::new(ray.point_at(ray.t_min), ray.direction)
     })
 }
 
@@ -201,19 +173,8 @@ const DEEPEST_SLIP: f64 = 1.0;
 pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
     let probe = if at.face.opaque_solid {
         // Only light that has just left another face can have slipped in.
-<<<<<<< HEAD
-        true => Ray::new(ray.origin - ray.direction * SLIP, ray.direction)
-            .with_range(0.0, SLIP)
-            .with_departure(ray.departure?),
-        false => beside(context, ray, hit, point),
-    };
-    let found = context.intersector.intersect(&probe, &mut Cost::default())?;
-    let other = *context.bound.faces.get(found.face.index())?;
-    let entering = ray.direction.dot(found.geometric_normal) < 0.0;
-    (other.against && other.body == AMBIENT && entering).then(|| (found, other, probe.point_at(found.t)))
-=======
         let back = ray.origin - ray.direction * DEEPEST_SLIP;
-        Ray::new(back, ray.direction).within(0.0, DEEPEST_SLIP).leaving(ray.from?)
+        Ray::new(back, ray.direction).with_range(0.0, DEEPEST_SLIP).with_departure(ray.departure?)
     } else {
         probe_at(context, ray, at)
     };
@@ -221,6 +182,5 @@ pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> 
     let face = *context.bound.faces.get(hit.face.index())?;
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
     let opaque = face.medium_on_opaque && face.body == AMBIENT;
-    (opaque && entering).then(|| FaceHit { hit, face, point: probe.at(hit.t) })
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
+    (opaque && entering).then(|| FaceHit { hit, face, point: probe.point_at(hit.t) })
 }

@@ -47,9 +47,9 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
     for _ in 0..MOST_FACES {
         let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
-        let point = segment.at(hit.t);
+        let point = segment.point_at(hit.t);
         let d = segment.direction;
-        segment = Ray::new(point, d).leaving(departure(&hit));
+        segment = Ray::new(point, d).with_departure(departure(&hit));
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         crossings.cross(face.body, along < 0.0);
@@ -58,7 +58,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         }
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
         let reach = way_through_glue(context.glue_mm(), along);
-        let probe = Ray::new(point - d * reach, d).within(0.0, 2.0 * reach).leaving(departure(&hit));
+        let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(departure(&hit));
         let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let entering = d.dot(second.geometric_normal) < 0.0;
         let may_touch = |other: &&FaceOptics| {
@@ -96,7 +96,7 @@ pub(super) fn recover_media<C: RayPayload>(
         return None;
     }
     let middle = 0.5 * (ray.t_min + end.min(ray.t_min + LONGEST_LOOK));
-    let recovered = payload.moved_inside(&media_at(context, &Ray::new(ray.at(middle), ray.direction)))?;
+    let recovered = payload.moved_inside(&media_at(context, &Ray::new(ray.point_at(middle), ray.direction)))?;
     (recovered.body() != payload.body()).then_some(recovered)
 }
 

@@ -53,7 +53,7 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
     }
     let mut end = ray.t_max;
     if let Some(h) = hit {
-        if context.region.contains(ray.origin) && context.region.contains(ray.at(h.t)) {
+        if context.region.contains(ray.origin) && context.region.contains(ray.point_at(h.t)) {
             return hit;
         }
         end = h.t;
@@ -81,7 +81,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             // A sphere may be crossed twice.
             let mut passed = start;
             while let Some(t) = context.bound.receivers[r as usize].crossing(ray, passed, end) {
-                self.count_at(path, r, ray.at(t));
+                self.count_at(path, r, ray.point_at(t));
                 passed = t;
             }
         }

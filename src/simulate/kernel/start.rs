@@ -19,19 +19,20 @@ const REACHES: [f64; 4] = [1.0, 0.1, 0.01, 1e-3];
 #[inline(never)]
 pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in REACHES {
-        let probe = Ray::new(ray.origin + normal * reach, -normal).within(0.0, 2.0 * reach);
+        let probe = Ray::new(ray.origin + normal * reach, -normal).with_range(0.0, 2.0 * reach);
         let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
-        let mut point = probe.at(hit.t);
+        let mut point = probe.point_at(hit.t);
         if hit.face != face {
             // A face of a body that lies on it may come first.
-            let behind = Ray::new(point, -normal).within(0.0, context.glue_mm()).leaving(departure(&hit));
+            let behind =
+                Ray::new(point, -normal).with_range(0.0, context.glue_mm()).with_departure(departure(&hit));
             let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };
-            (point, hit) = (behind.at(next.t), next);
+            (point, hit) = (behind.point_at(next.t), next);
         }
         if hit.face == face {
             let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
             let direction = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
-            *ray = Ray::new(point, direction).leaving(departure(&hit));
+            *ray = Ray::new(point, direction).with_departure(departure(&hit));
             return below;
         }
     }

@@ -82,7 +82,7 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<R
     let reach = context.glue_mm();
     let d = ray.direction;
     let before = Ray::new(ray.origin - d * reach, d);
-    let mut probe = before.within(0.0, 2.0 * reach);
+    let mut probe = before.with_range(0.0, 2.0 * reach);
     let mut on_solid = false;
     let mut enters_opaque = false;
     let mut leaves_opaque = false;
@@ -97,7 +97,9 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<R
         }
         on_solid |= face.opaque_solid || face.body != AMBIENT;
         let rounding = rounding_at(ray.origin);
-        probe = Ray::new(probe.at(hit.t), d).within(-rounding, probe.t_max - hit.t).leaving(departure(&hit));
+        probe = Ray::new(probe.point_at(hit.t), d)
+            .with_range(-rounding, probe.t_max - hit.t)
+            .with_departure(departure(&hit));
     }
     // Over an edge a ray goes in and out at once.
     let into_opaque = enters_opaque && !leaves_opaque;

@@ -34,7 +34,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             self.end_without_face(path, ray);
             return false;
         };
-        let point = ray.at(hit.t);
+        let point = ray.point_at(hit.t);
         path.length += hit.t;
         let face = context.bound.faces.get(hit.face.index());
         let Some(&face) = face.filter(|_| hit.t.is_finite() && hit.normal.is_finite()) else {
@@ -49,49 +49,6 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body) {
             partner = self.resolve_contact(ray, &mut at);
         }
-<<<<<<< HEAD
-        leave(context, path, ray, local);
-        return false;
-    };
-    let point = ray.point_at(hit.t);
-    path.length += hit.t;
-    let Some(&face) = context.bound.faces.get(hit.face.index()) else {
-        lose(path, ray, Cause::NotANumber, Some(hit.face), local);
-        return false;
-    };
-    if !(hit.t.is_finite() && hit.normal.is_finite()) {
-        lose(path, ray, Cause::NotANumber, Some(hit.face), local);
-        return false;
-    }
-    let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-    let touched = match C::MEDIA && !entering && (face.sealed || face.against && face.body != AMBIENT) {
-        true => contact::contact(context, ray, hit, face, point),
-        false => None,
-    };
-    let pair = match C::MEDIA && context.bound.dressed && face.touching && touched.is_none() {
-        true => contact::dressed(context, ray, hit, face, point),
-        false => None,
-    };
-    let (hit, face, entering, point) = match (&touched, &pair) {
-        (Some((hit, face, point)), _) => (hit, *face, true, *point),
-        (None, Some(Ok((hit, face, point)))) => (hit, *face, !entering, *point),
-        (None, _) => (hit, face, entering, point),
-    };
-    if face.sealed && !entering {
-        record(context, path, point, Event::Lost, local);
-        lose(path, ray, Cause::InsideSolid, Some(hit.face), local);
-        return false;
-    }
-    let meeting = Meeting { hit, face, entering, point, skip: Cell::new(0.0) };
-    if C::MEDIA && (pair.is_some() || face.against && face.body == AMBIENT && path.carry.body() != AMBIENT) {
-        // Light that comes back from an opaque face does not meet the face of its own body on it once more.
-        meeting.skip.set(context.bound.scene.run.glue_mm);
-    }
-    let going = match &context.bound.surfaces[face.surface as usize] {
-        Surface::Absorber => {
-            record(context, path, point, Event::Absorbed, local);
-            local.absorb(hit.face, path.quanta);
-=======
         if let Some(partner) = &partner {
             at.hit = &partner.hit;
             at.face = partner.face;
@@ -100,7 +57,6 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if at.face.opaque_solid && !at.entering {
             self.record(path, at.point, Event::Lost);
             self.lose(path, ray, LostCause::InsideSolid, Some(at.hit.face));
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
             return false;
         }
         if C::MEDIA && at.face.medium_on_opaque && at.face.body == AMBIENT && path.payload.body() != AMBIENT {
@@ -149,35 +105,6 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         None
     }
 
-<<<<<<< HEAD
-/// A ray meets a face.
-pub(super) struct Meeting<'a> {
-    pub(super) hit: &'a Hit,
-    pub(super) face: FaceOptics,
-    pub(super) entering: bool,
-    pub(super) point: Point,
-    /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
-    pub(super) skip: Cell<f64>,
-}
-
-/// Starts the next segment; false when a limit cuts the path off.
-#[inline(always)]
-pub(super) fn onward<C: Carry>(
-    context: &Context<'_>,
-    path: &mut Path<C>,
-    ray: &mut Ray,
-    meeting: &Meeting<'_>,
-    going: Vector,
-    local: &mut Local,
-) -> bool {
-    let (hit, point) = (meeting.hit, meeting.point);
-    let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
-    path.bounce += 1;
-    let mut next = Ray::new(point, going).with_departure(from);
-    if C::MEDIA && meeting.skip.get() > 0.0 {
-        let reach = meeting.skip.get() / going.dot(hit.geometric_normal).abs().max(1e-3);
-        next.t_min = contact::beyond(context, &next, hit.geometric_normal, reach);
-=======
     /// Books what a surface does to the light of a path, and starts what goes on; false when the path ends.
     #[inline(always)]
     fn apply(&mut self, path: &mut Path<C>, ray: &mut Ray, at: &mut SurfaceInteraction<'_>) -> bool {
@@ -222,7 +149,6 @@ pub(super) fn onward<C: Carry>(
             Some(direction) => self.leave_face(path, ray, at, direction),
             None => false,
         }
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
     }
 
     /// Goes one of both ways on from a partly reflecting face, or both; the direction to go on in.
@@ -292,7 +218,7 @@ pub(super) fn onward<C: Carry>(
         direction: Vector,
     ) -> bool {
         path.bounce += 1;
-        let mut next = Ray::new(at.point, direction).leaving(at.departure());
+        let mut next = Ray::new(at.point, direction).with_departure(at.departure());
         if C::MEDIA && at.skip > 0.0 {
             let reach = way_through_glue(at.skip, direction.dot(at.hit.geometric_normal));
             next.t_min = end_of_contact(self.context, &next, at.hit.geometric_normal, reach);
@@ -317,54 +243,13 @@ pub(super) fn onward<C: Carry>(
         true
     }
 
-<<<<<<< HEAD
-/// Beer's law over the segment, for bodies that absorb.
-#[inline(always)]
-fn attenuate<C: Carry>(context: &Context<'_>, path: &mut Path<C>, length: f64, local: &mut Local) {
-    let body = path.carry.body();
-    let alpha = context.bound.bodies[body as usize].absorption(path.carry.wavelength());
-    if alpha > 0.0 {
-        let kept = whole(path.quanta * (-alpha * length).exp());
-        let taken = path.quanta - kept;
-        local.ends.absorbed += count(taken);
-        local.bulk.add(body as usize, taken);
-        path.quanta = kept;
-    }
-}
-
-/// Scattering inside a body.
-#[inline(never)]
-fn scatter<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray, local: &mut Local) -> bool {
-    let Some(scatter) = &context.bound.bodies[path.carry.body() as usize].scatter else { return false };
-    let point = ray.point_at(ray.t_max);
-    let numbers = key(context, path).pair(Purpose::BulkDirection);
-    path.length += ray.t_max;
-    stray(path);
-    path.bounce += 1;
-    record(context, path, point, Event::Scattered, local);
-    let going = scatter.sample(ray.direction, numbers);
-    if let Some(stokes) = path.carry.stokes() {
-        *stokes = Stokes::unpolarised(1.0, going);
-    }
-    proceed(context, path, ray, Ray::new(point, going), local)
-}
-
-/// The end of a path that meets no face: on a receiver, in the far field, or lost inside a body.
-#[inline(always)]
-fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: &mut Local) {
-    if path.receiver != NO_RECEIVER {
-        let point = ray.point_at(ray.t_max);
-        if C::MEDIA && around::is_out(context, &path.carry, ray, point) {
-            record(context, path, point, Event::Lost, local);
-            return lose(path, ray, Cause::NoExit, None, local);
-=======
     /// Scattering inside a body.
     #[inline(never)]
     fn scatter_in_body(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
         let body = path.payload.body();
         let Some(scatter) = &context.bound.bodies[body as usize].scatter else { return false };
-        let point = ray.at(ray.t_max);
+        let point = ray.point_at(ray.t_max);
         let numbers = path.key(context).pair(Purpose::BulkDirection);
         path.length += ray.t_max;
         path.release();
@@ -373,36 +258,9 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
         let direction = scatter.sample(ray.direction, numbers);
         if let Some(stokes) = path.payload.stokes_mut() {
             *stokes = Stokes::unpolarised(1.0, direction);
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
         }
         self.start_segment(path, ray, Ray::new(point, direction))
     }
-<<<<<<< HEAD
-    if C::MEDIA && path.carry.body() != AMBIENT {
-        match around::regained(context, &path.carry, ray, f64::INFINITY, false) {
-            Some(found) if found.body() == AMBIENT => path.carry = found,
-            _ => {
-                record(context, path, ray.point_at(1.0), Event::Lost, local);
-                return lose(path, ray, Cause::NoExit, None, local);
-            }
-        }
-    }
-    let mut caught = false;
-    for &r in &context.far {
-        let receiver = &context.bound.receivers[r as usize];
-        if let Some(spot) = receiver.direction(ray.direction) {
-            caught = true;
-            if C::PLAIN || receiver.interactions.is_none_or(|n| n == path.bounce) {
-                deposit(context, receiver, path, r, &spot, local);
-            }
-        }
-    }
-    record(context, path, ray.point_at(context.plan.reach), Event::Escaped, local);
-    let end = if caught { &mut local.ends.received } else { &mut local.ends.escaped };
-    *end += count(path.quanta);
-}
-=======
->>>>>>> 0d58269 (Untie simulate: surfaces return what becomes of light, one place books it)
 
     /// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
     #[inline(always)]
@@ -422,7 +280,7 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
     fn end_without_face(&mut self, path: &mut Path<C>, ray: &Ray) {
         let context = self.context;
         if path.receiver != NO_RECEIVER {
-            let point = ray.at(ray.t_max);
+            let point = ray.point_at(ray.t_max);
             if C::MEDIA && has_left_by_opening(context, &path.payload, ray, point) {
                 self.record(path, point, Event::Lost);
                 return self.lose(path, ray, LostCause::NoExit, None);
@@ -436,13 +294,13 @@ fn leave<C: Carry>(context: &Context<'_>, path: &mut Path<C>, ray: &Ray, local: 
             match recover_media(context, &path.payload, ray, f64::INFINITY, false) {
                 Some(recovered) if recovered.body() == AMBIENT => path.payload = recovered,
                 _ => {
-                    self.record(path, ray.at(1.0), Event::Lost);
+                    self.record(path, ray.point_at(1.0), Event::Lost);
                     return self.lose(path, ray, LostCause::NoExit, None);
                 }
             }
         }
         let received = self.count_far(path, ray);
-        self.record(path, ray.at(context.plan.drawn_length), Event::Escaped);
+        self.record(path, ray.point_at(context.plan.drawn_length), Event::Escaped);
         let end = if received { &mut self.tally.ends.received } else { &mut self.tally.ends.escaped };
         *end += quanta_as_integer(path.quanta);
     }
