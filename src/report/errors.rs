@@ -4,7 +4,7 @@ use super::maps::spoken;
 use super::{Cell, Table, figures, grouped, seconds};
 use crate::simulate::Results;
 use crate::study::default_accuracy::Chosen;
-use crate::study::figures::{Figure, Limit, ReceiverFigures};
+use crate::study::figures::{Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 
 /// A figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
@@ -78,17 +78,14 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
 }
 
 /// What would be needed to halve either error.
-pub(super) fn halving(results: &Results, error: Option<&GeometricError>) -> String {
-    // Four times the rays; sums over a scrambled net need fewer.
+pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) -> String {
+    let cost = halving(results, error);
     let mut text =
-        format!("To halve the statistical errors takes at most {} more", seconds(3.0 * results.seconds.trace));
-    if let Some(e) = error.filter(|e| e.rays > 0 && e.seconds[1] > 0.0) {
-        let s = &results.seconds;
-        let twice = s.tessellate + s.build + 1.1 * s.trace + s.tessellate + s.build;
-        let spline = e.seconds[1] * results.rays as f64 / e.rays as f64;
+        format!("To halve the statistical errors takes at most {} more", seconds(cost.statistical_seconds));
+    if let (Some(finer), Some(spline)) = (cost.geometric_seconds, cost.spline_seconds) {
         text += &format!(
             ", to halve those from the facets a run at half the tolerance of about {}, to take them away a run on the spline of about {}",
-            seconds(twice),
+            seconds(finer),
             seconds(spline)
         );
     }
@@ -163,7 +160,7 @@ pub(super) fn alternatives(chosen: &Chosen) -> Table {
             Cell::Number(a.tolerance_mm[1], 2),
             Cell::Number(a.seconds, 3),
             a.figure.as_str().into(),
-            Cell::Number(100.0 * a.geometric_share, 2),
+            a.geometric_share.map_or_else(|| "–".into(), |share| Cell::Number(100.0 * share, 2)),
             Cell::Number(a.geometric_to_statistical, 2),
         ]);
     }

@@ -253,7 +253,7 @@ impl SimulationReport<'_> {
         }
         let section = Section::new("Energy").with(table).with(receivers);
         let section = section.with(errors::figure_table(self.results, self.figures));
-        let section = section.with(errors::halving(self.results, self.geometric).as_str());
+        let section = section.with(errors::halving_cost(self.results, self.geometric).as_str());
         let measured = self.geometric.filter(|g| g.rays > 0).map(errors::changes).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternatives);
         let section = measured.chain(tried).fold(section, |s, table| s.with(table));

@@ -10,7 +10,7 @@
 //! Known weakness: errors that the pilot is too short to tell from none count as large, so that the spline is taken where facets
 //! might have done.
 
-use super::geometric_error::{GeometricError, ReceiverError, ReplicatedRun, compare, trace_replicates};
+use super::geometric_error::{GeometricError, MOST_CELLS, ReceiverError, ReplicatedRun, compare, trace_replicates};
 use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 use crate::intersect::NormalMode;
 use crate::math::Uv;
@@ -29,9 +29,10 @@ const PILOT_RAYS: [u64; 2] = [4096, 65_536];
 const SHORT_RUN: u64 = 32_768;
 /// Replicates of a pilot, which tell the standard error of a difference within 9 %.
 const REPLICATES: u32 = 64;
-/// Standard errors fall with the number of rays to this power: sums over a scrambled net faster than those over random numbers
-/// (measured on the fixtures: 0.6 to 1.0 for power and widths), cells of few rays each like random numbers.
-const NET_ORDER: f64 = 0.75;
+/// Standard errors of sums over a scrambled net fall with the number of rays to this power: 0.52 to 0.68 for power, positions and
+/// widths on the three scenes of the fixtures from 2¹⁴ to 2²⁰ rays.
+const NET_ORDER: f64 = 0.6;
+/// The same of independent random numbers, and of cells, each of which few rays reach.
 const RANDOM_ORDER: f64 = 0.5;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
@@ -39,8 +40,8 @@ const LOST: f64 = 1e-3;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Corners this near to one plane, as a share of their distances, span one: rounding of a file's twelve digits.
 const PLANE: f64 = 1e-10;
-/// Finer facets are tried up to this many times the error allowed: beyond it they are too many.
-const MOST_FINER: f64 = 20.0;
+/// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
+const MOST_FINER: f64 = 50.0;
 /// The error of interpolated normals and places falls with the tolerance at first order or faster; so much finer to be sure.
 const MARGIN: f64 = 1.5;
 /// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
@@ -86,8 +87,9 @@ pub struct Alternative {
     pub intersector: &'static str,
     /// Seconds of tracing the whole run so, from those of the pilot.
     pub seconds: f64,
-    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure.
-    pub geometric_share: f64,
+    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure;
+    /// absent where it is 0 on the spline, as the width of a perfect focus is.
+    pub geometric_share: Option<f64>,
     /// The same in standard errors of the whole run; up to 1 is allowed.
     pub geometric_to_statistical: f64,
     /// That figure, as in `focus: rms_1`.
@@ -120,7 +122,7 @@ pub struct Undecided<'a> {
 struct Worst {
     /// Geometric over allowed error.
     ratio: f64,
-    share: f64,
+    share: Option<f64>,
     figure: String,
 }
 
@@ -203,6 +205,8 @@ impl Undecided<'_> {
             ("exact", "the run is so short that the spline costs less than to find out whether facets do")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.run.rays / SHARE)) {
             ("exact", "the rays of a file cannot be divided for a pilot")
+        } else if self.has_huge_map() {
+            ("exact", "a map of so many cells takes longer to compare than the spline to trace")
         } else {
             return None;
         };
@@ -218,6 +222,11 @@ impl Undecided<'_> {
             // On flat faces nothing is changed, and that needs no rays to know.
             geometric: (intersector == "octree").then(|| GeometricError::none(self.bound)),
         })
+    }
+
+    /// Whether a receiver has so many cells that a pilot does not keep them apart.
+    fn has_huge_map(&self) -> bool {
+        self.bound.receivers.iter().any(|r| r.cell_count() > MOST_CELLS)
     }
 
     /// Whether every face is a polygon in a plane.
@@ -266,35 +275,35 @@ fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> W
     let order = if settings.sampling == Sampling::Sobol { NET_ORDER } else { RANDOM_ORDER };
     let mut worst = Worst::default();
     for r in &error.receivers {
-        let mut judge = |figure: &str, geometric: f64, allowed: f64, value: f64| {
+        let mut weigh = |figure: &str, geometric: f64, allowed: f64, value: f64| {
             let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
             if ratio > worst.ratio {
-                let share = if value != 0.0 { geometric / value.abs() } else { f64::INFINITY };
-                worst = Worst { ratio, share: share.min(f64::MAX), figure: format!("{}: {figure}", r.name) };
+                let share = (value != 0.0).then(|| geometric / value.abs());
+                worst = Worst { ratio, share, figure: format!("{}: {figure}", r.name) };
             }
         };
-        judge_receiver(r, [scale.powf(-order), scale.powf(-RANDOM_ORDER)], &mut judge);
+        each_figure(r, [scale.powf(-order), scale.powf(-RANDOM_ORDER)], &mut weigh);
     }
     worst
 }
 
-/// Hands every figure of a receiver to `judge`: its name, its geometric error, the statistical one of the whole run, its value.
-fn judge_receiver(r: &ReceiverError, [sums, cells]: [f64; 2], judge: &mut dyn FnMut(&str, f64, f64, f64)) {
+/// Hands every figure of a receiver to `weigh`: its name, its geometric error, the statistical one of the whole run, its value.
+fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut(&str, f64, f64, f64)) {
     let s = &r.statistical;
-    judge("power", r.power.geometric(), s.power * sums, r.power.spline);
+    weigh("power", r.power.geometric(), s.power * sums, r.power.spline);
     if r.unit.is_empty() {
         return;
     }
     let size = r.rms[0].spline.hypot(r.rms[1].spline);
     for (axis, name) in ["1", "2"].into_iter().enumerate() {
         let (rms, centroid) = (&r.rms[axis], &r.centroid[axis]);
-        judge(&format!("rms_{name}"), rms.geometric(), s.rms[axis] * sums, rms.spline);
+        weigh(&format!("rms_{name}"), rms.geometric(), s.rms[axis] * sums, rms.spline);
         // A position has no size of its own: what is negligible goes by that of the light.
-        judge(&format!("centroid_{name}"), centroid.geometric(), s.centroid[axis] * sums, size);
+        weigh(&format!("centroid_{name}"), centroid.geometric(), s.centroid[axis] * sums, size);
     }
     // One cell of the whole run, whose error falls with its own rays.
-    judge("max", r.peak.geometric(), s.peak * cells, r.peak.spline);
-    judge("cells", r.map.geometric.hypot(r.map.noise), s.map * cells, 1.0);
+    weigh("max", r.peak.geometric(), s.peak * cells, r.peak.spline);
+    weigh("cells", r.map.geometric.hypot(r.map.noise), s.map * cells, 1.0);
 }
 
 impl Worst {
@@ -302,6 +311,7 @@ impl Worst {
         if self.figure.is_empty() {
             return "not at all".into();
         }
-        format!("{} by {:.2e} of it, {:.2} of its standard error", self.figure, self.share, self.ratio)
+        let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {s:.1e} of it"));
+        format!("{} {by}, {:.2} of its standard error", self.figure, self.ratio)
     }
 }

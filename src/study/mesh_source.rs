@@ -1,6 +1,6 @@
 //! Where a study gets its meshes and intersectors from, and how it asks them about many rays.
 
-use super::accuracy_target::TolerancePlan;
+use super::tolerance_plan::TolerancePlan;
 use crate::intersect::{Cost, Hit, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::mesh::FacetMesh;

@@ -32,6 +32,7 @@ pub mod sample_models;
 mod scene_accuracy;
 pub mod stability;
 mod timing;
+mod tolerance_plan;
 
 pub use mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 pub use model_mesh_source::ModelMeshSource;

@@ -1,7 +1,7 @@
 //! The [`MeshSource`] of a model: the tessellator, octree, BVH, polishing and exact spline that `trace` itself uses.
 
-use super::accuracy_target::TolerancePlan;
 use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource};
+use super::tolerance_plan::TolerancePlan;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};

@@ -89,10 +89,10 @@ fn the_default_answer_is_right_on_scenes_known_in_closed_form() {
     assert!(count >= 60 && missed.len() as f64 <= 0.02 * count as f64, "{} of {count}: {missed:#?}", missed.len());
 }
 
-/// A paraboloid with an LED of 1 mm: facets of 0.05 to 0.2 mm blur what it throws by a fifth, and say so.
+/// A paraboloid with an LED of 0.2 mm: facets of 0.05 to 0.2 mm blur what it throws, and say so.
 #[test]
 fn facets_that_blur_a_lamp_say_by_how_much() {
-    let known = known_scenes::parabolic_lamp(25.0, 1.0);
+    let known = known_scenes::parabolic_lamp(25.0, 0.2);
     let truth = known.figures[0].1;
     let (bound, settings) = bind(&known);
     let source = ModelMeshSource::new(&known.model);

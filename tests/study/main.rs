@@ -2,11 +2,14 @@
 
 mod accuracy;
 mod asks;
+#[cfg(feature = "truck")]
 mod axial;
 mod check;
+#[cfg(feature = "truck")]
 mod default_figures;
 #[path = "../support/files.rs"]
 mod files;
+#[cfg(feature = "truck")]
 mod known_scenes;
 mod models;
 mod stability;

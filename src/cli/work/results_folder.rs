@@ -159,6 +159,7 @@ fn document(
     for (k, figures) in all_figures.iter().enumerate() {
         document["receivers"][k]["figures"] = json_value(figures)?;
     }
+    document["halving"] = json_value(&study::figures::halving(&run.results, run.geometric.as_ref()))?;
     if let Some(chosen) = &prepared.chosen {
         document["chosen"] = json_value(chosen)?;
     }

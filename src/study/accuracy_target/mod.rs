@@ -1,18 +1,19 @@
 //! Accuracy asked for as an angle: the local tolerances and the kind of normals that reach it most cheaply, checked.
 //!
 //! A facet of sag s on a surface of radius R met at incidence i misdirects the mirrored ray by up to 2·(s/R)·tan i with
-//! interpolated normals and 2·acos(1 − s/R) with flat ones. PilotHit rays on the spline give radius and incidence on every face, and
+//! interpolated normals and 2·acos(1 − s/R) with flat ones. Pilot rays on the spline give radius and incidence on every face, and
 //! with them a tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i); the same rays on such facets then tell how far each face
 //! is from what was asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
 //!
-//! Every kind of normals that could be the cheapest is made to reach what is asked and then timed. Known weakness: the 99th
-//! percentile is over all hits of these rays; other rays (more grazing ones) err more.
+//! Every kind of normals that could be the cheapest is made to reach what is asked and then timed. The answer names
+//! the largest error beside the 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err
+//! more.
 
 mod search;
-mod tolerance_plan;
+mod survey;
 
+pub use super::tolerance_plan::{RelativeTolerance, TolerancePlan};
 pub use search::{RayGenerator, meet_target, meet_target_for_rays};
-pub use tolerance_plan::{RelativeTolerance, TolerancePlan};
 
 use crate::intersect::NormalMode;
 use serde::Serialize;
@@ -48,7 +49,9 @@ pub struct AccuracyPlan {
     pub asked_deg: f64,
     /// Reached on fresh rays (p99), degrees.
     pub reached_deg: f64,
-    /// Whether that is within what was asked.
+    /// The largest error of these rays, degrees.
+    pub largest_deg: f64,
+    /// Whether the 99th percentile is within what was asked.
     pub kept: bool,
     /// Kind of normals to trace with.
     #[serde(serialize_with = "by_name")]

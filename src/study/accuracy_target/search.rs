@@ -1,6 +1,6 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
-use super::tolerance_plan::{Survey, TolerancePlan, factor, p99};
+use super::survey::{Survey, factor, p99};
 use super::{AccuracyPlan, AccuracyTarget, Trial};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
@@ -10,6 +10,7 @@ use crate::study::cross_check::angle_deg;
 use crate::study::mesh_source::{FacetTree, MeshSource, answer, reflect, with_intersectors};
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Clock;
+use crate::study::tolerance_plan::TolerancePlan;
 use std::time::Instant;
 
 /// Numbers written without an exponent.
@@ -33,6 +34,8 @@ const MARGIN: f64 = 0.9;
 const ACCEPTED: f64 = 0.96;
 /// Meshes made for one kind of normals.
 const ATTEMPTS: usize = 6;
+/// Share of the rays that the 99th percentile leaves out.
+const BEYOND_PERCENTILE: f64 = 0.01;
 /// A kind of normals that would need more facets than this is given up.
 const MOST_FACETS: f64 = 6e6;
 
@@ -102,10 +105,13 @@ pub fn meet_target_for_rays(
     let range =
         if low == high { format!("{} mm", brief(low)) } else { format!("{} to {} mm", brief(low), brief(high)) };
     let answer = format!(
-        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline) with {} normals on {} facets within {range}{}.",
+        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{}) with {} normals on {} facets within \
+         {range}{}.",
         target.degrees,
         brief(found.reached),
         found.checked,
+        brief(found.largest),
+        found.without_angle(),
         found.normals,
         found.facets,
         if kept { "" } else { ": not reached" }
@@ -113,6 +119,7 @@ pub fn meet_target_for_rays(
     AccuracyPlan {
         asked_deg: target.degrees,
         reached_deg: found.reached,
+        largest_deg: found.largest,
         kept,
         normals: found.normals,
         tolerance_mm: [low, high],
@@ -176,6 +183,7 @@ struct Solution {
     prepare: f64,
     trace: f64,
     reached: f64,
+    largest: f64,
     checked: u64,
     flips: u64,
 }
@@ -186,6 +194,14 @@ impl Solution {
     }
     fn seconds(&self) -> f64 {
         self.prepare + self.trace
+    }
+    /// Rays that no angle stands for, in words, where they are more than the percentile leaves out.
+    fn without_angle(&self) -> String {
+        let share = self.flips as f64 / (self.flips + self.checked).max(1) as f64;
+        if share <= BEYOND_PERCENTILE {
+            return String::new();
+        }
+        format!("; {} % more meet another face or none", brief(100.0 * share))
     }
 }
 
@@ -284,6 +300,7 @@ impl Search<'_> {
             let m = self.measure(&plan, normals, &fresh);
             let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();
             let reached = p99(&mut errors);
+            let largest = errors.iter().copied().fold(0.0, f64::max);
             let found = Solution {
                 normals,
                 plan: plan.clone(),
@@ -291,6 +308,7 @@ impl Search<'_> {
                 prepare: m.prepare,
                 trace: m.per_ray * self.target.job_rays,
                 reached,
+                largest,
                 checked: m.errors.len() as u64,
                 flips: m.flips,
             };
@@ -332,6 +350,7 @@ impl Search<'_> {
             prepare: 0.0,
             trace: 0.0,
             reached: f64::INFINITY,
+            largest: f64::INFINITY,
             checked: 0,
             flips: 0,
         }

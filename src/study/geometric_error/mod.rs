@@ -14,7 +14,7 @@ mod replicates;
 
 pub use cells::MapError;
 
-pub(in crate::study) use replicates::{ReplicatedRun, trace_replicates};
+pub(in crate::study) use replicates::{MOST_CELLS, ReplicatedRun, trace_replicates};
 
 use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, RunSettings};
@@ -82,7 +82,7 @@ pub struct ReceiverError {
     pub width: [Paired; 2],
     /// The brightest place, in the receiver's unit, over [`Self::peak_cells`] × as many cells.
     pub peak: Paired,
-    /// Cells a side that the brightest place was judged over.
+    /// Cells a side that the brightest place was judged over; 0 where there are too many cells to keep apart.
     pub peak_cells: usize,
     /// All cells together.
     pub map: MapError,
@@ -113,7 +113,7 @@ pub struct Statistical {
 impl GeometricError {
     /// Of facets that are the surface itself.
     pub(in crate::study) fn none(bound: &BoundScene) -> Self {
-        let none = |name: &String| ReceiverError { name: name.clone(), ..ReceiverError::default() };
+        let none = |name: &String| ReceiverError { name: name.clone(), peak_cells: 1, ..ReceiverError::default() };
         Self { receivers: bound.receivers.iter().map(|r| none(&r.name)).collect(), ..Self::default() }
     }
 }
@@ -150,27 +150,39 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
         return ReceiverError { name: result.name.clone(), power, statistical, ..ReceiverError::default() };
     }
     let [first, second] = [0, 1].map(|axis| estimate::moments(runs, k, axis));
-    let cells = cells::CellPairs::new(bound, runs, k);
-    let peak = cells.peak();
-    let map = cells.map();
     statistical.centroid = result.centroid_error;
     statistical.rms = result.rms_error;
-    statistical.peak = peak.statistical;
-    statistical.map = map.statistical;
-    let (layer, pooled_cells) = cells.layer();
-    ReceiverError {
+    let mut error = ReceiverError {
         name: result.name.clone(),
         unit: if result.kind == "plane" { "mm" } else { "deg" },
         power,
         centroid: [first[0], second[0]],
         rms: [first[1], second[1]],
         width: [first[2], second[2]],
-        peak: peak.density,
-        peak_cells: peak.cells,
-        map,
-        pooled_cells,
         statistical,
-        cells: layer,
+        ..ReceiverError::default()
+    };
+    if result.cells.len() <= replicates::MOST_CELLS {
+        error.set_cells(&cells::CellPairs::new(bound, runs, k));
+    }
+    error
+}
+
+impl ReceiverError {
+    /// Takes in what was found of the cells.
+    fn set_cells(&mut self, cells: &cells::CellPairs<'_>) {
+        let peak = cells.peak();
+        self.peak = peak.density;
+        self.peak_cells = peak.cells;
+        self.map = cells.map();
+        self.statistical.peak = peak.statistical;
+        self.statistical.map = self.map.statistical;
+        (self.cells, self.pooled_cells) = cells.layer();
+    }
+
+    /// Whether the cells were compared; of grids of millions they are not.
+    pub fn has_cells(&self) -> bool {
+        self.peak_cells > 0
     }
 }
 

@@ -4,6 +4,9 @@ use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, replicates, trace};
 use std::sync::Mutex;
 
+/// Cells of a receiver up to which each replicate's are kept apart: 128 MB of sums, and a tenth of a second for all replicates.
+pub(in crate::study) const MOST_CELLS: usize = 1 << 22;
+
 /// What one replicate brought to one receiver: quanta, and their moments in half sides.
 #[derive(Clone, Debug, Default)]
 pub(in crate::study) struct ReplicateSums {
@@ -69,7 +72,8 @@ pub(in crate::study) fn trace_replicates(
     settings: &RunSettings,
 ) -> ReplicatedRun {
     let count = replicates(bound, settings) as usize;
-    let cells: Vec<usize> = bound.receivers.iter().map(|r| r.cell_count()).collect();
+    let counted = |cells: usize| if cells <= MOST_CELLS { cells } else { 0 };
+    let cells: Vec<usize> = bound.receivers.iter().map(|r| counted(r.cell_count())).collect();
     let state = Mutex::new((Totals::default(), vec![Vec::new(); count]));
     let finished = |portion: &PartialRun| {
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());

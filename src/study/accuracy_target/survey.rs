@@ -1,11 +1,10 @@
-//! Tolerances that follow radius and incidence: for each face a share of its radius of curvature.
+//! What pilot rays find on the faces of a model, and the tolerances that follow from radius and incidence there.
 
 use crate::intersect::Hit;
 use crate::math::{FaceId, Ray};
 use crate::model::{Face, Model};
-use crate::tessellate::{FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
+use crate::study::tolerance_plan::{RelativeTolerance, TolerancePlan};
 use rustc_hash::FxHashMap;
-use serde::Serialize;
 
 /// Least |cos| of the incidence of a pilot: beyond 89.94° a mirrored ray errs by more than any tolerance mends.
 const GRAZING: f64 = 1e-3;
@@ -17,35 +16,6 @@ const RADII_MM: [f64; 2] = [1e-9, 1e9];
 const FLATTEST_MM: f64 = 1e12;
 /// Least and largest factor of one correction.
 const STEPS: [f64; 2] = [1e-3, 30.0];
-
-/// Local tolerances for a model: on each face in proportion to the radius of curvature.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct TolerancePlan {
-    /// Faces that enough rays met to be judged on their own.
-    pub places: Vec<RelativeTolerance>,
-    /// For all others.
-    pub other: RelativeTolerance,
-    /// No tolerance is larger, mm.
-    pub coarsest_mm: f64,
-    /// No tolerance is smaller, mm.
-    pub finest_mm: f64,
-}
-
-/// A tolerance in proportion to the radius of curvature.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct RelativeTolerance {
-    /// The placed faces; those of one face of a part stand together.
-    #[serde(serialize_with = "numbers")]
-    pub faces: Vec<FaceId>,
-    /// Tolerance over radius.
-    pub of_radius: f64,
-    /// The radii between which it follows, mm: nearly the least and the largest that rays met.
-    pub radii_mm: [f64; 2],
-}
-
-fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Error> {
-    s.collect_seq(faces.iter().map(|f| f.0))
-}
 
 /// What is known of one pilot's hit.
 #[derive(Clone, Copy, Debug)]
@@ -182,57 +152,4 @@ pub(super) fn p99(errors: &mut [f64]) -> f64 {
     }
     let k = ((errors.len() as f64 * 0.99).ceil() as usize).clamp(1, errors.len()) - 1;
     *errors.select_nth_unstable_by(k, f64::total_cmp).1
-}
-
-impl TolerancePlan {
-    /// The same tolerance everywhere.
-    pub fn uniform(tolerance_mm: f64) -> Self {
-        let other = RelativeTolerance { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
-        Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
-    }
-
-    /// The same, to be made coarser or finer within bounds.
-    pub(super) fn even(tolerance_mm: f64, [finest_mm, coarsest_mm]: [f64; 2]) -> Self {
-        Self { coarsest_mm, finest_mm, ..Self::uniform(tolerance_mm) }
-    }
-
-    /// All tolerances multiplied.
-    pub(super) fn scale(&mut self, factor: f64) {
-        for share in self.places.iter_mut().chain([&mut self.other]) {
-            share.of_radius *= factor;
-        }
-    }
-
-    /// Tolerances at the ends of the radii, mm, and the radii.
-    fn range(&self, share: &RelativeTolerance) -> ([f64; 2], [f64; 2]) {
-        let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
-        let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
-        // The radii at which exactly these are reached, so that in between it is in proportion.
-        let radii = [0, 1].map(|k| tolerance[k] / share.of_radius.max(f64::MIN_POSITIVE));
-        (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
-    }
-
-    /// What the least tolerance would be without the bounds, mm.
-    pub(super) fn unbounded_mm(&self) -> f64 {
-        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
-        shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(f64::MIN_POSITIVE)
-    }
-
-    /// Least and largest tolerance, mm.
-    pub fn tolerance_mm(&self) -> [f64; 2] {
-        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
-        let ends = shares.map(|s| self.range(s).0);
-        ends.fold([f64::INFINITY, 0.0], |[a, b], [c, d]| [a.min(c), b.max(d)])
-    }
-
-    /// Puts the plan into the mesher's settings, before overrides that are there already: those win.
-    pub fn apply(&self, settings: &mut Settings) {
-        (settings.tolerance, settings.radii) = self.range(&self.other);
-        settings.law = ToleranceLaw::Power;
-        let own = self.places.iter().map(|share| {
-            let (tolerance, radii) = self.range(share);
-            ToleranceOverride { place: FaceSelector::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
-        });
-        settings.overrides.splice(0..0, own);
-    }
 }

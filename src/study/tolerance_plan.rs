@@ -1,0 +1,87 @@
+//! Tolerances that follow the radius of curvature: for each face a share of its own.
+
+use crate::math::FaceId;
+use crate::tessellate::{FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
+use serde::Serialize;
+
+/// Local tolerances for a model: on each face in proportion to the radius of curvature.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct TolerancePlan {
+    /// Faces that enough rays met to be judged on their own.
+    pub places: Vec<RelativeTolerance>,
+    /// For all others.
+    pub other: RelativeTolerance,
+    /// No tolerance is larger, mm.
+    pub coarsest_mm: f64,
+    /// No tolerance is smaller, mm.
+    pub finest_mm: f64,
+}
+
+/// A tolerance in proportion to the radius of curvature.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RelativeTolerance {
+    /// The placed faces; those of one face of a part stand together.
+    #[serde(serialize_with = "numbers")]
+    pub faces: Vec<FaceId>,
+    /// Tolerance over radius.
+    pub of_radius: f64,
+    /// The radii between which it follows, mm: nearly the least and the largest that rays met.
+    pub radii_mm: [f64; 2],
+}
+
+fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Error> {
+    s.collect_seq(faces.iter().map(|f| f.0))
+}
+
+impl TolerancePlan {
+    /// The same tolerance everywhere.
+    pub fn uniform(tolerance_mm: f64) -> Self {
+        let other = RelativeTolerance { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
+        Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
+    }
+
+    /// The same, to be made coarser or finer within bounds.
+    pub(in crate::study) fn even(tolerance_mm: f64, [finest_mm, coarsest_mm]: [f64; 2]) -> Self {
+        Self { coarsest_mm, finest_mm, ..Self::uniform(tolerance_mm) }
+    }
+
+    /// All tolerances multiplied.
+    pub(in crate::study) fn scale(&mut self, factor: f64) {
+        for share in self.places.iter_mut().chain([&mut self.other]) {
+            share.of_radius *= factor;
+        }
+    }
+
+    /// Tolerances at the ends of the radii, mm, and the radii.
+    pub(in crate::study) fn range(&self, share: &RelativeTolerance) -> ([f64; 2], [f64; 2]) {
+        let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
+        let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
+        // The radii at which exactly these are reached, so that in between it is in proportion.
+        let radii = [0, 1].map(|k| tolerance[k] / share.of_radius.max(f64::MIN_POSITIVE));
+        (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
+    }
+
+    /// What the least tolerance would be without the bounds, mm.
+    pub(in crate::study) fn unbounded_mm(&self) -> f64 {
+        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
+        shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(f64::MIN_POSITIVE)
+    }
+
+    /// Least and largest tolerance, mm.
+    pub fn tolerance_mm(&self) -> [f64; 2] {
+        let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
+        let ends = shares.map(|s| self.range(s).0);
+        ends.fold([f64::INFINITY, 0.0], |[a, b], [c, d]| [a.min(c), b.max(d)])
+    }
+
+    /// Puts the plan into the mesher's settings, before overrides that are there already: those win.
+    pub fn apply(&self, settings: &mut Settings) {
+        (settings.tolerance, settings.radii) = self.range(&self.other);
+        settings.law = ToleranceLaw::Power;
+        let own = self.places.iter().map(|share| {
+            let (tolerance, radii) = self.range(share);
+            ToleranceOverride { place: FaceSelector::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
+        });
+        settings.overrides.splice(0..0, own);
+    }
+}
