@@ -18,7 +18,7 @@ fn file(data: &str) -> String {
     format!("ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('X'));\nENDSEC;\nDATA;\n{data}\nENDSEC;\nEND-ISO-10303-21;\n")
 }
 
-/// A plane square as an open shell; `extra` records are appended.
+/// A plane square as an open shell; `extra` records are appended, in place of those with their numbers.
 fn square(extra: &str) -> String {
     let corners = [(0, 0), (1, 0), (1, 1), (0, 1)];
     let mut d =
@@ -33,7 +33,11 @@ fn square(extra: &str) -> String {
     d += "#50=EDGE_LOOP('',(#40,#41,#42,#43));\n#51=FACE_OUTER_BOUND('',#50,.T.);\n#52=ADVANCED_FACE('',(#51),#3,.T.);\n";
     d += "#53=OPEN_SHELL('',(#52));\n#54=SHELL_BASED_SURFACE_MODEL('',(#53));\n";
     d += "#55=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#54),$);\n";
-    file(&(d + extra))
+    let replaced = |line: &&str| {
+        line.split_once('=').is_some_and(|(id, _)| extra.lines().any(|e| e.starts_with(&format!("{id}="))))
+    };
+    let kept: String = d.lines().filter(|line| !replaced(line)).map(|line| format!("{line}\n")).collect();
+    file(&(kept + extra))
 }
 
 #[test]
@@ -117,7 +121,7 @@ fn cycles_of_every_kind_end() {
 }
 
 #[test]
-fn an_assembly_that_doubles_at_every_level_is_cut_off() {
+fn an_assembly_that_doubles_at_every_level_is_refused_by_name() {
     // 40 levels of two uses each would be 10¹² instances.
     let mut d = String::new();
     for k in 0..40 {
@@ -126,10 +130,8 @@ fn an_assembly_that_doubles_at_every_level_is_cut_off() {
         d += &format!("#3{k:03}=SHAPE_REPRESENTATION('',(#2{k:03},#2{k:03}),$);\n");
     }
     d += "#3040=SHAPE_REPRESENTATION('',(#54),$);\n";
-    let start = Instant::now();
-    let import = import(&square(&d));
-    assert!(import.model.instances.len() <= 1 << 20);
-    assert!(start.elapsed() < Duration::from_secs(20));
+    let refused = read_bytes("many.stp", square(&d).as_bytes(), &Settings::default()).expect_err("2^40 squares");
+    assert!(matches!(refused.kind(), ErrorKind::TooManyPlaced { count, .. } if *count > 1 << 39), "{refused}");
 }
 
 /// Live and largest bytes on the heap: the allocator of this test counts.
@@ -212,4 +214,76 @@ fn damaged_corpus_is_read_or_refused() {
         println!("{:6.2} s {peak:7.1} MB {}", worst.as_secs_f64(), path.display());
         assert!(worst < Duration::from_secs(10) && peak < 1000.0, "{}", path.display());
     }
+}
+
+#[test]
+fn a_number_used_twice_is_named_and_its_first_instance_stands() {
+    let twice = "#10=DIRECTION('',(0.,0.,1.));\n#900=A();\n#900=B();\nENDSEC;\nEND-ISO";
+    let import = import(&square("").replace("ENDSEC;\nEND-ISO", twice));
+    assert_eq!(import.report.faces.converted, 1);
+    let problems = &import.report.problems;
+    assert_eq!(problems.len(), 2, "{problems:?}");
+    assert!(problems[0].contains("#10 ") && problems[1].contains("#900 "), "{problems:?}");
+}
+
+#[test]
+fn runs_of_codes_without_end_take_one_look_each() {
+    let start = Instant::now();
+    let name = "\\X2\\00".repeat(250_000);
+    let text = square("").replace("ADVANCED_FACE('", &format!("ADVANCED_FACE('{name}"));
+    assert_eq!(import(&text).report.faces.converted, 1);
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
+/// `levels` products, each of which holds the next one twice; the last one is a square.
+fn doubling(levels: u32) -> String {
+    let product = |k: u32| 1000 + k;
+    let mut d = String::new();
+    for k in 0..=levels {
+        d += &format!("#{}=PRODUCT_DEFINITION('','',$,$);\n", product(k));
+    }
+    for k in 0..levels {
+        for twin in 0..2 {
+            let (id, parent, child) = (2000 + 2 * k + twin, product(k), product(k + 1));
+            d += &format!("#{id}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{parent},#{child},$);\n");
+        }
+    }
+    d += &format!("#3000=PRODUCT_DEFINITION_SHAPE('','',#{});\n", product(levels));
+    square(&(d + "#3001=SHAPE_DEFINITION_REPRESENTATION(#3000,#55);\n"))
+}
+
+#[test]
+fn assemblies_that_multiply_are_counted_before_they_are_expanded() {
+    let start = Instant::now();
+    assert_eq!(import(&doubling(5)).report.instances, 32);
+    let read = |text: &str, limit: u64| {
+        read_bytes("many.stp", text.as_bytes(), &Settings { max_placed: limit, ..Settings::default() })
+    };
+    let refused = read(&doubling(40), 1 << 20).expect_err("2^40 squares");
+    assert!(matches!(refused.kind(), ErrorKind::TooManyPlaced { count, .. } if *count > 1 << 40), "{refused}");
+    assert!(read(&doubling(5), 32).is_err() && read(&doubling(5), 200).is_ok());
+    // Products that all hold each other have more paths than can be counted without walking them.
+    let mut knot = String::new();
+    for a in 0..14 {
+        knot += &format!("#{}=PRODUCT_DEFINITION('','',$,$);\n", 1000 + a);
+        for b in (0..14).filter(|b| *b != a) {
+            knot += &format!(
+                "#{}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{},#{},$);\n",
+                2000 + 14 * a + b,
+                1000 + a,
+                1000 + b
+            );
+        }
+    }
+    knot += "#3000=PRODUCT_DEFINITION_SHAPE('','',#1003);\n#3001=SHAPE_DEFINITION_REPRESENTATION(#3000,#55);\n";
+    assert!(read(&square(&knot), 1 << 16).is_err());
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
+#[test]
+fn what_stands_beyond_all_rounding_is_refused_by_name() {
+    let far = square("").replace("CARTESIAN_POINT('',(1,0,0))", "CARTESIAN_POINT('',(1.E30,0,0))");
+    let import = import(&far);
+    assert_eq!((import.report.faces.converted, import.report.faces.refused), (0, 1));
+    assert!(import.report.refusals[0].reason.contains("1e12 mm"), "{:?}", import.report.refusals);
 }

@@ -146,8 +146,8 @@ impl Face {
     pub fn area(&self) -> f64 {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
-        let mut breaks = self.surface.knots[0].clone();
-        breaks.dedup();
+        let mut breaks = self.surface.knots.clone();
+        breaks.iter_mut().for_each(Vec::dedup);
         let sweep = Sweep { face: self, breaks };
         if self.loops.is_empty() {
             let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
@@ -163,8 +163,8 @@ impl Face {
 /// The area between a curve of the parameter plane and the lower end of u.
 struct Sweep<'f> {
     face: &'f Face,
-    /// Distinct knots in u.
-    breaks: Vec<f64>,
+    /// Distinct knots in u and v, between which the density of area is smooth.
+    breaks: [Vec<f64>; 2],
 }
 
 impl Sweep<'_> {
@@ -172,10 +172,10 @@ impl Sweep<'_> {
     fn area_left_of(&self, curve: &UvCurve) -> f64 {
         let mut sum = 0.0;
         for span in curve.breakpoints().windows(2) {
-            let width = (span[1] - span[0]) / PIECES as f64;
-            for piece in 0..PIECES {
+            for piece in self.smooth_pieces(curve, [span[0], span[1]]).windows(2) {
+                let width = piece[1] - piece[0];
                 for (x, weight) in GAUSS {
-                    let d = curve.derivatives(span[0] + (piece as f64 + x) * width);
+                    let d = curve.derivatives(piece[0] + x * width);
                     if d.first.y != 0.0 {
                         sum += weight * width * d.first.y * self.row(d.point);
                     }
@@ -185,10 +185,33 @@ impl Sweep<'_> {
         sum
     }
 
+    /// Parameters at which a span of a curve is divided: at the rows of knots that a straight one crosses, at as many even steps of a
+    /// bent one.
+    fn smooth_pieces(&self, curve: &UvCurve, [t0, t1]: [f64; 2]) -> Vec<f64> {
+        let v0 = curve.evaluate(t0).y;
+        let v1 = curve.evaluate(t1).y;
+        let between = |k: &&f64| **k > v0.min(v1) && **k < v0.max(v1);
+        let crossed: Vec<f64> = self.breaks[1].iter().filter(between).copied().collect();
+        let mut cuts = vec![t0, t1];
+        if curve.degree == 1 {
+            cuts.extend(crossed.iter().map(|k| t0 + (t1 - t0) * (k - v0) / (v1 - v0)));
+        } else {
+            let count = crossed.len() + 1;
+            cuts.extend((1..count).map(|i| t0 + (t1 - t0) * i as f64 / count as f64));
+        }
+        cuts.sort_by(f64::total_cmp);
+        let mut pieces: Vec<f64> = cuts
+            .windows(2)
+            .flat_map(|w| (0..PIECES).map(|i| w[0] + (w[1] - w[0]) * i as f64 / PIECES as f64))
+            .collect();
+        pieces.push(t1);
+        pieces
+    }
+
     /// Integral of the surface's density of area from the lower end of u to a point.
     fn row(&self, end: Uv) -> f64 {
         let mut sum = 0.0;
-        for span in self.breaks.windows(2).filter(|s| s[0] < end.x) {
+        for span in self.breaks[0].windows(2).filter(|s| s[0] < end.x) {
             let width = (span[1].min(end.x) - span[0]) / PIECES as f64;
             for piece in 0..PIECES {
                 for (x, weight) in GAUSS {

@@ -4,7 +4,7 @@ use lampyris::step::{Import, Settings, read_bytes};
 use std::f64::consts::PI;
 
 /// A shell of face #900 in a file in millimetres and radians; `data` defines the face.
-fn import(data: &str) -> Import {
+pub(crate) fn import(data: &str) -> Import {
     let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
                  #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
                  #4=OPEN_SHELL('',(#900));\n#5=SHELL_BASED_SURFACE_MODEL('',(#4));\n\
@@ -23,18 +23,18 @@ fn import(data: &str) -> Import {
 }
 
 /// The area of the only face.
-fn area(import: &Import) -> f64 {
+pub(crate) fn area(import: &Import) -> f64 {
     let faces = import.report.faces;
     assert_eq!((faces.converted, faces.refused), (1, 0), "{:?}", import.report.refusals);
     crate::support::measure_model(&import.model).area
 }
 
-fn close(a: f64, b: f64, relative: f64) {
+pub(crate) fn close(a: f64, b: f64, relative: f64) {
     assert!((a / b - 1.0).abs() < relative, "{a} for {b}");
 }
 
 /// Points by id.
-fn points(list: &[(u32, [f64; 3])]) -> String {
+pub(crate) fn points(list: &[(u32, [f64; 3])]) -> String {
     list.iter().map(|(id, [x, y, z])| format!("#{id}=CARTESIAN_POINT('',({x:?},{y:?},{z:?}));\n")).collect()
 }
 
@@ -67,7 +67,7 @@ fn a_loop_that_runs_along_its_seam_bounds_the_face_whichever_way_it_runs() {
 }
 
 /// A unit square in the plane z = 0; orientation flags of the four uses and their order.
-fn square(flags: [&str; 4], order: [usize; 4]) -> String {
+pub(crate) fn square(flags: [&str; 4], order: [usize; 4]) -> String {
     let mut d = points(&[(10, [0., 0., 0.]), (11, [1., 0., 0.]), (12, [1., 1., 0.]), (13, [0., 1., 0.])]);
     d += "#20=AXIS2_PLACEMENT_3D('',#10,$,$);\n#21=PLANE('',#20);\n";
     for k in 0..4 {

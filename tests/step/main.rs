@@ -1,9 +1,12 @@
 //! Reading STEP files and the splines they hold, judged by quadrature and by figures of other programs.
 
+mod accounts;
 mod corpus;
 mod faces;
 #[path = "../support/files.rs"]
 mod files;
 mod fixtures;
 mod nurbs_properties;
+mod offsets;
+mod seams;
 mod support;

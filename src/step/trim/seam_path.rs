@@ -168,10 +168,12 @@ pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
 fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
     let n = polygon.len();
     let sides = if closed { n } else { n - 1 };
+    let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
     [-2.0, -1.0, 0.0, 1.0, 2.0].iter().any(|&k| {
         let by = period * k;
-        let lo = a.min(b) - by;
-        let hi = a.max(b) - by;
+        let slack = CROSSING_NOISE * (b - a).length();
+        let lo = a.min(b) - by - slack;
+        let hi = a.max(b) - by + slack;
         (0..sides).any(|i| {
             let (p, q) = (polygon[i], polygon[(i + 1) % n]);
             if p.x.max(q.x) < lo.x || p.x.min(q.x) > hi.x || p.y.max(q.y) < lo.y || p.y.min(q.y) > hi.y {
@@ -179,11 +181,17 @@ fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bo
             }
             let p = p + by;
             let q = q + by;
-            let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
             let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
             let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
-            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise)
-                && (s3 > noise && s4 < -noise || s3 < -noise && s4 > noise)
+            let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;
+            if s2.abs() <= noise && ends_apart {
+                // Through a corner: between what comes before it and what comes after it.
+                let on_line = |x: Uv| side(a, b, x + by).abs() <= noise;
+                let rest = if closed { n } else { n - 2 - i };
+                let next = (2..=rest).map(|k| polygon[(i + k) % n]).find(|x| !on_line(*x));
+                return next.is_some_and(|x| s1.abs() > noise && side(a, b, x + by) * s1 < 0.0);
+            }
+            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise) && ends_apart
         })
     })
 }
@@ -212,6 +220,13 @@ mod tests {
             (0, 7, start, goal)
         );
         assert!(path.points.len() > 2 && path.points.windows(2).all(|s| obstacles.leave_free(s[0], s[1])));
+        // A hole whose corners lie on the straight seam is in its way as well.
+        let turned: Vec<Uv> = obstacles.holes[0].iter().map(|p| *p + Uv::new(1.0, 0.0)).collect();
+        let through = [turned];
+        let obstacles = Obstacles { holes: &through, ..obstacles };
+        assert!(!obstacles.leave_free(Uv::new(1.0, 0.0), Uv::new(1.0, 1.0)));
+        assert!(obstacles.leave_free(Uv::new(1.3, 0.0), Uv::new(1.3, 1.0)), "a hole that is touched");
+        let obstacles = Obstacles { holes: &holes, ..obstacles };
         let foot = |p: Uv| Uv::new(p.x, 1.0);
         let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
         assert_eq!(border.points[border.points.len() - 1].y, 1.0);

@@ -1,0 +1,38 @@
+//! What an import says of its file: faces one by one, and what is no shape of a product.
+
+use crate::faces::{import, square};
+use lampyris::model::SurfaceKind;
+
+const FORWARD: [&str; 4] = [".T."; 4];
+const IN_ORDER: [usize; 4] = [0, 1, 2, 3];
+
+#[test]
+fn a_face_tells_its_layer_kind_area_and_a_point_on_it() {
+    let import = import(&(square(FORWARD, IN_ORDER) + "#100=PRESENTATION_LAYER_ASSIGNMENT('glass','',(#900));\n"));
+    let account = import.model.account();
+    assert_eq!((account.len(), account[0].instances, account[0].solids.len()), (1, 1, 1));
+    let solid = &account[0].solids[0];
+    let face = &solid.faces[0];
+    assert_eq!((solid.index, solid.closed, solid.faces.len()), (0, false, 1));
+    assert_eq!((face.id, face.kind, face.layer.as_deref()), (Some(900), SurfaceKind::Plane, Some("glass")));
+    assert!((face.area_mm2 - 1.0).abs() < 1e-12 && face.radius_mm.is_none());
+    let [x, y, z] = face.at;
+    assert!(x > 0.1 && x < 0.9 && y > 0.1 && y < 0.9 && z == 0.0, "{:?}", face.at);
+    let placed = import.model.placed_faces().next().expect("a face");
+    assert_eq!((placed.solid, placed.layer(), placed.kind()), (0, Some("glass"), SurfaceKind::Plane));
+    let text = serde_json::to_value(&account).expect("JSON");
+    assert_eq!(text[0]["solids"][0]["faces"][0]["kind"], "plane");
+}
+
+#[test]
+fn the_shape_of_an_aspect_is_no_second_face() {
+    let product = "#100=PRODUCT_DEFINITION('','',$,$);\n#101=PRODUCT_DEFINITION_SHAPE('','',#100);\n\
+                   #102=SHAPE_DEFINITION_REPRESENTATION(#101,#6);\n#103=SHAPE_ASPECT('','',#101,.T.);\n\
+                   #104=PROPERTY_DEFINITION('','Geometry of datum',#103);\n#105=SHAPE_REPRESENTATION('',(#900),#1);\n\
+                   #106=SHAPE_DEFINITION_REPRESENTATION(#104,#105);\n";
+    let import = import(&(square(FORWARD, IN_ORDER) + product));
+    assert_eq!(import.model.placed_face_count(), 1);
+    let left: Vec<(u64, &str)> = import.report.left_out.iter().map(|n| (n.id, n.entity.as_str())).collect();
+    assert_eq!(left, [(105, "SHAPE_REPRESENTATION")]);
+    assert!(import.report.left_out[0].reason.contains("#103 SHAPE_ASPECT"), "{:?}", import.report.left_out);
+}

@@ -1,0 +1,71 @@
+//! Holes where a seam or a coarse outline would have them, against closed forms.
+
+use crate::faces::{area, close, import, points};
+use std::f64::consts::PI;
+
+/// A tube of radius 10 and height 20 whose rims have their vertices at angle 0, with a window of `half` rad to both sides of a place.
+fn tube_with_window(middle: f64, half: f64) -> String {
+    let corner = |angle: f64, z: f64| [10.0 * angle.cos(), 10.0 * angle.sin(), z];
+    let (a, b) = (middle - half, middle + half);
+    points(&[
+        (10, [0., 0., 0.]),
+        (11, [0., 0., 20.]),
+        (12, [10., 0., 0.]),
+        (13, [10., 0., 20.]),
+        (14, [0., 0., 7.]),
+        (15, [0., 0., 13.]),
+        (16, corner(a, 7.)),
+        (17, corner(b, 7.)),
+        (18, corner(b, 13.)),
+        (19, corner(a, 13.)),
+    ]) + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n\
+          #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=CYLINDRICAL_SURFACE('',#30,10.);\n#32=CIRCLE('',#30,10.);\n\
+          #33=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#34=CIRCLE('',#33,10.);\n\
+          #35=AXIS2_PLACEMENT_3D('',#14,#20,#21);\n#36=CIRCLE('',#35,10.);\n\
+          #37=AXIS2_PLACEMENT_3D('',#15,#20,#21);\n#38=CIRCLE('',#37,10.);\n\
+          #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n\
+          #42=VERTEX_POINT('',#16);\n#43=VERTEX_POINT('',#17);\n#44=VERTEX_POINT('',#18);\n#45=VERTEX_POINT('',#19);\n\
+          #50=EDGE_CURVE('',#40,#40,#32,.T.);\n#51=EDGE_CURVE('',#41,#41,#34,.T.);\n\
+          #52=EDGE_CURVE('',#42,#43,#36,.T.);\n#53=EDGE_CURVE('',#43,#44,$,.T.);\n\
+          #54=EDGE_CURVE('',#45,#44,#38,.T.);\n#55=EDGE_CURVE('',#42,#45,$,.T.);\n\
+          #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+          #62=ORIENTED_EDGE('',*,*,#55,.T.);\n#63=ORIENTED_EDGE('',*,*,#54,.T.);\n\
+          #64=ORIENTED_EDGE('',*,*,#53,.F.);\n#65=ORIENTED_EDGE('',*,*,#52,.F.);\n\
+          #70=EDGE_LOOP('',(#60));\n#71=EDGE_LOOP('',(#61));\n#72=EDGE_LOOP('',(#62,#63,#64,#65));\n\
+          #80=FACE_OUTER_BOUND('',#70,.T.);\n#81=FACE_BOUND('',#71,.T.);\n#82=FACE_BOUND('',#72,.T.);\n\
+          #900=ADVANCED_FACE('',(#80,#81,#82),#31,.T.);\n"
+}
+
+#[test]
+fn a_tube_is_cut_open_around_a_hole_in_the_way_of_its_only_straight_seam() {
+    for (middle, half) in [(0.0, 0.3), (0.1, 0.4), (-0.2, 1.1), (PI, 0.3)] {
+        let import = import(&tube_with_window(middle, half));
+        close(area(&import), 400.0 * PI - 2.0 * half * 10.0 * 6.0, 1e-5);
+        assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+    }
+}
+
+#[test]
+fn a_hexagon_in_a_circle_a_little_wider_is_a_hole_in_it() {
+    // The circle's 16-sided polygon does not hold the corners.
+    let (outer, inner) = (1.0414, 1.0265);
+    let corners: Vec<(u32, [f64; 3])> = (0..6)
+        .map(|k| (100 + k, f64::from(k) * PI / 3.0 + 0.5))
+        .map(|(id, a)| (id, [inner * a.cos(), inner * a.sin(), 0.0]))
+        .collect();
+    let mut d = points(&[(10, [0., 0., 0.]), (11, [outer, 0., 0.])]) + &points(&corners);
+    d += &format!(
+        "#20=AXIS2_PLACEMENT_3D('',#10,$,$);\n#21=PLANE('',#20);\n#22=CIRCLE('',#20,{outer:?});\n#30=VERTEX_POINT('',#11);\n\
+         #40=EDGE_CURVE('',#30,#30,#22,.T.);\n#50=ORIENTED_EDGE('',*,*,#40,.T.);\n#60=EDGE_LOOP('',(#50));\n"
+    );
+    for k in 0..6 {
+        let next = (k + 1) % 6;
+        d += &format!("#13{k}=VERTEX_POINT('',#10{k});\n#14{k}=EDGE_CURVE('',#13{k},#13{next},$,.T.);\n");
+        d += &format!("#15{k}=ORIENTED_EDGE('',*,*,#14{k},.F.);\n");
+    }
+    d += "#61=EDGE_LOOP('',(#155,#154,#153,#152,#151,#150));\n#70=FACE_OUTER_BOUND('',#60,.T.);\n#71=FACE_BOUND('',#61,.T.);\n\
+          #900=ADVANCED_FACE('',(#70,#71),#21,.T.);\n";
+    let import = import(&d);
+    close(area(&import), PI * outer * outer - 1.5 * 3f64.sqrt() * inner * inner, 1e-3);
+    assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+}
