@@ -29,31 +29,31 @@ pub(crate) struct PlacedRepresentation {
 
 /// A directed relationship: what it leads to, and how that is placed.
 #[derive(Clone, Copy, Debug)]
-struct Link {
-    to: u64,
+pub(super) struct Link {
+    pub(super) to: u64,
     placement: Frame,
 }
 
-struct Usage {
-    child: u64,
+pub(super) struct Usage {
+    pub(super) child: u64,
     name: String,
     id: u64,
 }
 
 /// Structure of the file.
 pub(crate) struct Assembly<'f, 'a> {
-    file: &'f File<'a>,
+    pub(super) file: &'f File<'a>,
     /// Units by context.
     units: FxHashMap<u64, Units>,
     fallback: Units,
     /// Product definition → its representations.
-    shapes: FxHashMap<u64, Vec<u64>>,
+    pub(super) shapes: FxHashMap<u64, Vec<u64>>,
     /// Representations that stand for a product.
     owned: FxHashSet<u64>,
-    usages: FxHashMap<u64, Vec<Usage>>,
+    pub(super) usages: FxHashMap<u64, Vec<Usage>>,
     /// Usage → placement of the child in the parent.
     placements: FxHashMap<u64, Frame>,
-    links: FxHashMap<u64, Vec<Link>>,
+    pub(super) links: FxHashMap<u64, Vec<Link>>,
     /// Representations that are not the shape of a product, and what they are.
     pub(crate) left_out: Vec<(u64, String)>,
     /// Things that could not be placed.
@@ -216,22 +216,6 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// How many products and representations a walk would place, without walking: what is used twice counts twice.
-    pub(crate) fn count(&self) -> u64 {
-        let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
-        let mut counter = Counter { assembly: self, products: FxHashMap::default(), shapes: FxHashMap::default() };
-        let products: FxHashSet<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
-        let roots = products.into_iter().filter(|p| !children.contains(p));
-        let placed = roots.fold(0u64, |n, root| n.saturating_add(counter.product(root, 0)));
-        // Representations without a product nest by their mapped items.
-        let lone = self.file.entities().filter(|e| e.is_a("MAPPED_ITEM"));
-        let maps = lone
-            .filter_map(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0)?.attributes("REPRESENTATION_MAP", 0)?.id(1));
-        let maps: FxHashSet<u64> = maps.collect();
-        let largest = maps.into_iter().map(|id| counter.representation(id, 0)).max();
-        placed.max(largest.unwrap_or(1))
-    }
-
     /// Every placed representation, in the order of the file; what was visited when that became more than `limit`.
     pub(crate) fn walk(mut self, limit: u64) -> Result<(Vec<PlacedRepresentation>, Self), u64> {
         self.limit = limit;
@@ -317,30 +301,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         let usages = self.usages.remove(&definition).unwrap_or_default();
         for usage in &usages {
-            let at = match self.placements.get(&usage.id) {
-                Some(p) => *p,
-                None => Frame::IDENTITY,
-            };
-            let mut inner = owners.to_vec();
-            inner.push(usage.id);
-            self.place_product(usage.child, placement.compose(&at), usage.name.clone(), path, &inner);
+            let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
+            let inner = [owners, &[usage.id]].concat();
+            self.place_product(usage.child, placement.compose(&local), usage.name.clone(), path, &inner);
         }
         self.usages.insert(definition, usages);
         path.pop();
-    }
-
-    /// What a representation is for, when that is not the shape of a product.
-    fn purpose_besides_shape(&self, id: u64) -> Option<&'static str> {
-        let e = self.file.entity(id)?;
-        let has = |word: &str| e.keywords().any(|k| k.contains(word));
-        if has("CONSTRUCTIVE_GEOMETRY") {
-            return Some("holds construction geometry");
-        }
-        if has("DRAUGHTING") {
-            return Some("holds annotations of a drawing");
-        }
-        let shows = |k: &str| k.starts_with("PRESENTATION") || k.contains("_PRESENTATION_");
-        e.keywords().any(shows).then_some("says how something is shown")
     }
 
     fn place_representation(
@@ -364,7 +330,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
             return;
         }
-        if let Some(purpose) = self.purpose_besides_shape(id) {
+        if let Some(purpose) = purpose_besides_shape(self.file, id) {
             if self.reached.insert(id) {
                 self.left_out.push((id, purpose.into()));
             }
@@ -419,52 +385,16 @@ fn described<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
     definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
 }
 
-/// Counts what a walk would place; each product and representation is looked at once.
-struct Counter<'c, 'f, 'a> {
-    assembly: &'c Assembly<'f, 'a>,
-    /// Numbers that are known; 0 while they are being found, so that cycles end.
-    products: FxHashMap<u64, u64>,
-    shapes: FxHashMap<u64, u64>,
-}
-
-impl Counter<'_, '_, '_> {
-    fn product(&mut self, id: u64, depth: usize) -> u64 {
-        if let Some(known) = self.products.get(&id) {
-            return *known;
-        }
-        self.products.insert(id, 0);
-        let mut count = 1u64;
-        if depth < MAX_DEPTH {
-            let assembly = self.assembly;
-            for shape in assembly.shapes.get(&id).into_iter().flatten() {
-                count = count.saturating_add(self.representation(*shape, 0));
-            }
-            for usage in assembly.usages.get(&id).into_iter().flatten() {
-                count = count.saturating_add(self.product(usage.child, depth + 1));
-            }
-        }
-        self.products.insert(id, count);
-        count
+/// What a representation is for, when that is not the shape of a product.
+fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static str> {
+    let e = file.entity(id)?;
+    let has = |word: &str| e.keywords().any(|k| k.contains(word));
+    if has("CONSTRUCTIVE_GEOMETRY") {
+        return Some("holds construction geometry");
     }
-
-    fn representation(&mut self, id: u64, depth: usize) -> u64 {
-        if let Some(known) = self.shapes.get(&id) {
-            return *known;
-        }
-        self.shapes.insert(id, 0);
-        let mut count = 1u64;
-        if depth < MAX_DEPTH {
-            let file = self.assembly.file;
-            for item in self.assembly.items(id) {
-                let mapped = file.entity(item).and_then(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0));
-                let inner = mapped.and_then(|m| m.attributes("REPRESENTATION_MAP", 0)?.id(1));
-                count = count.saturating_add(inner.map_or(0, |inner| self.representation(inner, depth + 1)));
-            }
-            for link in self.assembly.links.get(&id).into_iter().flatten() {
-                count = count.saturating_add(self.representation(link.to, depth + 1));
-            }
-        }
-        self.shapes.insert(id, count);
-        count
+    if has("DRAUGHTING") {
+        return Some("holds annotations of a drawing");
     }
+    let shows = |k: &str| k.starts_with("PRESENTATION") || k.contains("_PRESENTATION_");
+    e.keywords().any(shows).then_some("says how something is shown")
 }

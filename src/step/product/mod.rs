@@ -1,6 +1,7 @@
 //! From records to parts, and to where they stand.
 //!
-//! Source: ISO 10303-43/44. An assembly places representations (`assembly`); a representation is shells of faces (`topology`, with
+//! Source: ISO 10303-43/44. An assembly places representations (`assembly`,
+//! `placed_count`); a representation is shells of faces (`topology`, with
 //! loops put in order by `loop_order` and shells turned by `orientation`), surfaces without a face and ready meshes (`free_surfaces`,
 //! `tessellated`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
 
@@ -10,6 +11,7 @@ mod free_surfaces;
 mod loop_order;
 pub(super) mod numbering;
 mod orientation;
+mod placed_count;
 pub(super) mod styles;
 mod tessellated;
 pub(super) mod topology;
