@@ -2,13 +2,16 @@
 
 use std::fs;
 
+/// As the system counts memory.
+const KILOBYTES_PER_GB: f64 = 1_000_000.0;
+
 /// Processor, number of cores and memory, as far as the system tells.
 pub(crate) fn hardware() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemTotal"));
-    let memory = memory.map(|kb| format!(", {:.0} GB", kb as f64 / 1e6)).unwrap_or_default();
+    let memory = memory.map(|kb| format!(", {:.0} GB", kb as f64 / KILOBYTES_PER_GB)).unwrap_or_default();
     format!("{cpu}, {cores} cores{memory}, {}", std::env::consts::OS)
 }
 

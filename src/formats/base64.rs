@@ -1,3 +1,5 @@
+//! Bytes as text, for data that stands within HTML, SVG and VTK files.
+
 /// Standard base64 (RFC 4648 §4, with padding).
 pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -21,7 +21,7 @@ pub fn write_data1(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
 /// When the file cannot be read, a line does not hold a ray, or the count is not that of the lines.
 pub fn read_data1(path: &Path) -> Result<Vec<LightRay>, Error> {
     let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
-    let mut lines = Lines::of(path, &text);
+    let mut lines = Lines::new(path, &text);
     let rays = lines.rays()?;
     lines.end()?;
     Ok(rays)
@@ -37,6 +37,9 @@ pub(super) fn ray_block(w: &mut dyn Write, rays: &[LightRay]) -> io::Result<()> 
     Ok(())
 }
 
+/// Largest number of lines that a head may promise: doubles count singly up to 9e15, no disk holds that many lines.
+const MOST_COUNTED: f64 = 1e15;
+
 /// The lines of a seed file that are not blank, with their numbers.
 pub(super) struct Lines<'a> {
     path: &'a Path,
@@ -45,7 +48,7 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn of(path: &'a Path, text: &'a str) -> Self {
+    pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
         let lines = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim())).filter(|(_, l)| !l.is_empty());
         Self { path, lines: Box::new(lines), at: 0 }
     }
@@ -71,7 +74,7 @@ impl<'a> Lines<'a> {
     /// The next line's whole numbers, zero or more.
     pub(super) fn counts<const N: usize>(&mut self, what: &str) -> Result<[usize; N], Error> {
         let numbers = self.numbers(N, what)?;
-        if numbers.iter().any(|x| *x < 0.0 || x.fract() != 0.0 || *x > 1e15) {
+        if numbers.iter().any(|x| *x < 0.0 || x.fract() != 0.0 || *x > MOST_COUNTED) {
             return Err(self.error(format!("whole numbers must stand here: {what}")));
         }
         Ok(std::array::from_fn(|i| numbers[i] as usize))

@@ -48,7 +48,7 @@ pub fn write_data3(path: &Path, data: &Data3) -> Result<(), Error> {
 /// When the file cannot be read or is not laid out as [`write_data3`] does; the message names the line.
 pub fn read_data3(path: &Path) -> Result<Data3, Error> {
     let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
-    let mut lines = Lines::of(path, &text);
+    let mut lines = Lines::new(path, &text);
     let [rows, columns] = lines.counts("rows and columns of the results")?;
     let mut results = Vec::new();
     if columns > 0 {

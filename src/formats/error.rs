@@ -1,3 +1,5 @@
+//! What can be wrong with a file: which, at which line, and what to do.
+
 use std::io;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,7 @@
 //! Luminous intensity in the EULUMDAT format (`.ldt`), by the `eulumdat` crate.
 
 use super::input::read_bytes;
+use super::photometry::SAME_ANGLE_DEG;
 use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
 use eulumdat::{Eulumdat, LampSet, Symmetry, TypeIndicator};
 use std::path::Path;
@@ -103,7 +104,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     let per_klm = if lumens > 0.0 { 1000.0 / lumens } else { 1.0 };
     let even = |a: &[f64]| {
         let step = a[1] - a[0];
-        if a.windows(2).all(|p| (p[1] - p[0] - step).abs() < 1e-9) { step } else { 0.0 }
+        if a.windows(2).all(|p| (p[1] - p[0] - step).abs() < SAME_ANGLE_DEG) { step } else { 0.0 }
     };
     let find = |name: &str| {
         all.keywords.iter().find(|k| k.0 == name).map_or(String::new(), |k| k.1.replace(['\n', '\r'], " "))

@@ -8,6 +8,9 @@ use crate::math::{Point, Vector};
 use serde_json::{Value, json};
 use std::path::Path;
 
+/// glTF counts in metres.
+const METRES_PER_MM: f64 = 1e-3;
+
 #[derive(Default)]
 struct Buffer {
     bytes: Vec<u8>,
@@ -115,8 +118,8 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let children: Vec<usize> = (0..nodes.len()).collect();
     // x → x, y → −z, z → y, and mm → m: a quarter turn about x.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let shift = Vector::new(middle.x, middle.z, -middle.y) * 1e-3;
-    nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [1e-3, 1e-3, 1e-3],
+    let shift = Vector::new(middle.x, middle.z, -middle.y) * METRES_PER_MM;
+    nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [METRES_PER_MM; 3],
         "rotation": [-half, 0.0, 0.0, half], "translation": shift.to_array()}));
     let mut document = json!({
         "asset": {"version": "2.0", "generator": concat!("lampyris ", env!("CARGO_PKG_VERSION"))},

@@ -1,3 +1,5 @@
+//! Values over a regular grid, and how they are written as CSV and NPZ.
+
 use super::npz::{NpyArray, write_npz};
 use super::{Error, write_atomic};
 use std::path::Path;

@@ -1,4 +1,9 @@
+//! Luminous intensity over two angles: its directions, its symmetries and its flux.
+
 use crate::math::Vector;
+
+/// Angles this near to each other are one, degrees: files write them with three decimals, sums and mirrors round them to 1e-13.
+pub(crate) const SAME_ANGLE_DEG: f64 = 1e-9;
 
 /// Luminous intensity over two angles: what an IES LM-63 or EULUMDAT file holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +88,7 @@ impl Photometry {
             let images = planes.iter().rev().map(|&(c, i)| (2.0 * about - c, i));
             let mut all: Vec<(f64, usize)> = planes.iter().copied().chain(images).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
-            all.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
+            all.dedup_by(|a, b| (a.0 - b.0).abs() < SAME_ANGLE_DEG);
             all
         };
         let all = match self.kind {
@@ -96,7 +101,7 @@ impl Photometry {
                 let left = planes.iter().filter(|p| p.0 >= 180.0).map(|&(c, i)| (540.0 - c, i));
                 let mut all: Vec<_> = right.chain(planes.iter().copied()).chain(left).collect();
                 all.sort_by(|a, b| a.0.total_cmp(&b.0));
-                all.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-9);
+                all.dedup_by(|a, b| (a.0 - b.0).abs() < SAME_ANGLE_DEG);
                 all
             }
             PhotometricType::C if first == 0.0 && last < 360.0 => {

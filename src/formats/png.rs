@@ -1,3 +1,5 @@
+//! Pictures of 8-bit colours: grids through a colour map, and PNG files.
+
 use super::{Error, ErrorKind, Grid, write_atomic};
 use std::io;
 use std::path::Path;
@@ -14,7 +16,7 @@ pub enum ColourMap {
 
 impl ColourMap {
     /// The colour at `x` in `[0, 1]`; values outside are clamped, NaN is grey.
-    pub fn at(self, x: f64) -> [u8; 3] {
+    pub fn colour(self, x: f64) -> [u8; 3] {
         if x.is_nan() {
             return [128; 3];
         }
@@ -49,7 +51,7 @@ impl Picture {
         for j in (0..ny).rev() {
             let row: Vec<u8> = (0..nx)
                 .flat_map(|i| {
-                    let colour = map.at(((grid.values[j * nx + i] - low) / span).powf(exponent));
+                    let colour = map.colour(((grid.values[j * nx + i] - low) / span).powf(exponent));
                     std::iter::repeat_n(colour, zoom).flatten()
                 })
                 .collect();

@@ -1,3 +1,5 @@
+//! Lines of points with values, as ray paths are shown and written.
+
 use crate::math::{Aabb, Point};
 
 /// Open polylines with one value each of any number of quantities: ray paths, usually.

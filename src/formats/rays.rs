@@ -23,6 +23,9 @@ pub struct LightRay {
 /// The first so many columns are needed; the wavelength may be missing.
 const REQUIRED_COLUMNS: usize = 7;
 
+/// A length this near to 1 is 1 but for rounding: a few units in the last place of a double.
+const UNIT_ROUNDING: f64 = 1e-15;
+
 /// Arrays of an NPZ file may unpack to this many times its size: directions, half of the numbers of a ray, hardly shrink.
 const MOST_INFLATION: u64 = 50;
 /// And to this much whatever its size, bytes: small files of equal rays shrink far.
@@ -44,7 +47,7 @@ impl LightRay {
             return Err("the direction has no length".into());
         }
         // A direction that is already of unit length keeps its bits.
-        let direction = if (length - 1.0).abs() < 1e-15 { given } else { given / length };
+        let direction = if (length - 1.0).abs() < UNIT_ROUNDING { given } else { given / length };
         let power = numbers[6];
         if power < 0.0 {
             return Err(format!("a power of {power}; powers must be zero or more"));

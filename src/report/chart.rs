@@ -1,3 +1,5 @@
+//! Pictures in two dimensions as plain data: series, bars and maps with their axes.
+
 use crate::formats::{ColourMap, Grid};
 
 /// A picture in two dimensions: interactive in the page, static beside it.

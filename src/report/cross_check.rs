@@ -233,11 +233,13 @@ impl CheckReport<'_> {
         }
         let section = Section::new("Rays answered differently");
         let section = match odd_rays(self.check, self.facets) {
-            Some(view) => section.with(view),
-            None => section.with("Facets and spline answered every ray alike, up to the facets' proved distance."),
+            Some(view) => section.with_block(view),
+            None => {
+                section.with_block("Facets and spline answered every ray alike, up to the facets' proved distance.")
+            }
         };
-        let section = section.with(table);
-        if self.check.disagreements.is_empty() { section } else { section.with(self.list()) }
+        let section = section.with_block(table);
+        if self.check.disagreements.is_empty() { section } else { section.with_block(self.list()) }
     }
 
     /// The rays themselves, to be looked at one by one.
@@ -270,9 +272,10 @@ impl CheckReport<'_> {
 
     fn distance(&self) -> Section {
         let who = if self.normals == "exact" { "facets' hits, moved to the spline," } else { "facets" };
-        let section =
-            Section::new("Facets against the spline").with(errors(self.check, who)).with(counts(self.check));
-        self.tables.iter().cloned().fold(section, |s, t| s.with(t))
+        let section = Section::new("Facets against the spline")
+            .with_block(errors(self.check, who))
+            .with_block(counts(self.check));
+        self.tables.iter().cloned().fold(section, |s, t| s.with_block(t))
     }
 
     fn speed(&self) -> Section {
@@ -296,6 +299,6 @@ impl CheckReport<'_> {
         let axes = [AxisStyle::linear("", ""), AxisStyle::linear("rate", "million rays/s")];
         let caption = "One thread; longer is better.";
         let chart = Chart { content, ..Chart::series("rates", "Rates", caption, axes, Vec::new()) };
-        Section::new("Speed").with(chart).with(table)
+        Section::new("Speed").with_block(chart).with_block(table)
     }
 }

@@ -1,3 +1,5 @@
+//! A result for people as plain data: title, answer, sections of text, pictures and tables.
+
 use super::{Chart, Provenance, Table, View};
 
 /// A result for people.
@@ -43,7 +45,7 @@ impl Section {
     }
 
     /// The section with one more block.
-    pub fn with(mut self, block: impl Into<Block>) -> Self {
+    pub fn with_block(mut self, block: impl Into<Block>) -> Self {
         self.blocks.push(block.into());
         self
     }

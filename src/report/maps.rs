@@ -109,7 +109,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
         let sum: f64 = grid.values.iter().sum();
         format!(
             "Statistical error of a cell, weighted by its light: {} %. ",
-            figures(100.0 * e.iter().sum::<f64>() / sum.max(1e-300), 2)
+            figures(100.0 * e.iter().sum::<f64>() / sum.max(f64::MIN_POSITIVE), 2)
         )
     });
     let cells = format!(

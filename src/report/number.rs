@@ -1,5 +1,11 @@
 //! Numbers for people: as many digits as mean something, thousands set apart, units that fit the size.
 
+/// Prefixes of the SI.
+const MILLI: f64 = 1e-3;
+const KILO: f64 = 1e3;
+const MEGA: f64 = 1e6;
+const GIGA: f64 = 1e9;
+
 /// A number with so many significant digits, without exponent where that stays short, thousands apart: `0.0123`, `1 234`, `3.2e-9`.
 pub fn figures(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -38,8 +44,8 @@ pub fn grouped(value: u64) -> String {
 pub fn seconds(value: f64) -> String {
     match value {
         v if !v.is_finite() => "–".into(),
-        v if v < 1e-3 => format!("{} µs", figures(v * 1e6, 3)),
-        v if v < 1.0 => format!("{} ms", figures(v * 1e3, 3)),
+        v if v < MILLI => format!("{} µs", figures(v * MEGA, 3)),
+        v if v < 1.0 => format!("{} ms", figures(v * KILO, 3)),
         v if v < 120.0 => format!("{} s", figures(v, 3)),
         v => format!("{} min {} s", (v / 60.0).floor(), (v % 60.0).round()),
     }
@@ -49,10 +55,10 @@ pub fn seconds(value: f64) -> String {
 pub fn bytes(value: u64) -> String {
     let value = value as f64;
     match value {
-        v if v < 1e3 => format!("{v} B"),
-        v if v < 1e6 => format!("{} kB", figures(v / 1e3, 3)),
-        v if v < 1e9 => format!("{} MB", figures(v / 1e6, 3)),
-        v => format!("{} GB", figures(v / 1e9, 3)),
+        v if v < KILO => format!("{v} B"),
+        v if v < MEGA => format!("{} kB", figures(v / KILO, 3)),
+        v if v < GIGA => format!("{} MB", figures(v / MEGA, 3)),
+        v => format!("{} GB", figures(v / GIGA, 3)),
     }
 }
 

@@ -37,7 +37,7 @@ fn indices(values: impl Iterator<Item = u32>) -> Value {
 
 fn colour_scale(map: ColourMap) -> Value {
     let stop = |k: u32| {
-        let [r, g, b] = map.at(f64::from(k) / 16.0);
+        let [r, g, b] = map.colour(f64::from(k) / 16.0);
         json!([f64::from(k) / 16.0, format!("rgb({r},{g},{b})")])
     };
     (0..=16).map(stop).collect()

@@ -1,3 +1,5 @@
+//! Where the numbers of a report come from.
+
 use serde::Serialize;
 
 /// Where numbers come from: everything needed to get them again.

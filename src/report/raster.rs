@@ -96,6 +96,9 @@ impl Canvas {
 /// Where the camera stands, as a direction towards it: the same as that of the interactive view.
 pub(super) const EYE: [f64; 3] = [0.75, -1.25, 0.85];
 
+/// A view of a single point is drawn as if it reached so far, mm.
+const LEAST_REACH_MM: f32 = 1e-6;
+
 /// The view as a picture of 1200 × 800 pixels.
 pub(super) fn render(view: &View) -> Picture {
     let mut canvas = Canvas::new();
@@ -105,7 +108,7 @@ pub(super) fn render(view: &View) -> Picture {
     let up = back.cross(right);
     // The eight corners of the box decide the scale, so that nothing is cut off.
     let middle = (low + high) * 0.5;
-    let mut reach = Vec2::splat(1e-6);
+    let mut reach = Vec2::splat(LEAST_REACH_MM);
     for k in 0..8 {
         let corner =
             Vec3::new([low.x, high.x][k & 1], [low.y, high.y][k >> 1 & 1], [low.z, high.z][k >> 2]) - middle;
@@ -134,7 +137,7 @@ pub(super) fn render(view: &View) -> Picture {
                     let base = match values {
                         Some(v) => v
                             .map
-                            .at(f64::from((v.values[t] - lo) / (hi - lo).max(1e-30)))
+                            .colour(f64::from((v.values[t] - lo) / (hi - lo).max(f32::MIN_POSITIVE)))
                             .map(|x| f32::from(x) / 255.0),
                         None => colour.map(|c| c as f32),
                     };

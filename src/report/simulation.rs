@@ -13,6 +13,9 @@ use crate::study::default_accuracy::Chosen;
 use crate::study::figures::ReceiverFigures;
 use crate::study::geometric_error::GeometricError;
 
+/// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
+const WORTH_A_SENTENCE: f64 = 1e-4;
+
 /// Everything that the report of a traced scene speaks of.
 pub struct SimulationReport<'a> {
     /// Title of the scene.
@@ -126,7 +129,7 @@ impl SimulationReport<'_> {
     fn cut_off(&self) -> String {
         let r = self.results;
         let share = r.power.cut_off / r.power.emitted;
-        if share < 1e-4 {
+        if share < WORTH_A_SENTENCE {
             return String::new();
         }
         let why = match (r.caught_rays, r.cut_off_rays - r.caught_rays) {
@@ -163,7 +166,7 @@ impl SimulationReport<'_> {
 
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
-        let mut section = notes.fold(Section::new("Light"), |s, note| s.with(note.as_str()));
+        let mut section = notes.fold(Section::new("Light"), |s, note| s.with_block(note.as_str()));
         let grids = |r| [photometric_grid(r), receiver_grid(r)].into_iter().flatten().map(move |grid| (r, grid));
         let mut maps: Vec<(&ReceiverResult, Grid)> = self.results.receivers.iter().flat_map(grids).collect();
         // Directions first: what a lamp is judged by.
@@ -188,17 +191,17 @@ impl SimulationReport<'_> {
             } else {
                 format!("{}-{}", file_stem(&r.name), grid.unit)
             };
-            section = section.with(Chart::map(&name, &title, &reading(r, &grid), grid));
+            section = section.with_block(Chart::map(&name, &title, &reading(r, &grid), grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
-                section = section.with(view).with(cuts);
+                section = section.with_block(view).with_block(cuts);
             }
         }
         if let Some(view) = view {
-            section = section.with(view);
+            section = section.with_block(view);
         }
         for sentence in &self.comparison {
-            section = section.with(sentence.as_str());
+            section = section.with_block(sentence.as_str());
         }
         section
     }
@@ -251,14 +254,14 @@ impl SimulationReport<'_> {
                 Cell::Number(r.rms_error[1], 2),
             ]);
         }
-        let section = Section::new("Energy").with(table).with(receivers);
-        let section = section.with(errors::figure_table(self.results, self.figures));
-        let section = section.with(errors::halving_cost(self.results, self.geometric).as_str());
+        let section = Section::new("Energy").with_block(table).with_block(receivers);
+        let section = section.with_block(errors::figure_table(self.results, self.figures));
+        let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
         let measured = self.geometric.filter(|g| g.rays > 0).map(errors::changes).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternatives);
-        let section = measured.chain(tried).fold(section, |s, table| s.with(table));
+        let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
-            section.with(self.channels())
+            section.with_block(self.channels())
         } else {
             section
         }
@@ -297,11 +300,11 @@ impl SimulationReport<'_> {
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";
         let section = Section::new("Cross-check")
-            .with(text)
-            .with(cross_check::counts(check))
-            .with(cross_check::errors(check, "facets"));
+            .with_block(text)
+            .with_block(cross_check::counts(check))
+            .with_block(cross_check::errors(check, "facets"));
         match cross_check::odd_rays(check, self.facets) {
-            Some(view) => section.with(view),
+            Some(view) => section.with_block(view),
             None => section,
         }
     }
@@ -320,7 +323,7 @@ impl SimulationReport<'_> {
                 table.row([name.into(), word.into(), b.because.as_str().into()]);
             }
         }
-        Section::new("What was simulated, what not, and why").with(table)
+        Section::new("What was simulated, what not, and why").with_block(table)
     }
 
     fn cost(&self) -> Section {
@@ -344,7 +347,7 @@ impl SimulationReport<'_> {
             table.row([name.into(), Cell::Number(time, 3), what.into()]);
         }
         let section = Section::new("Model, facets and times");
-        let section = self.views.iter().cloned().fold(section, |s, v| s.with(v)).with(table);
-        self.tables.iter().cloned().fold(section, |s, t| s.with(Block::Table(t)))
+        let section = self.views.iter().cloned().fold(section, |s, v| s.with_block(v)).with_block(table);
+        self.tables.iter().cloned().fold(section, |s, t| s.with_block(Block::Table(t)))
     }
 }

@@ -37,7 +37,8 @@ impl Scale {
         Self { low, high, log: axis.log, from, to }
     }
 
-    fn at(&self, value: f64) -> f64 {
+    /// Where a value stands in the picture.
+    fn position(&self, value: f64) -> f64 {
         let part = if self.log {
             (value.max(f64::MIN_POSITIVE).ln() - self.low.ln()) / (self.high.ln() - self.low.ln())
         } else {
@@ -77,7 +78,7 @@ const NUMBER_OPACITY: f64 = 0.75;
 
 /// The chart as a drawing.
 pub(super) fn draw(chart: &Chart) -> Drawing {
-    let size = [WIDTH, HEIGHT + more(chart)];
+    let size = [WIDTH, HEIGHT + extra_height(chart)];
     let mut drawing = Drawing { title: chart.title.clone(), size, elements: Vec::new() };
     let elements = &mut drawing.elements;
     match &chart.content {
@@ -104,16 +105,16 @@ fn label(text: String, place: Place, anchor: Anchor) -> Element {
 fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
     let [left, top, _, bottom] = AREA;
     for t in y.ticks() {
-        let at = y.at(t);
+        let at = y.position(t);
         elements.push(grid_line([left, at], [right, at]));
         elements.push(tick_label(figures(t, 3), [left - 7.0, at + 4.0], Anchor::End));
     }
-    for (t, at) in x.iter().flat_map(|x| x.ticks().into_iter().map(|t| (t, x.at(t)))) {
+    for (t, at) in x.iter().flat_map(|x| x.ticks().into_iter().map(|t| (t, x.position(t)))) {
         elements.push(grid_line([at, top], [at, bottom]));
         elements.push(tick_label(figures(t, 3), [at, bottom + 19.0], Anchor::Middle));
     }
     let [middle_x, middle_y] = [0.5 * (left + right), 0.5 * (top + bottom)];
-    elements.push(label(chart.x.title(), [middle_x, HEIGHT - 16.0 + more(chart)], Anchor::Middle));
+    elements.push(label(chart.x.title(), [middle_x, HEIGHT - 16.0 + extra_height(chart)], Anchor::Middle));
     let place = [17.0, middle_y];
     elements.push(Element::Text {
         text: chart.y.title(),
@@ -156,14 +157,14 @@ fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
 
 /// The line of a series, then its error bars, then its points on top.
 fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale; 2]) {
-    let place = |p: &[f64; 2]| (x.shows(p[0]) && y.shows(p[1])).then(|| [x.at(p[0]), y.at(p[1])]);
+    let place = |p: &[f64; 2]| (x.shows(p[0]) && y.shows(p[1])).then(|| [x.position(p[0]), y.position(p[1])]);
     let points: Vec<Place> = s.points.iter().filter_map(place).collect();
     if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Line | SeriesStyle::Dashed) {
         let dashed = s.style == SeriesStyle::Dashed;
         elements.push(Element::Line { points: points.clone(), ink, width: 2.0, opacity: 1.0, dashed });
     }
     for (p, e) in s.points.iter().zip(&s.errors).filter(|(p, _)| place(p).is_some()) {
-        let points = [p[1] - e, p[1] + e].map(|end| [x.at(p[0]), y.at(end)]).to_vec();
+        let points = [p[1] - e, p[1] + e].map(|end| [x.position(p[0]), y.position(end)]).to_vec();
         elements.push(Element::Line { points, ink, width: 1.0, opacity: 1.0, dashed: false });
     }
     if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Points | SeriesStyle::Faint) {
@@ -189,7 +190,7 @@ fn wrapped(name: &str, width: f64) -> Vec<String> {
 }
 
 /// What the drawing needs below for names of several lines.
-fn more(chart: &Chart) -> f64 {
+fn extra_height(chart: &Chart) -> f64 {
     let Content::Bars { categories, .. } = &chart.content else { return 0.0 };
     let slot = (AREA[2] - AREA[0]) / categories.len().max(1) as f64;
     let lines = categories.iter().map(|c| wrapped(c, slot).len()).max().unwrap_or(1);
@@ -221,9 +222,9 @@ fn bar_chart(
         let mut base = 0.0;
         for (k, value) in heights(c).enumerate() {
             let (low, high) = if log {
-                (bottom, if value > 0.0 { y.at(value) } else { bottom })
+                (bottom, if value > 0.0 { y.position(value) } else { bottom })
             } else {
-                (y.at(base), y.at(base + value))
+                (y.position(base), y.position(base + value))
             };
             let shift = if stacked { 0.0 } else { k as f64 * width };
             let corner = [left + slot * (c as f64 + 0.15) + shift, high];
@@ -258,7 +259,7 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
     let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
     let steps = 64;
     for k in 0..steps {
-        let ink = Ink::Colour(map.at((f64::from(k) + 0.5) / f64::from(steps)));
+        let ink = Ink::Colour(map.colour((f64::from(k) + 0.5) / f64::from(steps)));
         let h = (bottom - top) / f64::from(steps);
         let corner = [right + 12.0, bottom - (f64::from(k) + 1.0) * h];
         // A little taller than its step: no seam shows between two.
@@ -266,7 +267,7 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
     }
     let bar = plain([low, high], [bottom, top]);
     for t in bar.ticks() {
-        elements.push(tick_label(figures(t, 3), [right + 30.0, bar.at(t) + 4.0], Anchor::Start));
+        elements.push(tick_label(figures(t, 3), [right + 30.0, bar.position(t) + 4.0], Anchor::Start));
     }
     elements.push(label(grid.unit.clone(), [right + 30.0, bottom + 19.0], Anchor::Middle));
 }

@@ -1,3 +1,5 @@
+//! 3-D views as plain data, made of facets, lines and points, simplified until a page can show them.
+
 use crate::formats::{ColourMap, Facets, Group, Polylines};
 use crate::math::Point;
 use rustc_hash::FxHashMap;

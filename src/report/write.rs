@@ -1,3 +1,5 @@
+//! A report as a folder: the page, a static picture of every figure, a CSV of every table.
+
 use super::document::{Block, Report};
 use super::{chart_png, html, raster, static_chart};
 use crate::formats::{Error, ErrorKind, printable, write_atomic, write_png};

@@ -66,6 +66,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "input_files",
             "intersectors",
             "paired_receivers",
+            "contenders",
             "output_place",
             "path_file",
             "ray_sampler",

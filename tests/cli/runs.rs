@@ -83,6 +83,23 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
     }
 }
 
+/// A document without the keys that differ from run to run.
+fn without_times(mut document: Value) -> Value {
+    match &mut document {
+        Value::Object(map) => {
+            for key in
+                ["seconds", "mrays_per_s", "msegments_per_s", "threads", "provenance", "pilot_seconds", "cost"]
+            {
+                map.remove(key);
+            }
+            map.values_mut().for_each(|value| *value = without_times(value.take()));
+        }
+        Value::Array(list) => list.iter_mut().for_each(|value| *value = without_times(value.take())),
+        _ => {}
+    }
+    document
+}
+
 /// Parts of a run, merged in any order, are the single run, file by file.
 #[test]
 fn shards_merge_to_the_bits_of_one_run() {
@@ -100,6 +117,9 @@ fn shards_merge_to_the_bits_of_one_run() {
     assert_eq!(whole["digest"], merged["digest"]);
     assert_eq!(whole["power"], merged["power"]);
     assert_eq!(merged["check"]["octree_vs_bvh"]["disagree"], 0);
+    // Every number of the document but times and what made it: cross-check and figures of both errors too.
+    let timeless = |document: &Value| without_times(document.clone());
+    assert_eq!(timeless(&whole), timeless(&merged));
     for file in ["focus.csv", "focus.data3", "paths.vtp"] {
         let read = |folder: &str| std::fs::read(path.join(folder).join(file)).unwrap();
         assert!(read("whole") == read("merged"), "{file}");
@@ -218,4 +238,68 @@ fn all_ray_paths_are_streamed() {
     assert_eq!(size("out"), size("without"));
     let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--paths", "paths.parquet"]);
     assert!(code == 2 && err.contains(".npz"), "{err}");
+}
+
+/// Light that is lost and faces that are refused are the merged run's as well as the single one's; parts are found in their
+/// folder, waited for, and merged with the scene at another place.
+#[test]
+fn merged_parts_end_as_the_single_run_does() {
+    let folder = lens(opened);
+    let path = folder.path();
+    for part in ["1/2", "2/2"] {
+        let arguments = ["trace", "scene.toml", "--shard", part, "-o", "parts", "--max-refused", "1"];
+        assert_eq!(lampyris_in(path, &arguments).0, 0);
+    }
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out", "--max-refused", "1"]);
+    assert!(code == 4 && err.contains("of the energy was lost"), "{code} {err}");
+    assert_eq!(lampyris_in(path, &["merge", "parts", "-o", "out", "--max-refused", "1", "--max-lost", "1"]).0, 0);
+    std::fs::create_dir(path.join("moved")).unwrap();
+    for file in ["scene.toml", "model.stp"] {
+        std::fs::rename(path.join(file), path.join("moved").join(file)).unwrap();
+    }
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out"]);
+    assert!(code == 3 && err.contains("--scene"), "{code} {err}");
+    let elsewhere = ["merge", "parts", "-o", "out", "--scene", "moved/scene.toml"];
+    assert_eq!(lampyris_in(path, &[&elsewhere[..], &["--max-refused", "1", "--max-lost", "1"]].concat()).0, 0);
+    // A part too few is waited for as long as was asked.
+    std::fs::remove_file(path.join("parts/shard-2-of-2.tally")).unwrap();
+    let start = std::time::Instant::now();
+    let (code, _, err) = lampyris_in(path, &[&elsewhere[..], &["--wait", "1"]].concat());
+    assert!(code == 3 && err.contains("shard 2/2"), "{code} {err}");
+    assert!(start.elapsed() >= std::time::Duration::from_secs(1));
+}
+
+/// What a part cannot do is refused, and not dropped; a launcher says which part a process is.
+#[test]
+fn parts_refuse_what_they_do_not_do() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    for option in [&["--paths", "p.npz"][..], &["--verify-pruning"], &["--until-error", "1%@focus"]] {
+        let (code, _, err) =
+            lampyris_in(path, &[&["trace", "scene.toml", "--shard", "1/2", "-o", "a.tally"], option].concat());
+        assert!(code == 2 && err.contains("cannot be used with"), "{option:?}: {code} {err}");
+    }
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", "auto", "-o", "parts"]);
+    assert!(code == 2 && err.contains("no launcher"), "{code} {err}");
+    let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(path)
+        .args(["trace", "scene.toml", "--shard", "auto", "-o", "parts"])
+        .envs([("PMI_RANK", "1"), ("PMI_SIZE", "3")])
+        .output()
+        .unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && err.contains("shard 2 of 3, from PMI_RANK"), "{err}");
+    assert!(path.join("parts/shard-2-of-3.tally").is_file());
+    // Once more is nothing to do.
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", "2/3", "-o", "parts"]);
+    assert!(code == 0 && err.contains("traced already"), "{code} {err}");
+}
+
+/// A run that ends before its error is as small as was asked says so on the terminal.
+#[test]
+fn an_error_that_is_not_reached_is_said() {
+    let folder = lens(|m| m);
+    let arguments = ["trace", "scene.toml", "-o", "out", "--until-error", "0.0001%@focus", "--rays", "60000"];
+    let (code, _, err) = lampyris_in(folder.path(), &arguments);
+    assert!(code == 4 && err.replace('\n', " ").contains("not reached with"), "{code} {err}");
 }

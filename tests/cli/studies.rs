@@ -43,3 +43,12 @@ fn the_terminal_shows_the_table_and_the_folder_holds_it() {
     let csv = std::fs::read_to_string(folder.path().join("tables/effects.csv")).unwrap();
     assert_eq!(csv.lines().count(), 11, "{csv}");
 }
+
+/// A study that would not look at a file refuses it, whether it is there or not.
+#[test]
+fn a_file_that_a_study_does_not_use_is_refused() {
+    for study in ["complexity", "stability"] {
+        let (code, _, err) = lampyris(&["study", study, "no-such-file.stp"]);
+        assert!(code == 2 && err.contains("does not take no-such-file.stp"), "{code} {err}");
+    }
+}

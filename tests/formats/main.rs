@@ -1,6 +1,9 @@
 //! Files and pages that are written, opened by readers that others wrote.
 
+mod damaged;
 mod facets;
+#[path = "../support/files.rs"]
+mod files;
 mod grids;
 mod ray_sets;
 #[cfg(feature = "report")]

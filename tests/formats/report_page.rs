@@ -81,19 +81,19 @@ fn sample(n: u32) -> Report {
         title: "A sample".into(),
         answer: "The answer is **42 cd** & no <more>.".into(),
         sections: vec![
-            Section::new("Light").with(Chart::map("far", "Far field", "Straight ahead is 0, 0.", grid)).with(
-                View::of_facets("facets", "Facets", &facets).lines(
+            Section::new("Light")
+                .with_block(Chart::map("far", "Far field", "Straight ahead is 0, 0.", grid))
+                .with_block(View::of_facets("facets", "Facets", &facets).lines(
                     "rays",
                     &paths.inside(&mesh.bounds().grown(20.0)),
                     [1.0, 0.7, 0.1],
-                ),
-            ),
+                )),
             Section::new("Cost")
-                .with(Chart::series("front", "Front", "Lower left is better.", axes, series))
-                .with(bars)
-                .with(View::of_values("error", "Error", &facets, "error (deg)", &error, ColourMap::Viridis))
-                .with(table)
-                .with("Some **words**."),
+                .with_block(Chart::series("front", "Front", "Lower left is better.", axes, series))
+                .with_block(bars)
+                .with_block(View::of_values("error", "Error", &facets, "error (deg)", &error, ColourMap::Viridis))
+                .with_block(table)
+                .with_block("Some **words**."),
         ],
         provenance: Provenance { command: "lampyris demo".into(), seed: Some(1), ..Provenance::default() },
     }

@@ -52,25 +52,7 @@ pub(crate) enum Command {
     },
     /// Tessellate a STEP file into quad facets
     #[command(after_help = help_text::FACET, after_long_help = help_text::FACET_LONG)]
-    Facet {
-        /// STEP file
-        file: PathBuf,
-        /// File to write, by extension: .obj .ply .stl .vtu .glb .data2; may be given several times
-        #[arg(short, long, value_name = "OUT")]
-        output: Vec<PathBuf>,
-        #[command(flatten)]
-        meshing: MeshingOptions,
-        #[command(flatten)]
-        precision: AccuracyOption,
-        /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
-        #[arg(long)]
-        baseline: bool,
-        /// Number of threads; all cores by default
-        #[arg(long, value_name = "N")]
-        threads: Option<usize>,
-        #[command(flatten)]
-        limits: RefusalLimit,
-    },
+    Facet(FacetCommand),
     /// Simulate a scene and write a report, results.json and the receiver files
     #[command(after_help = help_text::TRACE)]
     Trace {
@@ -88,32 +70,7 @@ pub(crate) enum Command {
     },
     /// Compare octree, BVH and exact spline ray by ray
     #[command(after_help = help_text::CHECK, after_long_help = help_text::CHECK_LONG)]
-    Check {
-        /// STEP file or scene
-        file: PathBuf,
-        #[command(flatten)]
-        meshing: MeshingOptions,
-        #[command(flatten)]
-        tracing: TracingOptions,
-        #[command(flatten)]
-        precision: AccuracyOption,
-        /// Folder for a report with the disagreeing rays in 3-D, and for check.json
-        #[arg(short, long, value_name = "DIR")]
-        output: Option<PathBuf>,
-        #[command(flatten)]
-        page: PageOption,
-        /// Write the rays used and the octree's answers
-        #[arg(long, value_name = "FILE")]
-        rays_out: Option<PathBuf>,
-        /// Use the rays of a file
-        #[arg(long, value_name = "FILE", visible_alias = "replay")]
-        rays_in: Option<PathBuf>,
-        /// Write the rays that were answered differently, to be asked again with --replay
-        #[arg(long, value_name = "FILE")]
-        disagreements: Option<PathBuf>,
-        #[command(flatten)]
-        limits: RefusalLimit,
-    },
+    Check(Box<CheckCommand>),
     /// Measure what accuracy costs in time
     #[command(after_help = help_text::STUDY)]
     Study {
@@ -199,6 +156,57 @@ pub(crate) enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
     },
+}
+
+/// What `facet` takes.
+#[derive(Debug, clap::Args)]
+pub(crate) struct FacetCommand {
+    /// STEP file
+    pub(crate) file: PathBuf,
+    /// File to write, by extension: .obj .ply .stl .vtu .glb .data2; may be given several times
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) meshing: MeshingOptions,
+    #[command(flatten)]
+    pub(crate) precision: AccuracyOption,
+    /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
+    #[arg(long)]
+    pub(crate) baseline: bool,
+    /// Number of threads; all cores by default
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    #[command(flatten)]
+    pub(crate) limits: RefusalLimit,
+}
+
+/// What `check` takes.
+#[derive(Debug, clap::Args)]
+pub(crate) struct CheckCommand {
+    /// STEP file or scene
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) meshing: MeshingOptions,
+    #[command(flatten)]
+    pub(crate) tracing: TracingOptions,
+    #[command(flatten)]
+    pub(crate) precision: AccuracyOption,
+    /// Folder for a report with the disagreeing rays in 3-D, and for check.json
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) page: PageOption,
+    /// Write the rays used and the octree's answers
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rays_out: Option<PathBuf>,
+    /// Use the rays of a file
+    #[arg(long, value_name = "FILE", visible_alias = "replay")]
+    pub(crate) rays_in: Option<PathBuf>,
+    /// Write the rays that were answered differently, to be asked again with --replay
+    #[arg(long, value_name = "FILE")]
+    pub(crate) disagreements: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) limits: RefusalLimit,
 }
 
 /// Options of `trace` alone.

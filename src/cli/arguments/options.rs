@@ -131,17 +131,20 @@ fn part(text: &str) -> Result<(String, [f64; 2]), String> {
     Ok((name.trim().to_owned(), tolerance(range)?))
 }
 
+/// Largest number of rays: doubles, in which it may be written, count singly up to it.
+const MOST_RAYS: f64 = 9e15;
+
 /// A whole positive number; `1e6`, `1_000_000` and `10M` are understood.
 fn count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
     let (digits, factor) = match plain.chars().last() {
-        Some('k') => (&plain[..plain.len() - 1], 1e3),
-        Some('M') => (&plain[..plain.len() - 1], 1e6),
-        Some('G') => (&plain[..plain.len() - 1], 1e9),
+        Some('k') => (&plain[..plain.len() - 1], 1000.0),
+        Some('M') => (&plain[..plain.len() - 1], 1_000_000.0),
+        Some('G') => (&plain[..plain.len() - 1], 1_000_000_000.0),
         _ => (plain.as_str(), 1.0),
     };
     let value = digits.parse::<f64>().map_err(|_| format!("'{text}' is no number"))? * factor;
-    if (1.0..=9e15).contains(&value) && value.fract() == 0.0 {
+    if (1.0..=MOST_RAYS).contains(&value) && value.fract() == 0.0 {
         Ok(value as u64)
     } else {
         Err(format!("a number of rays is whole and at least 1, not {text}"))

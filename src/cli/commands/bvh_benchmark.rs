@@ -28,6 +28,10 @@ const TOLERANCES: [f64; 3] = [0.02, 0.0018, 0.000125];
 const RAYS: u64 = 50_000;
 const ROUNDS: usize = 11;
 
+/// Shortest time of a round that a rate is made of, s.
+const SHORTEST_ROUND: f64 = 1e-12;
+const MILLION: f64 = 1e6;
+
 /// Rows, the sentence that answers, and what the octrees look like.
 pub(crate) struct BvhBenchmark {
     pub(crate) rows: Vec<Value>,
@@ -125,7 +129,7 @@ impl BvhBenchmark {
                     entrants.iter().zip(measure(&competitors, &crowd, ROUNDS)).zip(&judged)
                 {
                     let footprint = structure.footprint();
-                    let rate = |seconds: f64| crowd.len() as f64 / seconds.max(1e-12) / 1e6;
+                    let rate = |seconds: f64| crowd.len() as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
                     let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
                     let wrong = if *who == "octree" { octree_wrong } else { comparison.wrong };
                     self.rows.push(json!({

@@ -1,13 +1,14 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
-use crate::cli::arguments::command::{PageOption, RefusalLimit};
-use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::arguments::command::CheckCommand;
+use crate::cli::arguments::options::TracingOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::terminal_tables::blank_table;
+use crate::cli::work::contenders::{Contenders, time_all};
 use crate::cli::work::cross_check::LIFT_IN_TOLERANCES;
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::intersectors::IntersectorChoice;
@@ -15,9 +16,6 @@ use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::ray_sampler::RaySampler;
 use crate::cli::work::{accuracy_target, facets, paired_receivers, threads};
 use crate::formats::write_atomic;
-use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::exact::Exact;
-use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
@@ -25,91 +23,33 @@ use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::report::{CheckReport, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::cross_check::{self, Competitor, CrossCheck, Intersectors, measure};
+use crate::study::accuracy_target::AccuracyPlan;
+use crate::study::cross_check::{self, CrossCheck, Intersectors};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
+use crate::study::receivers::PowerComparison;
 use crate::study::{Quantiles, Summary, records};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
-
-/// What `check` was asked for.
-pub(crate) struct CheckCommand<'a> {
-    pub(crate) file: &'a Path,
-    pub(crate) meshing: &'a MeshingOptions,
-    pub(crate) tracing: &'a TracingOptions,
-    pub(crate) accuracy: Option<&'a str>,
-    pub(crate) rays_out: Option<&'a PathBuf>,
-    pub(crate) rays_in: Option<&'a PathBuf>,
-    pub(crate) disagreements: Option<&'a PathBuf>,
-    pub(crate) output: Option<&'a PathBuf>,
-    pub(crate) page: PageOption,
-    pub(crate) limits: RefusalLimit,
-}
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;
-/// Rays of a timed round: enough for a tenth of a second on the slowest.
-const TIMED_RAYS: usize = 20_000;
-/// Timed rounds of every intersector, alternating.
-const TIMED_ROUNDS: usize = 3;
-/// Shortest time of a round that a rate is made of, s: below it a clock tells nothing.
-const SHORTEST_ROUND: f64 = 1e-12;
-/// Rays of a million rays per second.
-const MILLION: f64 = 1e6;
 /// Fewest rays of a scene's run that the sample is taken from.
 const FEWEST_SCENE_RAYS: u64 = 64;
 /// Columns of the table of rates.
 const TABLE_WIDTH: usize = 100;
 
-/// Every intersector over the same facets and the same model.
-struct Contenders<'a> {
-    octree: Octree<'a>,
-    bvh2: Bvh<'a>,
-    cwbvh: Bvh<'a>,
-    cwbvh_as_shipped: Bvh<'a>,
-    exact: Exact,
-}
-
-impl<'a> Contenders<'a> {
-    fn build(mesh: &'a FacetMesh, model: &Model, normals: NormalMode, console: &Console) -> Self {
-        let spinner = console.spinner("building octree, BVHs and spline");
-        let cwbvh = bvh::Settings { normals, ..Default::default() };
-        let contenders = Self {
-            octree: Octree::build(mesh, &octree::Settings { normals, ..Default::default() }),
-            bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
-            cwbvh: Bvh::build(mesh, &cwbvh),
-            cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
-            exact: Exact::build(model, &Default::default()),
-        };
-        spinner.finish_and_clear();
-        contenders
-    }
-
-    /// Under the names of the document, with whether whole batches are asked.
-    fn named<'s>(&'s self, polish: &'s dyn Intersector) -> [Competitor<'s>; 7] {
-        let competitor = |name, who, batch| Competitor { name, who, batch };
-        [
-            competitor("octree", &self.octree as &dyn Intersector, true),
-            competitor("octree_single", &self.octree, false),
-            competitor("bvh2", &self.bvh2, true),
-            competitor("cwbvh", &self.cwbvh, true),
-            competitor("cwbvh_as_shipped", &self.cwbvh_as_shipped, true),
-            competitor("polish", polish, true),
-            competitor("exact", &self.exact, true),
-        ]
-    }
-}
-
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
     let threads = threads::set_threads(command.tracing.threads)?;
-    let given = command.rays_in.map(|p| read_rays(p)).transpose()?;
-    let input = input_files::either(command.file, console)?;
+    let given = command.rays_in.as_deref().map(read_rays).transpose()?;
+    let input = input_files::either(&command.file, console)?;
     let (scene, loaded) = match &input {
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
     let model = &loaded.model;
-    let options = (command.meshing, command.tracing);
+    let options = (&command.meshing, &command.tracing);
     let (meshing, tracing, reached) =
-        accuracy_target::meshing_for(command.accuracy, options, scene, model, console)?;
+        accuracy_target::meshing_for(command.precision.accuracy.as_deref(), options, scene, model, console)?;
     let settings = facets::mesh_settings(&meshing, scene, model)?;
     let (tessellation, _) = facets::facets(model, &settings, console);
     let mesh = &tessellation.mesh;
@@ -145,16 +85,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Some(scene) => paired_receivers::trace_both(scene, &scene.bind(model)?, [facets, exact], &tracing, console),
         None => Vec::new(),
     };
-    let mut document = json_value(&found)?;
-    document["normals"] = normals.to_string().into();
-    if scene.is_some() {
-        document["receivers"] = json_value(&receivers)?;
-    }
-    if let Some(reached) = &reached {
-        document["accuracy"] = json_value(reached)?;
-    }
-    let text = json_text(&document)?;
-    if let Some(folder) = command.output {
+    let text = json_text(&document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
+    if let Some(folder) = &command.output {
         let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
         let report = CheckReport {
             title: command.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
@@ -198,21 +130,22 @@ fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     completion
 }
 
-/// Build time, size and rate of every intersector.
-fn time_all(found: &mut CrossCheck, contenders: &[Competitor], rays: &[Ray], console: &Console) {
-    let spinner = console.spinner("timing");
-    for contender in contenders {
-        let footprint = contender.who.footprint();
-        found.build_seconds.set(contender.name, footprint.build_seconds);
-        let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
-        found.bytes_per_facet.set(contender.name, bytes_per_facet);
+/// What `--json` prints; receivers are those of a scene.
+fn document(
+    found: &CrossCheck,
+    normals: NormalMode,
+    receivers: Option<&[PowerComparison]>,
+    reached: Option<&AccuracyPlan>,
+) -> Result<Value, Failure> {
+    let mut document = json_value(found)?;
+    document["normals"] = normals.to_string().into();
+    if let Some(receivers) = receivers {
+        document["receivers"] = json_value(&receivers)?;
     }
-    // Evenly over the rays, so that every kind of them is among the timed.
-    let timed: Vec<Ray> = rays.iter().copied().step_by(rays.len().div_ceil(TIMED_RAYS).max(1)).collect();
-    for (name, timing) in measure(contenders, &timed, TIMED_ROUNDS) {
-        found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
+    if let Some(reached) = reached {
+        document["accuracy"] = json_value(reached)?;
     }
-    spinner.finish_and_clear();
+    Ok(document)
 }
 
 /// The files of rays that were asked for.
@@ -223,7 +156,7 @@ fn write_rays(
     rays: &[Ray],
     console: &Console,
 ) -> Result<(), Failure> {
-    if let Some(path) = command.rays_out {
+    if let Some(path) = &command.rays_out {
         let mut hits = vec![None; rays.len()];
         octree.intersect_batch(rays, &mut hits, &mut Cost::default());
         write_atomic(path, |mut w| {
@@ -231,7 +164,7 @@ fn write_rays(
         })?;
         console.say(format_args!("wrote {}", path.display()));
     }
-    if let Some(path) = command.disagreements {
+    if let Some(path) = &command.disagreements {
         let kept = found.disagreements.iter().map(|d| (d.ray, d.octree.map(|h| h.t)));
         write_atomic(path, |mut w| records::write(&mut w, kept.clone()))?;
         console.say(format_args!("wrote {}", path.display()));
@@ -241,7 +174,7 @@ fn write_rays(
 
 /// Which files were written, or how to get them.
 fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
-    match command.output {
+    match &command.output {
         Some(folder) => {
             if command.page.is_wanted() {
                 console
@@ -376,4 +309,27 @@ fn summary(c: &CrossCheck, normals: NormalMode) -> String {
     }
     text += &format!("\n{table}\n");
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_that_finds_a_defect_does_not_end_well() {
+        let console = Console::new(false, true, 0, &[]);
+        let sound = || {
+            let mut found = CrossCheck::default();
+            found.scene.facets = 12;
+            found
+        };
+        assert_eq!(report_defects(&sound(), &console), Completion::Complete);
+        let mut found = sound();
+        found.octree_vs_bvh.disagree = 1;
+        assert_eq!(report_defects(&found, &console), Completion::Incomplete);
+        let mut found = sound();
+        found.facets_vs_exact.unexplained = 1;
+        assert_eq!(report_defects(&found, &console), Completion::Incomplete);
+        assert_eq!(report_defects(&CrossCheck::default(), &console), Completion::Incomplete);
+    }
 }

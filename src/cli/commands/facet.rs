@@ -1,7 +1,6 @@
 //! `lampyris facet`: quad facets within a proved tolerance, written in as many formats as asked for.
 
-use crate::cli::arguments::command::RefusalLimit;
-use crate::cli::arguments::options::MeshingOptions;
+use crate::cli::arguments::command::FacetCommand;
 use crate::cli::console::{Console, print};
 use crate::cli::output::appearance;
 use crate::cli::output::json::json_text;
@@ -14,19 +13,6 @@ use crate::report::{bytes, figures, grouped, seconds};
 use crate::tessellate::{Report, sampled_sag};
 use crate::truck::baseline;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
-
-/// What `facet` was asked for.
-pub(crate) struct FacetCommand<'a> {
-    pub(crate) file: &'a Path,
-    pub(crate) output: &'a [PathBuf],
-    pub(crate) meshing: &'a MeshingOptions,
-    pub(crate) accuracy: Option<&'a str>,
-    /// Whether truck's mesher runs too.
-    pub(crate) baseline: bool,
-    pub(crate) threads: Option<usize>,
-    pub(crate) limits: RefusalLimit,
-}
 
 pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
@@ -37,9 +23,13 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         );
     }
     threads::set_threads(command.threads)?;
-    let loaded = input_files::model_file(command.file, console)?;
-    let (meshing, reached) =
-        accuracy_target::meshing_for_facets(command.accuracy, command.meshing, &loaded.model, console)?;
+    let loaded = input_files::model_file(&command.file, console)?;
+    let (meshing, reached) = accuracy_target::meshing_for_facets(
+        command.precision.accuracy.as_deref(),
+        &command.meshing,
+        &loaded.model,
+        console,
+    )?;
     let mut settings = facets::mesh_settings(&meshing, None, &loaded.model)?;
     settings.measure = true;
     let (mut made, _) = facets::facets(&loaded.model, &settings, console);
@@ -49,7 +39,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     if command.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
         (facets.normal_error_deg, facets.curvature_per_mm) = normal_errors(&loaded.model, &made.mesh);
     }
-    for path in command.output {
+    for path in &command.output {
         let spinner = console.spinner(&format!("writing {}", path.display()));
         write_facets(path, &facets)?;
         spinner.finish_and_clear();

@@ -24,18 +24,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
     match command {
         Command::Demo { output, page, meshing, tracing } => demo::run(&output, &meshing, &tracing, page, console),
         Command::Info { file, limits } => info::run(&file, limits, console),
-        Command::Facet { file, output, meshing, precision, baseline, threads, limits } => {
-            let command = facet::FacetCommand {
-                file: &file,
-                output: &output,
-                meshing: &meshing,
-                accuracy: precision.accuracy.as_deref(),
-                baseline,
-                threads,
-                limits,
-            };
-            facet::run(&command, console)
-        }
+        Command::Facet(command) => facet::run(&command, console),
         Command::Trace { scene, output, meshing, tracing, extra } => {
             let command = trace::TraceCommand {
                 scene: &scene,
@@ -46,32 +35,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             };
             trace::run(&command, console)
         }
-        Command::Check {
-            file,
-            meshing,
-            tracing,
-            precision,
-            output,
-            page,
-            rays_out,
-            rays_in,
-            disagreements,
-            limits,
-        } => {
-            let command = check::CheckCommand {
-                file: &file,
-                meshing: &meshing,
-                tracing: &tracing,
-                accuracy: precision.accuracy.as_deref(),
-                rays_out: rays_out.as_ref(),
-                rays_in: rays_in.as_ref(),
-                disagreements: disagreements.as_ref(),
-                output: output.as_ref(),
-                page,
-                limits,
-            };
-            check::run(&command, console)
-        }
+        Command::Check(command) => check::run(&command, console),
         Command::Study { kind, file, output, page, meshing, tracing } => {
             let (file, output) = (file.as_deref(), output.as_ref());
             study::run(

@@ -216,7 +216,7 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
     );
     let view =
         View::of_values("error", "Error of the normal", &facets, "normal error (°)", &errors, ColourMap::Viridis);
-    Ok(Section::new("Where the error sits").with(view.caption(&text)))
+    Ok(Section::new("Where the error sits").with_block(view.caption(&text)))
 }
 
 fn study_interpolation(

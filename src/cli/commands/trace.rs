@@ -90,15 +90,8 @@ fn trace_whole(
 
     // All that can go wrong with the place of the results is tried before anything is traced.
     let _owned = OutputPlace::folder(folder)?;
-    if !extra.resume {
-        refuse_overwriting(&file)?;
-    }
     let with_page = extra.page.is_wanted();
-    results_folder::try_folder(prepared, folder, with_page)?;
-    if let Some(file) = &extra.paths {
-        make_folder(&folder_of(file))?;
-    }
-    let paths = extra.paths.as_deref().map(PathFile::create).transpose()?;
+    let paths = try_outputs(prepared, command, &file)?;
 
     // With an error to reach, the number of rays is found by tracing.
     let found = target.map(|target| target.trace(prepared, console));
@@ -165,6 +158,22 @@ fn trace_whole(
     checkpoint.remove();
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
+}
+
+/// Tries all that is to be written, and begins the file of paths where one is wanted.
+fn try_outputs(
+    prepared: &PreparedScene,
+    command: &TraceCommand,
+    checkpoint: &Path,
+) -> Result<Option<PathFile>, Failure> {
+    let TraceCommand { folder, extra, .. } = *command;
+    if !extra.resume {
+        refuse_overwriting(checkpoint)?;
+    }
+    results_folder::try_folder(prepared, folder, extra.page.is_wanted())?;
+    let Some(file) = &extra.paths else { return Ok(None) };
+    make_folder(&folder_of(file))?;
+    PathFile::create(file).map(Some)
 }
 
 /// Completes the file of paths.

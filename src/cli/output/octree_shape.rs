@@ -202,12 +202,12 @@ pub(crate) fn octree_section(shapes: &[OctreeShape]) -> Section {
             ]);
         }
     }
-    let section = Section::new("The octree").with(chart);
+    let section = Section::new("The octree").with_block(chart);
     let files = "octree.vtu and octree.glb hold up to 50 000 of them.";
     let view = |shape| {
         let view = octree_view(shape);
         View { caption: format!("{} {files}", view.caption), ..view }
     };
-    let section = shapes.first().into_iter().fold(section, |s, shape| s.with(view(shape)));
-    section.with(table)
+    let section = shapes.first().into_iter().fold(section, |s, shape| s.with_block(view(shape)));
+    section.with_block(table)
 }

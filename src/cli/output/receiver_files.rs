@@ -10,6 +10,9 @@ use crate::simulate::ReceiverResult;
 use crate::simulate::scene::FarFieldType;
 use std::path::Path;
 
+/// A far field whose ends are this near to those of all directions holds all of them, degrees.
+const WHOLE_RANGE_DEG: f64 = 1e-9;
+
 /// Writes all files of a receiver and gives their names; `geometric` are the errors of its cells from the facets, where they are known,
 /// `rays` those of the sample that it counted.
 pub(crate) fn write(
@@ -57,7 +60,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
         FarFieldType::B => (PhotometricType::B, [[-90.0, 90.0], [-90.0, 90.0]]),
         FarFieldType::C => (PhotometricType::C, [[0.0, 360.0], [0.0, 180.0]]),
     };
-    let same = |k: usize| (0..2).all(|e| (grid.axes[k].range[e] - whole[k][e]).abs() < 1e-9);
+    let same = |k: usize| (0..2).all(|e| (grid.axes[k].range[e] - whole[k][e]).abs() < WHOLE_RANGE_DEG);
     if !same(0) || !same(1) {
         return None;
     }

@@ -3,10 +3,11 @@
 //! Inner modules, each of which sees only those before it: `threads`, `input_files`, `facets` and `intersectors` (the
 //! ingredients), `output_place`, `ray_sampler`, `path_file`, `shards` and `accuracy_target`, `default_accuracy` and `scene_run`
 //! with `cross_check` (the run),
-//! `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `error_target` and `paired_receivers` (what is made of it).
+//! `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `error_target` `paired_receivers` and `contenders` (what is made of it).
 
 pub(super) mod accuracy_target;
 pub(super) mod checkpoint;
+pub(super) mod contenders;
 pub(super) mod cross_check;
 pub(super) mod default_accuracy;
 pub(super) mod error_target;

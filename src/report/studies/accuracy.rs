@@ -4,8 +4,11 @@ use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, figures, seconds};
 use serde_json::Value;
 
+/// Direction errors below it are rounding of unit vectors in double precision, degrees.
+const ROUNDING_DEG: f64 = 1e-7;
+
 /// The direction error that the answer speaks about, degrees.
-const ASKED: f64 = 0.05;
+const WANTED_DEG: f64 = 0.05;
 
 struct Point<'a> {
     row: &'a Value,
@@ -14,7 +17,7 @@ struct Point<'a> {
 }
 
 impl<'a> Point<'a> {
-    fn of(row: &'a Value) -> Option<Self> {
+    fn from_row(row: &'a Value) -> Option<Self> {
         let part = |key: &str| number(row, key).unwrap_or(0.0);
         let seconds = part("seconds_tessellate") + part("seconds_build") + number(row, "seconds_trace_median")?;
         Some(Self { row, seconds, error: number(row, "direction_error_deg_p99")? })
@@ -49,17 +52,19 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let threads = rows.iter().filter_map(|r| r["threads"].as_u64()).max().unwrap_or(1);
     let chosen: Vec<&Value> =
         rows.iter().copied().filter(|r| r["threads"].as_u64().unwrap_or(threads) == threads).collect();
-    let points: Vec<Point> = chosen.iter().filter_map(|r| Point::of(r)).collect();
+    let points: Vec<Point> = chosen.iter().filter_map(|r| Point::from_row(r)).collect();
     let title = format!("What accuracy costs in time: {model}");
-    let section =
-        Section::new("Cost against accuracy").with(front(&points)).with(slopes(&chosen)).with(best(&points));
-    let time = Section::new("Where the time goes").with(stacked(&chosen));
+    let section = Section::new("Cost against accuracy")
+        .with_block(front(&points))
+        .with_block(slopes(&chosen))
+        .with_block(best(&points));
+    let time = Section::new("Where the time goes").with_block(stacked(&chosen));
     (title, answer(&points), vec![section, time])
 }
 
 fn answer(points: &[Point]) -> String {
     let best = (points.iter())
-        .filter(|p| p.error <= ASKED && text(p.row, "intersector") != "exact")
+        .filter(|p| p.error <= WANTED_DEG && text(p.row, "intersector") != "exact")
         .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let exact = (points.iter())
         .filter(|p| text(p.row, "intersector") == "exact")
@@ -67,19 +72,21 @@ fn answer(points: &[Point]) -> String {
     let beside = exact.map_or(String::new(), |e| format!(" The exact spline costs **{}**.", seconds(e.seconds)));
     match best {
         Some(p) => format!(
-            "For a direction error of {ASKED}° (99th percentile) take **{}**: **{}** in all, {}° reached.{beside}",
+            "For a direction error of {WANTED_DEG}° (99th percentile) take **{}**: **{}** in all, {}° reached.{beside}",
             p.label(),
             seconds(p.seconds),
             figures(p.error, 2)
         ),
         None => {
-            format!("No combination measured here reaches a direction error of {ASKED}° (99th percentile).{beside}")
+            format!(
+                "No combination measured here reaches a direction error of {WANTED_DEG}° (99th percentile).{beside}"
+            )
         }
     }
 }
 
 /// Whether another combination is at least as good in both time and error, and better in one.
-fn beaten(p: &Point, points: &[Point]) -> bool {
+fn is_dominated(p: &Point, points: &[Point]) -> bool {
     let better = |q: &Point| q.seconds < p.seconds || q.error < p.error;
     points.iter().any(|q| q.seconds <= p.seconds && q.error <= p.error && better(q))
 }
@@ -99,7 +106,7 @@ fn best(points: &[Point]) -> Table {
     ];
     let mut table = Table::new("front", "The combinations that none beats", &columns)
         .caption("Each is the cheapest for its error. Prepare: tessellate and build.");
-    let mut front: Vec<&Point> = points.iter().filter(|p| !beaten(p, points)).collect();
+    let mut front: Vec<&Point> = points.iter().filter(|p| !is_dominated(p, points)).collect();
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let three = |x: f64| Cell::Number(x, 3);
     for p in front {
@@ -135,14 +142,14 @@ fn front(points: &[Point]) -> Chart {
             ..Series::default()
         }
     };
-    let mut series = vec![of("the front".into(), SeriesStyle::Line, &|p| !beaten(p, points))];
+    let mut series = vec![of("the front".into(), SeriesStyle::Line, &|p| !is_dominated(p, points))];
     let rows: Vec<&Value> = points.iter().map(|p| p.row).collect();
     for normals in distinct(&rows, "normals") {
         series.push(of(normals.into(), SeriesStyle::Points, &|p| {
-            text(p.row, "normals") == normals && !beaten(p, points)
+            text(p.row, "normals") == normals && !is_dominated(p, points)
         }));
     }
-    series.push(of("dominated".into(), SeriesStyle::Faint, &|p| beaten(p, points)));
+    series.push(of("dominated".into(), SeriesStyle::Faint, &|p| is_dominated(p, points)));
     series.retain(|s| !s.points.is_empty());
     let caption = "Each point is one combination of tolerance, normals and intersector; lower left is better. Faint: another \
         combination is both faster and more accurate. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \
@@ -156,7 +163,7 @@ fn slopes(rows: &[&Value]) -> Chart {
     // the hits are on planes their median is rounding, and the 99th percentile stands in for it.
     let octree = |r: &&&Value| text(r, "intersector") == "octree" && text(r, "normals") != "exact";
     let medians = || rows.iter().filter(octree).filter_map(|r| number(r, "direction_error_deg_p50"));
-    let (key, word) = if medians().next().is_some() && medians().all(|e| e > 1e-7) {
+    let (key, word) = if medians().next().is_some() && medians().all(|e| e > ROUNDING_DEG) {
         ("direction_error_deg_p50", "median")
     } else {
         ("direction_error_deg_p99", "p99")

@@ -63,5 +63,5 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let caption =
         "Median time of the trace by what the kernel can do; what the scene does not call for changes no result.";
     let chart = Chart { content, ..Chart::series("effects", "Time by effect", caption, axes, Vec::new()) };
-    ("What each effect costs".into(), answer, vec![Section::new("Time").with(chart).with(table)])
+    ("What each effect costs".into(), answer, vec![Section::new("Time").with_block(chart).with_block(table)])
 }

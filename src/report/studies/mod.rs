@@ -31,7 +31,7 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     if !lit.is_empty() {
         sections.push(receivers::section(&lit));
     }
-    sections.push(Section::new("All rows").with(rows_table(kind, &rows)));
+    sections.push(Section::new("All rows").with_block(rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
 }
 

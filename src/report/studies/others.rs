@@ -67,7 +67,11 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
     let caption = "Median time of all rays of a repetition on one thread; shorter is better. The paper's times are of its own machine.";
     let times = bars("time", "Time", caption, &own, keys, "s");
     let title = "Normals between corners: nearest, bilinear, cubic, exact".into();
-    let section = Section::new("Errors and times").with(chart).with(times).with(ratios(rows)).with(table);
+    let section = Section::new("Errors and times")
+        .with_block(chart)
+        .with_block(times)
+        .with_block(ratios(rows))
+        .with_block(table);
     (title, "Nothing was measured.".into(), vec![section])
 }
 
@@ -160,7 +164,7 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let caption = "Preparing and tracing together, against intersecting every spline surface with every ray (1 ×). Longer is better.";
     let mut chart = bars("ratio", title, caption, rows, keys, "×");
     chart.y.label = "times as fast".into();
-    let section = Section::new("Before and after").with(chart).with(growth(rows)).with(table);
+    let section = Section::new("Before and after").with_block(chart).with_block(growth(rows)).with_block(table);
     ("Three lamps, before and after".into(), answer, vec![section])
 }
 
@@ -169,7 +173,7 @@ fn growth(rows: &[&Value]) -> Chart {
     let line = |method: &&str| {
         let own = rows.iter().filter(|r| text(r, "method") == *method);
         let point = |r: &&Value| {
-            let rays = number(r, "rays")? / 1e6;
+            let rays = number(r, "rays")? / 1_000_000.0;
             Some([number(r, "patches")?, number(r, "seconds_trace_median")? / rays])
         };
         Series { name: (*method).into(), points: own.filter_map(point).collect(), ..Series::default() }
@@ -227,9 +231,9 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
             "Mrays/s",
         );
         chart.x = AxisStyle::linear("facets and call", "");
-        section = section.with(chart);
+        section = section.with_block(chart);
     }
-    section = section.with(rates(rows));
+    section = section.with_block(rates(rows));
     ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
 }
 

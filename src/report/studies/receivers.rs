@@ -7,9 +7,9 @@ use serde_json::Value;
 pub(super) fn section(rows: &[&Value]) -> Section {
     let intro = "The same rays on facets and on the spline: what the facets change (geometric) beside the noise of the run \
         (statistical). Where geometry is the larger, finer facets or better normals help; else more rays.";
-    let section = Section::new("Light on the receivers").with(intro);
-    let section = distinct(rows, "receiver").into_iter().fold(section, |s, name| s.with(chart(rows, name)));
-    section.with(table(rows))
+    let section = Section::new("Light on the receivers").with_block(intro);
+    let section = distinct(rows, "receiver").into_iter().fold(section, |s, name| s.with_block(chart(rows, name)));
+    section.with_block(table(rows))
 }
 
 fn chart(rows: &[&Value], receiver: &str) -> Chart {

@@ -29,7 +29,11 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let axes = [AxisStyle::linear("intersector", ""), AxisStyle::linear("rays", "")];
     let caption = "Rays flagged as unproved, and rays answered wrongly.";
     let chart = Chart { content, ..Chart::series("verdicts", "Flagged and wrong", caption, axes, Vec::new()) };
-    ("Numerical stability".into(), answer, vec![Section::new("Verdicts").with(chart).with(table).with(cases(rows))])
+    (
+        "Numerical stability".into(),
+        answer,
+        vec![Section::new("Verdicts").with_block(chart).with_block(table).with_block(cases(rows))],
+    )
 }
 
 /// One row a case, variants added up: right / flagged / wrong of every intersector.
