@@ -119,7 +119,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     // x → x, y → −z, z → y, and mm → m: a quarter turn about x.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let shift = Vector::new(middle.x, middle.z, -middle.y) * METRES_PER_MM;
-    nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [METRES_PER_MM; 3],
+    nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [METRES_PER_MM, METRES_PER_MM, METRES_PER_MM],
         "rotation": [-half, 0.0, 0.0, half], "translation": shift.to_array()}));
     let mut document = json!({
         "asset": {"version": "2.0", "generator": concat!("lampyris ", env!("CARGO_PKG_VERSION"))},

@@ -43,3 +43,29 @@ fn media_and_licences_are_listed() {
     let (code, out, _) = lampyris(&["licences"]);
     assert!(code == 0 && out.contains("UBUNTU FONT LICENCE") && out.contains("Plotly, Inc."), "{out}");
 }
+
+/// The faces of a plano-convex lens: a cap of a sphere, a plane and a rim, with figures in closed form.
+#[test]
+fn the_faces_of_a_file_are_listed_with_what_selects_them() {
+    let file = fixture("step/lens_planoconvex_analytic.stp").display().to_string();
+    let (code, out, err) = lampyris(&["info", &file, "--faces", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let solid = &found["parts"][0]["solids"][0];
+    assert_eq!(solid["closed"], true);
+    let faces = solid["faces"].as_array().unwrap();
+    let sphere = faces.iter().find(|f| f["kind"] == "sphere").unwrap();
+    let plane = faces.iter().find(|f| f["kind"] == "plane").unwrap();
+    let radius = sphere["radius_mm"].as_f64().unwrap();
+    // A disc of radius a carries the cap of a sphere of radius r whose area is 2πr(r − √(r² − a²)).
+    let disc = plane["area_mm2"].as_f64().unwrap();
+    let a2 = disc / std::f64::consts::PI;
+    let cap = 2.0 * std::f64::consts::PI * radius * (radius - (radius * radius - a2).sqrt());
+    let area = sphere["area_mm2"].as_f64().unwrap();
+    assert!((area / cap - 1.0).abs() < 1e-4, "{area} {cap}");
+    for face in faces {
+        assert!(face["id"].as_u64().is_some() && face["at"].as_array().unwrap().len() == 3, "{face}");
+    }
+    let (code, out, _) = lampyris(&["info", &file, "--faces"]);
+    assert!(code == 0 && out.contains("solid 0") && out.contains("sphere r "), "{out}");
+}

@@ -47,6 +47,9 @@ pub(crate) enum Command {
     Info {
         /// STEP file
         file: PathBuf,
+        /// List parts, solids and faces, each face with its #id, kind, area and a point on it
+        #[arg(long)]
+        faces: bool,
         #[command(flatten)]
         limits: RefusalLimit,
     },

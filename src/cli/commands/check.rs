@@ -29,7 +29,7 @@ use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
 use crate::study::{Quantiles, Summary, records};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;

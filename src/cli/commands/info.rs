@@ -1,5 +1,6 @@
 //! `lampyris info`: what a STEP file holds and what could not be read.
 
+use super::faces::print_faces;
 use crate::cli::arguments::command::RefusalLimit;
 use crate::cli::console::{Console, print};
 use crate::cli::output::json::json_text;
@@ -14,9 +15,17 @@ use std::path::Path;
 const SHOWN_NAMES: usize = 12;
 const SHOWN_NOTES: usize = 20;
 
-pub(crate) fn run(path: &Path, limits: RefusalLimit, console: &Console) -> Result<Completion, Failure> {
-    let report = input_files::step_file(path, None, console)?.report;
-    if console.json {
+pub(crate) fn run(
+    path: &Path,
+    faces: bool,
+    limits: RefusalLimit,
+    console: &Console,
+) -> Result<Completion, Failure> {
+    let import = input_files::step_file(path, None, console)?;
+    let report = import.report;
+    if faces {
+        print_faces(&import.model, console)?;
+    } else if console.json {
         print(&json_text(&report)?)?;
     } else {
         print(&summary(&report, console))?;

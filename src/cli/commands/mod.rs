@@ -4,6 +4,7 @@ mod assess;
 mod bvh_benchmark;
 mod check;
 mod demo;
+mod faces;
 mod facet;
 mod info;
 mod init;
@@ -23,7 +24,7 @@ use crate::cli::{completion::Completion, failure::Failure};
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     match command {
         Command::Demo { output, page, meshing, tracing } => demo::run(&output, &meshing, &tracing, page, console),
-        Command::Info { file, limits } => info::run(&file, limits, console),
+        Command::Info { file, faces, limits } => info::run(&file, faces, limits, console),
         Command::Facet(command) => facet::run(&command, console),
         Command::Trace { scene, output, meshing, tracing, extra } => {
             let command = trace::TraceCommand {
