@@ -93,6 +93,10 @@ const LONGEST_STEM: usize = 120;
 
 /// A name that is safe in a path: what is no letter, digit, `-` or `_` becomes `_`. A name too long for a file system is cut,
 /// and ends in a hash of the whole, so that long names that begin alike stay apart.
+///
+/// ```
+/// assert_eq!(lampyris::formats::file_stem("far field"), "far_field");
+/// ```
 pub fn file_stem(name: &str) -> String {
     let mut safe: String =
         name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();

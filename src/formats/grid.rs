@@ -5,6 +5,23 @@ use super::{Error, write_atomic};
 use std::path::Path;
 
 /// Values over a regular grid of cells: what a receiver recorded.
+///
+/// ```
+/// use lampyris::formats::{Axis, Grid};
+///
+/// let axis = |cells| Axis { label: "x".into(), unit: "mm".into(), range: [0.0, 4.0], cells };
+/// let grid = Grid {
+///     name: "wall".into(),
+///     quantity: "illuminance".into(),
+///     unit: "lx".into(),
+///     axes: [axis(4), axis(1)],
+///     values: vec![0.0, 1.0, 7.0, 2.0],
+///     error: None,
+///     geometric: None,
+///     layers: Vec::new(),
+/// };
+/// assert_eq!(grid.peak(), Some(([2.5, 2.0], 7.0)));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Name of the receiver.

@@ -53,19 +53,7 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
         .flat_map(|(n, l)| l.split([' ', '\t', ',', '\r']).filter(|w| !w.is_empty()).map(move |w| (n + 1, w)))
         .collect();
     let mut numbers = Numbers { path, words: &rest, at: 0, last_line: tilt_line };
-    match tilt.to_uppercase().as_str() {
-        "NONE" => {}
-        "INCLUDE" => {
-            numbers.next("lamp-to-luminaire geometry")?;
-            let count = numbers.count("number of tilt angles")?;
-            numbers.list(2 * count, "tilt table")?;
-        }
-        _ => {
-            let message =
-                format!("TILT={tilt} refers to another file; write TILT=NONE, or TILT=INCLUDE with its table");
-            return Err(Error::at_line(path, tilt_line, message));
-        }
-    }
+    numbers.skip_tilt_table(tilt)?;
     let lamps = numbers.next("number of lamps")?;
     let lumens_per_lamp = numbers.next("lumens per lamp")?;
     let multiplier = numbers.next("candela multiplier")?;
@@ -116,6 +104,21 @@ struct Numbers<'a> {
 }
 
 impl Numbers<'_> {
+    /// Reads over the table that a TILT line announces.
+    fn skip_tilt_table(&mut self, tilt: &str) -> Result<(), Error> {
+        match tilt.to_uppercase().as_str() {
+            "NONE" => Ok(()),
+            "INCLUDE" => {
+                self.next("lamp-to-luminaire geometry")?;
+                let count = self.count("number of tilt angles")?;
+                self.list(count.saturating_mul(2), "tilt table").map(|_| ())
+            }
+            _ => Err(self.error(format!(
+                "TILT={tilt} refers to another file; write TILT=NONE, or TILT=INCLUDE with its table"
+            ))),
+        }
+    }
+
     fn error(&self, message: String) -> Error {
         Error::at_line(self.path, self.last_line, message)
     }

@@ -6,6 +6,17 @@ use crate::math::Vector;
 pub(crate) const SAME_ANGLE_DEG: f64 = 1e-9;
 
 /// Luminous intensity over two angles: what an IES LM-63 or EULUMDAT file holds.
+///
+/// ```
+/// use lampyris::formats::{PhotometricType, parse_ies};
+///
+/// let text = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 180\n0\n100 100\n";
+/// let lamp = parse_ies(std::path::Path::new("lamp.ies"), text)?;
+/// assert_eq!(lamp.kind, PhotometricType::C);
+/// // 100 cd in every direction are 400 π lm.
+/// assert!((lamp.flux() - 400.0 * std::f64::consts::PI).abs() < 1e-9);
+/// # Ok::<(), lampyris::formats::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photometry {
     /// What the two angles mean.

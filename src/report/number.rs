@@ -7,6 +7,10 @@ const MEGA: f64 = 1e6;
 const GIGA: f64 = 1e9;
 
 /// A number with so many significant digits, without exponent where that stays short, thousands apart: `0.0123`, `1 234`, `3.2e-9`.
+///
+/// ```
+/// assert_eq!(lampyris::report::figures(0.0123456, 3), "0.0123");
+/// ```
 pub fn figures(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return if value.is_nan() {

@@ -4,6 +4,14 @@ use super::number::{figures, grouped};
 use crate::formats::csv_text;
 
 /// A table that can be sorted and copied; also written as CSV.
+///
+/// ```
+/// use lampyris::report::Table;
+///
+/// let mut table = Table::new("sags", "Sags", &[("face", ""), ("sag", "mm")]);
+/// table.row(["cap".into(), 0.25.into()]);
+/// assert_eq!(table.to_csv(), "face,sag (mm)\ncap,0.25\n");
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// Stem of its CSV file.

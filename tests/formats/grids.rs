@@ -72,8 +72,8 @@ fn png_opens_in_image_with_the_second_axis_upward() {
     let picture = image::open(path).unwrap().to_rgb8();
     assert_eq!(picture.dimensions(), (801, 534));
     // The largest value, 4, is the middle cell of the upper row.
-    assert_eq!(picture.get_pixel(400, 10).0, ColourMap::Inferno.at(1.0));
-    assert_eq!(picture.get_pixel(10, 530).0, ColourMap::Inferno.at(0.0));
+    assert_eq!(picture.get_pixel(400, 10).0, ColourMap::Inferno.colour(1.0));
+    assert_eq!(picture.get_pixel(10, 530).0, ColourMap::Inferno.colour(0.0));
     assert!(Picture { width: 0, height: 0, rgb: Vec::new() }.to_png().is_err());
 }
 

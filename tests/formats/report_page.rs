@@ -193,6 +193,27 @@ fn a_browser_draws_every_picture() {
     }
 }
 
+/// The page may run its own scripts alone, by their hash, and turn no text into code.
+#[test]
+fn scripts_run_by_their_hash_alone() {
+    let page = sample(20).to_html();
+    let policy = page.split("Content-Security-Policy\" content=\"").nth(1).unwrap().split('"').next().unwrap();
+    let scripts = policy.split(';').find(|p| p.trim().starts_with("script-src")).unwrap();
+    assert!(scripts.contains("'sha256-") && !scripts.contains("unsafe"), "{scripts}");
+    assert_eq!(scripts.matches("'sha256-").count(), page.matches("<script>").count());
+    // A script that got into the page all the same does not run.
+    let Some(browser) = chromium() else {
+        eprintln!("SKIPPED: no Chromium is installed, the page was not opened in a browser");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("page.html");
+    let smuggled = page.replacen("<main>", "<main><script>document.title = 'run'</script>", 1);
+    std::fs::write(&path, smuggled).unwrap();
+    let dom = browsed(browser, &path);
+    assert!(dom.contains("data-ready") && !dom.contains("<title>run</title>"), "{}", &dom[..400.min(dom.len())]);
+}
+
 #[test]
 #[ignore = "writes the sample report to LAMPYRIS_SAMPLE for people to look at"]
 fn sample_for_people() {

@@ -17,6 +17,8 @@ const MOST_RULES: usize = 40;
 /// Distance of source and receiver from the model, and margin of the beam, as shares of the box' diagonal.
 const DISTANCE: f64 = 0.5;
 const BEAM_MARGIN: f64 = 1.05;
+/// Coordinates below this share of the diagonal are rounding of the file's twelve digits.
+const ROUNDING: f64 = 1e-9;
 /// The receiver is so many times as wide as the beam.
 const RECEIVER_WIDTHS: f64 = 4.0;
 
@@ -98,9 +100,11 @@ fn rule(part: &Part) -> String {
 fn light(model: &Model, loaded: &LoadedModel) -> String {
     let bounds = loaded.reports.iter().find_map(|r| r.bbox_mm).unwrap_or([[-1.0; 3], [1.0; 3]]);
     let [low, high] = bounds;
-    let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
     let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
     let diagonal = 2.0 * half.iter().map(|h| h * h).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+    // A middle that is off by rounding alone stands at 0.
+    let middle =
+        [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])).map(|x| if x.abs() < ROUNDING * diagonal { 0.0 } else { x });
     let radius = BEAM_MARGIN * half[0].hypot(half[1]).max(DISTANCE * diagonal / 10.0);
     let at = |z: f64| format!("[{}, {}, {}]", short(middle[0]), short(middle[1]), short(z));
     let width = short(RECEIVER_WIDTHS * radius);

@@ -3,6 +3,7 @@
 use super::json::json_text;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
+use crate::formats::printable_line;
 use crate::report::file_stem;
 use crate::simulate::Results;
 use serde_json::Value;
@@ -58,7 +59,7 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     for r in results.receivers.iter().filter(|r| !r.files.is_empty()) {
         files.push((
             folder.join(format!("{}.csv", file_stem(&r.name))),
-            format!("{} cell by cell (also .npz .png .vti and more)", r.name),
+            format!("{} cell by cell (also .npz .png .vti and more)", printable_line(&r.name)),
         ));
     }
     if !results.ledger.is_empty() {

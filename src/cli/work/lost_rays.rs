@@ -67,6 +67,10 @@ pub(crate) fn report_lost_light(
     folder: &Path,
     console: &Console,
 ) -> Completion {
+    if !results.power.emitted.is_finite() {
+        console.say("the powers of the sources sum to no finite number: the powers of this run mean nothing");
+        return Completion::Incomplete;
+    }
     let share = results.power.lost / results.power.emitted;
     if share <= max_lost {
         return Completion::Complete;
