@@ -21,10 +21,10 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     let (code, out, err) = lampyris_in(path, &arguments);
     assert_eq!(code, 0, "{err}");
     let found: Value = serde_json::from_str(&out).unwrap();
-    // The beam covers the lens and a rim around it, which reaches the receiver.
-    assert!(
-        found["power"]["absorbed"].as_f64().unwrap() > 0.5 && found["power"]["received"].as_f64().unwrap() > 0.01
-    );
+    // The lens, of radius 20, absorbs its share of a beam that is 1.05 times as wide as the corner of its box is far.
+    let share = 1.0 / (1.05f64.powi(2) * 2.0);
+    let [absorbed, received] = ["absorbed", "received"].map(|key| found["power"][key].as_f64().unwrap());
+    assert!((absorbed - share).abs() < 0.05 && (received - (1.0 - share)).abs() < 0.05, "{absorbed}, not {share}");
     assert!(path.join("out/results.json").is_file() && !path.join("out/report.html").exists());
     // Never over a file that is there; into folders that are not.
     assert_eq!(lampyris_in(path, &["init", "my lens.stp"]).0, 2);
