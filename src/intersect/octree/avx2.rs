@@ -7,6 +7,7 @@
 use super::lanes::Lanes;
 use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
+use super::quad_edges::{QuadEdges, QuadRay};
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
 use super::tree::Tree;
 use super::walk;
@@ -71,6 +72,12 @@ unsafe fn row(node: &Node, row: usize) -> __m256 {
 #[inline(always)]
 unsafe fn broadcast_axis(v: &[f32; 3], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
+}
+
+/// The numbers of a corner in the order whose halves are given.
+#[inline(always)]
+unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
+    unsafe { _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(corner), order)) }
 }
 
 /// Half a row of corners against the ray's origin.
@@ -195,6 +202,58 @@ impl Lanes for Avx2 {
             let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
             let outside = _mm256_or_ps(_mm256_and_ps(below, above), _mm256_or_ps(late, early));
             !(_mm256_movemask_ps(outside) as u32) & 255
+        }
+    }
+
+    #[inline(always)]
+    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+        // SAFETY: see the head of the file; a masked load reads three numbers, those of a corner.
+        unsafe {
+            let three = _mm256_setr_epi64x(-1, -1, -1, 0);
+            let a = _mm256_maskload_pd(corners[0].as_ptr(), three);
+            let b = _mm256_maskload_pd(corners[1].as_ptr(), three);
+            let c = _mm256_maskload_pd(corners[2].as_ptr(), three);
+            let d = _mm256_maskload_pd(corners[3].as_ptr(), three);
+            let low = _mm256_min_pd(_mm256_min_pd(a, b), _mm256_min_pd(c, d));
+            let high = _mm256_max_pd(_mm256_max_pd(a, b), _mm256_max_pd(c, d));
+            let start = _mm256_load_pd(ray.origin.as_ptr());
+            let reach = _mm256_set1_pd(ray.reach);
+            let near = _mm256_and_pd(
+                _mm256_cmp_pd::<_CMP_GE_OQ>(start, _mm256_sub_pd(low, reach)),
+                _mm256_cmp_pd::<_CMP_LE_OQ>(start, _mm256_add_pd(high, reach)),
+            );
+            // Corners against the start in the order of the ray's axes, then axis by axis.
+            let order = _mm256_load_si256(ray.order.as_ptr().cast());
+            let origin = _mm256_load_pd(ray.ordered_origin.as_ptr());
+            let a = _mm256_sub_pd(ordered(a, order), origin);
+            let b = _mm256_sub_pd(ordered(b, order), origin);
+            let c = _mm256_sub_pd(ordered(c, order), origin);
+            let d = _mm256_sub_pd(ordered(d, order), origin);
+            let (ab, cd) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
+            let z = _mm256_permute2f128_pd::<0x31>(ab, cd);
+            let x = _mm256_permute2f128_pd::<0x20>(ab, cd);
+            let y = _mm256_permute2f128_pd::<0x20>(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
+            // Not fused, to have the bits of plain Rust.
+            let x = _mm256_sub_pd(x, _mm256_mul_pd(_mm256_set1_pd(ray.shear[0]), z));
+            let y = _mm256_sub_pd(y, _mm256_mul_pd(_mm256_set1_pd(ray.shear[1]), z));
+            let next_x = _mm256_permute4x64_pd::<0x39>(x);
+            let next_y = _mm256_permute4x64_pd::<0x39>(y);
+            let outline = _mm256_sub_pd(_mm256_mul_pd(next_x, y), _mm256_mul_pd(next_y, x));
+            let third_x = _mm256_extractf128_pd::<1>(x);
+            let third_y = _mm256_extractf128_pd::<1>(y);
+            let forth = _mm_mul_sd(_mm256_castpd256_pd128(x), third_y);
+            let back = _mm_mul_sd(_mm256_castpd256_pd128(y), third_x);
+            let zero = _mm256_setzero_pd();
+            let mut edges = QuadEdges {
+                diagonal: _mm_cvtsd_f64(_mm_sub_sd(forth, back)),
+                below: _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(outline, zero)) as u32,
+                above: _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(outline, zero)) as u32,
+                near: _mm256_movemask_pd(near) == 15,
+                ..QuadEdges::default()
+            };
+            _mm256_store_pd(edges.outline.as_mut_ptr(), outline);
+            _mm256_store_pd(edges.heights.as_mut_ptr(), z);
+            edges
         }
     }
 

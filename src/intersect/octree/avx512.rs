@@ -10,6 +10,7 @@ use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
+use super::quad_edges::{QuadEdges, QuadRay};
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
 use super::tree::Tree;
 use super::walk;
@@ -206,6 +207,12 @@ impl Lanes for Avx512 {
             edges.below[1] = _mm512_cmp_pd_mask::<_CMP_LT_OQ>(diagonal, zero);
             edges.above[1] = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(diagonal, zero);
         }
+    }
+
+    /// As with AVX2: one facet fills no wider register.
+    #[inline(always)]
+    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+        Avx2::quad(corners, ray)
     }
 
     /// As with AVX2: loads of 64 bytes would wait for the entries written by halves.

@@ -2,6 +2,7 @@
 
 use super::facet_pair::{Corners, Edges};
 use super::node::{Block, Node};
+use super::quad_edges::{QuadEdges, QuadRay};
 use super::ray::{BoxRay, SieveRay};
 use crate::intersect::facet::Line;
 
@@ -17,6 +18,11 @@ pub(super) trait Lanes {
     #[inline(always)]
     fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
         edges.set(corners, line);
+    }
+    /// The edge functions of a facet, all with the same bits.
+    #[inline(always)]
+    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+        QuadEdges::new(corners, ray)
     }
     /// Which distances do not lie beyond `t_max`, one bit each.
     fn open(enters: &[f32; 16], t_max: f32) -> u32;

@@ -34,6 +34,7 @@ mod light_buffer;
 mod node;
 mod pack;
 mod portable;
+mod quad_edges;
 mod ray;
 mod ray_state;
 mod settings;

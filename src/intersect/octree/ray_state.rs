@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use super::node::{Link, Node};
+use super::quad_edges::QuadRay;
 use super::ray::{BoxRay, SieveRay};
 use super::tree::Tree;
 use crate::intersect::facet::{FacetRay, Nearest};
@@ -44,6 +45,9 @@ pub(super) struct RayState {
     shift: f64,
     pub(super) index: usize,
     pub(super) facets: FacetRay,
+    pub(super) quads: QuadRay,
+    /// Whether the ray leaves a facet.
+    pub(super) departs: bool,
     pub(super) best: Nearest,
     top: usize,
     enters: [f32; STACK],
@@ -58,6 +62,8 @@ impl RayState {
             boxes: BoxRay::default(),
             sieve: SieveRay::default(),
             facets: FacetRay::new(&ray),
+            quads: QuadRay::default(),
+            departs: false,
             best: Nearest::up_to(0.0),
             shift: 0.0,
             next: Link::END,
@@ -113,6 +119,8 @@ impl RayState {
         // Adding zero makes −0.0 positive: distances are sorted by their bits.
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
         self.facets = FacetRay::new(ray);
+        self.quads = QuadRay::new(&self.facets, origin, tree.surroundings.reach);
+        self.departs = ray.departure.is_some();
         self.sieve.shear = self.facets.shear().map(|s| s as f32);
         self.sieve.axes = self.facets.axes().map(|a| a as u8);
         self.sieve.slack = moved;

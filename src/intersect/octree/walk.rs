@@ -12,7 +12,7 @@ use super::tree::Tree;
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::intersect::prefetch::{prefetch, prefetch_either};
-use crate::math::Ray;
+use crate::math::{Point, Ray};
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
 
@@ -133,7 +133,7 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
                 s.block = index as u32;
                 s.candidates = sift::<L>(&tree.blocks[index], s) & used_lanes(count);
                 if s.candidates != 0 {
-                    test(tree, s);
+                    test::<L>(tree, s);
                 }
                 s.next = s.pop(s.boxes.t_max);
             }
@@ -184,7 +184,7 @@ fn walk_batch<L: Lanes>(
         let queue = queues.take(EXACT);
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
-            test(tree, s);
+            test::<L>(tree, s);
             // What was next may lie beyond the new hit.
             s.recheck_next::<L>();
             prefetch_step(tree, s.next);
@@ -257,7 +257,7 @@ fn prefetch_corners(tree: &Tree, s: &RayState) {
 
 /// Tests the facets that the sieve left.
 #[inline(always)]
-fn test(tree: &Tree, s: &mut RayState) {
+fn test<L: Lanes>(tree: &Tree, s: &mut RayState) {
     let positions = &tree.surroundings.mesh.positions;
     let block = &tree.blocks[s.block as usize];
     let candidates = s.candidates;
@@ -269,10 +269,23 @@ fn test(tree: &Tree, s: &mut RayState) {
         // The second triangle of a triangle is a line: it is never hit, but to see that takes exact arithmetic.
         let is_quad = u32::from(block.positions[k][2] != block.positions[k][3]);
         let triangles = candidates >> k & 1 | candidates >> (k + 3) & (is_quad << 1);
-        s.facets.test(block.facets[k], triangles, corners, &tree.surroundings, &mut s.best);
+        let facet = block.facets[k];
+        let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
+        let edges = L::quad(arrays, &s.quads);
+        // Rarely the facet is near the start of a ray that leaves another, or an edge function is zero.
+        if (s.departs & edges.near) || !edges.keep_hits(facet, triangles, &s.quads, &mut s.best) {
+            test_with_care(tree, s, facet, triangles, corners);
+        }
         if mask == 0 {
             break;
         }
     }
     s.limit_to_hit();
+}
+
+/// The test of a facet where more than the signs of its edge functions decides.
+#[cold]
+#[inline(never)]
+fn test_with_care(tree: &Tree, s: &mut RayState, facet: u32, triangles: u32, corners: [&Point; 4]) {
+    s.facets.test(facet, triangles, corners, &tree.surroundings, &mut s.best);
 }

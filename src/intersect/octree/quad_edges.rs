@@ -1,0 +1,126 @@
+//! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::quad`] step by step,
+//! so that all instruction sets have its bits, but without the branches and the copies that cost more than the arithmetic.
+
+use crate::intersect::facet::{FacetRay, Line, Nearest};
+use std::hint::select_unpredictable;
+
+/// What the edge functions need of a ray.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(32))]
+pub(super) struct QuadRay {
+    /// Where the ray starts, in the order of x, y, z; the last means nothing.
+    pub(super) origin: [f64; 4],
+    /// The same in the order of the ray's axes, the main one last but one.
+    pub(super) ordered_origin: [f64; 4],
+    /// Halves of numbers in that order: those of lane `a` are `2a` and `2a + 1`.
+    pub(super) order: [u32; 8],
+    /// Slopes against the main axis, and the inverse of the direction along it.
+    pub(super) shear: [f64; 3],
+    pub(super) t_min: f64,
+    /// A facet is near the start when its box, grown by this, holds it, mm.
+    pub(super) reach: f64,
+}
+
+impl QuadRay {
+    #[inline(always)]
+    pub(super) fn new(ray: &FacetRay, origin: [f64; 4], reach: f64) -> Self {
+        let axes = ray.axes();
+        let Line { origin: [x, y, z], shear, t_min } = ray.line();
+        let mut order = [6, 7, 6, 7, 6, 7, 6, 7];
+        for (lane, axis) in axes.into_iter().enumerate() {
+            order[2 * lane] = 2 * axis as u32;
+            order[2 * lane + 1] = 2 * axis as u32 + 1;
+        }
+        Self { origin, ordered_origin: [x, y, z, 0.0], order, shear, t_min, reach }
+    }
+
+    fn line(&self) -> Line {
+        let [x, y, z, _] = self.ordered_origin;
+        Line { origin: [x, y, z], shear: self.shear, t_min: self.t_min }
+    }
+}
+
+/// Edge functions of the two triangles of a facet.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(32))]
+pub(super) struct QuadEdges {
+    /// From each corner to the one before.
+    pub(super) outline: [f64; 4],
+    /// Of the corners, along the main axis.
+    pub(super) heights: [f64; 4],
+    /// From the third corner to the first.
+    pub(super) diagonal: f64,
+    /// One bit for each edge function of the outline that is negative, and for each that is positive.
+    pub(super) below: u32,
+    pub(super) above: u32,
+    /// Whether the facet is near the start of the ray.
+    pub(super) near: bool,
+}
+
+impl QuadEdges {
+    /// In plain Rust.
+    #[inline(always)]
+    pub(super) fn new(corners: [&[f64; 3]; 4], ray: &QuadRay) -> Self {
+        let [sx, sy, _] = ray.shear;
+        let mut edges = Self { near: true, ..Self::default() };
+        let mut x = [0.0; 4];
+        let mut y = [0.0; 4];
+        for a in 0..3 {
+            let along = corners.map(|c| c[a]);
+            let low = along.into_iter().fold(f64::INFINITY, f64::min);
+            let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+            edges.near &= (ray.origin[a] >= low - ray.reach) & (ray.origin[a] <= high + ray.reach);
+        }
+        let [kx, ky, kz] = [ray.order[0], ray.order[2], ray.order[4]].map(|half| (half / 2 % 3) as usize);
+        let [ox, oy, oz, _] = ray.ordered_origin;
+        for k in 0..4 {
+            let z = corners[k][kz] - oz;
+            x[k] = (corners[k][kx] - ox) - sx * z;
+            y[k] = (corners[k][ky] - oy) - sy * z;
+            edges.heights[k] = z;
+        }
+        for k in 0..4 {
+            let next = (k + 1) % 4;
+            let edge = x[next] * y[k] - y[next] * x[k];
+            edges.outline[k] = edge;
+            edges.below |= u32::from(edge < 0.0) << k;
+            edges.above |= u32::from(edge > 0.0) << k;
+        }
+        edges.diagonal = x[0] * y[2] - y[0] * x[2];
+        edges
+    }
+
+    /// Keeps the nearest hit of these triangles of a facet; `false` where an edge function is zero and decides nothing.
+    #[inline(always)]
+    pub(super) fn keep_hits(&self, facet: u32, triangles: u32, ray: &QuadRay, best: &mut Nearest) -> bool {
+        let left = u32::from(self.diagonal < 0.0);
+        let right = u32::from(self.diagonal > 0.0);
+        let below = any_edge(self.below, left, right);
+        let above = any_edge(self.above, right, left);
+        let zeros = !(self.below | self.above) & 15;
+        let level = (left | right) ^ 1;
+        if any_edge(zeros, level, level) & triangles != 0 {
+            return false;
+        }
+        let met = triangles & !(below & above);
+        let line = ray.line();
+        let [e0, e1, e2, e3] = self.outline;
+        let [z0, z1, z2, z3] = self.heights;
+        if met == 3 {
+            line.keep(facet, false, [e1, self.diagonal, e0], [z0, z1, z2], best);
+        }
+        if met != 0 {
+            let second = met & 2 != 0;
+            let pick = |first: f64, other: f64| select_unpredictable(second, other, first);
+            let edges = [pick(e1, e2), pick(self.diagonal, e3), pick(e0, -self.diagonal)];
+            line.keep(facet, second, edges, [z0, pick(z1, z2), pick(z2, z3)], best);
+        }
+        true
+    }
+}
+
+/// Which triangles have one of these edges: bit 0 for the first, bit 1 for the second, which the diagonal bounds from its other side.
+#[inline(always)]
+fn any_edge(outline: u32, first: u32, second: u32) -> u32 {
+    (outline | outline >> 1 | first) & 1 | (outline >> 1 | outline >> 2 | second << 1) & 2
+}
