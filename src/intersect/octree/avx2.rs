@@ -89,44 +89,42 @@ unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: 
     }
 }
 
-/// One layer of a sorting network: `partner` is what each lane is compared with, `LESS` the lanes that keep the lesser.
-#[inline(always)]
-unsafe fn layer<const LESS: i32>(keys: __m256i, partner: __m256i) -> __m256i {
-    unsafe { _mm256_blend_epi32::<LESS>(_mm256_max_epi32(keys, partner), _mm256_min_epi32(keys, partner)) }
-}
+/// By octant: the places of children, the farthest first.
+#[repr(align(64))]
+pub(super) struct Orders(pub(super) [[u32; 8]; 8]);
 
-/// Sorts the children that are met by falling distance, with the least network of eight, and stores them.
-///
-/// A key is a distance that is not negative with the child in its lowest three bits; children that are not met have
-/// the key −1 and come last.
-#[inline(always)]
-pub(super) unsafe fn sort<const SINGLE: bool>(
-    met: u32,
-    keys: __m256i,
-    node: &Node,
-    enters: &mut [f32; 8],
-    links: &mut [u32; 8],
-) -> usize {
-    if SINGLE && met & met.wrapping_sub(1) == 0 {
-        if met != 0 {
-            // It is taken at once, so that its distance is of no interest.
-            links[0] = node.children[(met.trailing_zeros() & 7) as usize];
+pub(super) static ORDERS: Orders = {
+    let mut orders = [[0; 8]; 8];
+    let mut octant = 0;
+    while octant < 8 {
+        let mut k = 0;
+        while k < 8 {
+            orders[octant][k] = (7 ^ k ^ octant) as u32;
+            k += 1;
         }
-        return usize::from(met != 0);
+        octant += 1;
     }
-    unsafe {
-        let k = layer::<0xCC>(keys, _mm256_shuffle_epi32::<0x4E>(keys));
-        let k = layer::<0xF0>(k, _mm256_permute4x64_epi64::<0x4E>(k));
-        let k = layer::<0xAA>(k, _mm256_shuffle_epi32::<0xB1>(k));
-        let k = layer::<0x30>(k, _mm256_permute4x64_epi64::<0xD8>(k));
-        let k = layer::<0x50>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 4, 2, 6, 1, 5, 3, 7)));
-        let k = layer::<0x54>(k, _mm256_permutevar8x32_epi32(k, _mm256_setr_epi32(0, 2, 1, 4, 3, 6, 5, 7)));
-        let children = _mm256_loadu_si256(node.children.as_ptr().cast());
-        _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, k));
-        _mm256_storeu_si256(enters.as_mut_ptr().cast(), k);
-        met.count_ones() as usize
+    Orders(orders)
+};
+
+/// By mask: the lanes whose bits are set, one after the other.
+static COMPRESSIONS: [[u8; 8]; 256] = {
+    let mut compressions = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let mut lane = 0;
+        let mut count = 0;
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                compressions[mask][count] = lane as u8;
+                count += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
     }
-}
+    compressions
+};
 
 impl Lanes for Avx2 {
     #[inline(always)]
@@ -152,19 +150,19 @@ impl Lanes for Avx2 {
             let leave =
                 _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
             let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let used = _mm256_sllv_epi32(
-                _mm256_set1_epi32(node.used as i32),
-                _mm256_setr_epi32(31, 30, 29, 28, 27, 26, 25, 24),
-            );
-            let met = _mm256_and_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave), _mm256_castsi256_ps(used));
-            let keys = _mm256_or_si256(
-                _mm256_and_si256(_mm256_castps_si256(enter), _mm256_set1_epi32(0x7FFF_FFF8)),
-                lanes,
-            );
-            let none = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
-            let keys = _mm256_castps_si256(_mm256_blendv_ps(none, _mm256_castsi256_ps(keys), met));
-            sort::<SINGLE>(_mm256_movemask_ps(met) as u32, keys, node, enters, links)
+            // Farthest first.
+            let order = _mm256_load_si256(ORDERS.0.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
+            let enter = _mm256_permutevar8x32_ps(enter, order);
+            let leave = _mm256_permutevar8x32_ps(leave, order);
+            let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(node.children.as_ptr().cast()), order);
+            let unused = _mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_setzero_si256()));
+            let met = _mm256_andnot_ps(unused, _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
+            let met = _mm256_movemask_ps(met) as u32;
+            let packed = _mm_loadl_epi64(COMPRESSIONS.get_unchecked(met as usize & 255).as_ptr().cast());
+            let packed = _mm256_cvtepu8_epi32(packed);
+            _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_permutevar8x32_ps(enter, packed));
+            _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, packed));
+            met.count_ones() as usize
         }
     }
 

@@ -5,7 +5,7 @@
 //! because octants are below eight and axes below three.
 #![allow(unsafe_code)]
 
-use super::avx2::{self, Avx2};
+use super::avx2::{self, Avx2, ORDERS};
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::light_buffer::LightBuffer;
@@ -138,13 +138,16 @@ impl Lanes for Avx512 {
             let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
             let enter = _mm512_castps512_ps256(most);
             let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-LEAVE_STRETCH));
-            let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.used as u8, enter, leave);
-            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            // The distance but its sign and lowest three bits, these of the lane.
-            let distance = _mm256_set1_epi32(0x7FFF_FFF8);
-            let keys = _mm256_ternarylogic_epi32::<0xF8>(lanes, _mm256_castps_si256(enter), distance);
-            let keys = _mm256_mask_blend_epi32(met, _mm256_set1_epi32(-1), keys);
-            avx2::sort::<SINGLE>(u32::from(met), keys, node, enters, links)
+            // Farthest first.
+            let order = _mm256_load_si256(ORDERS.0.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
+            let enter = _mm256_permutexvar_ps(order, enter);
+            let leave = _mm256_permutexvar_ps(order, leave);
+            let children = _mm256_permutexvar_epi32(order, _mm256_loadu_si256(node.children.as_ptr().cast()));
+            let used = _mm256_test_epi32_mask(children, children);
+            let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
+            _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_maskz_compress_ps(met, enter));
+            _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_maskz_compress_epi32(met, children));
+            met.count_ones() as usize
         }
     }
 

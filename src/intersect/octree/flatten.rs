@@ -1,6 +1,7 @@
 //! From cells to nodes and blocks: sparse octants merged into full nodes, children next to each other.
 
 use super::cell::{Cell, Content};
+use super::clip::Box32;
 use super::node::{Block, Link, Node};
 use super::{Settings, Statistics, huge_pages};
 use crate::math::Point;
@@ -73,7 +74,7 @@ impl Draft {
                 } else {
                     self.add_in_turn(children, collapse, depth)
                 };
-                for (slot, (bounds, link)) in boxes.iter().zip(links).enumerate() {
+                for ((bounds, link), slot) in boxes.iter().zip(links).zip(octant_slots(&boxes)) {
                     node.set(slot, bounds, link);
                 }
                 self.nodes[me] = node;
@@ -150,4 +151,39 @@ fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
             children.extend(inner);
         }
     }
+}
+
+/// Places for up to eight boxes such that the one at place `p ^ octant` is mostly met before those of larger `p` by rays of an octant:
+/// each box stands at the corner of a cube that it is nearest to, as far as that is free.
+///
+/// Source: Ylitie, Karras, Laine, HPG 2017, section 3.3, with the greedy choice in place of the auction.
+fn octant_slots(boxes: &[Box32]) -> [usize; 8] {
+    let middles: Vec<[f32; 3]> = boxes.iter().map(|b| std::array::from_fn(|a| b.low[a] + b.high[a])).collect();
+    let mut mean = [0.0; 3];
+    for middle in &middles {
+        for a in 0..3 {
+            mean[a] += middle[a] / middles.len() as f32;
+        }
+    }
+    let mut slots = [0; 8];
+    let mut open = [true; 8];
+    let mut placed = [false; 8];
+    for _ in 0..middles.len().min(8) {
+        let mut best = (f32::NEG_INFINITY, 0, 0);
+        for (child, middle) in middles.iter().enumerate().filter(|(child, _)| !placed[*child]) {
+            let [x, y, z] = std::array::from_fn(|a| middle[a] - mean[a]);
+            for slot in (0..8).filter(|&slot| open[slot]) {
+                let toward = |a: usize, x: f32| if slot >> a & 1 == 1 { x } else { -x };
+                let gain = toward(0, x) + toward(1, y) + toward(2, z);
+                if gain > best.0 {
+                    best = (gain, child, slot);
+                }
+            }
+        }
+        let (_, child, slot) = best;
+        slots[child] = slot;
+        open[slot] = false;
+        placed[child] = true;
+    }
+    slots
 }

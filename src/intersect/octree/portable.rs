@@ -23,16 +23,11 @@ impl Lanes for Portable {
             }
         }
         let mut count = 0;
-        for k in 0..8 {
+        for place in (0..8).rev() {
+            let k = place ^ usize::from(ray.octant);
             if node.used >> k & 1 == 1 && enter[k] <= leave[k] * LEAVE_STRETCH {
-                let mut place = count;
-                while place > 0 && enters[place - 1] < enter[k] {
-                    enters[place] = enters[place - 1];
-                    links[place] = links[place - 1];
-                    place -= 1;
-                }
-                enters[place] = enter[k];
-                links[place] = node.children[k];
+                enters[count] = enter[k];
+                links[count] = node.children[k];
                 count += 1;
             }
         }
