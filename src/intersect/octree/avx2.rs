@@ -55,12 +55,6 @@ pub(super) fn walk(
 /// Eight lanes of f32.
 pub(super) struct Avx2;
 
-/// Component `K` in all lanes.
-#[inline(always)]
-unsafe fn broadcast<const K: i32>(v: __m128) -> __m256 {
-    unsafe { _mm256_broadcastss_ps(_mm_permute_ps::<K>(v)) }
-}
-
 #[inline(always)]
 unsafe fn row(node: &Node, row: usize) -> __m256 {
     unsafe {
@@ -128,23 +122,29 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
 
 impl Lanes for Avx2 {
     #[inline(always)]
-    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.
         unsafe {
-            let inverse = _mm_load_ps(ray.inverse.as_ptr());
-            let slack = _mm_load_ps(ray.slack.as_ptr());
-            let to = _mm_sub_ps(_mm_load_ps(node.origin.as_ptr()), _mm_load_ps(ray.origin.as_ptr()));
-            let base = _mm_mul_ps(to, inverse);
-            let scale = _mm_mul_ps(_mm_load_ps(node.step.as_ptr()), inverse);
-            let (early, late) = (_mm_sub_ps(base, slack), _mm_add_ps(base, slack));
-            let (sx, sy, sz) = (broadcast::<0x00>(scale), broadcast::<0x55>(scale), broadcast::<0xAA>(scale));
+            let [x, y, z] = [0, 1, 2];
+            let inverse_x = _mm256_load_ps(ray.inverse[0].as_ptr());
+            let inverse_y = _mm256_load_ps(ray.inverse[1].as_ptr());
+            let inverse_z = _mm256_load_ps(ray.inverse[2].as_ptr());
+            let base_x = _mm256_mul_ps(_mm256_set1_ps(node.origin[x] - ray.origin[x]), inverse_x);
+            let base_y = _mm256_mul_ps(_mm256_set1_ps(node.origin[y] - ray.origin[y]), inverse_y);
+            let base_z = _mm256_mul_ps(_mm256_set1_ps(node.origin[z] - ray.origin[z]), inverse_z);
+            let sx = _mm256_mul_ps(_mm256_set1_ps(node.step[x]), inverse_x);
+            let sy = _mm256_mul_ps(_mm256_set1_ps(node.step[y]), inverse_y);
+            let sz = _mm256_mul_ps(_mm256_set1_ps(node.step[z]), inverse_z);
+            let slack_x = _mm256_set1_ps(ray.slack[x]);
+            let slack_y = _mm256_set1_ps(ray.slack[y]);
+            let slack_z = _mm256_set1_ps(ray.slack[z]);
             let [nx, ny, nz] = [ray.entry_row(0), ray.entry_row(1), ray.entry_row(2)];
-            let enter_x = _mm256_fmadd_ps(row(node, nx), sx, broadcast::<0x00>(early));
-            let enter_y = _mm256_fmadd_ps(row(node, ny), sy, broadcast::<0x55>(early));
-            let enter_z = _mm256_fmadd_ps(row(node, nz), sz, broadcast::<0xAA>(early));
-            let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, broadcast::<0x00>(late));
-            let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, broadcast::<0x55>(late));
-            let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, broadcast::<0xAA>(late));
+            let enter_x = _mm256_fmadd_ps(row(node, nx), sx, _mm256_sub_ps(base_x, slack_x));
+            let enter_y = _mm256_fmadd_ps(row(node, ny), sy, _mm256_sub_ps(base_y, slack_y));
+            let enter_z = _mm256_fmadd_ps(row(node, nz), sz, _mm256_sub_ps(base_z, slack_z));
+            let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, _mm256_add_ps(base_x, slack_x));
+            let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, _mm256_add_ps(base_y, slack_y));
+            let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, _mm256_add_ps(base_z, slack_z));
             let enter =
                 _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
             let leave =
@@ -162,7 +162,7 @@ impl Lanes for Avx2 {
             let packed = _mm256_cvtepu8_epi32(packed);
             _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_permutevar8x32_ps(enter, packed));
             _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, packed));
-            met.count_ones() as usize
+            met
         }
     }
 

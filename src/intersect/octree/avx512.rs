@@ -25,6 +25,8 @@ pub(super) fn available() -> bool {
         && is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512vbmi")
 }
 
 /// Finds the nearest hit of each ray.
@@ -38,7 +40,7 @@ pub(super) fn walk(
     hits: &mut [Option<FacetHit>],
     cost: &mut Cost,
 ) {
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl")]
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl,avx512bw,avx512vbmi")]
     fn run(
         tree: &Tree,
         light_buffers: &[LightBuffer],
@@ -55,22 +57,27 @@ pub(super) fn walk(
 
 struct Avx512;
 
-/// By octant: the rows of bounds where a ray enters and leaves along x, then y, then z.
-static ROWS: [[u64; 8]; 8] = {
-    let mut rows = [[0; 8]; 8];
+/// By octant: the bytes of a node's bounds along x, then y, then z; of each axis first where a ray enters the children, the farthest
+/// first, then where it leaves them.
+static BOUNDS: BoundOrders = {
+    let mut orders = [[0; 64]; 8];
     let mut octant = 0;
     while octant < 8 {
-        let mut axis = 0;
-        while axis < 3 {
-            let near = 2 * axis + (octant >> axis & 1);
-            rows[octant][2 * axis] = near as u64;
-            rows[octant][2 * axis + 1] = (near ^ 1) as u64;
-            axis += 1;
+        let mut place = 0;
+        while place < 48 {
+            let axis = place / 16;
+            let side = place / 8 % 2;
+            let row = 2 * axis + (octant >> axis & 1 ^ side);
+            orders[octant][place] = (8 * row + (7 ^ place % 8 ^ octant)) as u8;
+            place += 1;
         }
         octant += 1;
     }
-    rows
+    BoundOrders(orders)
 };
+
+#[repr(align(64))]
+struct BoundOrders([[u8; 64]; 8]);
 
 /// Bytes as numbers.
 #[inline(always)]
@@ -78,12 +85,15 @@ unsafe fn widen_bytes(bytes: __m128i) -> __m512 {
     unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes)) }
 }
 
-/// Lane `k` in the lower half, lane `k + 4` in the upper.
+/// Where a ray crosses bounds along an axis: into the children, and out of them, which is negated.
 #[inline(always)]
-unsafe fn broadcast_halves(v: __m256, k: i32) -> __m512 {
+unsafe fn crossings(bytes: __m128i, node: &Node, ray: &BoxRay, axis: usize) -> __m512 {
     unsafe {
-        let lanes = _mm512_mask_blend_epi32(0xFF00, _mm512_set1_epi32(k), _mm512_set1_epi32(k + 4));
-        _mm512_permutexvar_ps(lanes, _mm512_castps256_ps512(v))
+        let inverse = _mm512_load_ps(ray.inverse[axis].as_ptr());
+        let to = _mm512_sub_ps(_mm512_set1_ps(node.origin[axis]), _mm512_set1_ps(ray.origin[axis]));
+        let base = _mm512_fmsub_ps(to, inverse, _mm512_set1_ps(ray.slack[axis]));
+        let scale = _mm512_mul_ps(_mm512_set1_ps(node.step[axis]), inverse);
+        _mm512_fmadd_ps(widen_bytes(bytes), scale, base)
     }
 }
 
@@ -115,39 +125,27 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
 
 impl Lanes for Avx512 {
     #[inline(always)]
-    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         // SAFETY: see the head of the file.
         unsafe {
             // Leaving is computed negated, so that the greatest is wanted of both.
-            let inverse = _mm256_load_ps(ray.inverse.as_ptr());
-            let slack = _mm256_broadcast_ps(&_mm_load_ps(ray.slack.as_ptr()));
-            let origin = _mm256_broadcast_ps(&_mm_load_ps(node.origin.as_ptr()));
-            let step = _mm256_broadcast_ps(&_mm_load_ps(node.step.as_ptr()));
-            let to = _mm256_sub_ps(origin, _mm256_broadcast_ps(&_mm_load_ps(ray.origin.as_ptr())));
-            let scale = _mm256_mul_ps(step, inverse);
-            let base = _mm256_fmsub_ps(to, inverse, slack);
-            let order = _mm512_loadu_si512(ROWS.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
-            let rows = _mm512_permutexvar_epi64(order, _mm512_loadu_si512((node as *const Node).cast()));
-            let x = widen_bytes(_mm512_castsi512_si128(rows));
-            let y = widen_bytes(_mm512_extracti64x2_epi64::<1>(rows));
-            let z = widen_bytes(_mm512_extracti64x2_epi64::<2>(rows));
-            let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(-ray.t_max));
-            let x = _mm512_fmadd_ps(x, broadcast_halves(scale, 0), broadcast_halves(base, 0));
-            let y = _mm512_fmadd_ps(y, broadcast_halves(scale, 1), broadcast_halves(base, 1));
-            let z = _mm512_fmadd_ps(z, broadcast_halves(scale, 2), broadcast_halves(base, 2));
+            let octant = usize::from(ray.octant);
+            let order = _mm512_load_si512(BOUNDS.0.get_unchecked(octant).as_ptr().cast());
+            let bytes = _mm512_permutexvar_epi8(order, _mm512_load_si512((node as *const Node).cast()));
+            let x = crossings(_mm512_castsi512_si128(bytes), node, ray, 0);
+            let y = crossings(_mm512_extracti32x4_epi32::<1>(bytes), node, ray, 1);
+            let z = crossings(_mm512_extracti32x4_epi32::<2>(bytes), node, ray, 2);
+            let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(ray.negated_t_max));
             let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
             let enter = _mm512_castps512_ps256(most);
             let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-LEAVE_STRETCH));
-            // Farthest first.
-            let order = _mm256_load_si256(ORDERS.0.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
-            let enter = _mm256_permutexvar_ps(order, enter);
-            let leave = _mm256_permutexvar_ps(order, leave);
+            let order = _mm256_load_si256(ORDERS.0.get_unchecked(octant).as_ptr().cast());
             let children = _mm256_permutexvar_epi32(order, _mm256_loadu_si256(node.children.as_ptr().cast()));
             let used = _mm256_test_epi32_mask(children, children);
             let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
             _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_maskz_compress_ps(met, enter));
             _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_maskz_compress_epi32(met, children));
-            met.count_ones() as usize
+            u32::from(met)
         }
     }
 

@@ -8,10 +8,9 @@ use crate::intersect::facet::Line;
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
-    /// Where the ray enters the children that it may meet before `t_max`, and their links, the farthest first; gives
-    /// their number. What lies beyond it is of no meaning. `SINGLE` is for a ray that nothing else is done beside: it
-    /// rather guesses that one child is met than wait for a network to sort it.
-    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize;
+    /// Where the ray enters the children that it may meet before `t_max`, and their links, mostly the farthest first; what lies beyond
+    /// their number is of no meaning. Gives which they are: bit `k` for the child at `7 ^ k ^ octant`.
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32;
     /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;
     /// The edge functions of two facets, all with the same bits.

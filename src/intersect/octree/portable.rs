@@ -9,12 +9,12 @@ pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter<const SINGLE: bool>(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> usize {
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         let mut enter = [ray.t_min; 8];
         let mut leave = [ray.t_max; 8];
         for a in 0..3 {
-            let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
-            let scale = node.step[a] * ray.inverse[a];
+            let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a][0];
+            let scale = node.step[a] * ray.inverse[a][0];
             let (early, late) = (base - ray.slack[a], base + ray.slack[a]);
             let near = ray.entry_row(a);
             for k in 0..8 {
@@ -22,16 +22,18 @@ impl Lanes for Portable {
                 leave[k] = leave[k].min(f32::from(node.bounds[near ^ 1][k]) * scale + late);
             }
         }
+        let mut met = 0;
         let mut count = 0;
-        for place in (0..8).rev() {
-            let k = place ^ usize::from(ray.octant);
+        for lane in 0..8 {
+            let k = 7 ^ lane ^ usize::from(ray.octant);
             if node.used >> k & 1 == 1 && enter[k] <= leave[k] * LEAVE_STRETCH {
                 enters[count] = enter[k];
                 links[count] = node.children[k];
+                met |= 1 << lane;
                 count += 1;
             }
         }
-        count
+        met
     }
 
     #[inline(always)]

@@ -9,15 +9,16 @@ const CORNER_ROUNDING: f32 = 6e-7;
 
 /// What box tests need of a ray, in f32 about the middle of the mesh.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct BoxRay {
-    /// Inverse direction, then the same negated.
-    pub(super) inverse: [f32; 8],
+    /// By axis the inverse direction eight times, then the same negated.
+    pub(super) inverse: [[f32; 16]; 3],
     pub(super) origin: [f32; 4],
     /// By how much a crossing may be wrong.
     pub(super) slack: [f32; 4],
     pub(super) t_min: f32,
     pub(super) t_max: f32,
+    pub(super) negated_t_max: f32,
     /// One bit an axis: set where the ray runs against it and enters by upper bounds.
     pub(super) octant: u8,
 }

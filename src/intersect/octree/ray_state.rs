@@ -108,8 +108,9 @@ impl RayState {
             let exact = (origin[a] - frame.center[a]) + direction[a] * self.shift;
             let o = exact as f32;
             b.origin[a] = o;
-            b.inverse[a] = inverse;
-            b.inverse[a + 4] = -inverse;
+            if a < 3 {
+                b.inverse[a] = both_signs(inverse);
+            }
             b.slack[a] = ((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs();
             self.sieve.high[a] = o;
             self.sieve.low[a] = (exact - f64::from(o)) as f32;
@@ -136,26 +137,32 @@ impl RayState {
     /// bits of a distance are not its own.
     #[inline(always)]
     pub(super) fn limit_to_hit(&mut self) {
-        self.boxes.t_max = (((self.best.t - self.shift) * (1.0 + LIMIT_ROOM)) as f32).max(LEAST_LIMIT);
+        let t_max = (((self.best.t - self.shift) * (1.0 + LIMIT_ROOM)) as f32).max(LEAST_LIMIT);
+        self.boxes.t_max = t_max;
+        self.boxes.negated_t_max = -t_max;
     }
 
-    /// Writes the children of a node that the ray may meet above the top of the stack; gives their number.
+    /// Writes the children of a node that the ray may meet above the top of the stack.
     #[inline(always)]
-    pub(super) fn enter<L: Lanes, const SINGLE: bool>(&mut self, node: &Node) -> usize {
+    pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> Children {
         let base = self.top.min(STACK - 8);
         let enters = self.enters[base..base + 8].first_chunk_mut();
         let links = self.links[base..base + 8].first_chunk_mut();
-        match (enters, links) {
-            (Some(enters), Some(links)) => L::enter::<SINGLE>(node, &self.boxes, enters, links),
+        let met = match (enters, links) {
+            (Some(enters), Some(links)) => L::enter(node, &self.boxes, enters, links),
             _ => unreachable!("eight places"),
-        }
+        };
+        // The link of the nearest is read from the node: on the stack it was written just now.
+        let lane = met.leading_zeros() ^ 31;
+        let nearest = node.children[((7 ^ lane ^ u32::from(self.boxes.octant)) & 7) as usize];
+        Children { count: met.count_ones() as usize, nearest }
     }
 
-    /// Goes to the nearest of `count` entries that were just written and keeps the others.
+    /// Goes to the nearest of the children that were just written and keeps the others.
     #[inline(always)]
-    pub(super) fn take_nearest(&mut self, count: usize) -> Link {
-        self.top = (self.top + count - 1).min(STACK - 9);
-        Link(self.links[self.top])
+    pub(super) fn take_nearest(&mut self, children: Children) -> Link {
+        self.top = (self.top + children.count - 1).min(STACK - 9);
+        Link(children.nearest)
     }
 
     /// Goes on with the topmost entry that is not beyond `t_max`.
@@ -170,35 +177,57 @@ impl RayState {
         Link::END
     }
 
-    /// The nearest of `count` entries that were just written, else the topmost that is not beyond `t_max`: no branch
+    /// The nearest of the children that were just written, else the topmost entry that is not beyond `t_max`: no branch
     /// depends on which.
     #[inline(always)]
-    pub(super) fn advance<L: Lanes>(&mut self, count: usize) -> Link {
+    pub(super) fn advance<L: Lanes>(&mut self, children: Children) -> Link {
         let mut top = self.top.clamp(GROUND, STACK - 8);
-        let open = loop {
-            let upper = self.enters[top - GROUND..].first_chunk();
-            let open = upper.map_or(1, |upper| L::open(upper, self.boxes.t_max));
-            // The ground is open to all.
-            if open != 0 || top == GROUND {
-                break open | 1;
-            }
-            if count > 0 {
-                break 1;
-            }
+        let mut open = self.open_below::<L>(top);
+        while (open == 0) & (top != GROUND) & (children.count == 0) {
             top = (top - GROUND).max(GROUND);
-        };
-        let below = top - 1 - (open << 16).leading_zeros() as usize;
-        let above = top + count - 1;
-        self.top = select_unpredictable(count > 0, above, below).min(STACK - 9);
-        Link(self.links[self.top])
+            open = self.open_below::<L>(top);
+        }
+        // The ground is open to all.
+        let below = top - 1 - ((open | 1) << 16).leading_zeros() as usize;
+        let above = top + children.count - 1;
+        let older = self.links[below % STACK];
+        self.top = select_unpredictable(children.count > 0, above, below).min(STACK - 9);
+        Link(select_unpredictable(children.count > 0, children.nearest, older))
+    }
+
+    /// Which of the sixteen entries below `top` are not beyond `t_max`.
+    #[inline(always)]
+    fn open_below<L: Lanes>(&self, top: usize) -> u32 {
+        match self.enters[top - GROUND..].first_chunk() {
+            Some(entries) => L::open(entries, self.boxes.t_max),
+            None => 1,
+        }
     }
 
     /// Looks again at what was next, after `t_max` has come nearer.
     #[inline(always)]
     pub(super) fn recheck_next<L: Lanes>(&mut self) {
         self.top += usize::from(self.next != Link::END);
-        self.next = self.advance::<L>(0);
+        self.next = self.advance::<L>(Children::NONE);
     }
+}
+
+/// Eight times a number, then eight times the same negated.
+#[inline(always)]
+fn both_signs(x: f32) -> [f32; 16] {
+    [x, x, x, x, x, x, x, x, -x, -x, -x, -x, -x, -x, -x, -x]
+}
+
+/// Children of a node that were written above the top of the stack.
+#[derive(Clone, Copy)]
+pub(super) struct Children {
+    pub(super) count: usize,
+    /// The link of the nearest.
+    nearest: u32,
+}
+
+impl Children {
+    pub(super) const NONE: Self = Self { count: 0, nearest: 0 };
 }
 
 /// As [`crate::intersect::facet::Surroundings::lifted`]; few rays graze the facet that they leave.

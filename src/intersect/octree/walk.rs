@@ -7,7 +7,7 @@
 use super::lanes::Lanes;
 use super::light_buffer::{self, LightBuffer};
 use super::node::{Block, Link, Target};
-use super::ray_state::RayState;
+use super::ray_state::{Children, RayState};
 use super::tree::Tree;
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
@@ -125,8 +125,8 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
             Target::Node(index) => {
                 cost.nodes += 1;
                 let t_max = s.boxes.t_max;
-                let count = s.enter::<L, true>(&tree.nodes[index]);
-                s.next = if count > 0 { s.take_nearest(count) } else { s.pop(t_max) };
+                let children = s.enter::<L>(&tree.nodes[index]);
+                s.next = if children.count > 0 { s.take_nearest(children) } else { s.pop(t_max) };
             }
             Target::Block(index, count) => {
                 cost.tests += count as u64;
@@ -165,8 +165,8 @@ fn walk_batch<L: Lanes>(
         cost.nodes += queue.count as u64;
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
-            let count = s.enter::<L, false>(&tree.nodes[s.next.as_node()]);
-            s.next = s.advance::<L>(count);
+            let children = s.enter::<L>(&tree.nodes[s.next.as_node()]);
+            s.next = s.advance::<L>(children);
             prefetch_step(tree, s.next);
             queues.put(s.next.kind(), ray);
         }
@@ -177,7 +177,7 @@ fn walk_batch<L: Lanes>(
             cost.tests += count as u64;
             s.block = index as u32;
             s.candidates = sift::<L>(&tree.blocks[index], s) & used_lanes(count);
-            s.next = s.advance::<L>(0);
+            s.next = s.advance::<L>(Children::NONE);
             prefetch_step(tree, s.next);
             queues.put(select_unpredictable(s.candidates != 0, CORNERS, s.next.kind()), ray);
         }
