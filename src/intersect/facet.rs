@@ -27,7 +27,7 @@ const REACH: f64 = 1.0 / (1u64 << 40) as f64;
 /// Share of the way to the middle of its triangle by which a start on a border is moved inside.
 const NUDGE: f64 = 1.0 / 1048576.0;
 /// The most by which it is moved, in units of [`Surroundings::reach`].
-const LONGEST_NUDGE: f64 = 1024.0;
+pub(crate) const LONGEST_NUDGE: f64 = 1024.0;
 
 /// Height over the facet that it leaves to which the start of a grazing ray is lifted, relative to the largest coordinate: 16 to 32
 /// units in its last place, more than the rounding of a point computed on the facet, and of what asks where it lies.

@@ -1,7 +1,7 @@
 //! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::quad`] step by step,
 //! so that all instruction sets have its bits, but without the branches and the copies that cost more than the arithmetic.
 
-use crate::intersect::facet::{FacetRay, Line, Nearest};
+use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Line, Nearest};
 use std::hint::select_unpredictable;
 
 /// What the edge functions need of a ray.
@@ -32,6 +32,23 @@ impl QuadRay {
             order[2 * lane + 1] = 2 * axis as u32 + 1;
         }
         Self { origin, ordered_origin: [x, y, z, 0.0], order, shear, t_min, reach }
+    }
+
+    /// Above which an edge function of a facet keeps its sign when the start is moved as [`LONGEST_NUDGE`] allows, mm².
+    ///
+    /// A move of `δ` an axis shears to `2δ`, since no slope is above one, and changes an edge function by at most that times the sum of
+    /// what its corners differ by in both sheared coordinates: each is below four times the farthest corner's distance from the start
+    /// along an axis. The sum is doubled, for the rounding and the reach of the start.
+    #[inline(always)]
+    fn margin(&self, corners: [&[f64; 3]; 4]) -> f64 {
+        let mut farthest = 0.0;
+        for corner in corners {
+            for a in 0..3 {
+                let distance = (corner[a] - self.origin[a]).abs();
+                farthest = if distance > farthest { distance } else { farthest };
+            }
+        }
+        2.0 * 2.0 * LONGEST_NUDGE * self.reach * (2.0 * 4.0 * farthest)
     }
 
     fn line(&self) -> Line {
@@ -90,6 +107,16 @@ impl QuadEdges {
         edges
     }
 
+    /// Whether none of these triangles of a facet is met, wherever near its start the ray begins.
+    #[inline(always)]
+    pub(super) fn misses_clearly(&self, triangles: u32, corners: [&[f64; 3]; 4], ray: &QuadRay) -> bool {
+        let margin = ray.margin(corners);
+        let [e0, e1, e2, e3] = self.outline;
+        let first = has_both_signs([e0, e1, self.diagonal], margin);
+        let second = has_both_signs([e2, e3, -self.diagonal], margin);
+        triangles & !(u32::from(first) | u32::from(second) << 1) == 0
+    }
+
     /// Keeps the nearest hit of these triangles of a facet; `false` where an edge function is zero and decides nothing.
     #[inline(always)]
     pub(super) fn keep_hits(&self, facet: u32, triangles: u32, ray: &QuadRay, best: &mut Nearest) -> bool {
@@ -123,4 +150,10 @@ impl QuadEdges {
 #[inline(always)]
 fn any_edge(outline: u32, first: u32, second: u32) -> u32 {
     (outline | outline >> 1 | first) & 1 | (outline >> 1 | outline >> 2 | second << 1) & 2
+}
+
+/// Whether edge functions have opposite signs by more than a margin.
+#[inline(always)]
+fn has_both_signs([a, b, c]: [f64; 3], margin: f64) -> bool {
+    ((a > margin) | (b > margin) | (c > margin)) & ((a < -margin) | (b < -margin) | (c < -margin))
 }

@@ -272,8 +272,12 @@ fn test<L: Lanes>(tree: &Tree, s: &mut RayState) {
         let facet = block.facets[k];
         let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
         let edges = L::quad(arrays, &s.quads);
-        // Rarely the facet is near the start of a ray that leaves another, or an edge function is zero.
-        if (s.departs & edges.near) || !edges.keep_hits(facet, triangles, &s.quads, &mut s.best) {
+        // Often the facet is a neighbour of the one that the ray leaves, and passed by far from the start.
+        if s.departs & edges.near {
+            if !edges.misses_clearly(triangles, arrays, &s.quads) {
+                test_with_care(tree, s, facet, triangles, corners);
+            }
+        } else if !edges.keep_hits(facet, triangles, &s.quads, &mut s.best) {
             test_with_care(tree, s, facet, triangles, corners);
         }
         if mask == 0 {
