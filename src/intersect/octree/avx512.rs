@@ -68,7 +68,7 @@ static BOUNDS: BoundOrders = {
             let axis = place / 16;
             let side = place / 8 % 2;
             let row = 2 * axis + (octant >> axis & 1 ^ side);
-            orders[octant][place] = (8 * row + (7 ^ place % 8 ^ octant)) as u8;
+            orders[octant][place] = (8 * row + (7 ^ (place % 8) ^ octant)) as u8;
             place += 1;
         }
         octant += 1;

@@ -20,8 +20,6 @@ pub(super) struct Frame {
 pub(super) struct Passage {
     pub(super) near: f64,
     pub(super) far: f64,
-    /// Whether the ray starts inside.
-    pub(super) inside: bool,
 }
 
 impl Frame {
@@ -35,12 +33,21 @@ impl Frame {
         }
     }
 
+    /// Whether a ray with this origin starts inside the box around the mesh.
+    #[inline(always)]
+    pub(super) fn holds(&self, origin: [f64; 4]) -> bool {
+        let mut inside = true;
+        for a in 0..4 {
+            inside &= (origin[a] >= self.low[a]) & (origin[a] <= self.high[a]);
+        }
+        inside
+    }
+
     /// Where a ray with this origin and inverse direction, in four lanes, passes the mesh.
     #[inline(always)]
     pub(super) fn passage(&self, ray: &Ray, origin: [f64; 4], inverse: [f64; 4]) -> Passage {
         let mut enter = [0.0; 4];
         let mut leave = [0.0; 4];
-        let mut inside = true;
         for a in 0..4 {
             let low = (self.low[a] - origin[a]) * inverse[a];
             let high = (self.high[a] - origin[a]) * inverse[a];
@@ -48,11 +55,10 @@ impl Frame {
             let last = ordered_max(low, high);
             enter[a] = first - first.abs() * CROSSING_ERROR;
             leave[a] = last + last.abs() * CROSSING_ERROR;
-            inside &= (origin[a] >= self.low[a]) & (origin[a] <= self.high[a]);
         }
         let near = ordered_max(ordered_max(enter[0], enter[1]), ordered_max(enter[2], ray.t_min));
         let far = ordered_min(ordered_min(leave[0], leave[1]), ordered_min(leave[2], ray.t_max));
-        Passage { near, far, inside }
+        Passage { near, far }
     }
 }
 

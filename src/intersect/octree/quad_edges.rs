@@ -22,16 +22,16 @@ pub(super) struct QuadRay {
 }
 
 impl QuadRay {
+    /// The ray with these axes, the main one last.
     #[inline(always)]
-    pub(super) fn new(ray: &FacetRay, origin: [f64; 4], reach: f64) -> Self {
-        let axes = ray.axes();
-        let Line { origin: [x, y, z], shear, t_min } = ray.line();
-        let mut order = [6, 7, 6, 7, 6, 7, 6, 7];
-        for (lane, axis) in axes.into_iter().enumerate() {
-            order[2 * lane] = 2 * axis as u32;
-            order[2 * lane + 1] = 2 * axis as u32 + 1;
-        }
-        Self { origin, ordered_origin: [x, y, z, 0.0], order, shear, t_min, reach }
+    pub(super) fn set(&mut self, ray: &FacetRay, axes: [usize; 3], origin: [f64; 4], reach: f64) {
+        let [x, y, z] = axes;
+        self.origin = origin;
+        self.ordered_origin = [origin[x], origin[y], origin[z], 0.0];
+        self.order = ORDERS[z];
+        self.shear = ray.shear();
+        self.t_min = ray.line().t_min;
+        self.reach = reach;
     }
 
     /// Above which an edge function of a facet keeps its sign when the start is moved as [`LONGEST_NUDGE`] allows, mm².
@@ -56,6 +56,9 @@ impl QuadRay {
         Line { origin: [x, y, z], shear: self.shear, t_min: self.t_min }
     }
 }
+
+/// [`QuadRay::order`] by main axis.
+static ORDERS: [[u32; 8]; 3] = [[2, 3, 4, 5, 0, 1, 6, 7], [4, 5, 0, 1, 2, 3, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7]];
 
 /// Edge functions of the two triangles of a facet.
 #[derive(Clone, Copy, Debug, Default)]

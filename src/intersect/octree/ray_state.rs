@@ -95,11 +95,15 @@ impl RayState {
         let inverse =
             direction.map(|d| 1.0 / if d.abs() < LEAST_COMPONENT { LEAST_COMPONENT.copysign(d) } else { d });
         let frame = &tree.frame;
-        // Far origins are moved to where they enter, since f32 is good only near the mesh.
-        let passage = frame.passage(ray, origin, inverse);
-        let inside = passage.inside & (ray.t_min >= 0.0);
-        let meets = inside | ((passage.near <= passage.far) & passage.near.is_finite());
-        self.shift = select_unpredictable(inside, 0.0, passage.near);
+        // Far origins are moved to where they enter, since f32 is good only near the mesh. Rays of one kind mostly start all inside
+        // or all outside.
+        let mut meets = true;
+        self.shift = 0.0;
+        if !(frame.holds(origin) & (ray.t_min >= 0.0)) {
+            let passage = frame.passage(ray, origin, inverse);
+            meets = (passage.near <= passage.far) & passage.near.is_finite();
+            self.shift = passage.near;
+        }
         let moved = (tree.surroundings.slack(ray) + self.shift.abs() * SHIFT_ERROR) as f32;
         let b = &mut self.boxes;
         let mut octant = 0;
@@ -120,10 +124,11 @@ impl RayState {
         // Adding zero makes −0.0 positive: distances are sorted by their bits.
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
         self.facets = FacetRay::new(ray);
-        self.quads = QuadRay::new(&self.facets, origin, tree.surroundings.reach);
+        let axes = self.facets.axes();
+        self.quads.set(&self.facets, axes, origin, tree.surroundings.reach);
         self.departs = ray.departure.is_some();
         self.sieve.shear = self.facets.shear().map(|s| s as f32);
-        self.sieve.axes = self.facets.axes().map(|a| a as u8);
+        self.sieve.axes = axes.map(|a| a as u8);
         self.sieve.slack = moved;
         self.best = Nearest::up_to(ray.t_max);
         self.limit_to_hit();
