@@ -5,8 +5,8 @@
 //! piece is symmetric, and pieces are halved until it is met.
 
 use super::tolerances::{
-    DIFFERENCE_STEP, LAST_POLE_STEP, MAX_OVERSHOOT, ON_BORDER, PARALLEL_DERIVATIVES, POLE_DISTANCE_RATIO,
-    POLE_STEPS, SAME_JOINT, SHARE_OF_GAP, SMOOTH_SLOPE, STRAIGHT_SHARE, STRAIGHT_SIZE,
+    DIFFERENCE_STEP, LARGEST_SWING, LAST_POLE_STEP, MAX_OVERSHOOT, ON_BORDER, PARALLEL_DERIVATIVES,
+    POLE_DISTANCE_RATIO, POLE_STEPS, SAME_JOINT, SHARE_OF_GAP, SMOOTH_SLOPE, STRAIGHT_SHARE, STRAIGHT_SIZE,
 };
 use crate::math::{Point, Uv};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, UvCurve};
@@ -45,6 +45,8 @@ pub(crate) struct Target<'t> {
     pub(crate) poles: &'t [Pole],
     /// What the curve must not leave; infinite where the surface has no border.
     pub(crate) range: [[f64; 2]; 2],
+    /// Differences after which the surface repeats and which of them `locate` takes is up to what is expected.
+    pub(crate) period: [Option<f64>; 2],
     /// Nearer than this is at the pole, mm.
     pub(crate) pole_tolerance: f64,
     /// Allowed error in space, mm.
@@ -108,6 +110,20 @@ impl Target<'_> {
         let step = DIFFERENCE_STEP * (b - a) * inward;
         let beside = (self.locate)(t + step, piece.evaluate(t + step), Some(uv));
         Ok(Node { t, uv, slope: (beside - uv) / step, miss })
+    }
+
+    /// Where the middle between two nodes is expected. Close to a pole azimuths change so fast that the cubic swings by whole periods;
+    /// then the chord says which period is meant.
+    fn middle_guess(&self, a: Node, b: Node) -> Uv {
+        let mut guess = hermite(a, b, 0.5);
+        let chord = 0.5 * (a.uv + b.uv);
+        for d in 0..2 {
+            let far = |p: f64| (guess[d] - chord[d]).abs() > LARGEST_SWING * p;
+            if self.period[d].is_some_and(far) {
+                guess[d] = chord[d];
+            }
+        }
+        guess
     }
 
     /// How far a point lies beyond the border, as a fraction of the range.
@@ -222,7 +238,7 @@ impl Target<'_> {
             return Ok(());
         }
         let t = 0.5 * (a.t + b.t);
-        let middle = self.node(piece, t, 1.0, Some(hermite(a, b, 0.5)))?;
+        let middle = self.node(piece, t, 1.0, Some(self.middle_guess(a, b)))?;
         let middle = self.slope_inside(middle, 0.0);
         self.halve(piece, a, middle, depth + 1, nodes, gap)?;
         self.halve(piece, middle, b, depth + 1, nodes, gap)

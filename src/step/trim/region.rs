@@ -38,6 +38,8 @@ impl<'t, 'e> Region<'t, 'e> {
             derivatives: &|uv| self.surface.derivatives(uv),
             poles: &poles,
             range: self.surface.domain(),
+            // The piece in the chart's parameters says which period is meant.
+            period: [None; 2],
             pole_tolerance: self.task.accuracy,
             tolerance: self.task.tolerance,
             budget: &self.task.budget,

@@ -63,6 +63,7 @@ impl FaceTask<'_> {
             range: [0, 1].map(|d| {
                 if chart.period[d].is_some() { [f64::NEG_INFINITY, f64::INFINITY] } else { chart.range[d] }
             }),
+            period: chart.period,
             pole_tolerance: self.accuracy,
             tolerance: self.tolerance,
             budget: &self.budget,

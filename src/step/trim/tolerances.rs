@@ -58,6 +58,8 @@ pub(super) const POLE_DISTANCE_RATIO: f64 = 1e4;
 pub(super) const POLE_STEPS: [f64; 3] = [1e-4, 1e-3, 1e-2];
 /// See [`POLE_STEPS`].
 pub(super) const LAST_POLE_STEP: f64 = 0.03;
+/// A cubic that leaves the middle of its chord by more than this share of a period says nothing about which period is meant.
+pub(super) const LARGEST_SWING: f64 = 0.25;
 /// Where the file itself leaves a gap, this share of it is accurate enough.
 pub(super) const SHARE_OF_GAP: f64 = 0.05;
 /// A uv curve that leaves its chord by less than this share of its size is the chord.
