@@ -177,6 +177,30 @@ fn grazing_rays_that_start_on_edges_stay_inside() {
     }
 }
 
+#[test]
+fn a_facet_is_not_met_by_what_leaves_it_wherever_its_start_was_rounded_to() {
+    // Starts of a ten-millionth of a millimetre above a facet in an axis plane, running down onto it.
+    let mut mesh = FacetMesh::default();
+    add_grid(&mut mesh, 4, 4, 0, |u, v| Point::new(100.0 * u, 100.0 * v, 30.0));
+    add_grid(&mut mesh, 4, 4, 1, |u, v| Point::new(100.0 * u, 100.0 * v, -30.0));
+    let mut r = Random(3);
+    let mut rays = Vec::new();
+    for k in 0..2000 {
+        let facet = r.below(16);
+        let [a, _, c, _] = mesh.corners(facet);
+        let start = a.lerp(c, r.within(0.3, 0.7)) + Vector::new(r.within(-5.0, 5.0), r.within(-5.0, 5.0), 1.2e-7);
+        let down = 10f64.powi(-(k % 9));
+        let direction = Vector::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0), -down).normalize();
+        let departure =
+            Departure { face: mesh.facets[facet].face, primitive: facet as u32, uv: Default::default() };
+        rays.push(Ray::new(start, direction).with_departure(departure));
+    }
+    for (ray, hit) in rays.iter().zip(ask(&mesh, &rays)) {
+        let own = ray.departure.map(|d| d.primitive);
+        assert!(hit.is_none_or(|hit| Some(hit.primitive) != own), "{hit:?} by {ray:?}");
+    }
+}
+
 fn leave(ray: Ray, hit: &Hit, direction: Vector) -> Ray {
     Ray::new(ray.point_at(hit.t), direction).with_departure(Departure {
         face: hit.face,

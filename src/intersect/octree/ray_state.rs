@@ -46,8 +46,8 @@ pub(super) struct RayState {
     pub(super) index: usize,
     pub(super) facets: FacetRay,
     pub(super) quads: QuadRay,
-    /// Whether the ray leaves a facet.
-    pub(super) departs: bool,
+    /// The facet that the ray leaves, else one that no block has.
+    pub(super) departed: u32,
     pub(super) best: Nearest,
     top: usize,
     enters: [f32; STACK],
@@ -63,7 +63,7 @@ impl RayState {
             sieve: SieveRay::default(),
             facets: FacetRay::new(&ray),
             quads: QuadRay::default(),
-            departs: false,
+            departed: u32::MAX,
             best: Nearest::up_to(0.0),
             shift: 0.0,
             next: Link::END,
@@ -126,7 +126,7 @@ impl RayState {
         self.facets = FacetRay::new(ray);
         let axes = self.facets.axes();
         self.quads.set(&self.facets, axes, origin, tree.surroundings.reach);
-        self.departs = ray.departure.is_some();
+        self.departed = ray.departure.map_or(u32::MAX, |departure| departure.primitive);
         self.sieve.shear = self.facets.shear().map(|s| s as f32);
         self.sieve.axes = axes.map(|a| a as u8);
         self.sieve.slack = moved;

@@ -272,8 +272,8 @@ fn test<L: Lanes>(tree: &Tree, s: &mut RayState) {
         let facet = block.facets[k];
         let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
         let edges = L::quad(arrays, &s.quads);
-        // Often the facet is a neighbour of the one that the ray leaves, and passed by far from the start.
-        if s.departs & edges.near {
+        // Often the facet is the one that the ray leaves, or a neighbour of it, and passed by far from the start.
+        if ((s.departed != u32::MAX) & edges.near) | (s.departed == facet) {
             if !edges.misses_clearly(triangles, arrays, &s.quads) {
                 test_with_care(tree, s, facet, triangles, corners);
             }
