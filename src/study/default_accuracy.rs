@@ -220,7 +220,7 @@ impl Undecided<'_> {
             pilot_seconds: 0.0,
             alternatives: Vec::new(),
             // On flat faces nothing is changed, and that needs no rays to know.
-            geometric: (intersector == "octree").then(|| GeometricError::none(self.bound)),
+            geometric: (intersector == "octree").then(|| GeometricError::of_exact_facets(self.bound)),
         })
     }
 

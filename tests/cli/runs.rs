@@ -87,9 +87,16 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
 fn without_times(mut document: Value) -> Value {
     match &mut document {
         Value::Object(map) => {
-            for key in
-                ["seconds", "mrays_per_s", "msegments_per_s", "threads", "provenance", "pilot_seconds", "cost"]
-            {
+            for key in [
+                "seconds",
+                "mrays_per_s",
+                "msegments_per_s",
+                "threads",
+                "provenance",
+                "pilot_seconds",
+                "halving",
+                "cost",
+            ] {
                 map.remove(key);
             }
             map.values_mut().for_each(|value| *value = without_times(value.take()));

@@ -22,7 +22,8 @@ pub(crate) struct AccuracyOption {
 /// Options of everything that tessellates.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct MeshingOptions {
-    /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform; 0.05..0.2 by default
+    /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform; 0.05..0.2
+    /// by default; a traced scene that asks for no tolerance, accuracy, normals or intersector chooses facets or spline by a pilot
     #[arg(long, help_heading = "Facets", value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
     pub(crate) tolerance: Option<[f64; 2]>,
     /// Largest angle between facet and surface normal, degrees; off by default
@@ -54,10 +55,10 @@ pub(crate) struct TracingOptions {
     /// Number of threads; all cores by default
     #[arg(long, help_heading = "Rays", value_name = "N")]
     pub(crate) threads: Option<usize>,
-    /// What finds the hits; octree by default
+    /// What finds the hits; octree by default, in a traced scene chosen by a pilot
     #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) intersector: Option<IntersectorKind>,
-    /// How the normal at a hit is got: bilinear by default; exact moves the hit to the spline
+    /// How the normal at a hit is got: bilinear by default, in a traced scene chosen by a pilot; exact moves the hit to the spline
     #[arg(long, help_heading = "Rays", value_name = "NAME")]
     pub(crate) normals: Option<NormalMode>,
 }

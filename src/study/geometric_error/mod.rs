@@ -112,9 +112,10 @@ pub struct Statistical {
 
 impl GeometricError {
     /// Of facets that are the surface itself.
-    pub(in crate::study) fn none(bound: &BoundScene) -> Self {
-        let none = |name: &String| ReceiverError { name: name.clone(), peak_cells: 1, ..ReceiverError::default() };
-        Self { receivers: bound.receivers.iter().map(|r| none(&r.name)).collect(), ..Self::default() }
+    pub(in crate::study) fn of_exact_facets(bound: &BoundScene) -> Self {
+        let unchanged =
+            |name: &String| ReceiverError { name: name.clone(), peak_cells: 1, ..ReceiverError::default() };
+        Self { receivers: bound.receivers.iter().map(|r| unchanged(&r.name)).collect(), ..Self::default() }
     }
 }
 
