@@ -69,3 +69,41 @@ fn a_hexagon_in_a_circle_a_little_wider_is_a_hole_in_it() {
     close(area(&import), PI * outer * outer - 1.5 * 3f64.sqrt() * inner * inner, 1e-3);
     assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
 }
+
+/// A flat disc of radius 10 as a polar spline whose middle is a ring of radius `ring`, trimmed by a circle of radius 3 that passes the
+/// middle at `distance`.
+fn disc_beside_its_pole(ring: f64, distance: f64) -> String {
+    let turn = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)];
+    let mut list = Vec::new();
+    for (i, r) in [ring, 10.0].iter().enumerate() {
+        for (j, (x, y)) in turn.iter().enumerate() {
+            list.push((300 + 10 * i as u32 + j as u32, [r * f64::from(*x), r * f64::from(*y), 0.0]));
+        }
+    }
+    let row = |i: u32| (0..9).map(|j| format!("#{}", 300 + 10 * i + j)).collect::<Vec<_>>().join(",");
+    let weights =
+        (0..9).map(|j| if j % 2 == 0 { "1." } else { "0.7071067811865476" }).collect::<Vec<_>>().join(",");
+    let middle = 3.0 + distance;
+    points(&list)
+        + &points(&[(10, [middle, 0., 0.]), (11, [middle + 3.0, 0., 0.])])
+        + &format!(
+            "#33=(BOUNDED_SURFACE()B_SPLINE_SURFACE(1,2,(({}),({})),.UNSPECIFIED.,.F.,.T.,.F.)\
+             B_SPLINE_SURFACE_WITH_KNOTS((2,2),(3,2,2,2,3),(0.,1.),(0.,1.,2.,3.,4.),.UNSPECIFIED.)\
+             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_SURFACE((({weights}),({weights})))REPRESENTATION_ITEM('')SURFACE());\n\
+             #30=AXIS2_PLACEMENT_3D('',#10,$,$);\n#35=CIRCLE('',#30,3.);\n#40=VERTEX_POINT('',#11);\n\
+             #50=EDGE_CURVE('',#40,#40,#35,.T.);\n#60=ORIENTED_EDGE('',*,*,#50,.T.);\n#70=EDGE_LOOP('',(#60));\n\
+             #80=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#80),#33,.T.);\n",
+            row(0),
+            row(1)
+        )
+}
+
+#[test]
+fn an_edge_that_passes_a_pole_closely_does_not_wind_around_it() {
+    for ring in [1e-9, 1e-4] {
+        for distance in [1.0, 0.1, 0.07, 0.03, 0.01] {
+            let import = import(&disc_beside_its_pole(ring, distance));
+            close(area(&import), 9.0 * PI, 1e-3);
+        }
+    }
+}
