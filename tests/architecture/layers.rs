@@ -224,6 +224,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "placed_count",
             "tessellated",
             "numbering",
+            "solid_recipes",
+            "recipe_parts",
             "free_surfaces",
             "conversion",
         ],

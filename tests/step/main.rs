@@ -8,5 +8,6 @@ mod files;
 mod fixtures;
 mod nurbs_properties;
 mod offsets;
+mod recipes;
 mod seams;
 mod support;

@@ -4,6 +4,7 @@ use super::free_surfaces::convert_free_surfaces;
 use super::loop_order::{DirectedUse, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::is_inside_out;
+use super::recipe_parts::convert_recipes;
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use crate::math::{Aabb, Point};
@@ -85,6 +86,7 @@ pub(crate) fn convert(
         }
     }
     add_shells(file, items, faces, styles, &mut part, &mut out);
+    convert_recipes(&geometry, items, styles, settings, &mut part, &mut out);
     convert_free_surfaces(&geometry, items, styles, settings, &mut part, &mut out);
     out.part = part;
     out

@@ -3,7 +3,7 @@
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly`,
 //! `placed_count`); a representation is shells of faces (`topology`, with
 //! loops put in order by `loop_order` and shells turned by `orientation`), surfaces without a face and ready meshes (`free_surfaces`,
-//! `tessellated`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
+//! `tessellated`), solids given as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
 
 pub(super) mod assembly;
 pub(super) mod conversion;
@@ -12,6 +12,8 @@ mod loop_order;
 pub(super) mod numbering;
 mod orientation;
 mod placed_count;
+mod recipe_parts;
+mod solid_recipes;
 pub(super) mod styles;
 mod tessellated;
 pub(super) mod topology;

@@ -63,6 +63,8 @@ pub(crate) struct ShapeItems {
     pub(crate) shells: Vec<ShellPlan>,
     /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
     pub(crate) surfaces: Vec<u64>,
+    /// Solids given as a recipe.
+    pub(crate) recipes: Vec<u64>,
     /// Tessellated solids, shells and faces.
     pub(crate) tessellated: Vec<u64>,
     pub(crate) refused: Vec<Refusal>,
@@ -71,7 +73,11 @@ pub(crate) struct ShapeItems {
 impl ShapeItems {
     /// Whether there is nothing to convert or to refuse.
     pub(crate) fn is_empty(&self) -> bool {
-        self.shells.is_empty() && self.surfaces.is_empty() && self.tessellated.is_empty() && self.refused.is_empty()
+        self.shells.is_empty()
+            && self.surfaces.is_empty()
+            && self.recipes.is_empty()
+            && self.tessellated.is_empty()
+            && self.refused.is_empty()
     }
 
     /// Sorts one item in; what is no shape is left out.
@@ -116,7 +122,7 @@ impl ShapeItems {
         } else if e.keywords().any(is_tessellated) {
             self.tessellated.push(id);
         } else if e.is_one_of(&RECIPES) {
-            self.refused.push(Refusal::new(e, "solids given as a recipe (CSG, sweeps of areas) are not converted; export them as a boundary representation"));
+            self.recipes.push(id);
         } else if is_surface(e) && !self.surfaces.contains(&id) {
             self.surfaces.push(id);
         }

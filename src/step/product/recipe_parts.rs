@@ -1,0 +1,104 @@
+//! Solids of recipes in a part: their faces trimmed, their edges shared.
+
+use super::numbering::{ConvertedPart, add_face};
+use super::solid_recipes::{RecipeFace, SolidRecipe};
+use super::styles::Styles;
+use super::topology::ShapeItems;
+use crate::math::Point;
+use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
+use crate::nurbs::Curve;
+use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::settings::Settings;
+use crate::step::trim::face::{BuiltFace, build_face};
+use crate::step::trim::fit::Budget;
+use crate::step::trim::task::FaceTask;
+
+/// Ends of edges of one recipe this near are one vertex, mm: the curves of a profile meet as loosely as its file says.
+const SAME_VERTEX_MM: f64 = 1e-3;
+
+/// Converts the recipes of a representation: each becomes a closed shell.
+pub(super) fn convert_recipes(
+    geometry: &Geometry<'_, '_>,
+    items: &ShapeItems,
+    styles: &Styles,
+    settings: &Settings,
+    part: &mut Part,
+    out: &mut ConvertedPart,
+) {
+    for &id in &items.recipes {
+        let solid = geometry.entity(id).and_then(|e| geometry.solid_recipe(e));
+        match solid.and_then(|solid| build(geometry, id, solid, settings)) {
+            Ok((edges, built)) => {
+                out.found += built.len();
+                let name = geometry.entity(id).map_or_else(|_| String::new(), |e| e.args().name(0));
+                let numbers = add_edges(edges, part);
+                let faces: Vec<Face> = built
+                    .into_iter()
+                    .map(|b| Face { entity: None, ..add_face(b, id, name.clone(), part, &numbers, styles) })
+                    .collect();
+                part.shells.push(Shell {
+                    faces,
+                    closed: true,
+                    colour: styles.colour(id),
+                    name,
+                    ..Shell::default()
+                });
+            }
+            Err(refusal) => {
+                out.found += 1;
+                out.refused.push(refusal);
+            }
+        }
+    }
+}
+
+/// Trims every face of a solid; one that cannot be had costs the solid.
+fn build(
+    geometry: &Geometry<'_, '_>,
+    id: u64,
+    solid: SolidRecipe,
+    settings: &Settings,
+) -> Outcome<(Vec<Curve>, Vec<BuiltFace>)> {
+    let SolidRecipe { edges, faces } = solid;
+    let mut built = Vec::with_capacity(faces.len());
+    for RecipeFace { chart, same_sense, loops } in faces {
+        let task = FaceTask {
+            chart,
+            same_sense,
+            edges: loops.iter().flatten().map(|&(edge, _)| (edge, &edges[edge])).collect(),
+            loops,
+            tolerance: settings.uv_tolerance,
+            accuracy: geometry
+                .units
+                .accuracy
+                .unwrap_or(settings.uv_tolerance)
+                .clamp(settings.uv_tolerance, SAME_VERTEX_MM),
+            budget: Budget::new(settings.face_budget),
+            implicit_outer: false,
+        };
+        let refused =
+            |reason: &'static str| Refusal { id, entity: geometry.file.entity_name(id), reason: reason.into() };
+        built.push(build_face(task).map_err(refused)?);
+    }
+    Ok((edges, built))
+}
+
+/// Adds edges with their vertices, which they share where they meet.
+fn add_edges(edges: Vec<Curve>, part: &mut Part) -> Vec<Option<EdgeId>> {
+    let first = part.vertices.len();
+    let mut numbers = Vec::with_capacity(edges.len());
+    for curve in edges {
+        let vertices = curve.domain().map(|t| {
+            let p: Point = curve.evaluate(t);
+            let near = part.vertices[first..].iter().position(|v| (*v - p).length() <= SAME_VERTEX_MM);
+            let number = near.unwrap_or_else(|| {
+                part.vertices.push(p);
+                part.vertices.len() - 1 - first
+            });
+            VertexId((first + number) as u32)
+        });
+        numbers.push(Some(EdgeId(part.edges.len() as u32)));
+        part.edges.push(Edge { curve, vertices, entity: None });
+    }
+    numbers
+}

@@ -1,0 +1,342 @@
+//! Solids that a file gives as a recipe: CSG primitives, and areas or faces swept along a line or around an axis. Their faces are exact.
+//!
+//! Source: ISO 10303-42, 4.5 (solid models). A profile lies in a plane; its loops are turned so that the material is on their left seen
+//! from where the sweep goes, so that every side face looks outward by `tangent × sweep`. Known weakness: the file's sense of loops in
+//! a profile is believed by area only (the largest loop is the outer one), and booleans of CSG are refused.
+
+use super::topology::{EdgeKey, read_face};
+use crate::math::{Frame, Homogeneous, Point, Vector};
+use crate::model::Analytic;
+use crate::nurbs::{ControlPoint, Curve, conic};
+use crate::step::chart::{Chart, Kind};
+use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::part21::{Args, Entity};
+use std::f64::consts::TAU;
+
+/// Points of a profile nearer to the axis than this stay where they are when it is turned, mm.
+const ON_AXIS_MM: f64 = 1e-9;
+/// A turn this near to a whole one is whole, rad: angles are written with nine digits and more.
+const WHOLE_TURN_SLACK: f64 = 1e-6;
+/// Cosine of sweep and normal below which a profile is swept within its own plane.
+const FLAT_SWEEP: f64 = 1e-9;
+/// Samples of a curve of a profile for the area that tells which way a loop runs.
+const SAMPLES: usize = 16;
+
+/// A solid as edges and faces, before its faces are trimmed.
+#[derive(Default)]
+pub(super) struct SolidRecipe {
+    pub(super) edges: Vec<Curve>,
+    pub(super) faces: Vec<RecipeFace>,
+}
+
+/// A face of a recipe: loops run with the material on their left about the outward normal.
+pub(super) struct RecipeFace {
+    pub(super) chart: Chart,
+    pub(super) same_sense: bool,
+    /// Edge and whether it is run backwards.
+    pub(super) loops: Vec<Vec<(usize, bool)>>,
+}
+
+/// Closed loops of curves in a plane.
+struct Profile {
+    normal: Vector,
+    loops: Vec<Vec<Curve>>,
+}
+
+impl<'f, 'a> Geometry<'f, 'a> {
+    /// The solid of a recipe; booleans and other recipes are refused by name.
+    pub(super) fn solid_recipe(&self, e: Entity<'f, 'a>) -> Outcome<SolidRecipe> {
+        if let Some(a) = e.attributes("CSG_SOLID", 1) {
+            let root = self.resolve(e, a.id(0), "tree root")?;
+            // A tree is a primitive or a boolean: no root is another CSG solid.
+            return if root.is_a("CSG_SOLID") { Err(unsupported(root)) } else { self.solid_recipe(root) };
+        }
+        let moved = e.attributes("EXTRUDED_AREA_SOLID", 1).or_else(|| e.attributes("EXTRUDED_FACE_SOLID", 1));
+        if let Some(a) = moved {
+            let direction = self.direction(a.id(1)).and_then(|d| d.try_normalize());
+            let depth = self.length(a, 2).filter(|d| *d > 0.0);
+            let (Some(direction), Some(depth)) = (direction, depth) else {
+                return Err(Refusal::new(e, "its direction or depth is missing"));
+            };
+            let profile = self.profile(e, a.id(0))?;
+            return extrude(profile, direction * depth)
+                .ok_or_else(|| Refusal::new(e, "its profile is swept within its own plane"));
+        }
+        let turned = e.attributes("REVOLVED_AREA_SOLID", 1).or_else(|| e.attributes("REVOLVED_FACE_SOLID", 1));
+        if let Some(a) = turned {
+            let axis = self.resolve(e, a.id(1), "axis")?;
+            let angle = a.real(2).map(|x| x * self.units.angle).filter(|x| *x > 0.0);
+            let angle = angle.ok_or_else(|| Refusal::new(e, "its angle is not positive"))?;
+            let profile = self.profile(e, a.id(0))?;
+            return revolve(profile, &self.placement(axis.id)?, angle.min(TAU))
+                .ok_or_else(|| Refusal::new(e, "its profile is turned within its own plane"));
+        }
+        self.primitive(e)
+    }
+
+    fn length(&self, a: Args<'f, 'a>, k: usize) -> Option<f64> {
+        a.real(k).map(|x| x * self.units.length).filter(|x| x.is_finite())
+    }
+
+    /// The primitives of CSG.
+    fn primitive(&self, e: Entity<'f, 'a>) -> Outcome<SolidRecipe> {
+        let size = |a: Args<'f, 'a>, k: usize| {
+            let size = self.length(a, k).filter(|x| *x > 0.0);
+            size.ok_or_else(|| Refusal::new(e, "a size is not positive"))
+        };
+        let frame = |a: Args<'f, 'a>| self.placement(self.resolve(e, a.id(0), "position")?.id);
+        let whole = |kind: Kind, analytic: Analytic| SolidRecipe {
+            edges: Vec::new(),
+            faces: vec![RecipeFace { chart: Chart::new(kind, analytic), same_sense: true, loops: Vec::new() }],
+        };
+        if let Some(a) = e.attributes("SPHERE", 1) {
+            let radius = size(a, 0)?;
+            let center = self.resolve(e, a.id(1), "centre")?;
+            let frame = Frame::translation(self.point(center.id)?);
+            return Ok(whole(Kind::Torus { frame, major: 0.0, minor: radius }, Analytic::Sphere { frame, radius }));
+        }
+        if let Some(a) = e.attributes("TORUS", 1) {
+            let (frame, major, minor) = (frame(a)?, size(a, 1)?, size(a, 2)?);
+            if major <= minor {
+                return Err(Refusal::new(e, "its tube touches its axis"));
+            }
+            return Ok(whole(Kind::Torus { frame, major, minor }, Analytic::Torus { frame, major, minor }));
+        }
+        let polygon = |frame: &Frame, corners: &[[f64; 2]]| {
+            let place = |c: &[f64; 2]| frame.point(Point::new(c[0], c[1], 0.0));
+            let n = corners.len();
+            let sides = (0..n).map(|k| Curve::line(place(&corners[k]), place(&corners[(k + 1) % n]), [0.0, 1.0]));
+            Profile { normal: frame.z, loops: vec![sides.collect()] }
+        };
+        let swept = |profile: Profile, by: Vector| extrude(profile, by).ok_or_else(|| unsupported(e));
+        if let Some(a) = e.attributes("BLOCK", 1) {
+            let (frame, x, y, z) = (frame(a)?, size(a, 1)?, size(a, 2)?, size(a, 3)?);
+            return swept(polygon(&frame, &[[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]]), frame.z * z);
+        }
+        if let Some(a) = e.attributes("RIGHT_ANGULAR_WEDGE", 1) {
+            let (frame, x, y, z) = (frame(a)?, size(a, 1)?, size(a, 2)?, size(a, 3)?);
+            let top =
+                self.length(a, 4).filter(|t| *t >= 0.0).ok_or_else(|| Refusal::new(e, "its ltx is negative"))?;
+            let corners = [[0.0, 0.0], [x, 0.0], [top, y], [0.0, y]];
+            let corners = if top > 0.0 { &corners[..] } else { &[[0.0, 0.0], [x, 0.0], [0.0, y]] };
+            return swept(polygon(&frame, corners), frame.z * z);
+        }
+        if let Some(a) = e.attributes("RIGHT_CIRCULAR_CYLINDER", 1) {
+            let (frame, height, radius) = (frame(a)?, size(a, 1)?, size(a, 2)?);
+            let profile = Profile { normal: frame.z, loops: vec![vec![conic::arc(&frame, radius, [0.0, TAU])]] };
+            let mut solid = swept(profile, frame.z * height)?;
+            // The side is known in its closed form.
+            solid.faces.iter_mut().filter(|f| matches!(f.chart.kind, Kind::Extrusion { .. })).for_each(|side| {
+                side.chart = Chart::cylinder(frame, radius);
+            });
+            return Ok(solid);
+        }
+        if let Some(a) = e.attributes("RIGHT_CIRCULAR_CONE", 1) {
+            let (frame, height) = (frame(a)?, size(a, 1)?);
+            let radius = self.length(a, 2).filter(|r| *r >= 0.0);
+            let angle = a.real(3).map(|x| x * self.units.angle).filter(|x| *x > 0.0 && *x < 0.25 * TAU);
+            let (Some(radius), Some(angle)) = (radius, angle) else {
+                return Err(Refusal::new(e, "its radius or semi-angle is no size"));
+            };
+            let wide = radius + height * angle.tan();
+            let place = |r: f64, h: f64| frame.point(Point::new(r, 0.0, h));
+            let corners = [place(0.0, 0.0), place(radius, 0.0), place(wide, height), place(0.0, height)];
+            let sides = (0..4).map(|k| (corners[k], corners[(k + 1) % 4])).filter(|(p, q)| p != q);
+            let sides = sides.map(|(p, q)| Curve::line(p, q, [0.0, 1.0])).collect();
+            let profile = Profile { normal: -frame.y, loops: vec![sides] };
+            return revolve(profile, &frame, TAU).ok_or_else(|| unsupported(e));
+        }
+        Err(unsupported(e))
+    }
+
+    /// The loops of a CURVE_BOUNDED_SURFACE or a face in a plane.
+    fn profile(&self, e: Entity<'f, 'a>, id: Option<u64>) -> Outcome<Profile> {
+        let area = self.resolve(e, id, "swept area")?;
+        let (surface, loops) = if let Some(a) = area.attributes("CURVE_BOUNDED_SURFACE", 1) {
+            let surface = self.resolve(area, a.id(0), "basis surface")?;
+            let boundaries = a.list(1).ids().into_iter();
+            (surface, boundaries.map(|b| self.segments(self.entity(b)?, 0)).collect::<Outcome<Vec<_>>>()?)
+        } else {
+            let plan = read_face(self.file, area.id)?;
+            let curve = |(key, reversed): &(EdgeKey, bool)| -> Outcome<Curve> {
+                let EdgeKey::Entity(edge) = key else {
+                    return Err(Refusal::new(area, "polygonal loops of a profile are not supported"));
+                };
+                let curve = self.edge(*edge)?.curve.ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
+                Ok(if *reversed { curve.reversed() } else { curve })
+            };
+            let loops = plan.loops.iter().map(|l| l.iter().map(curve).collect()).collect::<Outcome<Vec<_>>>()?;
+            (self.entity(plan.surface)?, loops)
+        };
+        let plane =
+            surface.attributes("PLANE", 1).ok_or_else(|| Refusal::new(surface, "a profile must be plane"))?;
+        let frame = self.placement(self.resolve(surface, plane.id(0), "position")?.id)?;
+        if loops.is_empty() {
+            return Err(Refusal::new(area, "its profile has no border"));
+        }
+        Ok(Profile { normal: frame.z, loops })
+    }
+}
+
+fn unsupported(e: Entity<'_, '_>) -> Refusal {
+    Refusal::new(e, "this kind of recipe is not converted; export the solid as a boundary representation")
+}
+
+impl Profile {
+    /// The same profile seen from where a sweep goes: the outer loop counter-clockwise, holes clockwise; `None` when it is swept within
+    /// its plane.
+    fn facing(mut self, sweep: Vector) -> Option<Self> {
+        let cosine = self.normal.dot(sweep) / sweep.length();
+        if !(cosine.abs() > FLAT_SWEEP) {
+            return None;
+        }
+        if cosine < 0.0 {
+            self.normal = -self.normal;
+        }
+        let areas: Vec<f64> = self.loops.iter().map(|l| signed_area(l, self.normal)).collect();
+        let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()))?;
+        for (k, curves) in self.loops.iter_mut().enumerate() {
+            if (areas[k] > 0.0) != (k == outer) {
+                curves.reverse();
+                curves.iter_mut().for_each(|c| *c = c.reversed());
+            }
+        }
+        Some(self)
+    }
+}
+
+/// Area of a loop about a normal, by a polygon: only its sign and its order of size matter.
+fn signed_area(curves: &[Curve], normal: Vector) -> f64 {
+    let mut points: Vec<Point> = Vec::new();
+    for curve in curves {
+        let [a, b] = curve.domain();
+        points.extend((0..SAMPLES).map(|i| curve.evaluate(a + (b - a) * i as f64 / SAMPLES as f64)));
+    }
+    let n = points.len();
+    let origin = points[0];
+    let sum = (0..n).map(|i| (points[i] - origin).cross(points[(i + 1) % n] - origin)).sum::<Vector>();
+    0.5 * sum.dot(normal)
+}
+
+/// Loops of edges run the other way.
+fn reversed(loops: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
+    loops.iter().map(|l| l.iter().rev().map(|&(edge, back)| (edge, !back)).collect()).collect()
+}
+
+impl SolidRecipe {
+    fn add_edge(&mut self, curve: Curve) -> usize {
+        self.edges.push(curve);
+        self.edges.len() - 1
+    }
+
+    /// A plane cap; `forward` when its outward normal is the profile's.
+    fn add_cap(&mut self, frame: Frame, loops: &[Vec<(usize, bool)>], forward: bool) {
+        let chart = Chart::new(Kind::Plane { frame }, Analytic::Plane { frame });
+        let loops = if forward { loops.to_vec() } else { reversed(loops) };
+        self.faces.push(RecipeFace { chart, same_sense: forward, loops });
+    }
+}
+
+/// A profile moved along a direction.
+fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
+    let profile = profile.facing(by)?;
+    let mut solid = SolidRecipe::default();
+    let mut bottoms = Vec::new();
+    let mut tops = Vec::new();
+    for curves in &profile.loops {
+        let n = curves.len();
+        let bottom: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
+        let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(moved(c, |p| p + by))).collect();
+        let start = |c: &Curve| c.evaluate(c.domain()[0]);
+        let posts: Vec<usize> =
+            curves.iter().map(|c| solid.add_edge(Curve::line(start(c), start(c) + by, [0.0, 1.0]))).collect();
+        for (k, curve) in curves.iter().enumerate() {
+            let chart = match &curve.points[..] {
+                [p, q] => {
+                    let along = q.project() - p.project();
+                    let frame = Frame::from_axis(p.project(), along.cross(by), Some(along));
+                    Chart::new(Kind::Plane { frame }, Analytic::Plane { frame })
+                }
+                _ => Chart::new(Kind::Extrusion { base: curve.clone(), direction: by }, Analytic::Extrusion),
+            };
+            let border = vec![(bottom[k], false), (posts[(k + 1) % n], false), (top[k], true), (posts[k], true)];
+            solid.faces.push(RecipeFace { chart, same_sense: true, loops: vec![border] });
+        }
+        bottoms.push(bottom.iter().map(|&e| (e, false)).collect::<Vec<_>>());
+        tops.push(top.iter().map(|&e| (e, false)).collect::<Vec<_>>());
+    }
+    let origin = solid.edges[0].evaluate(solid.edges[0].domain()[0]);
+    let frame = Frame::from_axis(origin, profile.normal, None);
+    solid.add_cap(frame, &bottoms, false);
+    solid.add_cap(Frame { origin: origin + by, ..frame }, &tops, true);
+    Some(solid)
+}
+
+/// A profile turned about the z axis of a frame.
+fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
+    // Where the profile goes at first, at the middle of its largest loop's samples.
+    let points: Vec<Point> =
+        profile.loops.iter().flatten().map(|c| c.evaluate(0.5 * (c.domain()[0] + c.domain()[1]))).collect();
+    let far = points.into_iter().max_by(|a, b| distance(axis, *a).total_cmp(&distance(axis, *b)))?;
+    let profile = profile.facing(axis.z.cross(far - axis.origin))?;
+    let whole = angle >= TAU - WHOLE_TURN_SLACK;
+    let angle = if whole { TAU } else { angle };
+    let (sin, cos) = angle.sin_cos();
+    let turn = |p: Point| {
+        let q = axis.local_point(p);
+        axis.point(Point::new(cos * q.x - sin * q.y, sin * q.x + cos * q.y, q.z))
+    };
+    let mut solid = SolidRecipe::default();
+    let mut starts = Vec::new();
+    let mut ends = Vec::new();
+    for curves in &profile.loops {
+        let n = curves.len();
+        // An edge on the axis stays where it is and bounds no side.
+        let on_axis = |c: &Curve| c.points.iter().all(|p| distance(axis, p.project()) <= ON_AXIS_MM);
+        let first: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
+        let last: Vec<usize> = curves
+            .iter()
+            .zip(&first)
+            .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(moved(c, turn)) })
+            .collect();
+        let mut arcs: Vec<Option<usize>> = Vec::with_capacity(n);
+        for c in curves {
+            let p = c.evaluate(c.domain()[0]);
+            let q = axis.local_point(p);
+            let radius = q.x.hypot(q.y);
+            arcs.push((radius > ON_AXIS_MM).then(|| {
+                let center = axis.point(Point::new(0.0, 0.0, q.z));
+                let frame = Frame::from_axis(center, axis.z, Some(p - center));
+                solid.add_edge(conic::arc(&frame, radius, [0.0, angle]))
+            }));
+        }
+        for (k, curve) in curves.iter().enumerate().filter(|(_, c)| !on_axis(c)) {
+            let mut border = vec![(first[k], false)];
+            border.extend(arcs[(k + 1) % n].map(|arc| (arc, false)));
+            border.push((last[k], true));
+            border.extend(arcs[k].map(|arc| (arc, true)));
+            let chart = Chart::revolution(*axis, curve.clone());
+            solid.faces.push(RecipeFace { chart, same_sense: false, loops: vec![border] });
+        }
+        starts.push(first.iter().map(|&e| (e, false)).collect::<Vec<_>>());
+        ends.push(last.iter().map(|&e| (e, false)).collect::<Vec<_>>());
+    }
+    if !whole {
+        let origin = solid.edges[0].evaluate(solid.edges[0].domain()[0]);
+        let frame = Frame::from_axis(origin, profile.normal, None);
+        solid.add_cap(frame, &starts, false);
+        let normal = turn(origin + profile.normal) - turn(origin);
+        solid.add_cap(Frame::from_axis(turn(origin), normal, None), &ends, true);
+    }
+    Some(solid)
+}
+
+fn distance(axis: &Frame, p: Point) -> f64 {
+    let q = axis.local_point(p);
+    q.x.hypot(q.y)
+}
+
+fn moved(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
+    let points = curve.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
+    Curve { points, ..curve.clone() }
+}
