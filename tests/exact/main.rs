@@ -1,11 +1,15 @@
 //! The exact spline intersector: closed forms, pure clipping and closed shells judge it.
 
 mod audit;
+mod certificates;
 mod closed_forms;
+mod drift;
 mod edges;
 #[path = "../support/files.rs"]
 mod files;
 mod grazing;
+mod hostile;
 mod models;
 mod polish;
+mod referee;
 mod support;

@@ -8,11 +8,23 @@ use super::query::{Query, Root};
 use super::structure::Exact;
 use super::trim::Region;
 use crate::intersect::Certainty;
-use crate::math::Vector;
+use crate::math::{Uv, Vector};
+
+/// A root that a leaf's search has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// Local parameters of the leaf.
+    pub(super) local: [f64; 2],
+    pub(super) t: f64,
+    pub(super) certainty: Certainty,
+    /// Surface parameters, where the surface as given settled it.
+    pub(super) settled: Option<Uv>,
+}
 
 impl Exact {
     /// Takes a root when it lies in range, inside the trims, and is not the point that the ray leaves.
-    pub(super) fn offer(&self, query: &mut Query, index: u32, local: [f64; 2], t: f64, certainty: Certainty) {
+    pub(super) fn offer(&self, query: &mut Query, index: u32, candidate: Candidate) {
+        let Candidate { local, t, certainty, settled } = candidate;
         if !query.is_in_range(t) {
             return;
         }
@@ -31,7 +43,7 @@ impl Exact {
                 return;
             }
         }
-        query.accept(Root { t, leaf: index, local, certainty, near_trim });
+        query.accept(Root { t, leaf: index, local, certainty, near_trim, settled });
     }
 
     /// Whether a root lies inside the trims, and whether a trim is within the band.

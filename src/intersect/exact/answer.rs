@@ -4,10 +4,10 @@ use super::leaf_test;
 use super::patch;
 use super::query::{Query, Root};
 use super::structure::Exact;
-use super::tolerances::{CONTACT_LENGTH, NEWTON_STEP, TANGENT};
+use super::tolerances::{CONTACT_LENGTH, TANGENT};
 use super::{net, traversal};
 use crate::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
-use crate::math::{Ray, Vector};
+use crate::math::{Ray, Uv, Vector};
 
 /// The first hit with everything that is known about it; also a miss has a certainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +38,12 @@ const SAME_CROSSING_FAR: f64 = 1e-13;
 /// A correction that moves a root farther is not one: where the search went by the net in the ray's frame, rounding may say
 /// otherwise, and its word stands.
 const LARGEST_CORRECTION: f64 = 1e-6;
+/// A derivative of the surface as given is trusted when it is longer than this many times the rounding of the net's points: it is
+/// not rounded itself, the points it comes from are.
+const GIVEN_ROUNDING: f64 = 4.0;
+/// A normal is taken where the next step is below this, as a share of a leaf: with 2e-12 the angular momentum of a ray in a mirror
+/// ball drifted by 5e-10 in 20,000 bounces.
+const UNBIASED: f64 = 2e-15;
 /// Corrections before a hit is named; steps square, so that the second is mostly the last.
 const CORRECTIONS: usize = 4;
 
@@ -119,8 +125,9 @@ impl Exact {
         let mut t = root.t;
         let mut local = root.local;
         let mut jet = net::evaluate(control, leaf.degree, local[0], local[1]);
-        if root.certainty == Certainty::Certified {
+        if root.certainty == Certainty::Certified && root.settled.is_none() {
             let oc = query.o - leaf.center;
+            let mut last = f64::INFINITY;
             for _ in 0..CORRECTIONS {
                 let (step, t_after) = leaf_test::newton_step(query, oc, &jet);
                 let size = step[0].abs().max(step[1].abs());
@@ -129,18 +136,33 @@ impl Exact {
                 }
                 t = t_after;
                 local = [local[0] - step[0], local[1] - step[1]];
-                // The normal is that of the point before the step.
-                if size < 2.0 * NEWTON_STEP {
+                // The normal is that of the point before the step, always on the side that Newton's method comes from.
+                if size < UNBIASED || size > 0.5 * last {
                     break;
                 }
+                last = size;
                 jet = net::evaluate(control, leaf.degree, local[0], local[1]);
             }
             t = t.clamp(query.t_min, query.limit);
         }
         let inside = local.map(|x| x.clamp(0.0, 1.0));
-        let normal: Vector = label.sign * patch::normal(control, leaf.degree, inside, &jet, label.rounding);
-        let (uv, certainty) = (label.uv(inside), root.certainty);
+        let uv = root.settled.unwrap_or_else(|| label.uv(inside));
+        let regular = if label.ill_scaled { None } else { patch::regular_normal(&jet, label.rounding) };
+        let normal = label.sign * regular.unwrap_or_else(|| self.delicate_normal(root.leaf, uv, inside));
+        let certainty = root.certainty;
         Hit { t, normal, geometric_normal: normal, face: label.face, primitive: label.patch, uv, certainty }
+    }
+
+    /// The unit normal along `Su × Sv` where `f64` leaves too little of it: of the surface as given, and its limit at singular
+    /// points of that.
+    #[cold]
+    fn delicate_normal(&self, index: u32, uv: Uv, local: [f64; 2]) -> Vector {
+        let leaf = &self.leaves[index as usize];
+        let patch = &self.geometry.patches[leaf.patch as usize];
+        let [du, dv] = self.geometry.reference(patch).tangents(uv);
+        // The control points themselves are rounded: where they should coincide, their differences mean nothing.
+        patch::cross_normal(du, dv, GIVEN_ROUNDING * patch.rounding)
+            .unwrap_or_else(|| patch::limit_normal(leaf.net(&self.pool), leaf.degree, local, patch.rounding))
     }
 }
 

@@ -5,11 +5,13 @@
 //! says so, solved by Newton when at most one root is left, and halved otherwise. Boxes that come down to rounding are
 //! reported as tangent or uncertified, never dropped.
 
+use super::acceptance::Candidate;
 use super::clip_hull::{Preconditioner, hull, linear_hull, newton, precondition, range_along, seen_along};
 use super::leaf::Leaf;
 use super::net::{self, Net, Slopes, V4};
 use super::patch::project;
 use super::query::Query;
+use super::settlement;
 use super::structure::Exact;
 use super::tolerances::{CONTACT_LENGTH, ROUND, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
@@ -38,6 +40,9 @@ const LEAST_CUT: f64 = 1e-15;
 const REGULAR: f64 = 1e-6;
 /// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
 const TANGENT_SINE: f64 = 1e-3;
+/// Points times degrees of a bicubic net, on which a step takes half a microsecond.
+const BICUBIC_WORK: usize = 96;
+
 /// A box of parameters with the net over it.
 struct Node {
     net: Net,
@@ -101,6 +106,8 @@ impl Exact {
         let margin = size.map(|s| noise + steps * ROUND * s);
         let departure = query.departure.and_then(|own| own.local_to(leaf, &self.geometry));
         let clipping = Clipping { index, leaf, margin, departure };
+        // A step on a net of many points costs as many of a bicubic one.
+        let work = (net.len() * (usize::from(degree[0]) + usize::from(degree[1]))).div_ceil(BICUBIC_WORK) as u32;
         let near = range_along(&net).0;
         let mut stack = vec![Node { net, rect, near }];
         while let Some(node) = stack.pop() {
@@ -112,7 +119,7 @@ impl Exact {
                 query.undecided_from = query.undecided_from.min(node.near);
                 continue;
             }
-            query.budget -= 1;
+            query.budget = query.budget.saturating_sub(work);
             self.clip_node(query, &clipping, node, &mut stack);
         }
     }
@@ -188,7 +195,14 @@ impl Exact {
         let leaving = clipping.departure.is_some_and(is_departure)
             && query.departure.is_some_and(|own| own.is_unique_root(t));
         if !leaving {
-            self.offer(query, clipping.index, local, t, Certainty::Certified);
+            let found = Candidate { local, t, certainty: Certainty::Certified, settled: None };
+            let margin = [0, 1].map(|k: usize| (ROOT_ROUNDING + 2.0 * y.slack[k]) * [size_u, size_v][k]);
+            let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
+            if ill_scaled || settlement::is_open(local, margin) {
+                self.settle(query, clipping.index, found, margin);
+            } else {
+                self.offer(query, clipping.index, found);
+            }
         }
         true
     }
@@ -205,7 +219,7 @@ impl Exact {
             && query.departure.is_some_and(|own| own.is_unique_root(t.abs() - CONTACT_LENGTH * TANGENT));
         if !leaving {
             let certainty = self.contact(clipping.leaf, local, query);
-            self.offer(query, clipping.index, local, t, certainty);
+            self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
         }
     }
 

@@ -1,12 +1,13 @@
 //! The model as the tracer sees it: placed faces in world orientation, cut into Bézier patches about centres of their own.
 
 use super::edge_use::edge_gaps;
-use super::patch::{Patch, PatchGrid};
+use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
+use super::reference::{self, ReferencePatch};
 use super::tolerances::VERTEX_RADIUS;
 use super::trim::Trim;
 use crate::math::{FaceId, Frame, Point, Uv};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
-use crate::nurbs::Curve;
+use crate::nurbs::{Curve, Surface};
 use rustc_hash::FxHashMap;
 
 /// Gaps of a file wider than this are not bridged, but flagged, mm: solids with wider ones are not closed to any reader.
@@ -51,6 +52,8 @@ pub(super) struct Geometry {
     pub(super) patches: Vec<Patch>,
     pub(super) trims: Vec<Trim>,
     pub(super) grids: Vec<PatchGrid>,
+    /// The surfaces as given, in the order of `grids`.
+    pub(super) surfaces: Vec<Surface>,
     /// Edge curves of each part, in its own coordinates.
     pub(super) edges: Vec<Vec<Curve>>,
     /// The vertices at their ends, and how far from each its sectors decide, mm: beyond all ends that miss it.
@@ -83,6 +86,7 @@ impl Geometry {
                         let gaps = &gaps[placed.part.0 as usize];
                         geometry.trims.push(Trim::new(face, grid.closed, band, gaps));
                         geometry.grids.push(grid);
+                        geometry.surfaces.push(face.surface.clone());
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
                     let closed = |s: &usize| model.part(placed.part).shells[*s].closed;
@@ -121,7 +125,40 @@ impl Geometry {
             flagged,
             solid,
         });
-        self.patches.extend(face.surface.bezier_patches().iter().map(|p| Patch::new(p, record, placed)));
+        for mut patch in face.surface.bezier_patches() {
+            if is_ill_scaled(&patch) {
+                reference::extract(&face.surface, &mut patch);
+            }
+            self.patches.push(Patch::new(&patch, record, placed));
+        }
+    }
+
+    /// A patch as it was given.
+    pub(super) fn reference(&self, patch: &Patch) -> ReferencePatch<'_> {
+        let face = &self.faces[patch.face as usize];
+        let surface = &self.surfaces[face.grid as usize];
+        ReferencePatch { surface, placement: &face.placement, domain: patch.domain }
+    }
+
+    /// Whether a point of the world is a pole of the patch's surface, within `distance` mm.
+    pub(super) fn is_pole(&self, patch: &Patch, point: Point, distance: f64) -> bool {
+        let sides = self.pole_sides(patch);
+        (0..2).any(|d| {
+            (0..2).any(|end| {
+                let mut local = [0.5; 2];
+                local[d] = end as f64;
+                sides[d][end] && project(&patch.jet(local)).0.distance(point - patch.center) <= distance
+            })
+        })
+    }
+
+    /// Which sides of a patch are a pole of its surface.
+    fn pole_sides(&self, patch: &Patch) -> [[bool; 2]; 2] {
+        let grid = &self.grids[self.faces[patch.face as usize].grid as usize];
+        [0, 1].map(|d: usize| {
+            let ends = [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]];
+            [0, 1].map(|end| grid.poles[d][end] && patch.domain[d][end] == ends[end])
+        })
     }
 
     /// The trimming of a patch's face.

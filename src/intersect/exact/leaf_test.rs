@@ -5,11 +5,13 @@
 //! `middle − Y f(middle) ± |Y| R · ½` (Krawczyk's operator); when that misses the leaf there is none, and when the row
 //! sums of `|Y| R` stay below 1 there is at most one in the enlarged domain, which Newton's method then finds.
 
+use super::acceptance::Candidate;
 use super::clip;
 use super::leaf::Leaf;
 use super::linearization::{Linearization, projected_jet};
 use super::net::{self, Jet, V4};
 use super::query::Query;
+use super::settlement;
 use super::structure::Exact;
 use super::tolerances::{COORDINATE_ROUNDING, EXTENSION, INVERSE_ROUNDING, NEWTON_STEP, REACH, ROUND, SINGULAR};
 use crate::intersect::Certainty;
@@ -74,7 +76,9 @@ impl Exact {
         let Some((local, s)) = self.newton_on_leaf(query, leaf, [du, dv], [k1, k2]) else {
             return self.clip_touched(query, index);
         };
-        self.offer_only_root(query, index, (local, s), oc, margin);
+        let place = PARAMETER_ROUNDING + 2.0 * NEWTON_STEP;
+        let margins = [place + noise * (y00.abs() + y01.abs()), place + noise * (y10.abs() + y11.abs())];
+        self.offer_only_root(query, index, (local, s), oc, (margin, margins));
     }
 
     /// The only root of a leaf's enlarged domain, in parameters, with the homogeneous point there; `None` where Newton's method
@@ -117,7 +121,14 @@ impl Exact {
 
     /// Offers the only root of the enlarged domain: outside of the leaf it is another leaf's.
     #[inline(always)]
-    fn offer_only_root(&self, query: &mut Query, index: u32, ([u, v], s): ([f64; 2], V4), oc: Vector, margin: f64) {
+    fn offer_only_root(
+        &self,
+        query: &mut Query,
+        index: u32,
+        ([u, v], s): ([f64; 2], V4),
+        oc: Vector,
+        (margin, margins): (f64, [f64; 2]),
+    ) {
         let e = margin + 2.0 * NEWTON_STEP;
         let leaf = &self.linearizations[index as usize];
         let reach = if leaf.widened { self.leaves[index as usize].reach } else { REACH };
@@ -127,7 +138,8 @@ impl Exact {
         }
         let p = Vector::new(s[0], s[1], s[2]) / s[3];
         let t = query.d.dot(p - oc);
-        if !query.is_in_range(t) {
+        let open = leaf.ill_scaled || settlement::is_open([u, v], margins);
+        if !open && !query.is_in_range(t) {
             return;
         }
         if let Some(own) = query.departure
@@ -138,7 +150,12 @@ impl Exact {
         {
             return;
         }
-        self.offer(query, index, [u, v], t, Certainty::Certified);
+        let found = Candidate { local: [u, v], t, certainty: Certainty::Certified, settled: None };
+        if open {
+            self.settle(query, index, found, margins);
+        } else {
+            self.offer(query, index, found);
+        }
     }
 
     /// Clips a leaf whose oriented box the ray touches.

@@ -26,6 +26,8 @@ pub(super) struct Linearization {
     pub(super) whole: bool,
     /// Whether roots count beyond the unit square.
     pub(super) widened: bool,
+    /// Whether every root is settled by the surface as given.
+    pub(super) ill_scaled: bool,
 }
 
 /// What names a hit.
@@ -41,10 +43,12 @@ pub(super) struct HitLabel {
     pub(super) sign: f64,
     pub(super) face: FaceId,
     pub(super) patch: u32,
+    /// Whether places and normals are taken from the surface as given.
+    pub(super) ill_scaled: bool,
 }
 
 impl Linearization {
-    pub(super) fn new(leaf: &Leaf, slopes: &Slopes, middle: &V4) -> Self {
+    pub(super) fn new(leaf: &Leaf, slopes: &Slopes, middle: &V4, ill_scaled: bool) -> Self {
         let half = leaf.reach.map(|[lo, hi]| ((0.5 - lo).max(hi - 0.5) as f32).next_up());
         Self {
             rows: std::array::from_fn(|c| [slopes.u[c], slopes.v[c], middle[c], slopes.ru[c] + slopes.rv[c]]),
@@ -55,6 +59,7 @@ impl Linearization {
             degree: leaf.degree,
             whole: leaf.whole,
             widened: leaf.reach != REACH,
+            ill_scaled,
         }
     }
 
@@ -105,6 +110,7 @@ impl HitLabel {
             sign: face.sign,
             face: face.id,
             patch: leaf.patch,
+            ill_scaled: patch.ill_scaled,
         }
     }
 

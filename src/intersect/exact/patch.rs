@@ -32,6 +32,8 @@ pub(super) struct Patch {
     pub(super) center: Point,
     /// The rectangle of the surface's domain.
     pub(super) domain: [[f64; 2]; 2],
+    /// Whether `f64` leaves too few digits of its places: [`is_ill_scaled`].
+    pub(super) ill_scaled: bool,
 }
 
 impl PatchGrid {
@@ -89,7 +91,13 @@ impl Patch {
             net,
             center: placed.placement.point(center),
             domain: patch.domain,
+            ill_scaled: is_ill_scaled(patch),
         }
+    }
+
+    /// Largest coordinate of its control points about its centre, mm.
+    pub(super) fn size(&self) -> f64 {
+        self.rounding / (NET_ROUNDING * f64::EPSILON)
     }
 
     /// Local parameters of surface parameters.
@@ -110,6 +118,14 @@ impl Patch {
     }
 }
 
+/// Whether `f64` leaves too few digits of places on a patch: a knot span that is next to nothing beside its parameters, or weights
+/// that differ by powers of ten.
+pub(super) fn is_ill_scaled(patch: &BezierPatch) -> bool {
+    let short = patch.domain.iter().any(|[a, b]| f64::EPSILON * a.abs().max(b.abs()) > LARGEST_ULP * (b - a));
+    let weights = patch.points.iter().fold([f64::INFINITY, 0.0f64], |[lo, hi], p| [lo.min(p.w), hi.max(p.w)]);
+    short || weights[1] > LARGEST_WEIGHT_RATIO * weights[0]
+}
+
 /// Position about the centre and first derivatives of a homogeneous jet.
 #[inline(always)]
 pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
@@ -124,8 +140,12 @@ pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
 const TRUSTED: f64 = 1e6;
 /// Square of the least sine between two derivatives that give a normal: seven digits of it are right.
 const LEAST_SINE_SQUARED: f64 = 1e-18;
-/// Square of the largest ratio of lengths of two derivatives that give a normal.
-const LARGEST_RATIO_SQUARED: f64 = 1e18;
+/// Ulps of a parameter that are a larger share of a patch's rectangle than this leave too few digits of places in it: of 10 mm a
+/// micrometre's thousandth.
+const LARGEST_ULP: f64 = 1e-10;
+/// Weights of one patch that differ by more than this make it run at speeds so different that places in its slow part lose as many
+/// digits.
+const LARGEST_WEIGHT_RATIO: f64 = 1e4;
 /// Shares of the way to the middle of the net at which the limit of the normal is taken at a singular point: the least is right
 /// to about 1e-6 rad; nets that are flatter there need more.
 const LIMIT_STEPS: [f64; 3] = [1e-6, 1e-4, 1e-2];
@@ -134,16 +154,29 @@ const LIMIT_STEPS: [f64; 3] = [1e-6, 1e-4, 1e-2];
 ///
 /// `rounding` is the error of the net's points, mm.
 pub(super) fn normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], jet: &Jet, rounding: f64) -> Vector {
+    regular_normal(jet, rounding).unwrap_or_else(|| limit_normal(net, degree, [u, v], rounding))
+}
+
+/// Unit normal along `Su × Sv`; `None` where the rounding of the derivatives leaves too little of it.
+#[inline(always)]
+pub(super) fn regular_normal(jet: &Jet, rounding: f64) -> Option<Vector> {
     let (_, du, dv) = project(jet);
+    cross_normal(du, dv, TRUSTED * rounding)
+}
+
+/// The direction of `du × dv`; `None` where one of them is shorter than `shortest`, or both are parallel.
+#[inline(always)]
+pub(super) fn cross_normal(du: Vector, dv: Vector, shortest: f64) -> Option<Vector> {
     let n = du.cross(dv);
+    let trusted = du.length_squared().min(dv.length_squared()) > shortest * shortest;
+    let clear = n.length_squared() > LEAST_SINE_SQUARED * du.length_squared() * dv.length_squared();
+    (trusted && clear).then(|| n.normalize())
+}
+
+/// The limit of the unit normal at a singular point, from the middle of the net.
+pub(super) fn limit_normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], rounding: f64) -> Vector {
     let shortest = TRUSTED * rounding;
     let trusted = |du: Vector, dv: Vector| du.length_squared().min(dv.length_squared()) > shortest * shortest;
-    if trusted(du, dv) && n.length_squared() > LEAST_SINE_SQUARED * du.length_squared() * dv.length_squared() {
-        let ratio = du.length_squared() / dv.length_squared();
-        if ratio > 1.0 / LARGEST_RATIO_SQUARED && ratio < LARGEST_RATIO_SQUARED {
-            return n.normalize();
-        }
-    }
     // Where a derivative vanishes the normal is the limit, taken as near as derivatives can be trusted.
     let toward_middle = |step: f64| {
         let moved = [u, v].map(|x| x + step * (0.5 - x));

@@ -29,6 +29,8 @@ pub(super) struct Root {
     pub(super) certainty: Certainty,
     /// Within the band of a trimming curve.
     pub(super) near_trim: bool,
+    /// Its surface parameters where the surface as given settled it: nothing is left to refine.
+    pub(super) settled: Option<Uv>,
 }
 
 /// The surface point that the ray leaves.

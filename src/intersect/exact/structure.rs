@@ -21,7 +21,8 @@ pub struct Settings {
     pub leaves: usize,
     /// How often a patch may be halved at most.
     pub depth: u32,
-    /// Clipping steps a ray may take before its answer is left uncertified; a step takes about half a microsecond.
+    /// Clipping steps on a bicubic net that a ray may take before its answer is left uncertified: half a microsecond each. Nets of
+    /// higher degree count as many as they take longer.
     pub budget: u32,
     /// Distance from a trim that is flagged, mm.
     pub trim_band: f64,

@@ -178,7 +178,7 @@ impl Subdivision<'_> {
         leaf.net = out.pool.len() as u32;
         let middle = net::evaluate(&control, self.patch.degree, 0.5, 0.5).s;
         out.pool.extend(control);
-        out.linearizations.push(Linearization::new(&leaf, &slopes, &middle));
+        out.linearizations.push(Linearization::new(&leaf, &slopes, &middle, self.patch.ill_scaled));
         out.leaves.push(leaf);
     }
 }

@@ -1,0 +1,228 @@
+//! The spline as it was given, in numbers of 32 digits: where `f64` cannot tell, this does.
+//!
+//! De Boor's algorithm on the surface's own knots and control points, so that neither the extraction of Bézier patches nor their
+//! halving has rounded anything. The ray is met where two components of `(S − o) × d` vanish, which no rounding of a frame
+//! across it blurs.
+//!
+//! An evaluation takes some microseconds: only roots whose place `f64` leaves open are settled here.
+
+use super::double_double::DoubleDouble;
+use crate::math::simd::{self, Instructions, Kernel};
+use crate::math::{Frame, Homogeneous, Uv, Vector};
+use crate::nurbs::{BezierPatch, Surface, find_span};
+use smallvec::SmallVec;
+
+/// Newton steps from a root of `f64`, which has digits to begin with.
+const STEPS: usize = 12;
+/// Newton's method has converged at a step of this size, as a share of a patch: the next is below 32 digits.
+const LAST_STEP: f64 = 1e-20;
+
+type Number = DoubleDouble;
+type Point4 = [Number; 4];
+type Point3 = [Number; 3];
+
+/// A root of 32 digits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SettledRoot {
+    /// Distance along the ray.
+    pub(super) t: f64,
+    /// As shares of the patch's rectangle.
+    pub(super) local: [f64; 2],
+    /// On the surface, rounded.
+    pub(super) uv: Uv,
+}
+
+/// A patch of a placed surface.
+#[derive(Clone, Copy)]
+pub(super) struct ReferencePatch<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) placement: &'a Frame,
+    /// The knot rectangle.
+    pub(super) domain: [[f64; 2]; 2],
+}
+
+/// A root to be settled, for [`simd::dispatch`].
+struct Settling<'a> {
+    patch: ReferencePatch<'a>,
+    ray: [Vector; 2],
+    start: [f64; 2],
+}
+
+impl Kernel for Settling<'_> {
+    type Output = Option<SettledRoot>;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> Self::Output {
+        self.patch.newton(self.ray, self.start)
+    }
+}
+
+/// Tangents to be found, for [`simd::dispatch`].
+struct TangentsAt<'a> {
+    patch: ReferencePatch<'a>,
+    uv: Uv,
+}
+
+impl Kernel for TangentsAt<'_> {
+    type Output = [Vector; 2];
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> Self::Output {
+        let (_, du, dv) = self.patch.derivatives([self.uv.x.into(), self.uv.y.into()]);
+        let [u, v] = [0, 1].map(|d| self.patch.width(d));
+        [rounded(du.map(|x| x * u)), rounded(dv.map(|x| x * v))]
+    }
+}
+
+impl ReferencePatch<'_> {
+    /// The root of a ray (origin, direction) near the patch's parameters `start`; `None` when Newton's method finds none.
+    pub(super) fn settle(self, ray: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
+        simd::dispatch(Settling { patch: self, ray, start })
+    }
+
+    /// Derivatives in the world by u and v, as shares of the patch: how far the surface would run over it at this speed, mm.
+    pub(super) fn tangents(self, uv: Uv) -> [Vector; 2] {
+        simd::dispatch(TangentsAt { patch: self, uv })
+    }
+
+    #[inline(always)]
+    fn width(&self, d: usize) -> Number {
+        Number::from(self.domain[d][1]) - self.domain[d][0].into()
+    }
+
+    #[inline(always)]
+    fn newton(&self, [o, d]: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
+        // The largest component of the direction, and the two others.
+        let main = d.abs().max_position();
+        let others = [(main + 1) % 3, (main + 2) % 3];
+        let widths = [0, 1].map(|k| self.width(k));
+        let mut uv = [0, 1].map(|k| widths[k] * start[k].into() + self.domain[k][0].into());
+        for _ in 0..STEPS {
+            let (p, du, dv) = self.derivatives(uv);
+            let r: Point3 = std::array::from_fn(|k| p[k] - o[k].into());
+            let beside = |x: &Point3, k: usize| x[k] * d[main].into() - x[main] * d[k].into();
+            let f = others.map(|k| beside(&r, k));
+            let (a, b) = (others.map(|k| beside(&du, k)), others.map(|k| beside(&dv, k)));
+            let determinant = a[0] * b[1] - b[0] * a[1];
+            if !(determinant.to_f64().abs() > 0.0) {
+                return None;
+            }
+            let step = [(b[1] * f[0] - b[0] * f[1]) / determinant, (a[0] * f[1] - a[1] * f[0]) / determinant];
+            let size = [0, 1].map(|k| (step[k] / widths[k]).to_f64().abs());
+            uv = [uv[0] - step[0], uv[1] - step[1]];
+            if !(size[0].max(size[1]) < 1.0) {
+                return None;
+            }
+            if size[0].max(size[1]) < LAST_STEP {
+                let t = (r[main] - du[main] * step[0] - dv[main] * step[1]) / d[main].into();
+                let local = [0, 1].map(|k| ((uv[k] - self.domain[k][0].into()) / widths[k]).to_f64());
+                return Some(SettledRoot { t: t.to_f64(), local, uv: Uv::new(uv[0].to_f64(), uv[1].to_f64()) });
+            }
+        }
+        None
+    }
+
+    /// The point and the derivatives in the world.
+    #[inline(always)]
+    fn derivatives(&self, [u, v]: [Number; 2]) -> (Point3, Point3, Point3) {
+        let s = self.surface;
+        let spans =
+            [0, 1].map(|d| find_span(&s.knots[d], s.degree[d], 0.5 * (self.domain[d][0] + self.domain[d][1])));
+        let [p, q] = s.degree;
+        let columns = s.counts()[1];
+        // Each row of the net in v, then the rows' values and derivatives in u.
+        let mut values: SmallVec<[Point4; 8]> = SmallVec::new();
+        let mut slopes: SmallVec<[Point4; 8]> = SmallVec::new();
+        for i in spans[0] - p..=spans[0] {
+            let row = &s.points[i * columns + spans[1] - q..=i * columns + spans[1]];
+            let row = row.iter().map(|x| x.to_array().map(Number::from)).collect();
+            let [value, slope] = de_boor(&s.knots[1], q, spans[1], row, v);
+            values.push(value);
+            slopes.push(slope);
+        }
+        let [s0, su] = de_boor(&s.knots[0], p, spans[0], values, u);
+        let [sv, _] = de_boor(&s.knots[0], p, spans[0], slopes, u);
+        let point: Point3 = std::array::from_fn(|k| s0[k] / s0[3]);
+        let slope = |x: &Point4| -> Point3 { std::array::from_fn(|k| (x[k] - point[k] * x[3]) / s0[3]) };
+        let origin: Point3 = self.placement.origin.to_array().map(Number::from);
+        let placed = self.place(&point);
+        (std::array::from_fn(|k| placed[k] + origin[k]), self.place(&slope(&su)), self.place(&slope(&sv)))
+    }
+
+    /// The image of a difference of points.
+    #[inline(always)]
+    fn place(&self, x: &Point3) -> Point3 {
+        let f = self.placement;
+        std::array::from_fn(|k| {
+            let sum = x[0] * f.x[k].into() + x[1] * f.y[k].into() + x[2] * f.z[k].into();
+            sum * f.scale.into()
+        })
+    }
+}
+
+/// Value and derivative of a spline in one span.
+#[inline(always)]
+fn de_boor(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Point4; 8]>, t: Number) -> [Point4; 2] {
+    let mut slope = [Number::ZERO; 4];
+    for r in 1..=degree {
+        if r == degree {
+            let width = Number::from(knots[span + 1]) - knots[span].into();
+            let scale = Number::from(degree as f64) / width;
+            slope = std::array::from_fn(|c| (points[degree][c] - points[degree - 1][c]) * scale);
+        }
+        for j in (r..=degree).rev() {
+            let low = knots[span - degree + j];
+            let high = knots[span + 1 + j - r];
+            let share = (t - low.into()) / (Number::from(high) - low.into());
+            let rest = Number::from(1.0) - share;
+            let before = points[j - 1];
+            points[j] = std::array::from_fn(|c| before[c] * rest + points[j][c] * share);
+        }
+    }
+    [points[degree], slope]
+}
+
+#[inline(always)]
+fn rounded(x: Point3) -> Vector {
+    Vector::from_array(x.map(Number::to_f64))
+}
+
+/// The control points of a Bézier patch, each coordinate rounded once: knot spans of 1e-9 beside weights of 1e6 leave no digit of
+/// what `f64` extracts.
+pub(super) fn extract(surface: &Surface, patch: &mut BezierPatch) {
+    let [p, q] = surface.degree;
+    let columns = surface.counts()[1];
+    let spans = [0, 1]
+        .map(|d| find_span(&surface.knots[d], surface.degree[d], 0.5 * (patch.domain[d][0] + patch.domain[d][1])));
+    let rows: Vec<Vec<Point4>> = (spans[0] - p..=spans[0])
+        .map(|i| {
+            let row = &surface.points[i * columns + spans[1] - q..=i * columns + spans[1]];
+            let row: SmallVec<[Point4; 8]> = row.iter().map(|x| x.to_array().map(Number::from)).collect();
+            (0..=q).map(|k| blossom(&surface.knots[1], q, spans[1], row.clone(), k)).collect()
+        })
+        .collect();
+    for j in 0..=q {
+        let column: SmallVec<[Point4; 8]> = rows.iter().map(|row| row[j]).collect();
+        for i in 0..=p {
+            let point = blossom(&surface.knots[0], p, spans[0], column.clone(), i);
+            patch.points[i * (q + 1) + j] = Homogeneous::from_array(point.map(Number::to_f64));
+        }
+    }
+}
+
+/// The blossom of a span at its start, and `ends` times at its end: a Bézier point.
+fn blossom(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Point4; 8]>, ends: usize) -> Point4 {
+    for r in 1..=degree {
+        let t = Number::from(if r <= ends { knots[span + 1] } else { knots[span] });
+        for j in (r..=degree).rev() {
+            let low = Number::from(knots[span - degree + j]);
+            let high = Number::from(knots[span + 1 + j - r]);
+            // Both shares from differences of knots, so that neither loses digits where the other is nearly all.
+            let width = high - low;
+            let (share, rest) = ((t - low) / width, (high - t) / width);
+            let before = points[j - 1];
+            points[j] = std::array::from_fn(|c| before[c] * rest + points[j][c] * share);
+        }
+    }
+    points[degree]
+}

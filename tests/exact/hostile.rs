@@ -1,0 +1,213 @@
+//! Sixteen kinds of hostile faces, ten kinds of rays: no certified answer is wrong, by a judge of 32 digits.
+
+use crate::referee::{cross, place_at, root, rounded};
+use crate::support::*;
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::{Certainty, Cost};
+use lampyris::math::{Departure, FaceId, Point, Ray, Uv, Vector};
+use lampyris::nurbs::Surface;
+use std::f64::consts::TAU;
+
+const KINDS: [&str; 16] = [
+    "scattered net",
+    "graph",
+    "cusp",
+    "weights of 10^±3",
+    "needle",
+    "pole",
+    "full knots",
+    "spans of 1e-9",
+    "tiny",
+    "huge",
+    "far away",
+    "closed",
+    "near pole",
+    "weights of 10^±6, spans of 1e-9",
+    "flat",
+    "fold",
+];
+
+/// Inner knots: some of full multiplicity, or in pairs 1e-9 apart.
+fn knots(s: &mut Stream, points: usize, degree: usize, kind: usize) -> Vec<f64> {
+    let mut inner: Vec<f64> = (0..points - degree - 1).map(|_| s.within(0.05, 0.95)).collect();
+    for k in 1..inner.len() {
+        match kind {
+            6 => inner[k] = inner[k - 1],
+            7 | 13 => inner[k] = inner[0] + 1e-9 * k as f64,
+            _ => {}
+        }
+    }
+    inner.sort_by(f64::total_cmp);
+    [vec![0.0; degree + 1], inner, vec![1.0; degree + 1]].concat()
+}
+
+fn surface(s: &mut Stream, kind: usize) -> Surface {
+    let whole = |s: &mut Stream, a: usize, b: usize| a + (s.next() * (b - a + 1) as f64) as usize;
+    let degree = [whole(s, 2, 5), whole(s, 2, 5)];
+    let counts = degree.map(|d| d + 1 + if matches!(kind, 0 | 4) { 0 } else { whole(s, 0, 3) });
+    let knots = [0, 1].map(|d| knots(s, counts[d], degree[d], kind));
+    let squeeze = 10f64.powf(s.within(-10.0, -3.0));
+    let mut points = Vec::new();
+    for i in 0..counts[0] {
+        for j in 0..counts[1] {
+            let [a, b] = [(i, counts[0]), (j, counts[1])].map(|(k, n)| 2.0 * k as f64 / (n - 1) as f64 - 1.0);
+            let [x, y, z] = [0; 3].map(|_| s.within(-1.0, 1.0));
+            let angle = TAU * 0.5 * (a + 1.0);
+            let p = match kind {
+                0 | 2 | 6 => Point::new(50.0 * x, 50.0 * y, 50.0 * z),
+                4 => Point::new(50.0 * x, 50.0 * y * squeeze, 50.0 * z),
+                5 | 12 if i == 0 => Point::new(x, y, z) * if kind == 12 { squeeze } else { 0.0 },
+                11 => Point::new(50.0 * angle.cos(), 50.0 * angle.sin(), 50.0 * b),
+                14 => Point::new(50.0 * a + 5.0 * x, 50.0 * b + 5.0 * y, if z < 0.0 { 0.0 } else { 1e-9 * z }),
+                15 => Point::new(50.0 * angle.cos(), 50.0 * b, 50.0 * angle.sin() + 1e-7 * z),
+                _ => Point::new(50.0 * a + 5.0 * x, 50.0 * b + 5.0 * y, 20.0 * z),
+            };
+            points.push(p);
+        }
+    }
+    if kind == 2 {
+        for j in 0..counts[1] {
+            points[counts[1] + j] = points[j];
+        }
+    }
+    let (scale, shift) = match kind {
+        8 => (1e-5, Vector::ZERO),
+        9 => (2e4, Vector::ZERO),
+        10 => (0.1, Vector::new(1e7 * s.within(-1.0, 1.0), 3e6, 1e7)),
+        _ => (1.0, Vector::ZERO),
+    };
+    let spread = if kind == 3 {
+        3.0
+    } else if kind == 13 {
+        6.0
+    } else {
+        0.0
+    };
+    let weighted = |p: Point, w: f64| ((p * scale + shift) * w).extend(w);
+    let points = points.into_iter().map(|p| weighted(p, 10f64.powf(s.within(-spread, spread)))).collect();
+    Surface { degree, knots, points }
+}
+
+/// A ray towards the place of `uv`, of one of ten kinds; the ray and whether it starts there.
+fn ray(s: &mut Stream, surface: &Surface, size: f64, uv: Uv, kind: usize) -> Ray {
+    let at = place_at(surface, uv);
+    let (p, du, dv) = (rounded(at.point), rounded(at.du), rounded(at.dv));
+    let normal = rounded(cross(at.du, at.dv)).normalize_or(Vector::Z);
+    let tangent = (du.normalize_or(Vector::X) * s.within(-1.0, 1.0)
+        + dv.normalize_or(Vector::Y) * s.within(-1.0, 1.0))
+    .normalize_or(Vector::X);
+    let distance = size * s.within(0.5, 4.0);
+    let d = match kind {
+        2 => tangent,
+        3 => (tangent + normal * 10f64.powf(s.within(-9.0, -1.0))).normalize(),
+        4 => Vector::AXES[(s.next() * 3.0) as usize],
+        5 => (s.direction() * Vector::new(1.0, 1.0, [0.0, 5e-324, 1e-300, 1e-17][(s.next() * 4.0) as usize]))
+            .normalize(),
+        _ => s.direction(),
+    };
+    match kind {
+        6 => Ray::new(p, d),
+        7 => Ray::new(p, d).with_departure(Departure { face: FaceId(0), primitive: 0, uv }),
+        8 => Ray::new(p - d * size * 10f64.powf(s.within(2.0, 6.0)), d),
+        9 => Ray::new(p - d * distance, d).with_range(0.0, distance + size * s.within(-1e-6, 1e-6)),
+        _ => Ray::new(p - d * distance, d),
+    }
+}
+
+/// How many answers were certified, flagged and wrong.
+#[derive(Debug, Default)]
+struct Verdicts {
+    certified: usize,
+    flagged: usize,
+    wrong: Vec<String>,
+}
+
+fn judge(surface: &Surface, exact: &Exact, ray: &Ray, aimed: Uv, size: f64, what: &str, out: &mut Verdicts) {
+    let answer = exact.first(ray, &mut Cost::default());
+    if answer.certainty != Certainty::Certified {
+        out.flagged += 1;
+        return;
+    }
+    out.certified += 1;
+    let largest = surface.points.iter().map(|p| p.project().abs().max_element()).fold(0.0, f64::max);
+    let reach = largest.max(ray.origin.abs().max_element());
+    // What a rounded origin and 32 half ulps of the distance are worth along the ray, and a billionth of the face.
+    let tolerance =
+        |t: f64, sine: f64| 1e-9 * size.min(1.0) + 256.0 * f64::EPSILON * (reach + t.abs()) / sine.max(1e-12);
+    if let Some(hit) = answer.hit {
+        // At the very end of a knot span the root may belong to the next.
+        let near = root(surface, ray, hit.uv);
+        let at = place_at(surface, hit.uv);
+        let off = rounded(at.point) - ray.point_at(hit.t);
+        let blur = 4.0 * f64::EPSILON * (rounded(at.du).length() + rounded(at.dv).length());
+        let on_surface = off.length() <= 64.0 * f64::EPSILON * (reach + hit.t.abs()) + 1e-9 * size.min(1.0) + blur;
+        let right = near.is_some_and(|r| {
+            (r.t - hit.t).abs() <= tolerance(r.t, r.sine) && r.inside > -1e-9 - 64.0 * f64::EPSILON * reach
+        });
+        if !(on_surface || right) {
+            out.wrong.push(format!("{what}: no such point {hit:?}, near {near:?}"));
+        }
+        let (du, dv) = (rounded(at.du), rounded(at.dv));
+        let n = rounded(cross(at.du, at.dv));
+        let regular = n.length() > 1e-6 * du.length() * dv.length() && du.length().min(dv.length()) > 1e-5 * size;
+        let crease = surface
+            .knots
+            .iter()
+            .enumerate()
+            .any(|(d, k)| k.iter().any(|x| (x - hit.uv[d]).abs() <= 1e-12 && *x > 0.0 && *x < 1.0));
+        if regular && !crease && n.normalize().cross(hit.normal).length() > 1e-6 {
+            out.wrong.push(format!("{what}: normal {} for {}", hit.normal, n.normalize()));
+        }
+    }
+    // The point aimed at is on the ray: an answer behind it has missed it.
+    let Some(aim) = root(surface, ray, aimed) else { return };
+    let slack = tolerance(aim.t, aim.sine);
+    let counts = aim.sine > 1e-7
+        && aim.inside > 1e-6 * size.min(1.0) + 64.0 * f64::EPSILON * reach
+        && aim.t > ray.t_min + slack.max(if ray.departure.is_some() { 1e-5 * size } else { 0.0 })
+        && aim.t < ray.t_max - slack;
+    if counts && answer.hit.is_none_or(|hit| hit.t > aim.t + slack) {
+        out.wrong.push(format!("{what}: {:?} for {aim:?}", answer.hit));
+    }
+}
+
+fn run(seed: u64, faces: usize, rays: usize) -> Verdicts {
+    let mut out = Verdicts::default();
+    for face in 0..faces {
+        let kind = face % KINDS.len();
+        let mut s = Stream(seed.wrapping_mul(1_000_003) + face as u64);
+        let surface = surface(&mut s, kind);
+        let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+        let size = surface.bounds().diagonal();
+        for k in 0..rays {
+            let uv = Uv::new(s.within(0.0, 1.0), s.within(0.0, 1.0));
+            let ray = ray(&mut s, &surface, size, uv, k % 10);
+            if ray.origin.is_finite() {
+                let what = format!("{}, seed {seed}, face {face}, ray {k}", KINDS[kind]);
+                judge(&surface, &exact, &ray, uv, size, &what, &mut out);
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn no_certified_answer_on_a_hostile_face_is_wrong() {
+    let out = run(1, 32, 40);
+    assert!(out.wrong.is_empty(), "{} of {}:\n{}", out.wrong.len(), out.certified, out.wrong.join("\n"));
+    assert!(out.flagged * 10 < out.certified, "{} flagged, {} certified", out.flagged, out.certified);
+}
+
+#[test]
+#[ignore = "takes minutes, in release"]
+fn no_certified_answer_on_many_hostile_faces_is_wrong() {
+    let (mut certified, mut flagged, mut wrong) = (0, 0, Vec::new());
+    for seed in 100..120 {
+        let out = run(seed, 320, 100);
+        certified += out.certified;
+        flagged += out.flagged;
+        wrong.extend(out.wrong);
+    }
+    println!("{certified} certified, {flagged} flagged, {} wrong", wrong.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
