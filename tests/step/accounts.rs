@@ -36,3 +36,17 @@ fn the_shape_of_an_aspect_is_no_second_face() {
     assert_eq!(left, [(105, "SHAPE_REPRESENTATION")]);
     assert!(import.report.left_out[0].reason.contains("#103 SHAPE_ASPECT"), "{:?}", import.report.left_out);
 }
+
+#[test]
+fn parts_of_edges_and_faces_have_the_geometry_of_their_parents() {
+    // The lower half of the square: its sides are parts of the square's, its bounds are its own.
+    let half = "#14=CARTESIAN_POINT('',(0.,0.5,0.));\n#15=CARTESIAN_POINT('',(1.,0.5,0.));\n\
+                #34=VERTEX_POINT('',#14);\n#35=VERTEX_POINT('',#15);\n\
+                #101=SUBEDGE('',#31,#35,#41);\n#102=EDGE_CURVE('',#35,#34,$,.T.);\n#103=SUBEDGE('',#34,#30,#43);\n\
+                #111=ORIENTED_EDGE('',*,*,#101,.T.);\n#112=ORIENTED_EDGE('',*,*,#102,.T.);\n#113=ORIENTED_EDGE('',*,*,#103,.T.);\n\
+                #120=EDGE_LOOP('',(#50,#111,#112,#113));\n#121=FACE_OUTER_BOUND('',#120,.T.);\n#900=SUBFACE('',(#121),#901);\n";
+    let import = import(&(square(FORWARD, IN_ORDER).replace("#900=", "#901=") + half));
+    let account = import.model.account();
+    let face = &account[0].solids[0].faces[0];
+    assert!((face.area_mm2 - 0.5).abs() < 1e-12, "{} {:?}", face.area_mm2, import.report.refusals);
+}

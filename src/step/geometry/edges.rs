@@ -9,6 +9,9 @@ use super::{Geometry, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
+/// Longest chain of edges that are parts of edges.
+const MAX_PARENTS: usize = 4;
+
 /// An edge before it is numbered.
 #[derive(Clone, Debug)]
 pub(crate) struct TrimmedEdge {
@@ -19,19 +22,22 @@ pub(crate) struct TrimmedEdge {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// An EDGE_CURVE's curve, cut.
+    /// An edge's curve between its vertices; that of a SUBEDGE is its parent's.
     pub(crate) fn edge(&self, id: u64) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
-        let Some(edge) = e.attributes("EDGE", 1) else {
-            // Simple form: name, start, end, geometry, sense.
-            let Some(args) = e.attributes("EDGE_CURVE", 1) else {
-                return Err(Refusal::new(e, "this kind of edge is not supported"));
-            };
-            return self.edge_between(e.id, [args.id(0), args.id(1)], args.id(2), args.flag(3) != Some(false));
+        let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
+        let Some(vertices) = vertices.or_else(|| e.attributes("SUBEDGE", 1)) else {
+            return Err(Refusal::new(e, "this kind of edge is not supported"));
         };
-        let own = e.attributes("EDGE_CURVE", 3);
+        let mut owner = e;
+        for _ in 0..MAX_PARENTS {
+            let Some(a) = owner.attributes("SUBEDGE", 3) else { break };
+            owner = self.resolve(owner, a.id(0), "parent edge")?;
+        }
+        // A simple EDGE_CURVE has its vertices before its geometry.
+        let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        self.edge_between(e.id, [edge.id(0), edge.id(1)], curve, sense)
+        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, sense)
     }
 
     fn edge_between(

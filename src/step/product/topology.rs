@@ -24,6 +24,9 @@ const RECIPES: [&str; 16] = [
     "SOLID_REPLICA",
 ];
 
+/// Longest chain of faces that are parts of faces.
+const MAX_PARENTS: usize = 4;
+
 /// A shell to be converted.
 #[derive(Clone, Debug)]
 pub(crate) struct ShellPlan {
@@ -106,7 +109,7 @@ impl ShapeItems {
             "ORIENTED_CLOSED_SHELL",
         ]) {
             self.add_shell(file, Some(id), &name, &[], false, e);
-        } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+        } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE"]) {
             self.shells.push(ShellPlan {
                 name,
                 closed: false,
@@ -226,13 +229,18 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
         });
     };
     let complex = e.keyword().is_empty();
-    let (bounds, surface, sense) = if complex {
-        let bounds = e.attributes("FACE", 0).map(|a| a.list(0));
-        let own = e.attributes("FACE_SURFACE", 0);
-        (bounds, own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))
-    } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
-        let a = e.args();
-        (Some(a.list(1)), a.id(2), a.flag(3))
+    let bounds = if complex { e.attributes("FACE", 0).map(|a| a.list(0)) } else { Some(e.args().list(1)) };
+    // A part of a face has bounds of its own on its parent's surface.
+    let mut owner = e;
+    for _ in 0..MAX_PARENTS {
+        let Some(parent) = owner.attributes("SUBFACE", 2).and_then(|a| a.entity(0)) else { break };
+        owner = parent;
+    }
+    let (surface, sense) = if owner.keyword().is_empty() {
+        let own = owner.attributes("FACE_SURFACE", 0);
+        (own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))
+    } else if owner.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
+        (owner.args().id(2), owner.args().flag(3))
     } else {
         return Err(Refusal::new(e, "this kind of face is not supported"));
     };
