@@ -92,12 +92,13 @@ fn wrapped(text: &str, width: usize) -> String {
             out.push('\n');
         }
         let mut length = 0;
-        for word in line.split(' ') {
+        for (k, word) in line.split(' ').enumerate() {
             let letters = word.chars().count();
             if length > 0 && length + 1 + letters > width {
                 out.push('\n');
                 length = 0;
-            } else if length > 0 {
+            } else if k > 0 {
+                // Also before the first word of a line that begins with spaces, which stay.
                 out.push(' ');
                 length += 1;
             }

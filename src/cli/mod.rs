@@ -1,10 +1,11 @@
 //! The command line: arguments, progress, exit codes, and errors that show the line at fault.
 //!
 //! Data goes to stdout, messages and progress to stderr. Progress appears on a terminal alone, `NO_COLOR` is respected, and
-//! `--json` prints exactly one document. Known weakness: a broken pipe on stdout ends the command with code 1.
+//! `--json` prints exactly one document. A reader of stdout that goes away is no failure: files are written all the same. Names out of
+//! files are data: what a terminal would obey in them is written out. Known weakness: on Windows no signal saves a run.
 //!
-//! Inner modules, each of which sees only those before it: `failure`, `console` and `completion` (how a command talks and
-//! ends), `arguments` (what is asked), `output` (how answers are shown and written), `work` (from files to facets,
+//! Inner modules, each of which sees only those before it: `interruption`, `failure`, `console` and `completion` (how a
+//! command is stopped, talks and ends), `arguments` (what is asked), `output` (how answers are shown and written), `work` (from files to facets,
 //! intersectors and runs) and `commands`, which put these together.
 
 mod arguments;

@@ -213,6 +213,6 @@ fn pipes_and_devices_are_refused() {
         assert!(
             read_ray_set(path, Flux::Radiant).is_err() && read_data1(path).is_err() && read_data2(path).is_err()
         );
-        assert!(read_data3(path).is_err());
+        assert!(read_data3(path).is_err() && Scene::read(path).is_err());
     }
 }

@@ -30,6 +30,7 @@ Examples:
   lampyris trace lamp.toml                               all as the scene says
   lampyris trace lamp.toml --until-error 0.1%@wall       until the power on 'wall' is known to 0.1 %
   lampyris trace lamp.toml --shard 1/4 -o part1.tally    a quarter of the run; see lampyris merge
+  srun lampyris trace lamp.toml --shard auto -o parts    the part that the launcher gives; then lampyris merge parts -o DIR
 
 lampyris schema prints what a scene file may hold.";
 

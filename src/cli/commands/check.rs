@@ -12,10 +12,10 @@ use crate::cli::work::contenders::{Contenders, time_all};
 use crate::cli::work::cross_check::LIFT_IN_TOLERANCES;
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::intersectors::IntersectorChoice;
-use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
 use crate::cli::work::ray_sampler::RaySampler;
 use crate::cli::work::{accuracy_target, facets, paired_receivers, threads};
-use crate::formats::write_atomic;
+use crate::formats::{open_file, write_atomic};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
@@ -39,6 +39,9 @@ const FEWEST_SCENE_RAYS: u64 = 64;
 const TABLE_WIDTH: usize = 100;
 
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
+    for path in command.rays_out.iter().chain(&command.disagreements) {
+        make_folder(&folder_of(path))?;
+    }
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
     let input = input_files::either(&command.file, console)?;
@@ -190,7 +193,7 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
 }
 
 fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
-    let open = std::fs::File::open(path);
+    let open = open_file(path);
     let read = open.and_then(|f| records::read(&mut std::io::BufReader::new(f)));
     match read {
         Ok(list) if list.is_empty() => Err(Failure::input(format!("{}: no rays in it", path.display()))),

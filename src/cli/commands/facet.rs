@@ -4,6 +4,7 @@ use crate::cli::arguments::command::FacetCommand;
 use crate::cli::console::{Console, print};
 use crate::cli::output::appearance;
 use crate::cli::output::json::json_text;
+use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::cli::work::{accuracy_target, facets, input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
@@ -21,6 +22,9 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         return Err(
             crate::formats::Error::new(path, ErrorKind::Extension { given, known: FACET_EXTENSIONS }).into()
         );
+    }
+    for path in &command.output {
+        make_folder(&folder_of(path))?;
     }
     threads::set_threads(command.threads)?;
     let loaded = input_files::model_file(&command.file, console)?;

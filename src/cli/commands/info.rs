@@ -70,8 +70,10 @@ fn summary(r: &ImportReport, console: &Console) -> String {
     };
     line("names", list(&shown) + &more);
     line("read in", format!("{} (parse) + {} (convert)", seconds(r.seconds.parse), seconds(r.seconds.convert)));
-    let notes = (r.refusals.iter().map(|n| ("refused", n))).chain(r.repairs.iter().map(|n| ("repaired", n)));
-    let notes: Vec<_> = notes.collect();
+    let refused = r.refusals.iter().map(|n| ("refused", n));
+    let repaired = r.repairs.iter().map(|n| ("repaired", n));
+    let left_out = r.left_out.iter().map(|n| ("left out", n));
+    let notes: Vec<_> = refused.chain(repaired).chain(left_out).collect();
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_NOTES };
     if !notes.is_empty() {
         let mut table = blank_table(console.width());

@@ -6,7 +6,7 @@ use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::json_text;
 use crate::cli::work::lost_rays::{self, COLUMNS};
 use crate::cli::work::scene_run::PreparedScene;
-use crate::formats::write_vtp;
+use crate::formats::{read_text, write_vtp};
 use crate::report::path_lines;
 use crate::simulate::{PathVertex, Results, RunSettings, replay};
 use serde_json::{Value, json};
@@ -33,7 +33,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
             request.rays.push(ray);
             continue;
         }
-        let text = std::fs::read_to_string(word).map_err(|e| {
+        let text = read_text(Path::new(word)).map_err(|e| {
             Failure::input(format!("--replay {word}: {e}"))
                 .with_help(format!("give the number of a ray, or a {LEDGER} of an earlier run"))
         })?;

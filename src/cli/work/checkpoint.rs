@@ -5,7 +5,7 @@ use super::scene_run::PreparedScene;
 use super::tally_file::{TallyHeader, fingerprint};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::formats::write_atomic;
+use crate::formats::{read_bytes, write_atomic};
 use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -56,7 +56,7 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     /// When the file cannot be read, is damaged or is of another run.
     pub(crate) fn read(&self) -> Result<Option<PartialRun>, Failure> {
-        let bytes = match std::fs::read(&self.file) {
+        let bytes = match read_bytes(&self.file) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(Failure::input(format!("{}: {e}", self.file.display()))),
@@ -140,7 +140,7 @@ pub(crate) fn refuse_overwriting(file: &Path) -> Result<(), Failure> {
     if !file.exists() {
         return Ok(());
     }
-    let header = std::fs::read(file).ok().and_then(|bytes| PartialRun::header::<TallyHeader>(&bytes).ok());
+    let header = read_bytes(file).ok().and_then(|bytes| PartialRun::header::<TallyHeader>(&bytes).ok());
     let whose = header.map_or(String::new(), |h| format!(" ({})", h.command));
     let failure = Failure::arguments(format!("{}: an interrupted run{whose} is saved there", file.display()));
     Err(failure.with_help("--resume goes on with it; else give another place with -o, or remove the file"))

@@ -122,7 +122,8 @@ pub(crate) fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Failu
     let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
     for file in files {
         let path = scene.resolve(file);
-        let read = std::fs::read(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        let read =
+            crate::formats::read_bytes(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
         pieces.push(read);
     }
     let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();

@@ -104,7 +104,7 @@ impl Scene {
     /// Reads a scene file; paths in it are relative to its folder.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let text = crate::formats::read_text(path).map_err(|e| {
             let kind = ErrorKind::Unreadable;
             Error::new(kind, format!("{name}: cannot read the scene file: {e}")).help("check the path")
         })?;
