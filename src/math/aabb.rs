@@ -1,3 +1,5 @@
+//! Axis-aligned boxes and where rays cross them.
+
 use super::{Point, Ray, Vector};
 
 /// An axis-aligned box `[min, max]`; empty when any `min > max`.

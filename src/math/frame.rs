@@ -1,3 +1,5 @@
+//! Placements: similarity transforms as axes at an origin.
+
 use super::{Point, Vector};
 
 /// A similarity placement `x ↦ origin + scale · (x·X + y·Y + z·Z)`: right- or left-handed axes of unit length.
@@ -17,6 +19,9 @@ pub struct Frame {
     pub scale: f64,
 }
 
+/// Sine below which a hint runs along the axis: its part across is then four digits of rounding.
+const PARALLEL: f64 = 1e-12;
+
 impl Frame {
     /// Leaves everything where it is.
     pub const IDENTITY: Self = Self { origin: Point::ZERO, x: Vector::X, y: Vector::Y, z: Vector::Z, scale: 1.0 };
@@ -34,7 +39,7 @@ impl Frame {
         let x = x_hint
             .and_then(|h| h.try_normalize())
             .map(|h| h - z * h.dot(z))
-            .filter(|p| p.length_squared() > 1e-24)
+            .filter(|p| p.length_squared() > PARALLEL * PARALLEL)
             .and_then(|p| p.try_normalize())
             .unwrap_or_else(|| {
                 let pick = if z.x.abs() < 0.9 { Vector::X } else { Vector::Y };

@@ -1,3 +1,5 @@
+//! Interval arithmetic that rounds outward.
+
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A closed interval of reals whose arithmetic rounds outward, so that results always contain the exact ones.

@@ -1,3 +1,5 @@
+//! Rays, and the surface point that a ray leaves.
+
 use super::{FaceId, Point, Uv, Vector};
 
 /// A half-line or segment `origin + t·direction`, `t` in `[t_min, t_max]`.

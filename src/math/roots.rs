@@ -1,3 +1,5 @@
+//! Roots of quadratics and of monotonic functions, without cancellation.
+
 /// Real roots of `a·x² + b·x + c`, ascending, without cancellation; one root when `a = 0`, none when all vanish.
 ///
 /// Source: Press et al., *Numerical Recipes*, 5.6, with the discriminant by fused multiply-add (Kahan).

@@ -1,3 +1,5 @@
+//! Edges of a mesh: which are open, shared or used more than twice.
+
 use super::FacetMesh;
 use rustc_hash::FxHashMap;
 use std::ops::Range;

@@ -1,3 +1,5 @@
+//! The ABg model of scatter by polished surfaces.
+
 use super::error::{Error, ErrorKind, require};
 use crate::math::Vector;
 use std::f64::consts::PI;
@@ -17,6 +19,8 @@ pub struct Abg {
     shares: Vec<f64>,
 }
 
+/// How near a radius is found, as a direction cosine: fifty ulps of 1.
+const RADIUS_TOLERANCE: f64 = 1e-14;
 /// Largest possible |β − β₀|.
 const REACH: f64 = 2.0;
 /// Rings of the tabulated share: their width grows by a factor of 1.06.
@@ -85,7 +89,7 @@ impl Abg {
         let i = self.shares.partition_point(|&s| s <= share).max(1) - 1;
         let (low, high) = (self.radii[i], self.radii[(i + 1).min(RINGS)]);
         let missing = |r: f64| (self.shares[i] + self.ring(low, r) - share, self.weight(r));
-        crate::math::safe_newton(missing, low, high, 1e-14).or(Some(low))
+        crate::math::safe_newton(missing, low, high, RADIUS_TOLERANCE).or(Some(low))
     }
 
     fn weight(&self, r: f64) -> f64 {

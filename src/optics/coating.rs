@@ -1,3 +1,5 @@
+//! What a coated interface reflects and transmits, by angle and wavelength.
+
 use super::error::{Error, ErrorKind, require};
 use super::fresnel::{self, Power};
 use super::refraction::cos_transmitted;

@@ -1,3 +1,5 @@
+//! The things light can do, and sets of them: what a scene needs and a kernel offers.
+
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign, Sub};
 

@@ -1,3 +1,5 @@
+//! Why optical data was refused.
+
 use thiserror::Error;
 
 /// Why optical data was refused; the message says what is wrong and what to give instead.

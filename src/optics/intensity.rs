@@ -1,3 +1,5 @@
+//! Directions drawn from a measured luminous intensity.
+
 use super::error::{Error, ErrorKind, require};
 use crate::formats::{PhotometricType, Photometry};
 use crate::math::{Vector, safe_newton};

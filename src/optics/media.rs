@@ -1,3 +1,5 @@
+//! What light travels through: refractive index and absorption over the wavelength.
+
 use super::error::{Error, require};
 use super::phase::BulkScatter;
 use super::table::Table;

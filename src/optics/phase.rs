@@ -1,3 +1,5 @@
+//! Scattering inside a medium.
+
 use super::error::{Error, require};
 use crate::math::{Vector, orthonormal_pair};
 use std::f64::consts::PI;
@@ -10,6 +12,9 @@ pub struct BulkScatter {
     /// Mean cosine of the scattering angle, in (−1, 1): 0 isotropic, towards 1 forward.
     pub g: f64,
 }
+
+/// Mean cosine below which the series in g is used: its next term, g², is below the rounding that division by 2g leaves.
+const ISOTROPIC: f64 = 1e-6;
 
 impl BulkScatter {
     /// Refuses a negative coefficient and a `g` outside (−1, 1).
@@ -34,7 +39,7 @@ impl BulkScatter {
     /// The direction after an event; `u` uniform in `[0, 1)²`.
     pub fn sample(&self, d: Vector, u: [f64; 2]) -> Vector {
         let g = self.g;
-        let cos = if g.abs() < 1e-6 {
+        let cos = if g.abs() < ISOTROPIC {
             // The limit of the formula below, which would divide by zero; its next term is of order g.
             2.0 * u[0] - 1.0 + 1.5 * g * (1.0 - (2.0 * u[0] - 1.0).powi(2))
         } else {

@@ -1,3 +1,5 @@
+//! Directions of reflected and refracted light.
+
 use crate::math::Vector;
 
 /// The mirror image of direction `d` in a surface with unit normal `n` (either side).

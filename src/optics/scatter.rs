@@ -1,3 +1,5 @@
+//! Scattering at rough surfaces.
+
 use super::abg::Abg;
 use super::error::{Error, require};
 use super::sampling::{cosine_power, direction_about, lambertian};
@@ -105,10 +107,13 @@ fn share_below_pi(sigma: f64) -> f64 {
     -(-PI * PI / (2.0 * sigma * sigma)).exp_m1()
 }
 
+/// Angle, radians, below which it stands for its sine: they differ by a sixth of its square, 2e-9 of the density.
+const SMALL_ANGLE: f64 = 1e-4;
+
 /// Density per steradian of the Gaussian laid out flat: the flat density times θ/sin θ.
 fn gaussian(cos: f64, sigma: f64) -> f64 {
     let angle = cos.clamp(-1.0, 1.0).acos();
-    let stretch = if angle < 1e-4 { 1.0 } else { angle / angle.sin().max(f64::MIN_POSITIVE) };
+    let stretch = if angle < SMALL_ANGLE { 1.0 } else { angle / angle.sin().max(f64::MIN_POSITIVE) };
     let flat = (-angle * angle / (2.0 * sigma * sigma)).exp() / (2.0 * PI * sigma * sigma);
     flat * stretch / share_below_pi(sigma)
 }

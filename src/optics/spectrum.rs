@@ -1,3 +1,5 @@
+//! Spectra of sources, and wavelengths drawn from them.
+
 use super::cie;
 use super::error::{Error, ErrorKind, require};
 use super::intensity::linear_quantile;

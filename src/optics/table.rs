@@ -1,3 +1,5 @@
+//! Values over one variable, linear between points.
+
 use super::error::{Error, ErrorKind, require};
 
 /// A function of wavelength (or of an angle) given at points, linear between them, constant beyond the ends.

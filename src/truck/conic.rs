@@ -1,3 +1,5 @@
+//! Conic profiles of lenses and reflectors as truck curves.
+
 use super::modeling::{BSplineCurve, Curve, KnotVec, Line, NurbsCurve, Point3, Vector4};
 use thiserror::Error;
 
