@@ -2,6 +2,7 @@
 
 mod arguments;
 mod check;
+mod cluster;
 mod demo;
 #[path = "../support/files.rs"]
 mod files;
