@@ -107,3 +107,38 @@ fn an_edge_that_passes_a_pole_closely_does_not_wind_around_it() {
         }
     }
 }
+
+/// A strip of a cylinder of radius 2 between two helices, written as polylines: from height `rise · turn` up by 0.5.
+fn flank(turns: u32) -> String {
+    let (n, rise) = (64 * turns, 1.5);
+    let place = |k: u32, up: f64| {
+        let angle = f64::from(k) * PI / 32.0;
+        [2.0 * angle.cos(), 2.0 * angle.sin(), rise * angle / (2.0 * PI) + up]
+    };
+    let mut list = vec![(10, [0., 0., 0.])];
+    for k in 0..=n {
+        list.push((1000 + k, place(k, 0.0)));
+        list.push((50_000 + k, place(k, 0.5)));
+    }
+    let line = |first: u32| (0..=n).map(|k| format!("#{}", first + k)).collect::<Vec<_>>().join(",");
+    points(&list)
+        + &format!(
+            "#20=AXIS2_PLACEMENT_3D('',#10,$,$);\n#21=CYLINDRICAL_SURFACE('',#20,2.);\n#22=POLYLINE('',({}));\n#23=POLYLINE('',({}));\n\
+             #30=VERTEX_POINT('',#1000);\n#31=VERTEX_POINT('',#{});\n#32=VERTEX_POINT('',#{});\n#33=VERTEX_POINT('',#50000);\n\
+             #40=EDGE_CURVE('',#30,#31,#22,.T.);\n#41=EDGE_CURVE('',#31,#32,$,.T.);\n#42=EDGE_CURVE('',#33,#32,#23,.T.);\n\
+             #43=EDGE_CURVE('',#33,#30,$,.T.);\n#50=ORIENTED_EDGE('',*,*,#40,.T.);\n#51=ORIENTED_EDGE('',*,*,#41,.T.);\n\
+             #52=ORIENTED_EDGE('',*,*,#42,.F.);\n#53=ORIENTED_EDGE('',*,*,#43,.T.);\n#60=EDGE_LOOP('',(#50,#51,#52,#53));\n\
+             #70=FACE_OUTER_BOUND('',#60,.T.);\n#900=ADVANCED_FACE('',(#70),#21,.T.);\n",
+            line(1000),
+            line(50_000),
+            1000 + n,
+            50_000 + n
+        )
+}
+
+#[test]
+fn the_flank_of_a_thread_has_as_many_turns_as_the_thread() {
+    for turns in [1, 9] {
+        close(area(&import(&flank(turns))), 0.5 * 2.0 * 2.0 * PI * f64::from(turns), 1e-4);
+    }
+}

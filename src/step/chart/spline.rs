@@ -14,6 +14,8 @@ use std::sync::OnceLock;
 /// one patch: higher degrees take twice their number.
 const SEEDS: usize = 4;
 
+/// Most copies of a closed curve behind its first one: the turns of a thread.
+const MAX_COPIES: i64 = 256;
 /// Patches from which a search starts; nearer boxes come first.
 const MAX_PATCHES_SEARCHED: usize = 200;
 
@@ -242,7 +244,7 @@ pub(super) fn extend_periodically(curve: &Curve, [a, b]: [f64; 2], period: Optio
         return curve.clone();
     }
     let first = ((a - t0) / period + PERIOD_SLACK).floor() as i64;
-    let last = (((b - t0) / period - PERIOD_SLACK).ceil() as i64 - 1).clamp(first, first + 4);
+    let last = (((b - t0) / period - PERIOD_SLACK).ceil() as i64 - 1).clamp(first, first + MAX_COPIES);
     let start = t0 + first as f64 * period;
     let copy = curve.reparametrised([start, start + period]);
     let mut whole = copy.clone();

@@ -13,8 +13,10 @@ use crate::nurbs::{ControlPoint, Surface, UvCurve};
 use crate::step::chart::{Chart, offset};
 use rustc_hash::FxHashMap;
 
-/// Most periods that a face may span.
+/// Most periods that a face beside a pole may span: azimuths there mean little.
 const MAX_TURNS: f64 = 4.0;
+/// Most periods that a face without a pole may span: the flank of a thread has as many turns as the thread.
+const MAX_THREAD_TURNS: f64 = 256.0;
 
 /// A built face; seams are numbered from 0, edges as in the task.
 pub(crate) struct BuiltFace {
@@ -139,8 +141,8 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
         let natural = chart.range[d];
         match chart.period[d] {
             Some(period) => {
-                // Not even a loop on a seam comes near; slopes beside a pole that no longer mean anything do.
-                if !(b - a <= MAX_TURNS * period) {
+                let turns = if chart.poles.is_empty() { MAX_THREAD_TURNS } else { MAX_TURNS };
+                if !(b - a <= turns * period) {
                     return None;
                 }
                 let base = if natural[0].is_finite() { natural[0] } else { 0.0 };
