@@ -6,7 +6,7 @@ use crate::mesh::FacetMesh;
 /// What [`super::tessellate`] makes.
 #[derive(Clone, Debug, Default)]
 pub struct Tessellation {
-    /// The facets of all placed faces; the id of a facet's face is its index in [`Model::placed_faces`].
+    /// The facets of all placed faces; the id of a facet's face is its index in [`crate::model::Model::placed_faces`].
     pub mesh: FacetMesh,
     /// What came out, counted.
     pub report: Report,

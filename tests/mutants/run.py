@@ -40,13 +40,13 @@ MUTANTS = [
     ("doubt forgotten at a miss", EXACT + "answer.rs", "let undecided = query.undecided_from < f64::INFINITY;", "let undecided = false;", "exact study"),
     ("doubt forgotten in a passage", EXACT + "answer.rs", "if hit.t >= query.undecided_from {", "if false {", "exact study"),
     ("doubt forgotten when the budget ends", EXACT + "clip.rs", "query.undecided_from = query.undecided_from.min(node.near);", "", "exact study"),
-    ("normal swapped", EXACT + "answer.rs", "let normal: Vector = label.sign * patch::normal", "let normal: Vector = -label.sign * patch::normal", "exact"),
+    ("normal swapped", EXACT + "answer.rs", "let normal = label.sign * regular", "let normal = -label.sign * regular", "exact"),
     ("clipping takes two roots for one", EXACT + "clip.rs", "const UNIQUE: f64 = 0.9;", "const UNIQUE: f64 = 3.0;", "exact study"),
     ("clipping drops its slack", EXACT + "clip.rs", "keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];", "keep[k] = [keep[k][0] + 1e-6, keep[k][1] - 1e-6];", "exact study"),
     ("clipping drops boxes before the start", EXACT + "clip.rs", "hull.far < query.t_min - TANGENT", "hull.far < query.t_min + 1.0", "exact study"),
     ("clipping prefers the later box", EXACT + "clip.rs", "if node.near >= query.t_max && query.best.is_some() {", "if node.near >= query.t_max * 0.5 && query.best.is_some() {", "exact study"),
     # Polishing.
-    ("polish accepts a point off the ray", EXACT + "newton.rs", "if residual > TANGENT + rounding {", "if residual > 1e-2 {", "exact"),
+    ("polish accepts a point off the ray", EXACT + "newton.rs", "if residual > near + rounding {", "if residual > 1e-2 {", "exact"),
     ("polish swaps normals of reversed faces", EXACT + "newton.rs", "let normal = record.sign * patch::normal", "let normal = patch::normal", "exact simulate"),
     ("polish forgets seams", EXACT + "newton.rs", "uv[k] = if grid.closed[k] && uv[k]", "uv[k] = if false && uv[k]", "exact"),
     # The octree: rounding, boxes, sieve.

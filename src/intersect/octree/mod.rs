@@ -4,7 +4,7 @@
 //! against the cells they meet. Under a leaf cell facets are packed by the surface-area heuristic into blocks of four
 //! quads; sparse octants are merged until a node has up to eight children, whose boxes are eight-bit, relative to the
 //! node, tight to the clipped geometry and rounded outward. Blocks hold corners in 16 bits and only *sort out*, with
-//! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of [`super::facet`]. Thirty-two rays of
+//! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of `intersect::facet`. Thirty-two rays of
 //! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
 //!
 //! Where a run says beforehand which rays it will ask ([`Intersector::prepare_for`]), those of point and collimated sources are answered
