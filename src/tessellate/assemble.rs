@@ -2,7 +2,7 @@
 
 use super::border::edge_chords::EdgeSide;
 use super::border::edges::{self, Division, OwnDivision};
-use super::face;
+use super::face::{self, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
@@ -10,6 +10,7 @@ use super::nodes::Position;
 use super::report::Repair;
 use super::settings::{FaceSelector, Settings, ToleranceField};
 use super::tessellation::{FacetQuality, Tessellation};
+use super::triangulator::guarded;
 use crate::math::{FaceId, Frame, Point};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::{EdgeId, Face, Instance, Model, Part, TessellatedFace};
@@ -204,8 +205,16 @@ fn mesh_face(
         return None;
     }
     let finite = uses().all(|u| u.uv.points.iter().all(|p| p.is_finite()));
-    let whole = if finite { face::mesh(part, face, surface, divisions, shared, settings) } else { None };
-    whole.or_else(|| fallback::border_alone(part, face, surface, divisions, shared))
+    let whole =
+        if finite { face::mesh(part, face, surface, divisions, shared, settings) } else { Err(Unmeshed::Empty) };
+    let how = match whole {
+        Ok(mesh) => return Some(mesh),
+        Err(Unmeshed::Empty) => Repair::BorderOnly,
+        Err(Unmeshed::GaveUp) => Repair::TriangulationFailed,
+    };
+    // The same library may give up on the border too.
+    let border = guarded(|| fallback::border_alone(part, face, surface, divisions, shared)).ok().flatten();
+    border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
 }
 
 /// Whether all numbers of a face are numbers.

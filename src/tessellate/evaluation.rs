@@ -1,6 +1,6 @@
 //! Counts and measures what came out.
 
-use super::report::{NotCertified, Percentiles, Repair, Report, ToleranceRange};
+use super::report::{FailedFace, NotCertified, Percentiles, Repair, Report, ToleranceRange};
 use super::tessellation::{FacetQuality, Tessellation};
 use super::{angles, repairs, sample, settings::Settings};
 use crate::math::FaceId;
@@ -33,6 +33,7 @@ pub(super) fn fill_report(
     let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
     report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
     report.faces.failed = failed.len();
+    report.failed = failed_faces(model, failed);
     report.over_angle = angles::steep_faces(mesh, model, settings);
     report.faces.repaired = repairs.len();
     report.repaired = repairs::repaired_faces(made, model, repairs);
@@ -44,6 +45,14 @@ pub(super) fn fill_report(
         measure(&mut report, made, model, &areas);
     }
     made.report = report;
+}
+
+fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
+    if failed.is_empty() {
+        return Vec::new();
+    }
+    let entities: Vec<Option<u64>> = model.placed_faces().map(|f| f.entity()).collect();
+    failed.iter().map(|id| FailedFace { face: id.0, entity: entities[id.index()] }).collect()
 }
 
 fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {

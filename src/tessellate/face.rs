@@ -16,6 +16,7 @@ use super::report::Repair;
 use super::transition::creases::crease_lines;
 use super::transition::delaunay::{self, Outline};
 use super::transition::pairing;
+use super::triangulator::{GaveUp, guarded};
 use crate::math::{Point, Uv};
 use crate::model::{Face, Part};
 use crate::nurbs::FundamentalForms;
@@ -26,7 +27,22 @@ const SCALE_CELLS: usize = 64;
 const SCALE_PLACES: usize = 5;
 const FEW_CELLS: usize = 4;
 
-/// Meshes a face; `None` when nothing can be made of it.
+/// Why a face has no facets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unmeshed {
+    /// Nothing can be made of its parameter plane.
+    Empty,
+    /// The triangulation library gave up on it.
+    GaveUp,
+}
+
+impl From<GaveUp> for Unmeshed {
+    fn from(_: GaveUp) -> Self {
+        Self::GaveUp
+    }
+}
+
+/// Meshes a face.
 pub(super) fn mesh(
     part: &Part,
     face: &Face,
@@ -34,12 +50,12 @@ pub(super) fn mesh(
     divisions: &[Division],
     shared: &[Point],
     settings: &Settings,
-) -> Option<FaceMesh> {
+) -> Result<FaceMesh, Unmeshed> {
     // The border as polygons of the parameter plane, and the tree of cells over it.
     let loops = polygons::loops(face);
     let polygons = polygons::build(part, &loops, surface, divisions);
     if polygons.polygons.iter().all(|p| p.len() < 3) {
-        return None;
+        return Err(Unmeshed::Empty);
     }
     let angle = settings.angle_deg.map(f64::to_radians);
     let cells = tree::split(surface, settings.acceptance, &polygons, settings.budget, angle);
@@ -61,7 +77,8 @@ pub(super) fn mesh(
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, chords: &chords, scale };
-    let mut transition = delaunay::triangulate(surface, settings.acceptance, outline, settings.budget)?;
+    let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
+    let mut transition = guarded(triangulate)?.ok_or(Unmeshed::Empty)?;
     transition.triangles.extend(&grid.triangles);
     let repaired = if !transition.conflicts.is_empty() {
         Some(Repair::CrossingBorder)
@@ -82,7 +99,10 @@ pub(super) fn mesh(
     }
     let made = emission.finish();
     let (_, own) = transition.nodes.into_parts();
-    (!made.facets.is_empty()).then_some(FaceMesh { own, coarse, coincident, repaired, ..made })
+    if made.facets.is_empty() {
+        return Err(Unmeshed::Empty);
+    }
+    Ok(FaceMesh { own, coarse, coincident, repaired, ..made })
 }
 
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that

@@ -9,7 +9,6 @@ use super::border::polygons;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
 use super::face_surface::FaceSurface;
 use super::nodes::Position;
-use super::report::Repair;
 use super::sample;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
@@ -70,7 +69,7 @@ pub(super) fn border_alone(
         Some(triangles) if !triangles.is_empty() => triangles,
         _ => return None,
     };
-    let mut out = FaceMesh { own: border.own, repaired: Some(Repair::BorderOnly), ..FaceMesh::default() };
+    let mut out = FaceMesh { own: border.own, ..FaceMesh::default() };
     for t in triangles {
         // Where the surface has no normal the triangle's does; one without area shades nothing.
         let flat = (t[1].place - t[0].place).cross(t[2].place - t[0].place).try_normalize().unwrap_or(Vector::Z);

@@ -34,12 +34,14 @@ mod second_derivatives;
 mod settings;
 mod tessellation;
 mod transition;
+mod triangulator;
 
 use crate::model::Model;
 pub use angles::SteepFace;
 pub use evaluation::sampled_sag;
 pub use report::{
-    FaceCounts, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag, ShellCounts, ToleranceRange,
+    FaceCounts, FailedFace, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag, ShellCounts,
+    ToleranceRange,
 };
 pub use settings::{Acceptance, FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
 pub use tessellation::{FacetQuality, Tessellation};

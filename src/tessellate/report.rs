@@ -48,6 +48,8 @@ pub struct Report {
     pub nonmanifold_edges: usize,
     /// Placed faces.
     pub faces: FaceCounts,
+    /// Those without facets: nothing could be made of them.
+    pub failed: Vec<FailedFace>,
     /// Times.
     pub seconds: Seconds,
     /// Filled in by whoever knows the process; bytes.
@@ -118,6 +120,15 @@ pub struct FaceCounts {
     pub repaired: usize,
 }
 
+/// A face without facets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct FailedFace {
+    /// Index of the placed face.
+    pub face: u32,
+    /// The `#id` in the file.
+    pub entity: Option<u64>,
+}
+
 /// Times in seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Seconds {
@@ -138,6 +149,8 @@ pub enum Repair {
     CrossingBorder,
     /// Its parameter plane gave nothing: only its border was triangulated.
     BorderOnly,
+    /// The triangulation library gave up on it: only its border was triangulated.
+    TriangulationFailed,
 }
 
 /// A face of which something was given up.
