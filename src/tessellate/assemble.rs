@@ -2,7 +2,7 @@
 
 use super::border::edge_chords::EdgeSide;
 use super::border::edges::{self, Division, OwnDivision};
-use super::face::{self, Unmeshed};
+use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
@@ -13,13 +13,15 @@ use super::tessellation::{FacetQuality, Tessellation};
 use super::triangulator::guarded;
 use crate::math::{FaceId, Frame, Point};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{EdgeId, Face, Instance, Model, Part, TessellatedFace};
+use crate::model::{EdgeId, Face, Instance, Model, Part, PartId, TessellatedFace};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// A part's faces, in the order of its shells.
 pub(super) struct PartMesh {
-    shared: Vec<Point>,
-    faces: Vec<Option<FaceMesh>>,
+    pub(super) divisions: Vec<Division>,
+    pub(super) shared: Vec<Point>,
+    pub(super) faces: Vec<Option<FaceMesh>>,
 }
 
 /// Times that borders are sampled more densely where they cross or facets beside them are not proved.
@@ -27,44 +29,66 @@ const MAX_ROUNDS: u32 = 3;
 
 /// Meshes every part that is placed.
 pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
-    let mut uses: Vec<Vec<usize>> = vec![Vec::new(); model.parts.len()];
+    let mut placed: Vec<PlacedPart<'_>> =
+        model.parts.iter().map(|part| PlacedPart { part, firsts: Vec::new(), scale: 0.0 }).collect();
     for (i, instance) in model.instances.iter().enumerate() {
-        uses[instance.part.0 as usize].push(i);
+        let part = &mut placed[instance.part.0 as usize];
+        part.firsts.push(model.first_face(i).0);
+        part.scale = part.scale.max(instance.placement.scale.abs());
     }
-    let mesh = |(part, uses): (&Part, &Vec<usize>)| {
-        let scale = uses.iter().map(|&i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
-        (!uses.is_empty()).then(|| mesh_part(model, part, uses, scale, settings))
-    };
-    model.parts.par_iter().zip(&uses).map(mesh).collect()
+    let mesh = |part: &PlacedPart<'_>| (!part.firsts.is_empty()).then(|| mesh_part(part, settings));
+    placed.par_iter().map(mesh).collect()
 }
 
-/// The part's faces with their surfaces, tolerances filled in; `None` for faces with numbers that are none.
-fn face_surfaces<'p>(
-    model: &Model,
-    part: &'p Part,
-    uses: &[usize],
+/// A part in its places.
+struct PlacedPart<'m> {
+    part: &'m Part,
+    /// The first placed face of each instance.
+    firsts: Vec<u32>,
+    /// Largest scale of a placement.
     scale: f64,
-    settings: &Settings,
-) -> Vec<(&'p Face, Option<FaceSurface<'p>>)> {
-    let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-    let firsts: Vec<u32> = uses.iter().map(|&i| model.first_face(i).0).collect();
-    let with_surface = |(k, face): (usize, &'p Face)| {
-        let placed: Vec<FaceId> = firsts.iter().map(|first| FaceId(first + k as u32)).collect();
-        let (tolerance, radii) = tolerance(settings, part, face, &placed);
-        let surface = is_finite(face).then(|| {
-            let field = ToleranceField::new(tolerance, radii, settings.law, scale).with_angle(settings.angle_deg);
+}
+
+impl<'m> PlacedPart<'m> {
+    fn new(model: &'m Model, part: PartId) -> Self {
+        let uses = (0..model.instances.len()).filter(|&i| model.instances[i].part == part);
+        let scale = uses.clone().map(|i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
+        Self { part: model.part(part), firsts: uses.map(|i| model.first_face(i).0).collect(), scale }
+    }
+
+    /// The surface of the `k`th face with its tolerance; `None` where it has numbers that are none.
+    fn surface(&self, settings: &Settings, k: usize, face: &'m Face) -> Option<FaceSurface<'m>> {
+        let placed: Vec<FaceId> = self.firsts.iter().map(|first| FaceId(first + k as u32)).collect();
+        let (tolerance, radii) = tolerance(settings, self.part, face, &placed);
+        is_finite(face).then(|| {
+            let field =
+                ToleranceField::new(tolerance, radii, settings.law, self.scale).with_angle(settings.angle_deg);
             // Faces that were not read from a file have a gap of zero whether it was measured or not.
             let mut surface = FaceSurface::new(&face.surface, face.reversed, field);
             surface.gap = Some(face.gap).filter(|&g| g > 0.0);
             surface
-        });
-        (face, surface)
-    };
-    faces.into_par_iter().enumerate().map(with_surface).collect()
+        })
+    }
 }
 
-fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &Settings) -> PartMesh {
-    let faces = face_surfaces(model, part, uses, scale, settings);
+/// One of a part's faces with its surface.
+pub(super) fn face_with_surface<'m>(
+    model: &'m Model,
+    settings: &Settings,
+    part: PartId,
+    k: usize,
+) -> Option<(&'m Face, FaceSurface<'m>)> {
+    let placed = PlacedPart::new(model, part);
+    let face = placed.part.shells.iter().flat_map(|s| &s.faces).nth(k)?;
+    Some((face, placed.surface(settings, k, face)?))
+}
+
+fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
+    let part = placed.part;
+    let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
+    let with_surface = |(k, face)| (face, placed.surface(settings, k, face));
+    let faces: Vec<(&Face, Option<FaceSurface<'_>>)> =
+        faces.into_par_iter().enumerate().map(with_surface).collect();
     let known: Vec<(&Face, &FaceSurface<'_>)> =
         faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
     // The sides of each edge on its faces.
@@ -83,13 +107,14 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
     loop {
         let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
-            mesh_face(part, face, surface.as_ref()?, &divisions, &shared, settings)
+            let surface = surface.as_ref()?;
+            mesh_face(&FaceInput { part, face, surface, divisions: &divisions, shared: &shared, settings })
         };
         let meshes: Vec<Option<FaceMesh>> = match before.take() {
             None => faces.par_iter().map(mesh).collect(),
             Some(before) => {
                 // Few edges change: faces whose own did not are as they were, but for the numbers of their corners.
-                let renumbering = before.renumbering(part, &divisions);
+                let renumbering = Renumbering::new(part, (&before.divisions, before.shared), &divisions);
                 let again = |((face, _), old): (&(&Face, Option<FaceSurface<'_>>), &Option<FaceMesh>)| {
                     old.is_none()
                         || face.loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge))
@@ -104,7 +129,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
         };
         let coarse: Vec<usize> = meshes.iter().flatten().flat_map(|m| &m.coarse).map(|e| e.0 as usize).collect();
         if coarse.is_empty() || round == MAX_ROUNDS {
-            return with_coincident_vertices_joined(PartMesh { shared, faces: meshes });
+            return with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes });
         }
         round += 1;
         for e in coarse {
@@ -116,7 +141,7 @@ fn mesh_part(model: &Model, part: &Part, uses: &[usize], scale: f64, settings: &
 
 /// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there, the
 /// faces beyond must have the same.
-fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
+pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
     let pairs: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.coincident.iter().copied()).collect();
     if pairs.is_empty() {
         return mesh;
@@ -150,32 +175,31 @@ struct PreviousRound {
 }
 
 /// Where shared positions are now, and which edges have others.
-struct Renumbering {
+pub(super) struct Renumbering {
     changed: Vec<bool>,
     to: Vec<u32>,
 }
 
-impl PreviousRound {
-    fn renumbering(&self, part: &Part, now: &[Division]) -> Renumbering {
-        let mut to: Vec<u32> = (0..self.shared as u32).collect();
+impl Renumbering {
+    /// From one division of a part's edges, with so many shared positions, to another.
+    pub(super) fn new(part: &Part, (before, shared): (&[Division], usize), now: &[Division]) -> Self {
+        let mut to: Vec<u32> = (0..shared as u32).collect();
         let mut changed = Vec::with_capacity(part.edges.len());
-        for (old, new) in self.divisions.iter().zip(now) {
+        for (old, new) in before.iter().zip(now) {
             changed.push(old.t != new.t);
             if old.t == new.t {
                 (0..old.t.len() as u32 - 2).for_each(|k| to[(old.first + k) as usize] = new.first + k);
             }
         }
-        Renumbering { changed, to }
+        Self { changed, to }
     }
-}
 
-impl Renumbering {
-    fn has_changed(&self, edge: Option<EdgeId>) -> bool {
+    pub(super) fn has_changed(&self, edge: Option<EdgeId>) -> bool {
         edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
     }
 
     /// The mesh with the numbers that its shared positions have now.
-    fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
+    pub(super) fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
         for corner in &mut mesh.corners {
             if let Position::Shared(p) = &mut corner.position {
                 *p = self.to[*p as usize];
@@ -187,14 +211,8 @@ impl Renumbering {
 }
 
 /// A face by its cells and transition, or by its border alone; `None` where neither gives facets.
-fn mesh_face(
-    part: &Part,
-    face: &Face,
-    surface: &FaceSurface<'_>,
-    divisions: &[Division],
-    shared: &[Point],
-    settings: &Settings,
-) -> Option<FaceMesh> {
+pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
+    let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let uses = || face.loops.iter().flat_map(|l| &l.uses);
     // Edges and vertices that the part does not have cannot be met.
     let exists = |e: EdgeId| {
@@ -205,8 +223,7 @@ fn mesh_face(
         return None;
     }
     let finite = uses().all(|u| u.uv.points.iter().all(|p| p.is_finite()));
-    let whole =
-        if finite { face::mesh(part, face, surface, divisions, shared, settings) } else { Err(Unmeshed::Empty) };
+    let whole = if finite { face::mesh(input) } else { Err(Unmeshed::Empty) };
     let how = match whole {
         Ok(mesh) => return Some(mesh),
         Err(Unmeshed::Empty) => Repair::BorderOnly,
@@ -245,13 +262,17 @@ pub(super) struct Placed {
     pub(super) repairs: Vec<(FaceId, Repair)>,
 }
 
-/// Puts every instance's facets where they belong.
-pub(super) fn place_instances(model: &Model, parts: &[Option<PartMesh>]) -> Placed {
+/// Puts every instance's facets where they belong; `joined` are instances with a mesh of their own.
+pub(super) fn place_instances(
+    model: &Model,
+    parts: &[Option<PartMesh>],
+    joined: &FxHashMap<usize, PartMesh>,
+) -> Placed {
     let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new() };
     for (i, instance) in model.instances.iter().enumerate() {
         let first = model.first_face(i);
         let part = model.part(instance.part);
-        let Some(mesh) = &parts[instance.part.0 as usize] else { continue };
+        let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
         let shared = out.made.mesh.positions.len() as u32;
         out.made.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
         for (k, face) in mesh.faces.iter().enumerate() {

@@ -3,13 +3,14 @@
 use super::border::polygons::{BorderPolygons, BorderSide};
 use super::cells::cell::Subdivision;
 use super::face_surface::FaceSurface;
+use super::imprint::{Imprint, ImprintEnd};
 use super::nodes::{Node, Nodes, Position, edge_key};
 use super::proof::border_chord::{BorderChord, BorderChords};
 use super::proof::deviation::DeviationBounds;
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Part, TrimLoop};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Share of the face's extent within which vertices in one place have the same parameters: the trims' own rounding.
 const SAME_PARAMETERS: f64 = 1e-9;
@@ -17,6 +18,8 @@ const SAME_PARAMETERS: f64 = 1e-9;
 const AT_POLE: f64 = 1e-6;
 /// Share of a pole's length within which two corners on it are one.
 const SAME_AT_POLE: f64 = 1e-9;
+/// Share of the domain within which parameters of one place are on the same side of a seam.
+const SAME_SIDE: f64 = 0.1;
 
 /// The border of a face.
 pub(super) struct BorderNodes {
@@ -29,6 +32,8 @@ pub(super) struct BorderNodes {
     poles: Vec<[u32; 2]>,
     /// Positions of vertices that the file has twice, where loops touch.
     pub(super) coincident: Vec<[u32; 2]>,
+    /// Segments of a border of another solid's face.
+    pub(super) imprinted: Vec<[u32; 2]>,
 }
 
 /// A segment that follows an edge, over these parameters.
@@ -54,6 +59,7 @@ impl BorderNodes {
             followed: FxHashMap::default(),
             poles: Vec::new(),
             coincident: Vec::new(),
+            imprinted: Vec::new(),
         };
         let ids = out.add_nodes(part, polygons, shared);
         let uses: Vec<&EdgeUse> = loops.iter().flat_map(|l| &l.uses).collect();
@@ -126,6 +132,43 @@ impl BorderNodes {
         polygons.map(|p| p.iter().map(|v| node(v.uv, v.position)).collect()).collect()
     }
 
+    /// Adds the segments of an imprint, and tells which node stands for each of its vertices. Nodes that are there already are taken.
+    pub(super) fn add_imprint(&mut self, surface: &FaceSurface<'_>, imprint: &Imprint) -> Vec<(u32, usize)> {
+        let mut vertex_nodes = Vec::new();
+        let known: FxHashSet<[u32; 2]> = self.segments.iter().map(|s| edge_key(s[0], s[1])).collect();
+        for segment in &imprint.segments {
+            let nodes = segment.ends.map(|end| {
+                let node = self.node_at(surface, &end, imprint.near);
+                vertex_nodes.push((node, end.vertex));
+                node
+            });
+            if nodes[0] != nodes[1] && !known.contains(&edge_key(nodes[0], nodes[1])) {
+                self.imprinted.push(nodes);
+            }
+        }
+        vertex_nodes
+    }
+
+    fn node_at(&mut self, surface: &FaceSurface<'_>, end: &ImprintEnd, near: f64) -> u32 {
+        let extent = surface.extent();
+        let off = |n: &Node| ((n.uv - end.uv) / extent).abs().max_element();
+        // At a pole all parameters along it are one place: lines into it keep their own.
+        let reach = if surface.pole(end.uv).is_some() { SAME_PARAMETERS } else { SAME_SIDE };
+        let here = |n: &Node| (n.place - end.place).length() <= near && off(n) <= reach;
+        let found = self.nodes.iter().enumerate().filter(|(_, n)| here(n));
+        match found.min_by(|a, b| off(a.1).total_cmp(&off(b.1))) {
+            Some((n, _)) => n as u32,
+            None => {
+                // Both sides of a seam, and all of a pole, are one position.
+                let twin = self.nodes.iter().find(|n| (n.place - end.place).length() <= near).copied();
+                match twin {
+                    Some(twin) => self.nodes.push(Node { uv: end.uv, ..twin }),
+                    None => self.nodes.push_own(end.uv, end.place),
+                }
+            }
+        }
+    }
+
     /// Divides poles where the cells beside them are.
     pub(super) fn divide_poles(&mut self, cells: &Subdivision) {
         for [from, to] in std::mem::take(&mut self.poles) {
@@ -136,18 +179,31 @@ impl BorderNodes {
                 let slack = AT_POLE * (c.hi[1 - d] - c.lo[1 - d]);
                 c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
             });
-            let mut at: Vec<f64> =
-                touching.flat_map(|c| [c.lo[d], c.hi[d]]).filter(|&x| x > lo && x < hi).collect();
-            at.sort_by(f64::total_cmp);
-            at.dedup_by(|y, x| *y - *x < SAME_AT_POLE * (hi - lo));
+            // Where cells end, and where an imprint has a node already.
+            let place = self.nodes[from].position;
+            let imprinted = self.imprinted.iter().flatten().filter(|&&n| self.nodes[n].position == place);
+            let known = imprinted.map(|&n| (self.nodes[n].uv[d], Some(n)));
+            let mut at: Vec<(f64, Option<u32>)> =
+                touching.flat_map(|c| [c.lo[d], c.hi[d]]).map(|x| (x, None)).chain(known).collect();
+            at.retain(|&(x, _)| x > lo && x < hi);
+            at.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            at.dedup_by(|y, x| {
+                let same = y.0 - x.0 < SAME_AT_POLE * (hi - lo);
+                if same && x.1.is_none() {
+                    *x = *y;
+                }
+                same
+            });
             if a[d] > b[d] {
                 at.reverse();
             }
             let mut last = from;
-            for x in at {
-                let mut uv = a.lerp(b, (x - a[d]) / (b[d] - a[d]));
-                uv[d] = x;
-                let id = self.nodes.push(Node { uv, ..self.nodes[from] });
+            for (x, node) in at {
+                let id = node.unwrap_or_else(|| {
+                    let mut uv = a.lerp(b, (x - a[d]) / (b[d] - a[d]));
+                    uv[d] = x;
+                    self.nodes.push(Node { uv, ..self.nodes[from] })
+                });
                 self.segments.push([last, id]);
                 last = id;
             }

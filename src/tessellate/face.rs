@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::border::edges::Division;
-use super::border::polygons::{self, BorderPolygons};
+use super::border::polygons::{self, BorderPolygons, ImprintedPoints};
 use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
@@ -10,12 +10,13 @@ use super::cells::tree;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
+use super::imprint::{CarrierFacets, Imprint};
 use super::nodes::edge_key;
 use super::proof::prover::Prover;
 use super::report::Repair;
 use super::transition::creases::crease_lines;
 use super::transition::delaunay::{self, Outline};
-use super::transition::pairing;
+use super::transition::pairing::{self, TransitionFacet};
 use super::triangulator::{GaveUp, guarded};
 use crate::math::{Point, Uv};
 use crate::model::{Face, Part};
@@ -42,27 +43,45 @@ impl From<GaveUp> for Unmeshed {
     }
 }
 
+/// A face and what it is meshed on.
+#[derive(Clone, Copy)]
+pub(super) struct FaceInput<'i, 'a> {
+    pub(super) part: &'i Part,
+    pub(super) face: &'i Face,
+    pub(super) surface: &'i FaceSurface<'a>,
+    pub(super) divisions: &'i [Division],
+    /// The part's shared positions.
+    pub(super) shared: &'i [Point],
+    pub(super) settings: &'i Settings,
+}
+
 /// Meshes a face.
-pub(super) fn mesh(
-    part: &Part,
-    face: &Face,
-    surface: &FaceSurface<'_>,
-    divisions: &[Division],
-    shared: &[Point],
-    settings: &Settings,
-) -> Result<FaceMesh, Unmeshed> {
+pub(super) fn mesh(input: &FaceInput<'_, '_>) -> Result<FaceMesh, Unmeshed> {
+    mesh_with_imprint(input, &Imprint::default()).map(|(mesh, _)| mesh)
+}
+
+/// Meshes a face on which borders of faces of other solids lie.
+pub(super) fn mesh_with_imprint(
+    input: &FaceInput<'_, '_>,
+    imprint: &Imprint,
+) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
+    let FaceInput { part, face, surface, divisions, shared, settings } = *input;
     // The border as polygons of the parameter plane, and the tree of cells over it.
     let loops = polygons::loops(face);
-    let polygons = polygons::build(part, &loops, surface, divisions);
+    let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
+    let polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
     if polygons.polygons.iter().all(|p| p.len() < 3) {
         return Err(Unmeshed::Empty);
     }
+    let mut border = BorderNodes::new(part, &loops, surface, &polygons, shared);
+    let vertex_nodes = border.add_imprint(surface, imprint);
+    let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let angle = settings.angle_deg.map(f64::to_radians);
-    let cells = tree::split(surface, settings.acceptance, &polygons, settings.budget, angle);
+    let cells = tree::split(surface, settings.acceptance, &polygons, &lines, settings.budget, angle);
     // Whole cells become facets.
     let mut prover = Prover::new(surface, settings.acceptance);
-    let mut border = BorderNodes::new(part, &loops, surface, &polygons, shared);
-    let fixed: FxHashSet<[u32; 2]> = border.segments.iter().map(|s| edge_key(s[0], s[1])).collect();
+    let kept = border.segments.iter().chain(&border.imprinted);
+    let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
     let (lo, hi) = polygons.bounds();
     let input =
         GridInput { nodes: &mut border.nodes, chords: &border.chords, resolution: parameter_resolution(lo, hi) };
@@ -73,10 +92,10 @@ pub(super) fn mesh(
     let all = border.segments.iter().chain(&grid.outline);
     all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
     let segments: Vec<[u32; 2]> = all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect();
-    let BorderNodes { nodes, chords, followed, coincident, .. } = border;
+    let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
-    let outline = Outline { nodes, segments, creases, chords: &chords, scale };
+    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale };
     let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
     let mut transition = guarded(triangulate)?.ok_or(Unmeshed::Empty)?;
     transition.triangles.extend(&grid.triangles);
@@ -90,19 +109,22 @@ pub(super) fn mesh(
     let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
     let coarse = coarse.filter_map(|s| followed.get(&edge_key(s[0], s[1])).copied()).collect();
     // Pairs of triangles become quads.
+    let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
+    let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
     let mut emission = Emission::new(surface, &transition.nodes);
-    for quad in &grid.quads {
-        emission.facet(quad, None);
-    }
-    for f in pairing::pair_triangles(&transition, &fixed, &mut prover) {
+    let mut facets = Vec::new();
+    for f in whole_cells.chain(paired) {
         emission.facet(&f.facet, f.pole);
+        facets.push(f.facet.nodes);
     }
     let made = emission.finish();
-    let (_, own) = transition.nodes.into_parts();
+    let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
+    let (nodes, own) = transition.nodes.into_parts();
     if made.facets.is_empty() {
         return Err(Unmeshed::Empty);
     }
-    Ok(FaceMesh { own, coarse, coincident, repaired, ..made })
+    let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
+    Ok((FaceMesh { own, coarse, coincident, repaired, ..made }, carrier))
 }
 
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that

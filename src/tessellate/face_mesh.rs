@@ -23,7 +23,7 @@ pub(super) struct MeshedFacet {
 }
 
 /// The facets of a face.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct FaceMesh {
     pub(super) corners: Vec<Corner>,
     /// Places of the face's own positions.

@@ -51,6 +51,8 @@ pub(super) struct FaceSurface<'a> {
     pub(super) size: f64,
     /// Whether the sides of the domain are points: at both ends of u, of v.
     poles: [[bool; 2]; 2],
+    /// Whether both ends of u, of v are one curve in space.
+    pub(super) closed: [bool; 2],
     /// How far the face's edges lie from the surface, mm, where the file was measured.
     pub(super) gap: Option<f64>,
     /// Farthest that such a side strays from a point, mm.
@@ -76,8 +78,9 @@ impl<'a> FaceSurface<'a> {
         let affine = is_affine(surface, size);
         // A ball or ring within its tolerance would be a point: all its triangles had two corners in one place.
         let most = CLOSED_TOLERANCE * size;
-        let closed = |d: usize| poles[d] == [true; 2] || is_closed(surface, d, least);
-        let small = field.loosest() > most && (poles.contains(&[true; 2]) || closed(0) && closed(1));
+        let closed = [0, 1].map(|d| is_closed(surface, d, least));
+        let ends = |d: usize| poles[d] == [true; 2] || closed[d];
+        let small = field.loosest() > most && (poles.contains(&[true; 2]) || ends(0) && ends(1));
         let field = if small { field.at_most(most) } else { field };
         Self {
             spline: surface,
@@ -91,6 +94,7 @@ impl<'a> FaceSurface<'a> {
             sharp,
             size,
             poles,
+            closed,
             gap: None,
             pole_size,
         }

@@ -42,7 +42,8 @@ pub(super) fn border_alone(
     divisions: &[Division],
     shared: &[Point],
 ) -> Option<FaceMesh> {
-    let border = polygons::build(part, &polygons::loops(face), surface, divisions);
+    let border =
+        polygons::build(part, &polygons::loops(face), surface, divisions, &polygons::ImprintedPoints::NONE);
     // The trims' own parameters gave nothing.
     let corner = |v: &polygons::PolygonVertex| {
         let place = match v.position {

@@ -19,12 +19,14 @@ mod assemble;
 mod border;
 mod border_nodes;
 mod cells;
+mod contact;
 mod emission;
 mod evaluation;
 mod face;
 mod face_mesh;
 mod face_surface;
 mod fallback;
+mod imprint;
 mod nodes;
 mod proof;
 mod repairs;
@@ -69,7 +71,8 @@ pub use tessellation::{FacetQuality, Tessellation};
 pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
     let parts = assemble::mesh_parts(model, settings);
-    let assemble::Placed { mut made, failed, repairs } = assemble::place_instances(model, &parts);
+    let joined = contact::join(model, settings, &parts);
+    let assemble::Placed { mut made, failed, repairs } = assemble::place_instances(model, &parts, &joined);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
     evaluation::fill_report(&mut made, model, settings, &failed, &repairs);
     made

@@ -190,7 +190,7 @@ pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
 }
 
 /// Parameters of a near point of the surface, by damped Gauss–Newton from a start; never farther away than the start.
-fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
+pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
     let mut best = surface.clamp(start);
     let mut away = (surface.evaluate(best) - x).length();
     for _ in 0..MAX_STEPS {

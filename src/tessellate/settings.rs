@@ -26,6 +26,9 @@ pub struct Settings {
     pub budget: usize,
     /// What decides whether a facet is good enough.
     pub acceptance: Acceptance,
+    /// Distance, mm, within which faces of two solids are one interface, and are faceted once: where one lies wholly on the other, both
+    /// have the same facets there. 0 facets each by itself.
+    pub glue_mm: f64,
     /// Whether [`super::Report`] gets sampled sag and normal errors, which costs about twice the time of meshing.
     pub measure: bool,
 }
@@ -87,6 +90,7 @@ impl Default for Settings {
             overrides: Vec::new(),
             budget: 400_000,
             acceptance: Acceptance::Proved,
+            glue_mm: 0.0,
             measure: false,
         }
     }
@@ -138,6 +142,12 @@ impl ToleranceField {
             ToleranceLaw::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
             ToleranceLaw::Power => tight * (loose / tight).powf(x),
         }
+    }
+
+    /// The tighter of two everywhere, as a share of it.
+    pub(super) fn tighter(self, other: &Self, share: f64) -> Self {
+        let range = [0, 1].map(|k| share * self.range[k].min(other.range[k]));
+        Self { range, ..self }
     }
 
     /// The same with no tolerance above this.

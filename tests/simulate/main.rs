@@ -17,3 +17,6 @@ mod refusals;
 mod scenes;
 mod sources;
 mod support;
+mod touching;
+#[path = "../support/turned.rs"]
+mod turned;

@@ -2,6 +2,7 @@
 
 mod borders;
 mod closed;
+mod contacts;
 mod creases;
 mod field;
 #[path = "../support/files.rs"]
@@ -14,3 +15,5 @@ mod proof;
 mod repairs;
 mod shapes;
 mod support;
+#[path = "../support/turned.rs"]
+mod turned;

@@ -21,6 +21,8 @@ pub(crate) fn mesh_settings(
         settings.tolerance = range;
     }
     settings.angle_deg = meshing.angle.or(accuracy.and_then(|a| a.angle_deg));
+    // Faces that are one interface for light are faceted once.
+    settings.glue_mm = scene.map_or(0.0, |s| s.run.glue_mm);
     if let Some(plan) = &meshing.plan {
         plan.apply(&mut settings);
     }

@@ -50,6 +50,27 @@ pub(in crate::tessellate) fn divide(
     opposite_sides::equalise(part, faces, sides, denser, &mut times);
     open_lenses(part, faces, &mut times);
     separate_twins(part, sides, &mut times);
+    positions(part, times)
+}
+
+/// The divisions with further parameters, those of each edge in any order, and the shared positions.
+pub(in crate::tessellate) fn divide_more(
+    part: &Part,
+    divisions: &[Division],
+    further: &[Vec<f64>],
+) -> (Vec<Division>, Vec<Point>) {
+    let merged = divisions.iter().zip(further).map(|(division, further)| {
+        let mut t = division.t.clone();
+        t.extend(further);
+        t.sort_by(f64::total_cmp);
+        t.dedup();
+        t
+    });
+    positions(part, merged.collect())
+}
+
+/// Divisions at these parameters, and the shared positions.
+fn positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };

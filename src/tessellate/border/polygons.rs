@@ -75,12 +75,13 @@ pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
     vec![TrimLoop { uses }]
 }
 
-/// Builds the polygons on the part's shared points.
+/// Builds the polygons on the part's shared points; sides without an edge get corners at those of `imprinted` that lie on them.
 pub(in crate::tessellate) fn build(
     part: &Part,
     loops: &[TrimLoop],
     surface: &FaceSurface<'_>,
     divisions: &[Division],
+    imprinted: &ImprintedPoints<'_>,
 ) -> BorderPolygons {
     let mut out = BorderPolygons::default();
     let near = COINCIDENT_CORNERS[1] * surface.size + COINCIDENT_CORNERS[0];
@@ -104,7 +105,7 @@ pub(in crate::tessellate) fn build(
             let (from, to) = (starts[k], starts[(k + 1) % n]);
             match u.edge {
                 Some(edge) => polygon.extend(edge_side(u, &divisions[edge.0 as usize], edge_use, from)),
-                None => polygon.extend(free_side(u, surface, [from, to], &mut own, &mut seams)),
+                None => polygon.extend(free_side(u, surface, [from, to], &mut own, &mut seams, imprinted)),
             }
             if let Some(v) = polygon.get_mut(first) {
                 v.uv = u.start();
@@ -160,6 +161,7 @@ fn free_side(
     [from, to]: [Position; 2],
     own: &mut OwnPoints,
     seams: &mut Vec<SeamSide>,
+    imprinted: &ImprintedPoints<'_>,
 ) -> Vec<PolygonVertex> {
     let [t0, t1] = u.uv.domain();
     let uv = |f: f64| {
@@ -185,7 +187,8 @@ fn free_side(
             );
             breaks.push(1.0);
             breaks.sort_by(f64::total_cmp);
-            let fs = curve_chords::parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
+            let mut fs = curve_chords::parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
+            imprinted.add_samples(&mut fs, at);
             let samples: Vec<(f64, Position)> = fs[1..fs.len() - 1].iter().map(|&f| (f, own.add(at(f)))).collect();
             seams.push(SeamSide { shape, samples: samples.clone() });
             samples
@@ -220,3 +223,42 @@ impl OwnPoints {
 pub(in crate::tessellate) fn crosses_ray_from(p: Uv, [a, b]: [Uv; 2]) -> bool {
     (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
 }
+
+/// Points of a face of another solid that lies on this one.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::tessellate) struct ImprintedPoints<'p> {
+    pub(in crate::tessellate) points: &'p [Point],
+    /// Distance within which two places are one, mm.
+    pub(in crate::tessellate) near: f64,
+}
+
+impl ImprintedPoints<'_> {
+    pub(in crate::tessellate) const NONE: Self = ImprintedPoints { points: &[], near: 0.0 };
+
+    /// Adds the parameters of those points that lie on a curve whose samples these are, unless a sample is there already.
+    fn add_samples(&self, samples: &mut Vec<f64>, at: impl Fn(f64) -> Point) {
+        for &p in self.points {
+            let off = |t: f64| (at(t) - p).length();
+            // The best of all chords, then halving by thirds: chords turn little.
+            let nearest = |w: &[f64]| {
+                let (mut lo, mut hi) = (w[0], w[1]);
+                for _ in 0..NEAREST_STEPS {
+                    let (x, y) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+                    if off(x) < off(y) { hi = y } else { lo = x }
+                }
+                0.5 * (lo + hi)
+            };
+            let all = samples.windows(2).map(nearest).map(|t| (off(t), t));
+            let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((away, t)) = best
+                && away <= self.near
+                && samples.iter().all(|&s| (at(s) - p).length() > self.near)
+            {
+                samples.insert(samples.partition_point(|&s| s < t), t);
+            }
+        }
+    }
+}
+
+/// Steps by a third that find the nearest point of a curve: to the spacing of numbers.
+const NEAREST_STEPS: usize = 90;

@@ -33,7 +33,10 @@ const CUT_CLEARANCE: f64 = 1e-3;
 struct Tree<'s, 'a> {
     surface: &'s FaceSurface<'a>,
     acceptance: Acceptance,
+    /// Those of the border, then those that are imprinted.
     segments: Vec<[Uv; 2]>,
+    /// How many are the border's.
+    border: usize,
     /// Segments that are one point in space.
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
@@ -88,10 +91,11 @@ pub(in crate::tessellate) fn split(
     surface: &FaceSurface<'_>,
     acceptance: Acceptance,
     border: &BorderPolygons,
+    imprinted: &[[Uv; 2]],
     budget: usize,
     max_angle: Option<f64>,
 ) -> Subdivision {
-    let segments: Vec<[Uv; 2]> = border
+    let mut segments: Vec<[Uv; 2]> = border
         .polygons
         .iter()
         .flat_map(|p| (0..p.len()).map(move |i| [p[i].uv, p[(i + 1) % p.len()].uv]))
@@ -103,8 +107,10 @@ pub(in crate::tessellate) fn split(
     let root = Cell { lo, hi };
     let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
     let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
+    let border = segments.len();
+    segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
-    let tree = Tree { surface, acceptance, segments, poles, resolution, preferred, max_angle };
+    let tree = Tree { surface, acceptance, segments, border, poles, resolution, preferred, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -198,6 +204,10 @@ impl Tree<'_, '_> {
     /// corner stands between two samples.
     fn is_aligned(&self, cell: Cell, near: &[u32]) -> bool {
         near.iter().all(|&s| {
+            // No cell's side may be divided that another solid's border runs along.
+            if s as usize >= self.border {
+                return false;
+            }
             let [a, b] = self.segments[s as usize];
             (0..2).any(|d| {
                 let (e, eps) = (1 - d, self.resolution);
@@ -252,7 +262,7 @@ impl Tree<'_, '_> {
 
     /// Whether a point lies inside the border: parity of crossings along u.
     fn contains(&self, p: Uv) -> bool {
-        self.segments.iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
+        self.segments[..self.border].iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
     }
 }
 

@@ -22,6 +22,8 @@ pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) segments: Vec<[u32; 2]>,
     /// Lines inside that no triangle crosses; refinement may divide them.
     pub(in crate::tessellate) creases: Vec<[u32; 2]>,
+    /// Lines inside that no triangle crosses and nothing divides.
+    pub(in crate::tessellate) imprinted: Vec<[u32; 2]>,
     /// What border segments follow.
     pub(in crate::tessellate) chords: &'t BorderChords,
     /// Multiplies parameters before triangulating.
@@ -36,6 +38,8 @@ pub(in crate::tessellate) struct Transition {
     pub(in crate::tessellate) conflicts: Vec<[u32; 2]>,
     /// Those that are kept and crossed by them.
     pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
+    /// Whether all imprinted lines are edges of the triangulation.
+    pub(in crate::tessellate) holds_imprint: bool,
 }
 
 impl Transition {
@@ -123,11 +127,13 @@ pub(in crate::tessellate) fn triangulate(
     outline: Outline<'_>,
     budget: usize,
 ) -> Option<Transition> {
-    let Outline { nodes, segments, creases, chords, scale } = outline;
+    let Outline { nodes, segments, creases, imprinted, chords, scale } = outline;
     let mut mesh =
         Refinement { surface, nodes, scale, cdt: Cdt::new(), border: FxHashMap::default(), handles: Vec::new() };
-    mesh.insert_nodes(&segments)?;
+    mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_all(&segments);
+    // Crossed twice, a line bounds nothing.
+    let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) && mesh.constrain(a, b));
     for &[a, b] in &creases {
         mesh.keep_crease(a, b);
     }
@@ -165,7 +171,7 @@ pub(in crate::tessellate) fn triangulate(
             || (round + 1) * triangles.len() > MAX_WORK
             || corners >= limits.most(falls);
         if ended || !mesh.refine(&failing, chords) {
-            return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed });
+            return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed, holds_imprint });
         }
         round += 1;
     }
@@ -189,9 +195,9 @@ pub(super) struct Refinement<'s, 'a> {
 }
 
 impl Refinement<'_, '_> {
-    fn insert_nodes(&mut self, segments: &[[u32; 2]]) -> Option<()> {
+    fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
         let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
-        segments.iter().flatten().for_each(|&n| used[n as usize] = true);
+        segments.iter().chain(imprinted).flatten().for_each(|&n| used[n as usize] = true);
         for (n, used) in (0..).zip(used) {
             let handle = if used { Some(self.insert(n)?) } else { None };
             self.handles.push(handle);

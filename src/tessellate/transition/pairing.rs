@@ -5,7 +5,7 @@ use super::delaunay::Transition;
 use super::matching::{Candidate, CandidatesOf, augment};
 use crate::math::Uv;
 use crate::tessellate::face_surface::FaceSurface;
-use crate::tessellate::nodes::{Node, Nodes, ProvedFacet, edge_key};
+use crate::tessellate::nodes::{Node, Nodes, Position, ProvedFacet, edge_key};
 use crate::tessellate::proof::pole;
 use crate::tessellate::proof::prover::Prover;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -67,7 +67,7 @@ pub(in crate::tessellate) fn pair_triangles(
             facets.push(single_triangle(nodes, prover.surface, *tri));
         }
     }
-    join_sectors(nodes, prover, facets)
+    join_sectors(nodes, fixed, prover, facets)
 }
 
 /// All pairs that may be made, best first.
@@ -126,12 +126,20 @@ struct Join {
 
 /// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
 /// convex quad with the meridian between them as its diagonal.
-fn join_sectors(nodes: &Nodes, prover: &mut Prover<'_, '_>, facets: Vec<TransitionFacet>) -> Vec<TransitionFacet> {
+fn join_sectors(
+    nodes: &Nodes,
+    fixed: &FxHashSet<[u32; 2]>,
+    prover: &mut Prover<'_, '_>,
+    facets: Vec<TransitionFacet>,
+) -> Vec<TransitionFacet> {
+    // At a pole several nodes are one place.
+    let fixed: FxHashSet<[Position; 2]> = fixed.iter().map(|&[a, b]| places(nodes, a, b)).collect();
     // A sector is (a, b, pole): the next one around starts at b.
     let sectors = facets.iter().enumerate().filter(|(_, f)| is_sector(f));
     let starts: FxHashMap<u32, usize> = sectors.map(|(i, f)| (f.facet.nodes[0], i)).collect();
     let next = |f: &TransitionFacet| {
-        let j = *starts.get(&f.facet.nodes[1])?;
+        let [_, b, pole, _] = f.facet.nodes;
+        let j = *starts.get(&b).filter(|_| !fixed.contains(&places(nodes, b, pole)))?;
         (nodes[facets[j].facet.nodes[2]].position == nodes[f.facet.nodes[2]].position).then_some(j)
     };
     let follows: Vec<Option<usize>> = facets.iter().map(|f| if is_sector(f) { next(f) } else { None }).collect();
@@ -173,6 +181,12 @@ fn join_sectors(nodes: &Nodes, prover: &mut Prover<'_, '_>, facets: Vec<Transiti
         }
     })
     .collect()
+}
+
+/// Name of a side by the positions of its ends.
+fn places(nodes: &Nodes, a: u32, b: u32) -> [Position; 2] {
+    let (a, b) = (nodes[a].position, nodes[b].position);
+    [a.min(b), a.max(b)]
 }
 
 /// The quad of two sectors, with the pole as its third corner.

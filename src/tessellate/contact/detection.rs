@@ -1,0 +1,107 @@
+//! Which curved face of one solid lies wholly on a face of another.
+
+use super::trimmed::{FaceKey, TrimmedFace};
+use crate::math::Aabb;
+use crate::model::{Analytic, Model};
+use crate::tessellate::assemble::PartMesh;
+use crate::tessellate::settings::Settings;
+use rayon::prelude::*;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Share of the tolerance that a carrier's facets are held to.
+pub(super) const CARRIER_SHARE: f64 = 0.8;
+
+/// A face that lies on another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Contact {
+    /// The face whose facets both have.
+    pub(super) carrier: FaceKey,
+    /// The face that lies on it.
+    pub(super) guest: FaceKey,
+}
+
+/// A curved face with its box in the model.
+struct BoxedFace {
+    key: FaceKey,
+    shell: usize,
+    bounds: Aabb,
+}
+
+/// All contacts, each face either carrier or guest, and a guest of one carrier; and the faces concerned. Plane faces need none: their
+/// facets coincide as they are.
+pub(super) fn contacts<'m>(
+    model: &'m Model,
+    settings: &Settings,
+    parts: &[Option<PartMesh>],
+) -> (Vec<Contact>, FxHashMap<FaceKey, TrimmedFace<'m>>) {
+    let glue = settings.glue_mm;
+    let faces = curved_faces(model, parts, glue);
+    let mut pairs: Vec<[FaceKey; 2]> = Vec::new();
+    for (i, a) in faces.iter().enumerate() {
+        for b in faces[i + 1..].iter().take_while(|b| b.bounds.min.x <= a.bounds.max.x) {
+            let other_solid = a.key.instance != b.key.instance || a.shell != b.shell;
+            if other_solid && !a.bounds.intersection(b.bounds).is_empty() {
+                pairs.push([a.key.min(b.key), a.key.max(b.key)]);
+            }
+        }
+    }
+    pairs.sort_unstable();
+    let mut keys: Vec<FaceKey> = pairs.iter().flatten().copied().collect();
+    keys.sort_unstable();
+    keys.dedup();
+    let trimmed = |&key: &FaceKey| {
+        let part = model.instances[key.instance].part;
+        Some((key, TrimmedFace::new(model, settings, parts[part.0 as usize].as_ref()?, key)?))
+    };
+    let mut trimmed: FxHashMap<FaceKey, TrimmedFace<'m>> = keys.par_iter().filter_map(trimmed).collect();
+    let carried = |&[a, b]: &[FaceKey; 2]| {
+        let (x, y) = (trimmed.get(&a)?, trimmed.get(&b)?);
+        if x.carries(y, glue) {
+            Some(Contact { carrier: a, guest: b })
+        } else {
+            y.carries(x, glue).then_some(Contact { carrier: b, guest: a })
+        }
+    };
+    let all: Vec<Contact> = pairs.par_iter().filter_map(carried).collect();
+    let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
+    let mut guests: FxHashSet<FaceKey> = FxHashSet::default();
+    let mut out = Vec::new();
+    for c in all {
+        if !guests.contains(&c.carrier) && !carriers.contains(&c.guest) && guests.insert(c.guest) {
+            carriers.insert(c.carrier);
+            out.push(c);
+        }
+    }
+    out.sort_unstable();
+    for c in &out {
+        // Guests prove the carrier's facets over parameters of their own.
+        if let Some(field) = trimmed.get(&c.guest).map(|guest| guest.surface.field)
+            && let Some(carrier) = trimmed.get_mut(&c.carrier)
+        {
+            carrier.surface.field = carrier.asked.tighter(&field, CARRIER_SHARE);
+        }
+    }
+    trimmed.retain(|key, _| carriers.contains(key) || guests.contains(key));
+    (out, trimmed)
+}
+
+/// Curved faces with facets of their own, in order of their boxes along x.
+fn curved_faces(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Vec<BoxedFace> {
+    let mut out = Vec::new();
+    for (i, instance) in model.instances.iter().enumerate() {
+        let Some(mesh) = &parts[instance.part.0 as usize] else { continue };
+        let shells = model.part(instance.part).shells.iter().enumerate();
+        let faces = shells.flat_map(|(s, shell)| shell.faces.iter().map(move |face| (s, face)));
+        for (k, (shell, face)) in faces.enumerate() {
+            let plain = mesh.faces[k].as_ref().is_some_and(|m| m.repaired.is_none());
+            if matches!(face.analytic, Analytic::Plane { .. }) || !plain {
+                continue;
+            }
+            let corners = face.surface.bounds().corners().map(|p| instance.placement.point(p));
+            let bounds = Aabb::from_points(corners).grown(0.5 * glue);
+            out.push(BoxedFace { key: FaceKey { instance: i, face: k }, shell, bounds });
+        }
+    }
+    out.sort_by(|a, b| a.bounds.min.x.total_cmp(&b.bounds.min.x));
+    out
+}

@@ -1,0 +1,310 @@
+//! A face that lies on a carrier takes over the carrier's facets, each proved anew on its own surface.
+
+use super::trimmed::TrimmedFace;
+use crate::math::{Point, Uv};
+use crate::model::{EdgeUse, Part};
+use crate::tessellate::assemble::PartMesh;
+use crate::tessellate::border::polygons::{BorderPolygons, BorderSide, PolygonVertex, crosses_ray_from};
+use crate::tessellate::border_nodes::BorderNodes;
+use crate::tessellate::cells::cell::Cell;
+use crate::tessellate::emission::Emission;
+use crate::tessellate::face_mesh::FaceMesh;
+use crate::tessellate::imprint::{CarrierFacets, Imprint, ImprintEnd, ImprintSegment};
+use crate::tessellate::nodes::{Node, Position, ProvedFacet, edge_key};
+use crate::tessellate::proof::facet::prove_triangle;
+use crate::tessellate::proof::pole;
+use crate::tessellate::proof::prover::Prover;
+use crate::tessellate::settings::Settings;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A guest with its border as it is divided now.
+pub(super) struct Guest<'f, 'm> {
+    pub(super) face: &'f TrimmedFace<'m>,
+    pub(super) polygons: BorderPolygons,
+    /// The corners of all polygons, one after another, in the part's coordinates.
+    places: Vec<Point>,
+}
+
+impl<'f, 'm> Guest<'f, 'm> {
+    pub(super) fn new(face: &'f TrimmedFace<'m>, polygons: BorderPolygons, mesh: &PartMesh) -> Self {
+        let place = |v: &PolygonVertex| match v.position {
+            Position::Shared(p) => mesh.shared[p as usize],
+            Position::Own(p) => polygons.own[p as usize],
+        };
+        let places = polygons.polygons.iter().flatten().map(place).collect();
+        Self { face, polygons, places }
+    }
+
+    /// How many corners the border has.
+    pub(super) fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The border's sides: the places of both corners among all, and what runs between them.
+    fn sides(&self) -> impl Iterator<Item = (usize, usize, &PolygonVertex, &PolygonVertex)> {
+        let mut first = 0;
+        self.polygons.polygons.iter().flat_map(move |p| {
+            let start = first;
+            first += p.len();
+            (0..p.len()).map(move |k| {
+                let next = (k + 1) % p.len();
+                (start + k, start + next, &p[k], &p[next])
+            })
+        })
+    }
+
+    /// The place half-way along a side, in the part's coordinates.
+    fn middle(&self, part: &Part, uses: &[&EdgeUse], a: &PolygonVertex, b: &PolygonVertex) -> Point {
+        match a.side {
+            BorderSide::Edge { edge_use, t } => match uses[edge_use as usize].edge {
+                Some(edge) => part.edges[edge.0 as usize].curve.evaluate(0.5 * (t[0] + t[1])),
+                None => self.face.surface.point(0.5 * (a.uv + b.uv)),
+            },
+            _ => self.face.surface.point(0.5 * (a.uv + b.uv)),
+        }
+    }
+
+    /// The border as lines on the carrier; corners are counted from `first` on.
+    pub(super) fn imprint(&self, carrier: &TrimmedFace<'_>, first: usize, out: &mut Imprint) {
+        let uses: Vec<&EdgeUse> = self.face.loops.iter().flat_map(|l| &l.uses).collect();
+        let local = |p: Point| carrier.frame.local_point(self.face.frame.point(p));
+        for (i, j, a, b) in self.sides() {
+            let places = [self.places[i], self.places[j]].map(local);
+            if a.side == BorderSide::Pole || places[0] == places[1] {
+                continue;
+            }
+            // The middle is on no seam: it tells on which side of one the ends are.
+            let (middle, _) = carrier.projector.project(local(self.middle(self.face.part, &uses, a, b)));
+            let end = |vertex: usize, place: Point| {
+                let (uv, _) = carrier.projector.project(place);
+                ImprintEnd { uv: beside(carrier, uv, middle), place, vertex: first + vertex }
+            };
+            out.segments.push(ImprintSegment { ends: [end(i, places[0]), end(j, places[1])] });
+        }
+    }
+
+    /// Whether parameters lie inside the border.
+    fn contains(&self, uv: Uv) -> bool {
+        self.sides().filter(|(_, _, a, b)| crosses_ray_from(uv, [a.uv, b.uv])).count() % 2 == 1
+    }
+}
+
+/// Share of the domain within which a place lies on a seam.
+const ON_SEAM: f64 = 1e-6;
+
+/// Of all parameters that a place has on a closed surface, those on the side of `middle`.
+fn beside(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
+    let surface = &face.surface;
+    if let Some(across) = surface.pole(uv) {
+        // All along the pole is one place.
+        let [a, b] = surface.spline.domain()[across];
+        uv[across] = if uv[across] - a < b - uv[across] { a } else { b };
+        uv[1 - across] = middle[1 - across];
+        return uv;
+    }
+    for d in 0..2 {
+        let [a, b] = surface.spline.domain()[d];
+        let extent = b - a;
+        if surface.closed[d] && (uv[d] - a).min(b - uv[d]) <= ON_SEAM * extent {
+            uv[d] = if middle[d] - a < 0.5 * extent { a } else { b };
+        }
+    }
+    uv
+}
+
+/// The facets of a guest; `None` where they do not cover it exactly. `first` is the number of its first corner in the carrier's imprint.
+pub(super) fn facets(
+    guest: &Guest<'_, '_>,
+    carrier: &TrimmedFace<'_>,
+    facets: &CarrierFacets,
+    first: usize,
+    mesh: &PartMesh,
+    settings: &Settings,
+) -> Option<FaceMesh> {
+    let face = guest.face;
+    let surface = &face.surface;
+    let border = BorderNodes::new(face.part, &face.loops, surface, &guest.polygons, &mesh.shared);
+    let mut builder = Builder::new(guest, carrier, facets, first, border, settings.glue_mm);
+    let mut prover = Prover::new(surface, settings.acceptance);
+    let mut made: Vec<(ProvedFacet<4>, Option<(usize, Uv)>)> = Vec::new();
+    for &corners in &facets.facets {
+        let Some(mut q) = builder.facet_inside(corners) else { continue };
+        let triangle = q[2] == q[3];
+        if triangle {
+            // A pole is the third corner.
+            let polar = (0..3).find(|&k| surface.pole(builder.border.nodes[q[k]].uv).is_some());
+            let k = polar.map_or(0, |k| (k + 1) % 3);
+            q = [q[k], q[(k + 1) % 3], q[(k + 2) % 3], q[(k + 2) % 3]];
+        }
+        let proved = prove_facet(&mut prover, &builder.border, q);
+        let uv = q.map(|n| builder.border.nodes[n].uv);
+        let pole = pole::facet_parameters(surface, if triangle { &uv[..3] } else { &uv });
+        made.push((proved, pole));
+    }
+    let border = builder.border;
+    // Each side of the border is the side of one facet.
+    let key = |a: u32, b: u32| {
+        let (a, b) = (border.nodes[a].position, border.nodes[b].position);
+        [a.min(b), a.max(b)]
+    };
+    let sides = made.iter().flat_map(|(f, _)| (0..4).map(|k| key(f.nodes[k], f.nodes[(k + 1) % 4])));
+    let sides: FxHashSet<[Position; 2]> = sides.collect();
+    if made.is_empty() || border.segments.iter().any(|s| !sides.contains(&key(s[0], s[1]))) {
+        return None;
+    }
+    let mut emission = Emission::new(surface, &border.nodes);
+    made.iter().for_each(|(f, pole)| emission.facet(f, *pole));
+    let out = emission.finish();
+    let coincident = border.coincident;
+    let (_, own) = border.nodes.into_parts();
+    Some(FaceMesh { own, coincident, ..out })
+}
+
+/// Bound and tolerance of a facet; a triangle repeats its third corner.
+fn prove_facet(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4]) -> ProvedFacet<4> {
+    let mut prove = |t: [u32; 3]| prove_triangle(prover, &border.nodes, t, &border.chords, 1.0);
+    let first = prove([q[0], q[1], q[2]]);
+    if q[2] == q[3] {
+        return ProvedFacet { nodes: q, bound: first.bound, tolerance: first.tolerance };
+    }
+    let second = prove([q[0], q[2], q[3]]);
+    let tolerance = first.tolerance.min(second.tolerance);
+    let bound = first.bound.max(second.bound);
+    // The curve over the diagonal need not hold where all of a cell does.
+    let bound = if bound <= tolerance { bound } else { bound.min(prove_cell(prover, border, q, tolerance)) };
+    ProvedFacet { nodes: q, bound, tolerance }
+}
+
+/// Bound of a facet over a rectangle of parameters as a whole cell, the border's curves included; infinite where there is none.
+fn prove_cell(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4], limit: f64) -> f64 {
+    let surface = prover.surface;
+    let nodes = q.map(|n| border.nodes[n]);
+    let (lo, hi) = nodes.iter().fold((nodes[0].uv, nodes[0].uv), |(l, h), n| (l.min(n.uv), h.max(n.uv)));
+    let corners = Cell { lo, hi }.corners();
+    let near = SAME_PARAMETERS * surface.extent();
+    // The cell's corners in order of the facet's.
+    let Some(start) = (0..4).find(|&k| (nodes[k].uv - lo).abs().cmple(near).all()) else { return f64::INFINITY };
+    let at = [0, 1, 2, 3].map(|k| nodes[(start + k) % 4]);
+    if at.iter().zip(corners).any(|(n, c)| (n.uv - c).abs().cmpgt(near).any()) {
+        return f64::INFINITY;
+    }
+    let places = corners.map(|c| surface.point(c));
+    let moved = at.iter().zip(places).map(|(n, p)| (n.place - p).length()).fold(0.0, f64::max);
+    // Lines and triangles through moved points move no farther.
+    let Some(bound) = prover.quad_bound([lo, hi], &places, start % 2, limit) else { return f64::INFINITY };
+    let mut worst = bound + 4.0 * moved;
+    let xyz = [0, 1, 2].map(|k| nodes[k].place);
+    for k in 0..4 {
+        if let Some(chord) = border.chords.get(&edge_key(q[k], q[(k + 1) % 4])) {
+            let corner = if k < 2 { xyz } else { [2, 3, 0].map(|k| nodes[k].place) };
+            worst = worst.max(chord.bound(prover, corner, limit));
+        }
+    }
+    worst
+}
+
+/// Share of the domain within which a facet's corners are those of a cell.
+const SAME_PARAMETERS: f64 = 1e-9;
+
+/// Finds the guest's nodes of the carrier's.
+struct Builder<'b, 'f, 'm, 'c> {
+    guest: &'b Guest<'f, 'm>,
+    carrier: &'b TrimmedFace<'c>,
+    facets: &'b CarrierFacets,
+    border: BorderNodes,
+    /// Distance within which both faces lie on each other, mm.
+    glue: f64,
+    /// The guest's corner at a position of the carrier.
+    vertices: FxHashMap<Position, usize>,
+    /// Nodes of the guest by position and parameters.
+    known: FxHashMap<(Position, [u64; 2]), u32>,
+    /// The guest's own position, parameters and place at a position of the carrier.
+    inner: FxHashMap<Position, u32>,
+    /// Parameters of the border's corners at each position of the guest.
+    parameters: FxHashMap<Position, Vec<Uv>>,
+}
+
+fn name(position: Position, uv: Uv) -> (Position, [u64; 2]) {
+    (position, [(uv.x + 0.0).to_bits(), (uv.y + 0.0).to_bits()])
+}
+
+impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
+    fn new(
+        guest: &'b Guest<'f, 'm>,
+        carrier: &'b TrimmedFace<'c>,
+        facets: &'b CarrierFacets,
+        first: usize,
+        border: BorderNodes,
+        glue: f64,
+    ) -> Self {
+        let own = facets.vertex_nodes.iter().filter_map(|&(node, vertex)| {
+            let vertex = vertex.checked_sub(first).filter(|&v| v < guest.len())?;
+            Some((facets.nodes[node as usize].position, vertex))
+        });
+        let vertices = own.collect();
+        let known = (0..).zip(border.nodes.iter()).map(|(id, n)| (name(n.position, n.uv), id)).collect();
+        let mut parameters: FxHashMap<Position, Vec<Uv>> = FxHashMap::default();
+        for v in guest.polygons.polygons.iter().flatten() {
+            parameters.entry(v.position).or_default().push(v.uv);
+        }
+        Self { guest, carrier, facets, border, glue, vertices, known, inner: FxHashMap::default(), parameters }
+    }
+
+    /// From the carrier's part's coordinates to the guest's.
+    fn local(&self, p: Point) -> Point {
+        self.guest.face.frame.local_point(self.carrier.frame.point(p))
+    }
+
+    /// The guest's nodes of a facet that lies in it, counter-clockwise in its parameters.
+    fn facet_inside(&mut self, corners: [u32; 4]) -> Option<[u32; 4]> {
+        let triangle = corners[2] == corners[3];
+        let places = corners.map(|n| self.local(self.facets.nodes[n as usize].place));
+        let count = if triangle { 3 } else { 4 };
+        let middle = places[..count].iter().sum::<Point>() / count as f64;
+        let (uv, away) = self.guest.face.projector.project(middle);
+        // Beside the guest the nearest place is on its border, farther than the facet lies from its own surface.
+        let frame = self.guest.face.frame;
+        let (_, sag) = self.carrier.project(frame.point(middle));
+        if away * frame.scale.abs() > sag + self.glue || !self.guest.contains(uv) {
+            return None;
+        }
+        let middle = uv;
+        let [a, b, c] = [0, 1, 2].map(|k| self.node(corners[k], places[k], middle));
+        let d = if triangle { c } else { self.node(corners[3], places[3], middle) };
+        let normal = (places[1] - places[0]).cross(places[2] - places[0]);
+        let turned = self.guest.face.surface.spline.normal(middle).is_some_and(|n| n.dot(normal) < 0.0);
+        Some(match (turned, triangle) {
+            (false, _) => [a, b, c, d],
+            (true, true) => [a, c, b, b],
+            (true, false) => [a, d, c, b],
+        })
+    }
+
+    fn node(&mut self, carrier_node: u32, place: Point, middle: Uv) -> u32 {
+        let face = self.guest.face;
+        let position = self.facets.nodes[carrier_node as usize].position;
+        if let Some(&vertex) = self.vertices.get(&position) {
+            let mut corners = self.guest.polygons.polygons.iter().flatten();
+            if let Some(v) = corners.nth(vertex) {
+                let extent = face.surface.extent();
+                let off = |uv: &Uv| ((*uv - middle) / extent).length_squared();
+                let all = &self.parameters[&v.position];
+                let uv = all.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(v.uv);
+                let position = v.position;
+                if let Some(&known) = self.known.get(&name(position, uv)) {
+                    return known;
+                }
+                let node = self.border.nodes.push(Node { uv, place: self.guest.places[vertex], position });
+                self.known.insert(name(position, uv), node);
+                return node;
+            }
+        }
+        if let Some(&known) = self.inner.get(&position) {
+            return known;
+        }
+        let (uv, _) = face.projector.project(place);
+        let node = self.border.nodes.push_own(beside(face, uv, middle), place);
+        self.inner.insert(position, node);
+        node
+    }
+}

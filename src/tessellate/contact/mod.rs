@@ -1,0 +1,202 @@
+//! Faces of two solids that lie on each other are faceted once: a cemented doublet, a rod in its hole, a ring in its groove, a ball in
+//! its cup. Faceted apart, they overlap and gap by the sag of both, and light is lost between them.
+//!
+//! Where all of one face (the guest) lies on another (the carrier) within [`Settings::glue_mm`], whatever their parametrisations, the
+//! guest's border is imprinted on the carrier: its corners become nodes there, its chords edges that no facet crosses. The guest then
+//! takes over the carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Edges that run
+//! together get the samples of both, so that neighbours of either face still meet it.
+//!
+//! Guarantee: a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier by the glue
+//! distance; shells stay closed, as a guest that the carrier's facets do not cover up to its border keeps its own. Known weakness: faces that
+//! overlap only in part are faceted apart.
+
+mod detection;
+mod guest;
+mod projector;
+mod samples;
+mod trimmed;
+
+use super::assemble::{PartMesh, Renumbering, mesh_face, with_coincident_vertices_joined};
+use super::border::edges;
+use super::border::polygons::{self, ImprintedPoints};
+use super::face::{FaceInput, mesh_with_imprint};
+use super::imprint::{CarrierFacets, Imprint};
+use super::settings::Settings;
+use crate::math::Point;
+use crate::model::{Face, Model};
+use detection::{CARRIER_SHARE, Contact};
+use guest::Guest;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use samples::{EdgeSamples, FurtherSamples};
+use trimmed::{FaceKey, TrimmedFace};
+
+/// The meshes of all instances with faces in contact.
+pub(super) fn join(model: &Model, settings: &Settings, parts: &[Option<PartMesh>]) -> FxHashMap<usize, PartMesh> {
+    if settings.glue_mm <= 0.0 {
+        return FxHashMap::default();
+    }
+    let (contacts, faces) = detection::contacts(model, settings, parts);
+    if contacts.is_empty() {
+        return FxHashMap::default();
+    }
+    let joiner = Joiner { model, settings, parts, contacts: &contacts, faces: &faces };
+    let further = joiner.further_samples();
+    let mut meshes = joiner.divided_more(&further);
+    joiner.mesh_carriers_and_guests(&mut meshes);
+    meshes.into_iter().map(|(i, mesh)| (i, with_coincident_vertices_joined(mesh))).collect()
+}
+
+struct Joiner<'j, 'm> {
+    model: &'m Model,
+    settings: &'j Settings,
+    parts: &'j [Option<PartMesh>],
+    contacts: &'j [Contact],
+    faces: &'j FxHashMap<FaceKey, TrimmedFace<'m>>,
+}
+
+impl<'j, 'm> Joiner<'j, 'm> {
+    fn mesh_of(&self, instance: usize) -> Option<&'j PartMesh> {
+        self.parts[self.model.instances[instance].part.0 as usize].as_ref()
+    }
+
+    fn edge_samples(&self, key: FaceKey) -> Option<EdgeSamples<'j, 'm>> {
+        Some(EdgeSamples { face: self.faces.get(&key)?, divisions: &self.mesh_of(key.instance)?.divisions })
+    }
+
+    /// What edges must have more: where borders cross seams, and the samples of edges that run together.
+    fn further_samples(&self) -> FurtherSamples {
+        let glue = self.settings.glue_mm;
+        let mut further = FurtherSamples::default();
+        for c in self.contacts {
+            let (Some(carrier), Some(guest)) = (self.edge_samples(c.carrier), self.edge_samples(c.guest)) else {
+                continue;
+            };
+            guest.cross_seams(carrier.face, glue, &mut further);
+            carrier.take_over(&guest, glue, &mut further);
+            guest.take_over(&carrier, glue, &mut further);
+        }
+        further
+    }
+
+    /// Meshes of all instances concerned with their edges divided further; faces beside changed edges are meshed anew.
+    fn divided_more(&self, further: &FurtherSamples) -> FxHashMap<usize, PartMesh> {
+        let mut instances: Vec<usize> =
+            self.contacts.iter().flat_map(|c| [c.carrier.instance, c.guest.instance]).collect();
+        instances.sort_unstable();
+        instances.dedup();
+        let divide = |&i: &usize| {
+            let part = self.model.part(self.model.instances[i].part);
+            let before = self.mesh_of(i)?;
+            let none = vec![Vec::new(); part.edges.len()];
+            let (divisions, shared) = edges::divide_more(part, &before.divisions, further.get(&i).unwrap_or(&none));
+            let renumbering = Renumbering::new(part, (&before.divisions, before.shared.len()), &divisions);
+            let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
+            let renew = |(k, old): (usize, &Option<super::face_mesh::FaceMesh>)| {
+                let key = FaceKey { instance: i, face: k };
+                let changed = faces[k].loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge));
+                // Carriers and guests are meshed later.
+                if !changed || self.faces.contains_key(&key) {
+                    return old.clone().map(|m| renumbering.renumbered(m));
+                }
+                let id = self.model.instances[i].part;
+                let (face, surface) = super::assemble::face_with_surface(self.model, self.settings, id, k)?;
+                mesh_face(&FaceInput {
+                    part,
+                    face,
+                    surface: &surface,
+                    divisions: &divisions,
+                    shared: &shared,
+                    settings: self.settings,
+                })
+            };
+            let meshes = before.faces.par_iter().enumerate().map(renew).collect();
+            Some((i, PartMesh { divisions, shared, faces: meshes }))
+        };
+        instances.par_iter().filter_map(divide).collect()
+    }
+
+    fn input<'i>(&'i self, face: &'i TrimmedFace<'m>, mesh: &'i PartMesh) -> FaceInput<'i, 'm> {
+        FaceInput {
+            part: face.part,
+            face: face.face,
+            surface: &face.surface,
+            divisions: &mesh.divisions,
+            shared: &mesh.shared,
+            settings: self.settings,
+        }
+    }
+
+    fn mesh_carriers_and_guests(&self, meshes: &mut FxHashMap<usize, PartMesh>) {
+        let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
+        let now = &*meshes;
+        let made: Vec<Vec<(FaceKey, Option<super::face_mesh::FaceMesh>)>> =
+            groups.par_iter().map(|group| self.mesh_group(group, now)).collect();
+        for (key, mesh) in made.into_iter().flatten() {
+            if let Some(part) = meshes.get_mut(&key.instance) {
+                part.faces[key.face] = mesh;
+            }
+        }
+    }
+
+    /// A carrier and all faces that lie on it.
+    fn mesh_group(
+        &self,
+        group: &[Contact],
+        meshes: &FxHashMap<usize, PartMesh>,
+    ) -> Vec<(FaceKey, Option<super::face_mesh::FaceMesh>)> {
+        let carrier = &self.faces[&group[0].carrier];
+        let carrier_mesh = &meshes[&carrier.key.instance];
+        let mut imprint = Imprint { segments: Vec::new(), near: self.settings.glue_mm };
+        let mut guests: Vec<(Guest<'_, '_>, usize)> = Vec::new();
+        let mut first = 0;
+        for c in group {
+            let face = &self.faces[&c.guest];
+            let guest = self.guest(face, carrier, &meshes[&face.key.instance]);
+            guest.imprint(carrier, first, &mut imprint);
+            let next = first + guest.len();
+            guests.push((guest, first));
+            first = next;
+        }
+        let made = mesh_with_imprint(&self.input(carrier, carrier_mesh), &imprint);
+        let (mesh, facets) = match made {
+            Ok((mut mesh, facets)) if facets.holds_imprint => {
+                // What was asked, not what the guests are left a share of.
+                mesh.facets.iter_mut().for_each(|f| f.tolerance /= CARRIER_SHARE);
+                (Some(mesh), facets)
+            }
+            // Each by itself, as without a contact.
+            _ => (mesh_face(&self.input(carrier, carrier_mesh)), CarrierFacets::default()),
+        };
+        let mut out = vec![(carrier.key, mesh)];
+        for (guest, first) in &guests {
+            let mesh = &meshes[&guest.face.key.instance];
+            let taken = guest::facets(guest, carrier, &facets, *first, mesh, self.settings);
+            out.push((guest.face.key, taken.or_else(|| mesh_face(&self.input(guest.face, mesh)))));
+        }
+        out
+    }
+
+    /// A guest with corners where its seams cross the carrier's.
+    fn guest<'f>(&self, face: &'f TrimmedFace<'m>, carrier: &TrimmedFace<'_>, mesh: &PartMesh) -> Guest<'f, 'm> {
+        let near = self.settings.glue_mm;
+        let build = |points: &[Point]| {
+            let imprinted = ImprintedPoints { points, near };
+            polygons::build(face.part, &face.loops, &face.surface, &mesh.divisions, &imprinted)
+        };
+        let polygons = build(&[]);
+        let mut points = Vec::new();
+        for p in &polygons.polygons {
+            for k in (0..p.len()).filter(|&k| p[k].side == polygons::BorderSide::Seam) {
+                let (a, b) = (p[k].uv, p[(k + 1) % p.len()].uv);
+                let place = |f: f64| face.surface.point(a.lerp(b, f));
+                let on_carrier = |f: f64| carrier.project(face.frame.point(place(f))).0;
+                for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
+                    points.extend(samples::crossing(carrier, d, [0.0, 1.0], on_carrier).map(place));
+                }
+            }
+        }
+        let polygons = if points.is_empty() { polygons } else { build(&points) };
+        Guest::new(face, polygons, mesh)
+    }
+}

@@ -1,0 +1,62 @@
+//! Nearest points on one surface, many times.
+
+use crate::math::{Point, Uv};
+use crate::nurbs::Surface;
+use crate::tessellate::sample;
+
+/// Seeds a knot interval along each parameter, and fewest and most along the whole.
+const SEEDS: usize = 6;
+const SEED_RANGE: [usize; 2] = [12, 60];
+/// Nearest seeds from which the nearest point is looked for: two for both sides of a seam, and one more.
+const TRIED: usize = 3;
+/// Area of the parameters' unit square, in shares of that of the surface's own size, below which a place is a pole.
+const SINGULAR: f64 = 1e-9;
+
+/// A surface with places to start from.
+pub(super) struct Projector<'s> {
+    spline: &'s Surface,
+    /// Places to start from: none at poles, where no step leads anywhere.
+    seeds: Vec<(Uv, Point)>,
+    poles: Vec<(Uv, Point)>,
+}
+
+impl<'s> Projector<'s> {
+    pub(super) fn new(spline: &'s Surface) -> Self {
+        let [[u0, u1], [v0, v1]] = spline.domain();
+        let steps = |d: usize| {
+            let spans = spline.counts()[d] - spline.degree[d];
+            (SEEDS * spans).clamp(SEED_RANGE[0], SEED_RANGE[1])
+        };
+        let (nu, nv) = (steps(0), steps(1));
+        let place = |k: usize| {
+            let (i, j) = (k / (nv + 1), k % (nv + 1));
+            let uv = Uv::new(u0 + (u1 - u0) * i as f64 / nu as f64, v0 + (v1 - v0) * j as f64 / nv as f64);
+            (uv, spline.evaluate(uv))
+        };
+        let size = spline.bounds().diagonal() / Uv::new(u1 - u0, v1 - v0).max_element();
+        let is_regular = |&(uv, _): &(Uv, Point)| {
+            let d = spline.derivatives(uv);
+            d.du.cross(d.dv).length() > SINGULAR * size * size
+        };
+        let (seeds, poles) = (0..(nu + 1) * (nv + 1)).map(place).partition(is_regular);
+        Self { spline, seeds, poles }
+    }
+
+    /// Parameters of the point nearest to `p`, and how far that is.
+    pub(super) fn project(&self, p: Point) -> (Uv, f64) {
+        let mut best: [(f64, Uv); TRIED] = [(f64::INFINITY, Uv::ZERO); TRIED];
+        for &(uv, q) in &self.seeds {
+            let away = (q - p).length_squared();
+            if away < best[TRIED - 1].0 {
+                best[TRIED - 1] = (away, uv);
+                best.sort_by(|a, b| a.0.total_cmp(&b.0));
+            }
+        }
+        let feet = best.map(|(_, start)| {
+            let uv = sample::project(self.spline, p, start);
+            (uv, (self.spline.evaluate(uv) - p).length())
+        });
+        let poles = self.poles.iter().map(|&(uv, q)| (uv, (q - p).length()));
+        feet.into_iter().chain(poles).fold(feet[0], |a, b| if b.1 < a.1 { b } else { a })
+    }
+}

@@ -1,0 +1,123 @@
+//! One placed face, as contacts see it: its trimmed region, and places on it in the model's coordinates.
+
+use super::projector::Projector;
+use crate::math::{Frame, Point, Uv};
+use crate::model::{EdgeId, Face, Instance, Model, Part, TrimLoop};
+use crate::nurbs::project;
+use crate::tessellate::assemble::{PartMesh, face_with_surface};
+use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex, crosses_ray_from};
+use crate::tessellate::face_surface::FaceSurface;
+use crate::tessellate::nodes::Position;
+use crate::tessellate::settings::{Settings, ToleranceField};
+
+/// Steps of the grid over a face whose places inside it are looked at.
+const GRID: usize = 9;
+
+/// A face by its instance and its place among the faces of its part's shells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct FaceKey {
+    pub(super) instance: usize,
+    pub(super) face: usize,
+}
+
+/// A face that may be in contact with others.
+pub(super) struct TrimmedFace<'m> {
+    pub(super) key: FaceKey,
+    pub(super) part: &'m Part,
+    pub(super) face: &'m Face,
+    pub(super) frame: &'m Frame,
+    pub(super) surface: FaceSurface<'m>,
+    /// The tolerance that was asked of it.
+    pub(super) asked: ToleranceField,
+    pub(super) loops: Vec<TrimLoop>,
+    pub(super) polygons: BorderPolygons,
+    pub(super) projector: Projector<'m>,
+    /// Places on its border and inside, in the model's coordinates.
+    pub(super) samples: Vec<Point>,
+}
+
+impl<'m> TrimmedFace<'m> {
+    /// `None` where the face has no facets of its own.
+    pub(super) fn new(model: &'m Model, settings: &Settings, mesh: &PartMesh, key: FaceKey) -> Option<Self> {
+        let instance: &'m Instance = &model.instances[key.instance];
+        let part = model.part(instance.part);
+        let (face, surface) = face_with_surface(model, settings, instance.part, key.face)?;
+        let loops = polygons::loops(face);
+        let polygons = polygons::build(part, &loops, &surface, &mesh.divisions, &ImprintedPoints::NONE);
+        let mut out = Self {
+            key,
+            part,
+            face,
+            frame: &instance.placement,
+            projector: Projector::new(&face.surface),
+            asked: surface.field,
+            surface,
+            loops,
+            polygons,
+            samples: Vec::new(),
+        };
+        let border = out.vertices().map(|v| out.place_of(v, mesh));
+        let (lo, hi) = out.polygons.bounds();
+        let step = |k: usize| (k as f64 + 0.5) / GRID as f64;
+        let grid = (0..GRID * GRID).map(|k| lo + Uv::new(step(k / GRID), step(k % GRID)) * (hi - lo));
+        let inside = grid.filter(|&uv| out.contains(uv)).map(|uv| out.surface.point(uv));
+        let samples = border.chain(inside).map(|p| out.frame.point(p)).collect();
+        out.samples = samples;
+        Some(out)
+    }
+
+    /// All corners of the border.
+    pub(super) fn vertices(&self) -> impl Iterator<Item = &PolygonVertex> {
+        self.polygons.polygons.iter().flatten()
+    }
+
+    /// Where a corner of the border lies, in the part's coordinates.
+    pub(super) fn place_of(&self, v: &PolygonVertex, mesh: &PartMesh) -> Point {
+        match v.position {
+            Position::Shared(p) => mesh.shared[p as usize],
+            Position::Own(p) => self.polygons.own[p as usize],
+        }
+    }
+
+    /// Whether parameters lie inside the border.
+    pub(super) fn contains(&self, uv: Uv) -> bool {
+        let sides =
+            self.polygons.polygons.iter().flat_map(|p| (0..p.len()).map(|i| [p[i].uv, p[(i + 1) % p.len()].uv]));
+        sides.filter(|&s| crosses_ray_from(uv, s)).count() % 2 == 1
+    }
+
+    /// The edges of the border, each once.
+    pub(super) fn edges(&self) -> Vec<EdgeId> {
+        let mut edges: Vec<EdgeId> = self.face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges
+    }
+
+    /// Parameter of the point of an edge that is nearest to a place of the model, and how far it is, mm.
+    pub(super) fn nearest_on_edge(&self, edge: EdgeId, p: Point) -> (f64, f64) {
+        let (t, away) = project::nearest(&self.part.edges[edge.0 as usize].curve, self.frame.local_point(p));
+        (t, away * self.frame.scale.abs())
+    }
+
+    /// Parameters of the point of the surface that is nearest to a place of the model, and how far it is, mm.
+    pub(super) fn project(&self, p: Point) -> (Uv, f64) {
+        let (uv, away) = self.projector.project(self.frame.local_point(p));
+        (uv, away * self.frame.scale.abs())
+    }
+
+    /// Whether all of another face lies on this one, within `glue` mm.
+    pub(super) fn carries(&self, other: &Self, glue: f64) -> bool {
+        let edges = self.edges();
+        !other.samples.is_empty()
+            && other.samples.iter().all(|&p| {
+                let (uv, away) = self.project(p);
+                away <= glue && (self.contains(uv) || self.is_at_border(&edges, p, glue))
+            })
+    }
+
+    fn is_at_border(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
+        // A face without edges is whole: its border is a seam or a pole.
+        edges.is_empty() || edges.iter().any(|&e| self.nearest_on_edge(e, p).1 <= glue)
+    }
+}

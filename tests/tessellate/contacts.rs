@@ -1,0 +1,72 @@
+//! Curved faces of two solids that lie on each other have one and the same facets there, whatever their parametrisations.
+
+use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole};
+use lampyris::math::{FaceId, Point};
+use lampyris::model::Model;
+use lampyris::tessellate::{Settings, Tessellation, tessellate};
+
+/// The corners of a facet, each once, in an order that does not depend on where it starts.
+fn corners(made: &Tessellation, facet: usize) -> Vec<Point> {
+    let mut p = made.mesh.corners(facet).to_vec();
+    p.dedup();
+    p
+}
+
+/// Whether two facets have the same corners.
+fn same(a: &[Point], b: &[Point]) -> bool {
+    a.len() == b.len() && a.iter().all(|p| b.iter().any(|q| (*p - *q).length() < 1e-9))
+}
+
+/// Facets of a face.
+fn facets_of(made: &Tessellation, face: u32) -> Vec<Vec<Point>> {
+    let all = 0..made.mesh.facets.len();
+    all.filter(|&f| made.mesh.facets[f].face == FaceId(face)).map(|f| corners(made, f)).collect()
+}
+
+/// Checks that each facet of `guest` is one of `carrier`, that nothing is left open and that all is proved.
+fn check(name: &str, model: &Model, [carrier, guest]: [u32; 2]) {
+    let settings = Settings { glue_mm: 1e-3, measure: true, ..Settings::default() };
+    let made = tessellate(model, &settings);
+    let r = &made.report;
+    assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.open), (0, 0, 0), "{name}");
+    assert_eq!((r.certified, r.over_tolerance), (r.facets, Some(0)), "{name}: {:?}", r.not_certified);
+    let [on, of] = [carrier, guest].map(|face| facets_of(&made, face));
+    let missing = of.iter().filter(|f| !on.iter().any(|g| same(f, g))).count();
+    assert!(!of.is_empty() && missing == 0, "{name}: {missing} of {} facets are the guest's alone", of.len());
+    // Apart, hardly a facet is shared: this is not so by chance.
+    let apart = tessellate(model, &Settings { glue_mm: 0.0, ..settings });
+    let [on, of] = [carrier, guest].map(|face| facets_of(&apart, face));
+    let shared = of.iter().filter(|f| on.iter().any(|g| same(f, g))).count();
+    assert!(2 * shared < of.len(), "{name}: {shared} of {}", of.len());
+}
+
+#[test]
+fn a_cemented_doublet_has_one_interface() {
+    check("same aperture", &doublet(12.0, 0.7), [2, 3]);
+    check("smaller second lens", &doublet(10.0, 0.7), [2, 3]);
+}
+
+#[test]
+fn a_rod_has_the_facets_of_its_hole() {
+    check("rod", &rod_in_hole(0.4), [1, 6]);
+}
+
+#[test]
+fn a_ball_has_the_facets_of_its_cup() {
+    check("ball", &ball_in_cup(1.1), [0, 4]);
+}
+
+#[test]
+fn a_ring_has_the_facets_of_its_groove() {
+    for from in [0.0, 0.9] {
+        check("ring", &ring_in_groove(from), [0, 6]);
+    }
+}
+
+#[test]
+fn solids_that_do_not_touch_are_faceted_as_they_were() {
+    let mut model = doublet(12.0, 0.7);
+    model.instances[1].placement.origin.z += 0.01;
+    let glued = tessellate(&model, &Settings { glue_mm: 1e-3, ..Settings::default() });
+    assert_eq!(glued.mesh, tessellate(&model, &Settings::default()).mesh);
+}
