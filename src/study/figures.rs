@@ -36,9 +36,9 @@ impl Figure {
         Self { value, unit: unit.into(), statistical, geometric, limited_by }
     }
 
-    /// Both errors together.
+    /// Both errors together; the statistical one alone where the facets were not judged.
     pub fn combined(&self) -> f64 {
-        self.statistical.hypot(self.geometric.unwrap_or(0.0))
+        self.geometric.map_or(self.statistical, |geometric| self.statistical.hypot(geometric))
     }
 }
 

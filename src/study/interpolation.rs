@@ -128,7 +128,7 @@ fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row
     });
     let row = |((algorithm, hits), (_, timing)): ((NormalMode, &Mutex<Vec<Option<Hit>>>), _)| {
         let timing: super::Timing = timing;
-        let hits = hits.lock().map(|h| h.clone()).unwrap_or_default();
+        let hits = hits.lock().unwrap_or_else(|e| e.into_inner()).clone();
         let errors = HitErrors::between(&rays, &hits, &truth);
         Row {
             model: name.into(),

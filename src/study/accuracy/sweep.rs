@@ -152,7 +152,7 @@ impl Sweep<'_> {
             self.push(row, timing, threads);
         }
         let [runner] = runners;
-        self.truth = runner.hits.into_inner().unwrap_or_default();
+        self.truth = runner.hits.into_inner().unwrap_or_else(|e| e.into_inner());
     }
 
     /// Gives the seconds of meshing and building.
@@ -167,7 +167,7 @@ impl Sweep<'_> {
             for &threads in &settings.threads {
                 let timings = self.race(&runners, threads);
                 for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
-                    let hits = runner.hits.lock().map(|h| h.clone()).unwrap_or_default();
+                    let hits = runner.hits.lock().unwrap_or_else(|e| e.into_inner()).clone();
                     let row = self.row(tolerance, &meshed, *combination, &hits);
                     self.push(row, timing, threads);
                 }

@@ -41,6 +41,10 @@ impl Truth {
     pub(super) fn miss(margin: f64) -> Self {
         Self { t: None, cos: 1.0, margin, normal: None }
     }
+    /// Distance along the ray, which rounding grows with; a miss is judged where the ray starts.
+    pub(super) fn distance(&self) -> f64 {
+        self.t.unwrap_or(0.0)
+    }
     pub(super) fn with_normal(self, normal: Vector) -> Self {
         Self { normal: Some(normal), ..self }
     }

@@ -155,7 +155,7 @@ impl Grader<'_> {
     }
 
     fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
-        let resolution = self.scene.resolution(ray, truth.t.unwrap_or(0.0));
+        let resolution = self.scene.resolution(ray, truth.distance());
         let open = truth.margin <= 8.0 * resolution;
         let right = match (truth.t, hit) {
             (None, None) => true,
@@ -189,7 +189,7 @@ impl Grader<'_> {
     }
 
     fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
-        let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, truth.t.unwrap_or(0.0));
+        let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, truth.distance());
         let Some(h) = hit else { return truth.t.is_none() || truth.margin <= self.band + slack };
         let t = self.local_t(h);
         if !self.in_band(ray, t) {
@@ -219,7 +219,7 @@ impl Grader<'_> {
                 uv: h.uv,
             });
         }
-        let resolution = self.scene.resolution(ray, truths.last().and_then(|t| t.t).unwrap_or(0.0));
+        let resolution = self.scene.resolution(ray, truths.last().map_or(0.0, Truth::distance));
         let right = match self.geometry {
             Geometry::Facets => {
                 let sure = truths.iter().filter(|t| t.margin > self.band).count();
@@ -302,10 +302,12 @@ impl Grader<'_> {
         let end = Point::new(fold(straight.x, size.x), fold(straight.y, size.y), fold(straight.z, size.z));
         let off = frame.local_point(ray_here.origin).distance(end);
         let rounding = reflections as f64 * 16.0 * self.scene.resolution(ray, size.length());
-        match off <= rounding + path * reflections as f64 * 4.0 * f64::EPSILON {
-            true => Grade::Right,
-            false if any_flag => Grade::Flagged,
-            false => Grade::Wrong,
+        if off <= rounding + path * reflections as f64 * 4.0 * f64::EPSILON {
+            Grade::Right
+        } else if any_flag {
+            Grade::Flagged
+        } else {
+            Grade::Wrong
         }
     }
 }
