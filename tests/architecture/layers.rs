@@ -213,6 +213,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "frame",
             "tree",
             "ray",
+            "quad_edges",
             "facet_pair",
             "quad_edges",
             "lanes",
