@@ -16,8 +16,10 @@ use std::io::{self, Write};
 /// The replicates of a run that are done.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PartialRun {
-    /// Replicates of the whole run.
+    /// Replicates of the whole run; of one that grows, as far as is known.
     pub replicates: u32,
+    /// Whether further replicates may follow: parts of it may tell of different totals.
+    pub grows: bool,
     /// Those that are done, rising.
     pub done: Vec<u32>,
     /// Their sums.
@@ -26,7 +28,7 @@ pub struct PartialRun {
     pub seconds: f64,
 }
 
-const MAGIC: &[u8] = b"lampyris tally 4\n";
+const MAGIC: &[u8] = b"lampyris tally 5\n";
 
 impl PartialRun {
     pub(crate) fn empty(bound: &BoundScene, replicates: u32) -> Self {
@@ -49,13 +51,15 @@ impl PartialRun {
     /// # Errors
     /// When both have a replicate in common, or are parts of different runs.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
-        if self.replicates != other.replicates || !same_shape(&self.tallies, &other.tallies) {
+        let same_run = self.grows == other.grows && (self.grows || self.replicates == other.replicates);
+        if !same_run || !same_shape(&self.tallies, &other.tallies) {
             return Err("it is part of another run".into());
         }
         if let Some(twice) = other.done.iter().find(|r| self.done.binary_search(r).is_ok()) {
             return Err(format!("its replicate {twice} is in an earlier part already; each part counts once"));
         }
         self.add(other);
+        self.replicates = self.replicates.max(other.replicates);
         self.seconds += other.seconds;
         Ok(())
     }
@@ -76,6 +80,7 @@ impl PartialRun {
         let t = &self.tallies;
         block(&mut out, &serde_json::to_vec(header)?);
         out.extend(self.replicates.to_le_bytes());
+        out.extend(u32::from(self.grows).to_le_bytes());
         out.extend((self.done.len() as u32).to_le_bytes());
         self.done.iter().for_each(|r| out.extend(r.to_le_bytes()));
         out.extend(self.seconds.to_le_bytes());
@@ -118,6 +123,7 @@ impl PartialRun {
         let (header, mut r) = open::<H>(bytes)?;
         check(&header)?;
         let mut p = Self::empty(bound, r.u32()?);
+        p.grows = r.u32()? != 0;
         let done = r.u32()?;
         if done > p.replicates {
             return Err("it has more replicates than its run".into());

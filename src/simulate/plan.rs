@@ -16,26 +16,30 @@ const FEWEST_RAYS: u64 = 16;
 /// Most rays of a replicate, 2^21 or some more, whose quanta a word of 64 bits can hold.
 const MOST_RAYS_LOG2: u32 = 21;
 
-/// The rays of one source.
+/// Rays of a replicate of a run that can grow: round numbers of rays are whole numbers of replicates, and what a replicate costs
+/// beside its rays is below a per cent.
+pub const GROWING_REPLICATE: u64 = 5_000;
+
+/// Replicates from which on a run is divided into those of a fixed size without being asked to.
+const FEWEST_GROWING: u64 = 128;
+
+/// The rays of one source: in the whole run, or in each replicate of one that can grow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SourceShare {
-    pub(super) first: u64,
-    pub(super) rays: u64,
+    first: u64,
+    rays: u64,
     pub(crate) quanta: f64,
-}
-
-impl SourceShare {
-    /// The rays of one of `n` replicates.
-    pub(crate) fn range(&self, replicate: u32, n: u32) -> [u64; 2] {
-        let at = |k: u32| self.first + (u128::from(self.rays) * u128::from(k) / u128::from(n)) as u64;
-        [at(replicate), at(replicate + 1)]
-    }
 }
 
 /// How the rays of a run are divided among sources and replicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub(crate) shares: Vec<SourceShare>,
+    /// Rays of each replicate of a run that can grow.
+    replicate_rays: Option<u64>,
+    /// The first replicate that is asked for.
+    pub(crate) first_replicate: u32,
+    /// Past the last one.
     pub(crate) replicates: u32,
     pub(crate) rays: u64,
     /// Power of a quantum, in the unit of the sources.
@@ -52,21 +56,10 @@ pub(crate) struct Plan {
 impl Plan {
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
-        // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
-        let mut share = 0.0;
-        let mut given = 0;
-        let counts: Vec<u64> = bound
-            .emitters
-            .iter()
-            .map(|e| {
-                share += e.power / emitted;
-                let upto = (settings.rays as f64 * share).round() as u64;
-                let own = upto.saturating_sub(given);
-                given = upto;
-                e.rays.unwrap_or(own).max(1)
-            })
-            .collect();
-        let rays: u64 = counts.iter().sum();
+        let grows = can_grow(bound) && (settings.grows || grows_unasked(settings));
+        // A run that can grow is divided replicate by replicate, source by source within each; any other source by source.
+        let counts = rays_of_sources(bound, if grows { GROWING_REPLICATE } else { settings.rays }, emitted);
+        let divided: u64 = counts.iter().sum();
         let mut first = 0;
         let shares = bound
             .emitters
@@ -74,19 +67,27 @@ impl Plan {
             .zip(&counts)
             .map(|(e, &n)| {
                 // Each source emits exactly its power: its rays weigh a little more or less than the average one.
-                let quanta = (QUANTA * (e.power / emitted) * (rays as f64 / n as f64)).round().max(1.0);
+                let quanta = (QUANTA * (e.power / emitted) * (divided as f64 / n as f64)).round().max(1.0);
                 let share = SourceShare { first, rays: n, quanta };
                 first += n;
                 share
             })
             .collect();
-        let replicates = settings.replicates.clamp(2, (rays / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
-        let replicates = replicates.max((rays >> MOST_RAYS_LOG2) as u32);
+        let replicates = if grows {
+            settings.rays.div_ceil(GROWING_REPLICATE) as u32
+        } else {
+            let replicates = settings.replicates.clamp(2, (divided / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
+            replicates.max((divided >> MOST_RAYS_LOG2) as u32)
+        };
+        let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
+        let rays = if grows { divided * u64::from(replicates) } else { divided };
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
         let quantum = emitted / (rays as f64 * QUANTA);
         Self {
             shares,
+            replicate_rays: grows.then_some(divided),
+            first_replicate,
             replicates,
             rays,
             quantum,
@@ -95,6 +96,39 @@ impl Plan {
             sample_mask: record_mask,
             drawn_length: DRAWN_LENGTH,
         }
+    }
+
+    /// Whether it is divided into replicates of a fixed size, so that further ones may follow.
+    pub(crate) fn grows(&self) -> bool {
+        self.replicate_rays.is_some()
+    }
+
+    /// The rays of a source in a replicate: the first, and past the last.
+    pub(crate) fn range(&self, source: usize, replicate: u32) -> [u64; 2] {
+        let share = &self.shares[source];
+        match self.replicate_rays {
+            Some(size) => {
+                let first = size * u64::from(replicate) + share.first;
+                [first, first + share.rays]
+            }
+            None => {
+                let n = u128::from(self.replicates);
+                let at = |k: u32| share.first + (u128::from(share.rays) * u128::from(k) / n) as u64;
+                [at(replicate), at(replicate + 1)]
+            }
+        }
+    }
+
+    /// Which of how many interleaved lattices of places in a ray list a replicate takes. How many replicates a run that grows will
+    /// have is not known: each has a lattice of its own there.
+    pub(crate) fn lattice(&self, replicate: u32) -> [u32; 2] {
+        if self.grows() { [0, 1] } else { [replicate, self.replicates] }
+    }
+
+    /// Rays of a source in the whole run.
+    pub(crate) fn rays_of_source(&self, source: usize) -> u64 {
+        let rays = self.shares[source].rays;
+        if self.grows() { rays * u64::from(self.replicates) } else { rays }
     }
 
     #[inline]
@@ -124,12 +158,13 @@ impl Plan {
 
     /// The rays of a replicate that are recorded.
     pub(super) fn recorded(&self, replicate: u32) -> impl Iterator<Item = u64> {
-        let recorded_of = move |share: &SourceShare, step: u64| {
-            let [from, to] = share.range(replicate, self.replicates);
+        let recorded_of = move |source: usize, step: u64| {
+            let [from, to] = self.range(source, replicate);
             (from.next_multiple_of(step)..to).step_by(step as usize)
         };
         let step = self.record_mask.map(|m| m + 1);
-        step.into_iter().flat_map(move |step| self.shares.iter().flat_map(move |share| recorded_of(share, step)))
+        step.into_iter()
+            .flat_map(move |step| (0..self.shares.len()).flat_map(move |source| recorded_of(source, step)))
     }
 
     /// Whether the path of a ray belongs to the sample that is kept.
@@ -139,15 +174,45 @@ impl Plan {
 
     /// The source and the replicate of a ray; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
-        let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
-        let share = &self.shares[source];
-        let guess = u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays);
-        let holds = |r: &u32| {
-            let [from, to] = share.range(*r, self.replicates);
+        let holds = |source: usize, replicate: u32| {
+            let [from, to] = self.range(source, replicate);
             (from..to).contains(&ray)
         };
+        if let Some(size) = self.replicate_rays {
+            let replicate = u32::try_from(ray / size).ok().filter(|r| *r < self.replicates)?;
+            return (0..self.shares.len()).find(|&s| holds(s, replicate)).map(|s| (s, replicate));
+        }
+        let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
+        let share = &self.shares[source];
+        let guess = (u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays)) as u32;
         // Rounding puts the replicate next to the guess.
-        let near = (guess as u32).saturating_sub(1)..=(guess as u32).saturating_add(1).min(self.replicates - 1);
-        near.into_iter().find(holds).map(|r| (source, r))
+        let mut near = guess.saturating_sub(1)..=guess.saturating_add(1).min(self.replicates - 1);
+        near.find(|&r| holds(source, r)).map(|r| (source, r))
     }
+}
+
+/// Whether the run of a scene can grow: not where a source has a number of rays of its own.
+pub(crate) fn can_grow(bound: &BoundScene) -> bool {
+    bound.emitters.iter().all(|e| e.rays.is_none())
+}
+
+/// Whether a run is large and round enough to be divided into replicates of a fixed size without being asked to.
+fn grows_unasked(settings: &RunSettings) -> bool {
+    let usual = settings.replicates == RunSettings::default().replicates;
+    usual && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE && settings.rays.is_multiple_of(GROWING_REPLICATE)
+}
+
+/// So many rays shared out among the sources by their power; at least one to each.
+fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
+    // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
+    let mut share = 0.0;
+    let mut given = 0;
+    let mut counts = Vec::with_capacity(bound.emitters.len());
+    for e in &bound.emitters {
+        share += e.power / emitted;
+        let upto = (rays as f64 * share).round() as u64;
+        counts.push(e.rays.unwrap_or(upto.saturating_sub(given)).max(1));
+        given = upto;
+    }
+    counts
 }

@@ -159,18 +159,32 @@ impl Receiver {
         self.cell_count() * (1 + self.channels.count())
     }
 
-    /// Whether it may have a point in common with a box; asked with care, so that `true` costs time alone.
-    pub(crate) fn meets(&self, region: &Aabb) -> bool {
+    /// A box around a plane or sphere; empty for what stands nowhere.
+    pub(crate) fn bounds(&self) -> Aabb {
         match &self.shape {
             Shape::Plane { frame, half, .. } => {
                 let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-                let corners =
-                    corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1]));
+                Aabb::from_points(
+                    corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1])),
+                )
+            }
+            Shape::Sphere { frame, radius } => {
+                let reach = Vector::splat(*radius);
+                Aabb::from_points([frame.origin - reach, frame.origin + reach])
+            }
+            Shape::FarField { .. } | Shape::Absorbed { .. } => Aabb::EMPTY,
+        }
+    }
+
+    /// Whether it may have a point in common with a box; asked with care, so that `true` costs time alone.
+    pub(crate) fn meets(&self, region: &Aabb) -> bool {
+        match &self.shape {
+            Shape::Plane { frame, .. } => {
                 let apart = |box_corners: [Point; 8]| {
                     let sides = box_corners.map(|c| (c - frame.origin).dot(frame.z));
                     sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0)
                 };
-                !(Aabb::from_points(corners).intersection(*region).is_empty() || apart(region.corners()))
+                !(self.bounds().intersection(*region).is_empty() || apart(region.corners()))
             }
             Shape::Sphere { frame, radius } => {
                 let far = region.corners().map(|c| (c - frame.origin).length()).into_iter().fold(0.0, f64::max);

@@ -218,7 +218,14 @@ impl Results {
         let mut tallies = partial.tallies;
         // A run that was stopped early, or is one shard of many, answers for the rays it traced.
         let traced = tallies.ends[0].total as f64 * plan.quantum;
-        let quantum = if traced > 0.0 { plan.quantum * plan.emitted / traced } else { plan.quantum };
+        let quantum = if traced > 0.0 && plan.grows() {
+            // From the sums alone, so that it does not matter which of its parts told how large the run is.
+            plan.emitted / tallies.ends[0].total as f64
+        } else if traced > 0.0 {
+            plan.quantum * plan.emitted / traced
+        } else {
+            plan.quantum
+        };
         let Counts { rays, segments, corrected_normals, lost, cut_off, caught, .. } = tallies.counts;
         let bodies = bound.overlap_note(&tallies.counts).into_iter();
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));

@@ -8,7 +8,7 @@ use super::gather::{Gathering, ThreadSums};
 use super::hooks::{Hooks, Progress, Traced};
 use super::kernel::{Context, RaySelection};
 use super::partial_run::PartialRun;
-use super::plan::{Plan, SourceShare};
+use super::plan::Plan;
 use super::recorder::Recorder;
 use super::results::Results;
 use super::settings::RunSettings;
@@ -50,8 +50,11 @@ pub fn trace(
     } else {
         context.plan.recording().map(|plan| context.with_plan(plan, &single))
     };
-    let before = from.unwrap_or_else(|| PartialRun::empty(bound, context.plan.replicates));
-    let shard = shard_replicates(context.plan.replicates, settings.shard);
+    let mut before = from.unwrap_or_else(|| PartialRun::empty(bound, context.plan.replicates));
+    // What was traced of a run that has grown since is a part of the larger one.
+    before.grows = context.plan.grows();
+    before.replicates = before.replicates.max(context.plan.replicates);
+    let shard = shard_replicates(context.plan.first_replicate..context.plan.replicates, settings.shard);
     let todo: Vec<u32> = shard.clone().filter(|r| before.done.binary_search(r).is_err()).collect();
     let threads = thread_count(settings);
     announce(&context, threads);
@@ -80,9 +83,10 @@ pub fn trace(
 }
 
 /// The replicates of the `i`-th of `n` shards.
-fn shard_replicates(replicates: u32, [shard, shards]: [u32; 2]) -> Range<u32> {
-    let first = |k: u32| (u64::from(replicates) * u64::from(k) / u64::from(shards.max(1))) as u32;
-    first(shard)..first(shard.saturating_add(1)).min(replicates)
+fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
+    let count = u64::from(all.end.saturating_sub(all.start));
+    let first = |k: u32| all.start + (count * u64::from(k) / u64::from(shards.max(1))).min(count) as u32;
+    first(shard)..first(shard.saturating_add(1))
 }
 
 /// What the threads of a run share.
@@ -132,8 +136,8 @@ impl Work<'_, '_> {
 /// Tells the intersector which rays a run is going to ask.
 fn announce(context: &Context<'_>, threads: usize) {
     let of_shard = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
-    let beam = |(e, s): (&Emitter, &SourceShare)| Some((e.beam()?, of_shard(s.rays)));
-    let beams: Vec<_> = context.bound.emitters.iter().zip(&context.plan.shares).filter_map(beam).collect();
+    let beam = |(k, e): (usize, &Emitter)| Some((e.beam()?, of_shard(context.plan.rays_of_source(k))));
+    let beams: Vec<_> = context.bound.emitters.iter().enumerate().filter_map(beam).collect();
     context.intersector.prepare_for(&ExpectedRays { rays: of_shard(context.plan.rays), threads, beams: &beams });
 }
 
@@ -172,4 +176,15 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
 /// Number of replicates that a run is divided into.
 pub fn replicates(bound: &BoundScene, settings: &RunSettings) -> u32 {
     Plan::new(bound, settings).replicates
+}
+
+/// The replicates of a run that its settings ask for: all of them, or those from its first ray on.
+pub fn replicate_range(bound: &BoundScene, settings: &RunSettings) -> Range<u32> {
+    let plan = Plan::new(bound, settings);
+    plan.first_replicate..plan.replicates
+}
+
+/// Whether a run is divided into replicates of [`GROWING_REPLICATE`](super::GROWING_REPLICATE) rays, so that further ones may follow.
+pub fn grows(bound: &BoundScene, settings: &RunSettings) -> bool {
+    Plan::new(bound, settings).grows()
 }

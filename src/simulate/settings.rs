@@ -11,6 +11,11 @@ const WAVEFRONT: usize = 1024;
 pub struct RunSettings {
     /// Number of rays that leave the sources.
     pub rays: u64,
+    /// The first ray to trace of a run that grows, for a tally that joins those of the rays before it.
+    pub first_ray: u64,
+    /// Whether the run is divided into replicates of a fixed size, so that further rays may follow. Without, that is so where the rays
+    /// are many and a round number.
+    pub grows: bool,
     /// Seed of all random numbers.
     pub seed: u64,
     /// How sources are sampled.
@@ -55,6 +60,8 @@ impl From<&Run> for RunSettings {
     fn from(r: &Run) -> Self {
         Self {
             rays: r.rays,
+            first_ray: 0,
+            grows: false,
             seed: r.seed,
             sampling: r.sampling,
             interfaces: r.interfaces,

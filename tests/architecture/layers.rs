@@ -407,6 +407,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "mod",
         ],
     ),
+    ("simulate/emitter", &["measured", "stream", "area", "shape", "far mod", "packet", "simd_dispatch", "sampler"]),
     (
         "simulate/kernel",
         &[

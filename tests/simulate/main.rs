@@ -5,9 +5,11 @@ mod closed;
 mod contacts;
 mod effects;
 mod facets;
+mod far_sources;
 #[path = "../support/files.rs"]
 mod files;
 mod fixture_scenes;
+mod growing;
 mod hard;
 mod imaging;
 mod laid;

@@ -14,13 +14,13 @@ mod role;
 mod select;
 mod wavelengths;
 
-use super::body::AMBIENT;
+use super::body::{AMBIENT, Body};
 use super::emitter::{self, Emitter, Loaded};
 use super::receiver::Receiver;
-use super::scene::{Material, ReceiverKind, Scene};
+use super::scene::{Key, Material, ReceiverKind, Scene};
 use super::surfaces::{FaceOptics, Surface};
 use super::{Error, ErrorKind};
-use crate::math::Aabb;
+use crate::math::{Aabb, Vector};
 use crate::model::Model;
 pub use bound_scene::BoundScene;
 use chosen::ChosenRules;
@@ -62,7 +62,9 @@ impl Scene {
         }
         let receivers = bind_receivers(self, model)?;
         let faces_box = model.placed_faces().map(|f| nearest::face_bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
-        let region = faces_box.union(Aabb::from_points(emitters.iter().flat_map(Emitter::extent)));
+        let scene_box = receivers.iter().map(Receiver::bounds).fold(faces_box, Aabb::union);
+        start_near(self, &mut emitters, &bodies[AMBIENT as usize], &scene_box)?;
+        let region = emitters.iter().map(Emitter::extent).fold(faces_box, Aabb::union);
         let region = if region.is_empty() { region } else { region.grown(REGION_MARGIN * region.diagonal()) };
         let mut bound = BoundScene {
             scene: self.clone(),
@@ -133,6 +135,23 @@ fn bind_faces(
         face.medium_on_opaque = on_opaque;
     }
     Ok(Faces { faces, surfaces, touching_pairs })
+}
+
+/// Lets the rays of sources that are far away start beside the scene, which lies in a box. Surroundings that absorb or scatter take a
+/// part in what comes of them on their way; there they start where they are.
+fn start_near(scene: &Scene, emitters: &mut [Emitter], ambient: &Body, scene_box: &Aabb) -> Result<(), Error> {
+    if ambient.absorbs() || ambient.scatter.is_some() {
+        return Ok(());
+    }
+    for (i, emitter) in emitters.iter_mut().enumerate() {
+        let direction = Vector::from_array(scene.sources[i].direction);
+        emitter.start_near(scene_box, direction).map_err(|message| {
+            let at = [Key::Name("source"), Key::Index(i), Key::Name("at")];
+            let error = scene.error(ErrorKind::Value, &at, format!("this source cannot be traced: {message}"));
+            error.help("put it nearer, or make it `collimated`: from so far away its light is parallel")
+        })?;
+    }
+    Ok(())
 }
 
 fn bind_receivers(scene: &Scene, model: &Model) -> Result<Vec<Receiver>, Error> {

@@ -42,6 +42,13 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
     let intensity = |p: crate::formats::Photometry| {
         let sampler = IntensitySampler::new(&p).map_err(|e| scene.error(ErrorKind::Value, &at, e.to_string()))?;
         let flux = sampler.flux();
+        if !(flux > 0.0 && flux.is_finite()) {
+            return Err(scene.error(
+                ErrorKind::Value,
+                &at,
+                format!("the light of this file is no finite power: {flux}"),
+            ));
+        }
         Ok(Some(Loaded::Intensity(sampler, p.kind, flux)))
     };
     let list = |rays: Vec<LightRay>| {
@@ -51,6 +58,10 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
             sum
         };
         let sums: Vec<f64> = rays.iter().map(add).collect();
+        if !sum.is_finite() {
+            let error = scene.error(ErrorKind::Value, &at, "the powers of this list add up to no finite number");
+            return Err(error.help("give powers in the unit of the run"));
+        }
         if sum > 0.0 {
             Ok(Some(Loaded::Rays(RayList { rays, sums })))
         } else {

@@ -1,9 +1,10 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `measured`, `stream`, `area`, `shape`, this file, `packet`,
+//! Inner modules, each of which sees only those before it: `measured`, `stream`, `area`, `shape`, this file with `far`, `packet`,
 //! `simd_dispatch`, `sampler`.
 
 mod area;
+mod far;
 mod measured;
 mod packet;
 mod sampler;
@@ -18,10 +19,11 @@ use super::surfaces::SceneLight;
 use super::{Error, ErrorKind};
 use crate::formats::PhotometricType;
 use crate::intersect::Beam;
-use crate::math::{FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
+use crate::math::{Aabb, FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
 use crate::optics::{Spectrum, Wavelengths};
 pub(crate) use area::Area;
+use far::NearStart;
 pub(crate) use measured::{Loaded, load};
 pub(crate) use sampler::RaySampler;
 use shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, direction_about_axis, point_on_rectangle, radius_on_disc};
@@ -44,6 +46,8 @@ pub(crate) struct Emitter {
     frame: Frame,
     shape: Shape,
     lobe: Lobe,
+    /// Where the rays of a far source start.
+    near_start: Option<NearStart>,
 }
 
 /// What a ray has besides itself as it leaves its source.
@@ -110,6 +114,13 @@ impl Emitter {
         };
         let polarised = s.polarised.map(Vector::from_array);
         let power = s.power.unwrap_or(own_power);
+        if !scene::POWERS.contains(&power) {
+            let at = [scene::Key::Name("source"), scene::Key::Index(i), scene::Key::Name("file")];
+            let message = format!("the power of this file, {power:e}, is not within 1e-30 and 1e30");
+            return Err(scene
+                .error(ErrorKind::Value, &at, message)
+                .help("mend the file, or give the source's `power`"));
+        }
         Ok(Self {
             wavelengths,
             polarised,
@@ -120,6 +131,7 @@ impl Emitter {
             frame,
             shape,
             lobe,
+            near_start: None,
         })
     }
 
@@ -134,6 +146,8 @@ impl Emitter {
     pub(crate) fn beam(&self) -> Option<Beam> {
         let (origin, direction) = (self.frame.origin, self.frame.z);
         match (&self.shape, &self.lobe) {
+            // Their starts are moved, each along its own direction.
+            _ if self.near_start.is_some() => None,
             (Shape::Point, _) => Some(Beam::Point(origin)),
             (Shape::Disc(_) | Shape::Rectangle(_), Lobe::Collimated) => {
                 Some(Beam::Collimated { origin, direction })
@@ -142,14 +156,30 @@ impl Emitter {
         }
     }
 
-    /// Points around the places it shines from, faces and lists of rays left out.
-    pub(crate) fn extent(&self) -> [Point; 2] {
-        let size = match &self.shape {
+    /// Distance from its middle to the farthest place it shines from, mm; faces and lists of rays left out.
+    fn size(&self) -> f64 {
+        match &self.shape {
             Shape::Disc(radius) => *radius,
             Shape::Rectangle([a, b]) => a.hypot(*b),
             Shape::Point | Shape::Faces(_) | Shape::List(_) => 0.0,
-        };
-        [self.frame.origin - Vector::splat(size), self.frame.origin + Vector::splat(size)]
+        }
+    }
+
+    /// A box around the places it shines from; faces, lists of rays and what is far away left out.
+    pub(crate) fn extent(&self) -> Aabb {
+        if self.near_start.is_some() {
+            return Aabb::EMPTY;
+        }
+        let size = Vector::splat(self.size());
+        Aabb::from_points([self.frame.origin - size, self.frame.origin + size])
+    }
+
+    /// Moves the start of a ray of a far source to beside the scene.
+    #[inline(always)]
+    fn bring_near(&self, ray: &mut Ray) {
+        if let Some(near_start) = &self.near_start {
+            near_start.bring_near(ray);
+        }
     }
 
     #[inline(always)]

@@ -168,9 +168,10 @@ mod tests {
                 frame,
                 shape,
                 lobe,
+                near_start: None,
             };
             let rays = 5000;
-            let sampler = || RaySampler::new(&emitter, Stream::new(7, Sampling::Sobol, [3, 128], 0, rays), 100);
+            let sampler = || RaySampler::new(&emitter, Stream::new(7, Sampling::Sobol, 3, 0, rays), 100);
             let (mut batch, mut single) = (sampler(), sampler());
             let [mut a, mut b] = [Ray::new(Point::ZERO, Vector::Z); 2];
             let mut seen = vec![false; rays as usize];

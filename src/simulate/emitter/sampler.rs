@@ -33,10 +33,13 @@ impl RaySampler {
         }
         let index = self.index(self.stream.index_to_start(started));
         let Some(packet) = &self.packet else {
-            return (index, emitter.emit(&self.stream, index, ray));
+            let emission = emitter.emit(&self.stream, index, ray);
+            emitter.bring_near(ray);
+            return (index, emission);
         };
         let (origin, direction) = packet.ray(started as usize);
         *ray = Ray::new(origin, direction);
+        emitter.bring_near(ray);
         (index, Emission { from: None, wavelength: emitter.wavelength(&self.stream, index) })
     }
 
@@ -44,7 +47,9 @@ impl RaySampler {
     pub(crate) fn single_ray(&mut self, emitter: &Emitter, index: u32, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(index);
         let index = self.index(index);
-        (index, emitter.emit(&self.stream, index, ray))
+        let emission = emitter.emit(&self.stream, index, ray);
+        emitter.bring_near(ray);
+        (index, emission)
     }
 
     #[inline(always)]

@@ -38,8 +38,8 @@ pub(crate) struct Stream {
     sampling: Sampling,
     /// Scrambles of the dimensions of the net.
     scrambles: [u32; random::DIMENSIONS],
-    replicate: u32,
-    replicates: u32,
+    /// Which of how many interleaved lattices of places in a ray list it takes.
+    lattice: [u32; 2],
     /// Rays of this source in this replicate.
     rays: u32,
     /// The rays of a chunk in the order in which they start, and the numbers of the net for each, of the pairs that the source asks
@@ -59,34 +59,23 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
-    pub(crate) fn new(
-        seed: u64,
-        sampling: Sampling,
-        [replicate, replicates]: [u32; 2],
-        source: u32,
-        rays: u64,
-    ) -> Self {
+    pub(crate) fn new(seed: u64, sampling: Sampling, replicate: u32, source: u32, rays: u64) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
         let rays = rays.min(u64::from(u32::MAX)) as u32;
         let numbers = Default::default();
-        Self {
-            seed,
-            sampling,
-            scrambles,
-            replicate,
-            replicates,
-            rays,
-            order: Vec::new(),
-            pairs: [true; 3],
-            numbers,
-        }
+        Self { seed, sampling, scrambles, lattice: [0, 1], rays, order: Vec::new(), pairs: [true; 3], numbers }
     }
 
     /// The same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
     pub(super) fn with_pairs(self, pairs: [bool; 3]) -> Self {
         Self { pairs, ..self }
+    }
+
+    /// The same stream that takes, of a ray list, one of so many interleaved lattices of places.
+    pub(crate) fn with_lattice(self, lattice: [u32; 2]) -> Self {
+        Self { lattice, ..self }
     }
 
     pub(super) fn sampling(&self) -> Sampling {
@@ -217,10 +206,11 @@ impl Stream {
         Key { seed: self.seed, ray: index.in_run, branch: 0, bounce: pair }.pair(Purpose::Source)
     }
 
-    /// A number in `[0, 1)` that runs evenly through all rays of the source, each replicate taking every `replicates`-th step.
+    /// A number in `[0, 1)` that runs evenly through all rays of the source, each replicate taking a lattice of its own.
     pub(crate) fn systematic(&self, index: RayIndex) -> f64 {
         let jitter = self.random(index, 3)[0];
-        let step = f64::from(index.in_stream) + (f64::from(self.replicate) + jitter) / f64::from(self.replicates);
+        let [lattice, lattices] = self.lattice.map(f64::from);
+        let step = f64::from(index.in_stream) + (lattice + jitter) / lattices;
         (step / f64::from(self.rays.max(1))).min(1.0 - f64::EPSILON)
     }
 }

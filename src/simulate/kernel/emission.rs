@@ -53,14 +53,14 @@ impl SourceQueue {
 
     fn enter(&mut self, context: &Context<'_>, source: usize) {
         self.source = source;
-        let Some(share) = context.plan.shares.get(source) else { return };
-        self.range = share.range(self.replicate, context.plan.replicates);
+        let Some(emitter) = context.bound.emitters.get(source) else { return };
+        self.range = context.plan.range(source, self.replicate);
         self.next = self.range[0];
         let s = context.settings;
-        let replicate = [self.replicate, context.plan.replicates];
         let rays = self.range[1] - self.range[0];
-        let stream = Stream::new(s.seed, s.sampling, replicate, source as u32, rays);
-        self.sampler = Some(RaySampler::new(&context.bound.emitters[source], stream, self.range[0]));
+        let stream = Stream::new(s.seed, s.sampling, self.replicate, source as u32, rays)
+            .with_lattice(context.plan.lattice(self.replicate));
+        self.sampler = Some(RaySampler::new(emitter, stream, self.range[0]));
     }
 
     /// Starts the next ray that can start; `false` at the end of the replicate.

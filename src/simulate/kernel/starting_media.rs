@@ -10,7 +10,6 @@ use crate::math::{Point, Ray, Vector};
 use crate::simulate::bind::BoundScene;
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::{Emitter, RaySampler, Stream};
-use crate::simulate::plan::SourceShare;
 use crate::simulate::settings::RunSettings;
 
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
@@ -23,14 +22,14 @@ impl<'a> Context<'a> {
     /// What all replicates of a run share.
     pub(crate) fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
         let mut context = Self::without_media(bound, intersector, settings);
-        let sources = bound.emitters.iter().zip(&context.plan.shares).enumerate();
-        context.starting_media = sources.map(|(k, (e, share))| starting_media(&context, k, e, share)).collect();
+        let sources = bound.emitters.iter().enumerate();
+        context.starting_media = sources.map(|(k, e)| starting_media(&context, k, e)).collect();
         context
     }
 }
 
 /// What the rays of one source start in, from some of its rays.
-fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, share: &SourceShare) -> StartingMedia {
+fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> StartingMedia {
     let stated = emitter.media_stated || !context.bound.has_media();
     let replicates = context.plan.replicates;
     let probed = PROBED_RAYS.min(u64::from(replicates));
@@ -38,12 +37,13 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, share
     for k in 0..probed {
         // One ray of each of so many replicates: they are spread over the whole of a ray list.
         let replicate = (k * u64::from(replicates) / probed) as u32;
-        let [from, to] = share.range(replicate, replicates);
+        let [from, to] = context.plan.range(source, replicate);
         if from == to {
             continue;
         }
         let s = context.settings;
-        let stream = Stream::new(s.seed, s.sampling, [replicate, replicates], source as u32, to - from);
+        let stream = Stream::new(s.seed, s.sampling, replicate, source as u32, to - from)
+            .with_lattice(context.plan.lattice(replicate));
         let mut ray = Ray::new(Point::ZERO, Vector::Z);
         let index = ((to - from) * k / PROBED_RAYS) as u32;
         let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);

@@ -27,6 +27,7 @@ pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+pub(crate) use source::POWERS;
 pub use source::{Source, SourceKind};
 pub use spectrum::{SpectrumKey, SpectrumName};
 use std::collections::HashMap;

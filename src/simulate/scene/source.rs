@@ -229,7 +229,7 @@ impl Source {
 type Fault = Option<(&'static str, String)>;
 
 /// Powers that a source may have, in the unit of the run: sums over rays neither overflow nor vanish.
-const POWERS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
+pub(crate) const POWERS: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
 /// Largest exponent of a cosine lobe: 0.08° wide, below which a collimated source is meant.
 const LARGEST_EXPONENT: f64 = 1e6;

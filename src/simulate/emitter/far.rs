@@ -1,0 +1,166 @@
+//! Sources far away from the scene: their rays start beside it.
+//!
+//! A place 1 AU away is known to 0.03 mm in an `f64`, and so is every hit of a ray that starts there. A ray is the same wherever on it
+//! one starts: it is moved along its direction, with products and sums that keep what is rounded off.
+
+use super::{Emitter, Lobe, Shape};
+use crate::math::{Aabb, Point, Ray, Vector};
+
+/// Diagonals of the scene from which on a start is far: nearer, its rounding is below 10^-12 of the scene.
+const FAR_DIAGONALS: f64 = 1e3;
+
+/// Largest share of the scene's diagonal by which rounding may shift the rays of a source that is far and not collimated. They cross the
+/// scene side by side as evenly as before; by more than a hundredth of it their pattern would be that of rounding.
+const LARGEST_SHIFT: f64 = 1e-2;
+
+/// Rounding of a unit direction, and so of where its ray is after a unit of length.
+const DIRECTION_ROUNDING: f64 = f64::EPSILON;
+
+/// A number as the sum of two: the nearest `f64`, and what that is off.
+#[derive(Clone, Copy)]
+struct TwoFold {
+    high: f64,
+    low: f64,
+}
+
+impl TwoFold {
+    fn sum(a: f64, b: f64) -> Self {
+        let high = a + b;
+        let b_share = high - a;
+        Self { high, low: (a - (high - b_share)) + (b - b_share) }
+    }
+
+    fn product(a: f64, b: f64) -> Self {
+        let high = a * b;
+        Self { high, low: a.mul_add(b, -high) }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        let s = Self::sum(self.high, other.high);
+        Self::sum(s.high, s.low + self.low + other.low)
+    }
+
+    fn times(self, x: f64) -> Self {
+        let p = Self::product(self.high, x);
+        Self::sum(p.high, p.low + self.low * x)
+    }
+
+    fn over(self, divisor: Self) -> Self {
+        let first = self.high / divisor.high;
+        let remainder = self.plus(divisor.times(-first));
+        Self::sum(first, remainder.high / divisor.high)
+    }
+
+    fn value(self) -> f64 {
+        self.high + self.low
+    }
+}
+
+/// The point of a line nearest to `centre`, for any length of `direction`; exact but for its last rounding.
+fn foot_on_line(origin: Point, direction: Vector, centre: Point) -> Point {
+    let zero = TwoFold { high: 0.0, low: 0.0 };
+    let along = (0..3).fold(zero, |sum, k| sum.plus(TwoFold::sum(centre[k], -origin[k]).times(direction[k])));
+    let square = (0..3).fold(zero, |sum, k| sum.plus(TwoFold::product(direction[k], direction[k])));
+    let t = along.over(square);
+    Point::from_array([0, 1, 2].map(|k| t.times(direction[k]).plus(TwoFold { high: origin[k], low: 0.0 }).value()))
+}
+
+/// Where the rays of a far source start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NearStart {
+    centre: Point,
+    /// Distance before the point nearest to the centre, mm: as far as the scene reaches.
+    before: f64,
+    /// Distance from the centre from which on a start is moved, mm.
+    far: f64,
+}
+
+impl NearStart {
+    /// Moves the start of a ray that comes from far away to beside the scene.
+    #[inline(always)]
+    pub(super) fn bring_near(&self, ray: &mut Ray) {
+        let to_centre = self.centre - ray.origin;
+        if to_centre.length_squared() > self.far * self.far {
+            let t = to_centre.dot(ray.direction) - self.before;
+            if t > 0.0 {
+                let [o, d] = [ray.origin, ray.direction];
+                ray.origin = Point::new(d.x.mul_add(t, o.x), d.y.mul_add(t, o.y), d.z.mul_add(t, o.z));
+            }
+        }
+    }
+}
+
+impl Emitter {
+    /// Makes rays that come from far away start beside the scene, which lies in `scene_box`. `direction` is the axis of the source as it
+    /// was given, of any length.
+    ///
+    /// # Errors
+    /// When the source is so far away that its rays are not known within the scene; with what is wrong.
+    pub(crate) fn start_near(&mut self, scene_box: &Aabb, direction: Vector) -> Result<(), String> {
+        if scene_box.is_empty() {
+            return Ok(());
+        }
+        let centre = scene_box.center();
+        let diagonal = scene_box.diagonal();
+        let far = FAR_DIAGONALS * diagonal.max(f64::MIN_POSITIVE);
+        let size = self.size();
+        let distance = self.farthest_start(centre);
+        if !distance.is_finite() {
+            return Err("it lies farther away than numbers reach".into());
+        }
+        if distance <= far {
+            return Ok(());
+        }
+        let collimated = matches!(self.lobe, Lobe::Collimated)
+            && matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
+        if collimated && size <= far {
+            // The whole source moves along its direction, to before the scene, unless it shines away from it.
+            let foot = foot_on_line(self.frame.origin, direction, centre);
+            if (centre - self.frame.origin).dot(self.frame.z) > 0.0 {
+                self.frame.origin = foot - self.frame.z * diagonal;
+            }
+            return Ok(());
+        }
+        let shift = distance * DIRECTION_ROUNDING;
+        if shift > LARGEST_SHIFT * diagonal {
+            return Err(format!(
+                "it lies {distance:.1e} mm away from a scene of {diagonal:.1e} mm, where rounding shifts its rays by {shift:.1e} mm"
+            ));
+        }
+        self.near_start = Some(NearStart { centre, before: diagonal, far });
+        Ok(())
+    }
+
+    /// Distance from a point to the farthest start of its rays, mm.
+    fn farthest_start(&self, centre: Point) -> f64 {
+        match &self.shape {
+            Shape::Faces(_) => 0.0,
+            Shape::List(list) => {
+                let starts = list.rays.iter().map(|r| self.frame.point(r.origin));
+                starts.map(|p| (p - centre).length()).fold(0.0, f64::max)
+            }
+            Shape::Point | Shape::Disc(_) | Shape::Rectangle(_) => {
+                (self.frame.origin - centre).length() + self.size()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pythagorean directions and whole coordinates: the foot is known to the last bit, and single precision of products misses it.
+    #[test]
+    fn the_foot_on_a_line_from_afar_is_exact() {
+        let au = 2f64.powi(47);
+        for (d, offset) in [
+            (Vector::new(2.0, 3.0, 6.0), Vector::new(3.0, -2.0, 0.0)),
+            (Vector::new(-1.0, 4.0, 8.0), Vector::new(4.0, 1.0, 0.0)),
+        ] {
+            let centre = Point::new(7.0, -5.0, 11.0);
+            let origin = centre + offset - d * au;
+            assert_eq!(foot_on_line(origin, d, centre), centre + offset);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Runs that grow: further rays join those that were traced, and the bits are those of one run of all of them.
+
+use crate::support::World;
+use lampyris::math::Point;
+use lampyris::simulate::{BoundScene, Hooks, PartialRun, Results, RunSettings, Scene, replay, trace};
+use std::path::Path;
+
+/// A glass ball between two sources of unequal power, one of them weak, and a screen.
+fn ball() -> (World, BoundScene) {
+    let mut world = World::default();
+    world.sphere("ball", Point::ZERO, 5.0);
+    let text = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'ball'\nmedium = 'glass'\n\
+        [[source]]\nkind = 'collimated'\nat = [0, 0, -20]\nradius = 4\npower = 3\n\
+        [[source]]\nkind = 'point'\nat = [0, 9, -9]\npower = 1e-5\n\
+        [[receiver]]\nname = 'screen'\nat = [0, 0, 12]\nsize = [20, 20]\ncells = [8, 8]\n\
+        [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [8, 8]\n";
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    (world, bound)
+}
+
+fn part(rays: [u64; 2], shard: [u32; 2], from: Option<PartialRun>) -> PartialRun {
+    let (world, bound) = ball();
+    let settings =
+        RunSettings { rays: rays[1], first_ray: rays[0], grows: true, shard, threads: 2, ..RunSettings::default() };
+    trace(&bound, &world, &settings, from, &Hooks::with_progress(&|_| true)).partial
+}
+
+fn results(partial: PartialRun) -> Results {
+    let (_, bound) = ball();
+    let settings = RunSettings { rays: 20_000, grows: true, ..RunSettings::default() };
+    let traced = lampyris::simulate::Traced { partial, ..Default::default() };
+    Results::new(&bound, &settings, traced)
+}
+
+#[test]
+fn further_rays_give_the_bits_of_one_run() {
+    let whole = part([0, 60_000], [0, 1], None);
+    assert!(whole.is_whole());
+    // The later rays first, in three shards, then the earlier ones.
+    let mut sum = part([20_000, 60_000], [2, 3], None);
+    assert!(!sum.is_whole());
+    for piece in [part([0, 20_000], [0, 1], None), part([20_000, 60_000], [0, 3], None)] {
+        sum.merge(&piece).unwrap();
+    }
+    assert!(sum.merge(&part([0, 5_000], [0, 1], None)).is_err(), "rays count once");
+    sum.merge(&part([20_000, 60_000], [1, 3], None)).unwrap();
+    assert_eq!((sum.is_whole(), &sum.done, &sum.tallies), (true, &whole.done, &whole.tallies));
+    let [a, b] = [results(sum), results(whole.clone())];
+    assert_eq!(a.digest, b.digest);
+    for (a, b) in a.receivers.iter().zip(&b.receivers) {
+        assert_eq!((a.power, a.power_error, &a.cells, &a.errors), (b.power, b.power_error, &b.cells, &b.errors));
+    }
+    // What was done is gone on with.
+    let grown = part([0, 60_000], [0, 1], Some(part([0, 25_000], [0, 1], None)));
+    assert_eq!(grown.tallies, whole.tallies);
+}
+
+/// A weak source has a ray in every replicate, of its own small power, so that no power is lost or made up.
+#[test]
+fn every_replicate_emits_the_power_of_all_sources() {
+    let r = results(part([0, 20_000], [0, 1], None));
+    assert!((r.power.emitted / 3.00001 - 1.0).abs() < 1e-12 && r.power.imbalance() < 1e-12, "{:?}", r.power);
+    assert_eq!(r.tallies.replicates, 4);
+    assert_eq!(r.tallies.ends[0].error(4), 0.0, "all replicates emit the same");
+}
+
+/// More shards than replicates: some hold nothing, and together they hold everything once.
+#[test]
+fn there_may_be_more_shards_than_replicates() {
+    let mut sum = part([0, 10_000], [0, 7], None);
+    for k in 1..7 {
+        sum.merge(&part([0, 10_000], [k, 7], None)).unwrap();
+    }
+    assert_eq!(sum.tallies, part([0, 10_000], [0, 1], None).tallies);
+}
+
+#[test]
+fn a_ray_of_a_run_that_grows_can_be_traced_again() {
+    let (world, bound) = ball();
+    let settings = RunSettings { rays: 20_000, grows: true, ..RunSettings::default() };
+    for ray in [0, 4_999, 5_000, 12_345] {
+        let r = replay(&bound, &world, &settings, &[ray]);
+        assert!(r.rays == 1 && r.paths.iter().all(|v| v.ray == ray) && !r.paths.is_empty(), "{ray}");
+    }
+    assert_eq!(replay(&bound, &world, &settings, &[30_000]).rays, 0);
+}
+
+/// Round numbers of many rays are divided so without being asked to.
+#[test]
+fn large_round_runs_can_grow() {
+    let (world, bound) = ball();
+    let run = |rays: u64| {
+        let settings = RunSettings { rays, threads: 2, ..RunSettings::default() };
+        trace(&bound, &world, &settings, None, &Hooks::with_progress(&|_| true)).partial
+    };
+    let large = run(640_000);
+    assert!(large.grows && large.replicates == 128);
+    assert_eq!(part([0, 640_000], [0, 1], None).tallies, large.tallies);
+    assert!(!run(20_000).grows);
+}
