@@ -249,6 +249,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "orientation",
             "topology",
             "styles",
+            "purpose",
             "assembly",
             "placed_count",
             "tessellated",

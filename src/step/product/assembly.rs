@@ -4,6 +4,7 @@
 //! CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs, and inside representations along relationships and MAPPED_ITEMs.
 //! What holds shapes and is reached by no product is placed where it is.
 
+use super::purpose::{holds_mesh, purpose_besides_shape};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{FARTHEST_MM, Geometry};
@@ -254,7 +255,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             if self.reached.contains(&id) || mapped.contains(&id) {
                 continue;
             }
-            if let Some(aspect) = self.aspects.get(&id) {
+            // A ready mesh is named by its aspect alone.
+            if let Some(aspect) = self.aspects.get(&id).filter(|_| !holds_mesh(self.file, &self.items(id))) {
                 let what = format!("#{aspect} {}", self.file.entity_name(*aspect));
                 self.left_out.push((
                     id,
@@ -302,8 +304,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let usages = self.usages.remove(&definition).unwrap_or_default();
         for usage in &usages {
             let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
-            let inner = [owners, &[usage.id]].concat();
-            self.place_product(usage.child, placement.compose(&local), usage.name.clone(), path, &inner);
+            let at = placement.compose(&local);
+            self.place_product(usage.child, at, usage.name.clone(), path, &[owners, &[usage.id]].concat());
         }
         self.usages.insert(definition, usages);
         path.pop();
@@ -383,18 +385,4 @@ impl<'f, 'a> Assembly<'f, 'a> {
 /// Attributes of a property definition, the third of which is what it describes; subtypes add none.
 fn described<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
     definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
-}
-
-/// What a representation is for, when that is not the shape of a product.
-fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static str> {
-    let e = file.entity(id)?;
-    let has = |word: &str| e.keywords().any(|k| k.contains(word));
-    if has("CONSTRUCTIVE_GEOMETRY") {
-        return Some("holds construction geometry");
-    }
-    if has("DRAUGHTING") {
-        return Some("holds annotations of a drawing");
-    }
-    let shows = |k: &str| k.starts_with("PRESENTATION") || k.contains("_PRESENTATION_");
-    e.keywords().any(shows).then_some("says how something is shown")
 }

@@ -12,6 +12,7 @@ mod loop_order;
 pub(super) mod numbering;
 mod orientation;
 mod placed_count;
+mod purpose;
 mod recipe_parts;
 mod solid_recipes;
 pub(super) mod styles;

@@ -1,0 +1,23 @@
+//! What representations are for.
+
+use crate::step::part21::File;
+
+/// What a representation is for, when that is not the shape of a product.
+pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static str> {
+    let e = file.entity(id)?;
+    let has = |word: &str| e.keywords().any(|k| k.contains(word));
+    if has("CONSTRUCTIVE_GEOMETRY") {
+        return Some("holds construction geometry");
+    }
+    if has("DRAUGHTING") {
+        return Some("holds annotations of a drawing");
+    }
+    let shows = |k: &str| k.starts_with("PRESENTATION") || k.contains("_PRESENTATION_");
+    e.keywords().any(shows).then_some("says how something is shown")
+}
+
+/// Whether one of these items is a ready mesh.
+pub(super) fn holds_mesh(file: &File<'_>, items: &[u64]) -> bool {
+    let mesh = |k: &str| k.contains("TRIANGULATED") || k.starts_with("TESSELLATED");
+    items.iter().any(|i| file.entity(*i).is_some_and(|e| e.keywords().any(mesh)))
+}
