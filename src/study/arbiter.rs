@@ -25,6 +25,10 @@ const CULL_ROUNDING: f64 = 1e-9;
 /// Rounding of a distance against the ends of the ray's range, relative: 4500 units in the last place.
 const RANGE_ROUNDING: f64 = 1e-12;
 
+/// Distance along a ray from which on a crossing of the facet that it leaves is a hit on its other half, mm: starts are rounded to
+/// far less.
+const LEAST_OWN_DISTANCE: f64 = 1e-6;
+
 /// Which of two differing answers is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -47,7 +51,14 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     for f in (0..mesh.facets.len()).filter(|&f| passes_near(ray, &mesh.corners(f))) {
         let [a, b, c, d] = mesh.corners(f);
         let second = (!mesh.facets[f].is_triangle()).then_some([a, c, d]);
-        met.extend(std::iter::once([a, b, c]).chain(second).filter_map(|corners| meets(ray, corners)));
+        // The facet that the ray leaves is met where it starts, which is no hit; its other half may be met farther on.
+        let own = ray.departure.is_some_and(|departure| departure.primitive as usize == f);
+        met.extend(
+            std::iter::once([a, b, c])
+                .chain(second)
+                .filter_map(|corners| meets(ray, corners))
+                .filter(|hit| !own || hit.t > LEAST_OWN_DISTANCE),
+        );
     }
     // Of a hit within the band, a neighbour that faces the same way makes the surface go on; at a silhouette, where
     // they face both ways, and on a border the ray may as well pass by.

@@ -289,6 +289,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "records",
             "arbiter",
             "rays",
+            "surface_rays",
             "sample_models",
             "lamp",
             "tolerance_plan",

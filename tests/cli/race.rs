@@ -15,8 +15,8 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
-    // Six entrants, three kinds of rays; batch and single on one thread, batch on two.
-    assert_eq!(rows.len(), 6 * 3 * 3);
+    // Six entrants, four kinds of rays; batch and single on one thread, batch on two.
+    assert_eq!(rows.len(), 6 * 4 * 3);
     for row in rows {
         assert!(row["mrays_per_s_median"].as_f64().unwrap() > 0.0, "{row}");
         assert!(row["facets"].as_u64().unwrap() > 100, "{row}");
@@ -28,6 +28,9 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     for threads in [1, 2] {
         assert!(rows.iter().any(|r| r["threads"] == threads && r["rays_kind"] == "adversarial"));
     }
+    let surface: Vec<_> = rows.iter().filter(|r| r["rays_kind"] == "surface").collect();
+    assert_eq!(surface.len(), 6 * 3);
+    assert!(surface.iter().all(|r| r["hits"].as_u64() > Some(0) && r["hits"].as_u64() <= r["rays"].as_u64()));
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let text = String::from_utf8(read("octree.txt")).unwrap();
     for part in ["depth", "listed", "bytes a facet", "incoherent rays:", "nodes and", "blocks of 1, 2, 3, 4 facets"]

@@ -17,6 +17,7 @@ use crate::study::Progress;
 use crate::study::arbiter::{Verdict, arbitrate, same_distance};
 use crate::study::cross_check::{Competitor, measure};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
+use crate::study::surface_rays::SurfacePaths;
 use crate::tessellate::{self, tessellate};
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -94,14 +95,17 @@ impl BvhBenchmark {
         ];
         let bounds = mesh.bounds();
         let bounces = Bounces::new(&bounds, &octree, 4.0 * tolerance, seed, count);
-        let kinds: [(&str, Vec<Ray>); 3] = [
+        let surface = SurfacePaths::new(mesh, &octree, seed, count);
+        let kinds: [(&str, Vec<Ray>); 4] = [
             ("coherent", Camera::new(&bounds, count).rays(0..count)),
             ("incoherent", bounces.rays(0..count)),
+            ("surface", surface.rays(0..count)),
             ("adversarial", edge_rays(mesh, &bounds, seed, count)),
         ];
         let mut shape = OctreeShape::new(&octree);
         for (kind, rays) in &kinds {
             let truth = answers(&octree, rays).0;
+            let hits = truth.iter().flatten().count();
             let judged: Vec<(Comparison, Cost)> = (entrants.iter())
                 .map(|(_, _, who)| {
                     let (hits, cost) = answers(*who, rays);
@@ -139,6 +143,7 @@ impl BvhBenchmark {
                         "build_seconds": footprint.build_seconds,
                         "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
                         "nodes_per_ray": per_ray(cost.nodes), "tests_per_ray": per_ray(cost.tests),
+                        "rays": rays.len(), "hits": hits,
                         "wrong": wrong, "differs": comparison.differs, "undecided": comparison.undecided,
                     }));
                 }

@@ -1,0 +1,103 @@
+//! Surface rays, as a simulation asks most: they start on facets, where the ray before them hit.
+
+use super::Random;
+use super::rays::RaySource;
+use crate::intersect::{Cost, Intersector};
+use crate::math::{Departure, Ray, Uv, Vector};
+use crate::mesh::FacetMesh;
+use std::ops::Range;
+
+/// Rays of one path: it ends earlier where it leaves the model, and the next one begins.
+pub const PATH: u64 = 4;
+
+/// Paths of up to four rays that leave facets to either side in cosine-distributed directions; the first starts anywhere on the facets,
+/// uniform by area.
+pub struct SurfacePaths<'a> {
+    mesh: &'a FacetMesh,
+    guide: &'a dyn Intersector,
+    /// Area of the facets up to each, mm².
+    areas: Vec<f64>,
+    seed: u64,
+    count: u64,
+}
+
+impl<'a> SurfacePaths<'a> {
+    /// `guide` finds the points that the rays after the first leave, on the facets of `mesh`.
+    pub fn new(mesh: &'a FacetMesh, guide: &'a dyn Intersector, seed: u64, count: u64) -> Self {
+        let mut sum = 0.0;
+        let areas: Vec<f64> = (0..mesh.facets.len())
+            .map(|facet| {
+                sum += mesh.facet_area(facet);
+                sum
+            })
+            .collect();
+        // Without area there is nowhere to start.
+        let count = if sum > 0.0 { count } else { 0 };
+        Self { mesh, guide, areas, seed, count }
+    }
+
+    /// The rays of a path: at the end of a shorter one the others start anew, so that each has its index.
+    fn path(&self, path: u64) -> Vec<Ray> {
+        let mut random = Random::new(self.seed ^ 0x2f6b_1c09_a3d5_e871, path);
+        let mut rays = Vec::with_capacity(PATH as usize);
+        let mut ray = self.first(&mut random);
+        for _ in 0..PATH {
+            rays.push(ray);
+            ray = match self.guide.intersect(&ray, &mut Cost::default()) {
+                Some(hit) => {
+                    let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+                    let departure = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+                    let direction = cosine_direction(&mut random, hit.geometric_normal * side);
+                    Ray::new(ray.point_at(hit.t), direction).with_departure(departure)
+                }
+                None => self.first(&mut random),
+            };
+        }
+        rays
+    }
+
+    /// A ray from anywhere on the first triangle of a facet.
+    fn first(&self, random: &mut Random) -> Ray {
+        loop {
+            let all = self.areas.last().copied().unwrap_or(0.0);
+            let wanted = random.unit() * all;
+            let facet = self.areas.partition_point(|&area| area < wanted).min(self.areas.len() - 1);
+            let [a, b, c, _] = self.mesh.corners(facet);
+            let (mut u, mut v) = (random.unit(), random.unit());
+            if u + v > 1.0 {
+                u = 1.0 - u;
+                v = 1.0 - v;
+            }
+            let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            // The first triangle of a facet may be a line where the second has all its area.
+            if let Some(normal) = (b - a).cross(c - a).try_normalize() {
+                let departure =
+                    Departure { face: self.mesh.facets[facet].face, primitive: facet as u32, uv: Uv::ZERO };
+                let direction = cosine_direction(random, normal * side);
+                return Ray::new(a + (b - a) * u + (c - a) * v, direction).with_departure(departure);
+            }
+        }
+    }
+}
+
+/// A direction about a normal, cosine-distributed: the normal and a uniform direction added up.
+fn cosine_direction(random: &mut Random, normal: Vector) -> Vector {
+    (normal + random.direction()).try_normalize().unwrap_or(normal)
+}
+
+impl RaySource for SurfacePaths<'_> {
+    fn len(&self) -> u64 {
+        self.count
+    }
+    fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        let range = range.start..range.end.min(self.count);
+        let mut rays = Vec::new();
+        let mut path = range.start / PATH;
+        while path * PATH < range.end {
+            let indexed = (path * PATH..).zip(self.path(path));
+            rays.extend(indexed.filter(|(index, _)| range.contains(index)).map(|(_, ray)| ray));
+            path += 1;
+        }
+        rays
+    }
+}
