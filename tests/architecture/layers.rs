@@ -409,7 +409,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "mod",
         ],
     ),
-    ("simulate/emitter", &["measured", "stream", "area", "shape", "far mod", "packet", "simd_dispatch", "sampler"]),
+    (
+        "simulate/emitter",
+        &["ray_list", "measured", "stream", "area", "shape", "far mod", "packet", "simd_dispatch", "sampler"],
+    ),
     (
         "simulate/kernel",
         &[

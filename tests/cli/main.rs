@@ -12,6 +12,7 @@ mod names;
 mod newcomer;
 mod overrides;
 mod race;
+mod ray_files;
 mod receiver_files;
 mod runs;
 mod scene;

@@ -43,6 +43,7 @@ impl Scene {
             self.sources.iter().enumerate().map(|(i, s)| emitter::load(self, i, s)).collect::<Result<_, _>>()?;
         let light = wavelengths::scene_light(self, &loaded);
         let ranges = wavelengths::source_ranges(self, &loaded);
+        let file_notes = notes::source_files(self, &loaded);
         // Bodies, from the rules that give media.
         let chosen = chosen::choose_rules(self, model)?;
         let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light)?;
@@ -81,6 +82,7 @@ impl Scene {
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             notes: notes::beyond_tables(self, &chosen, &ranges),
         };
+        bound.notes.extend(file_notes);
         bound.notes.extend(notes::openings(&bound, model));
         bound.notes.extend(notes::films(&bound));
         Ok(bound)

@@ -6,6 +6,7 @@ use super::chosen::ChosenRules;
 use crate::model::{Model, PlacedFace};
 use crate::optics::catalogue;
 use crate::simulate::body::AMBIENT;
+use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
 use std::collections::BTreeSet;
 
@@ -44,13 +45,28 @@ fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<Str
     let [from, to] = known.range;
     let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
-    let whose = match scene.sources.get(source).map(|s| s.name.as_str()) {
-        Some(name) if !name.is_empty() => format!("the source '{name}'"),
-        _ => format!("[[source]] {}", source + 1),
-    };
+    let whose = source_label(scene, source);
     let light = if a == b { format!("{a} nm") } else { format!("{a} to {b} nm") };
     let known_for = if from == to { format!("{from} nm alone") } else { format!("{from} to {to} nm") };
     Some(format!("{} is known for {known_for}, but {whose} has light of {light}: {}", known.what, known.beyond))
+}
+
+/// A source as sentences name it.
+fn source_label(scene: &Scene, source: usize) -> String {
+    match scene.sources.get(source).map(|s| s.name.as_str()) {
+        Some(name) if !name.is_empty() => format!("the source '{name}'"),
+        _ => format!("[[source]] {}", source + 1),
+    }
+}
+
+/// What the readers of the sources' files changed or supposed.
+pub(super) fn source_files(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for (index, loaded) in loaded.iter().enumerate() {
+        let Some(Loaded::Rays(list)) = loaded else { continue };
+        sentences.extend(list.notes.iter().map(|note| format!("{}: {note}", source_label(scene, index))));
+    }
+    sentences
 }
 
 fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {

@@ -1,7 +1,8 @@
 //! The wavelengths of the sources, and whether every medium has an index there.
 
+use crate::optics::Wavelengths;
 use crate::simulate::body::Body;
-use crate::simulate::emitter::Loaded;
+use crate::simulate::emitter::{Loaded, RayList};
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::surfaces::SceneLight;
 use crate::simulate::{Error, ErrorKind};
@@ -18,22 +19,26 @@ const LAST_PROBE: f64 = 64.001;
 pub(super) fn scene_light(scene: &Scene, loaded: &[Option<Loaded>]) -> SceneLight {
     let lines = scene.sources.iter().zip(loaded).flat_map(|(s, loaded)| match (&s.spectrum, loaded) {
         (Some(key), _) => vec![key.optics().ok().and_then(|s| s.single_line())],
-        (None, Some(Loaded::Rays(list))) => {
-            let mut all: Vec<f64> = list.rays.iter().filter_map(|r| r.wavelength_nm).collect();
-            all.sort_by(f64::total_cmp);
-            all.dedup();
-            match all[..] {
-                [] => vec![Some(scene.run.wavelength_nm)],
-                [one] => vec![Some(one)],
-                _ => vec![None],
-            }
-        }
+        (None, Some(Loaded::Rays(list))) => vec![single_wavelength(list, scene)],
         _ => vec![Some(scene.run.wavelength_nm)],
     });
     let lines: Vec<Option<f64>> = lines.collect();
     let first = lines.first().copied().flatten();
     let coloured = first.is_none() || lines.iter().any(|l| *l != first);
     SceneLight { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
+}
+
+/// The only wavelength of a list of rays; `None` where it has several.
+fn single_wavelength(list: &RayList, scene: &Scene) -> Option<f64> {
+    if let Some(spectrum) = &list.spectrum {
+        let [first, last] = spectrum.range_nm();
+        return (first == last).then_some(first);
+    }
+    match list.own_wavelengths()[..] {
+        [] => Some(scene.run.wavelength_nm),
+        [one] => Some(one),
+        _ => None,
+    }
 }
 
 /// First and last wavelength of each source, nm.
@@ -43,6 +48,7 @@ pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f6
     (scene.sources.iter().zip(loaded))
         .map(|(source, loaded)| match (&source.spectrum, loaded) {
             (Some(key), _) => key.wavelengths(scene.run.unit).map_or(run, |s| s.range_nm()),
+            (None, Some(Loaded::Rays(RayList { spectrum: Some(spectrum), .. }))) => spectrum.range_nm(),
             (None, Some(Loaded::Rays(list))) => {
                 let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
                 all.fold(None, |r: Option<[f64; 2]>, nm| {
@@ -55,16 +61,20 @@ pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f6
         .collect()
 }
 
+/// Wavelengths over the whole of a spectrum.
+fn probes(spectrum: &Wavelengths) -> Vec<f64> {
+    (0..=PROBES).map(|k| spectrum.sample(f64::from(k) / LAST_PROBE)).collect()
+}
+
 /// Every medium must have an index at every wavelength of the sources.
 pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[Body]) -> Result<(), Error> {
     for (i, (source, loaded)) in scene.sources.iter().zip(loaded).enumerate() {
         let mut wavelengths: Vec<f64> = match (&source.spectrum, loaded) {
             (Some(key), _) => {
-                let sampler = key.wavelengths(scene.run.unit).ok();
-                sampler
-                    .map_or_else(Vec::new, |s| (0..=PROBES).map(|k| s.sample(f64::from(k) / LAST_PROBE)).collect())
+                key.wavelengths(scene.run.unit).map_or_else(|_| Vec::new(), |spectrum| probes(&spectrum))
             }
-            (None, Some(Loaded::Rays(list))) => list.rays.iter().filter_map(|r| r.wavelength_nm).collect(),
+            (None, Some(Loaded::Rays(RayList { spectrum: Some(spectrum), .. }))) => probes(spectrum),
+            (None, Some(Loaded::Rays(list))) => list.own_wavelengths(),
             _ => vec![scene.run.wavelength_nm],
         };
         wavelengths.sort_by(f64::total_cmp);

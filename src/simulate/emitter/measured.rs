@@ -1,8 +1,9 @@
 //! Sources that were measured: luminous intensities and lists of rays, read from files.
 
-use crate::formats::{LightRay, PhotometricType, read_data1, read_eulumdat, read_ies, read_rays};
+use super::ray_list::RayList;
+use crate::formats::{Flux, PhotometricType, RaySet, read_data1, read_eulumdat, read_ies, read_ray_set};
 use crate::optics::IntensitySampler;
-use crate::simulate::scene::{Key, Scene, Source, SourceKind};
+use crate::simulate::scene::{Key, PowerUnit, Scene, Source, SourceKind};
 use crate::simulate::{Error, ErrorKind};
 
 /// What the file of a source holds.
@@ -11,26 +12,6 @@ pub(crate) enum Loaded {
     /// A measured intensity, the type of its angles and its flux.
     Intensity(IntensitySampler, PhotometricType, f64),
     Rays(RayList),
-}
-
-/// Measured rays, to be drawn in proportion to their power; at least one, and one with power.
-#[derive(Clone, Debug)]
-pub(crate) struct RayList {
-    pub(crate) rays: Vec<LightRay>,
-    /// Power up to and including each ray.
-    sums: Vec<f64>,
-}
-
-impl RayList {
-    pub(crate) fn power(&self) -> f64 {
-        self.sums[self.sums.len() - 1]
-    }
-
-    /// The ray at a share of the summed power.
-    pub(crate) fn ray_at_share(&self, share: f64) -> &LightRay {
-        let at = share * self.power();
-        &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
-    }
 }
 
 /// Reads the file of a source, when it has one.
@@ -51,28 +32,22 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
         }
         Ok(Some(Loaded::Intensity(sampler, p.kind, flux)))
     };
-    let list = |rays: Vec<LightRay>| {
-        let mut sum = 0.0;
-        let add = |r: &LightRay| {
-            sum += r.power;
-            sum
-        };
-        let sums: Vec<f64> = rays.iter().map(add).collect();
-        if !sum.is_finite() {
-            let error = scene.error(ErrorKind::Value, &at, "the powers of this list add up to no finite number");
-            return Err(error.help("give powers in the unit of the run"));
-        }
-        if sum > 0.0 {
-            Ok(Some(Loaded::Rays(RayList { rays, sums })))
-        } else {
-            Err(scene.error(ErrorKind::Value, &at, "the rays of this list carry no power"))
-        }
+    let list = |set: RaySet| match RayList::new(set, source, scene.run.unit) {
+        Ok(list) => Ok(Some(Loaded::Rays(list))),
+        Err(fault) => Err(scene.error(ErrorKind::Value, &at, fault.message).help(fault.help)),
+    };
+    let flux = match scene.run.unit {
+        PowerUnit::Watt => Flux::Radiant,
+        PowerUnit::Lumen => Flux::Luminous,
     };
     match source.kind {
         SourceKind::Ies => intensity(read_ies(&path).map_err(unreadable)?),
         SourceKind::Eulumdat => intensity(read_eulumdat(&path).map_err(unreadable)?),
-        SourceKind::Rays => list(read_rays(&path).map_err(unreadable)?),
-        SourceKind::Data1 => list(read_data1(&path).map_err(unreadable)?),
+        SourceKind::Rays => list(read_ray_set(&path, flux).map_err(unreadable)?),
+        SourceKind::Data1 => {
+            let rays = read_data1(&path).map_err(unreadable)?;
+            list(RaySet { rays, flux: None, spectrum: None, notes: Vec::new() })
+        }
         _ => Ok(None),
     }
 }

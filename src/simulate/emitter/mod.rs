@@ -1,12 +1,13 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `measured`, `stream`, `area`, `shape`, this file with `far`, `packet`,
+//! Inner modules, each of which sees only those before it: `ray_list`, `measured`, `stream`, `area`, `shape`, this file with `far`, `packet`,
 //! `simd_dispatch`, `sampler`.
 
 mod area;
 mod far;
 mod measured;
 mod packet;
+mod ray_list;
 mod sampler;
 mod shape;
 mod simd_dispatch;
@@ -25,6 +26,7 @@ use crate::optics::{Spectrum, Wavelengths};
 pub(crate) use area::Area;
 use far::NearStart;
 pub(crate) use measured::{Loaded, load};
+pub(crate) use ray_list::RayList;
 pub(crate) use sampler::RaySampler;
 use shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, direction_about_axis, point_on_rectangle, radius_on_disc};
 use smallvec::SmallVec;
@@ -87,6 +89,8 @@ impl Emitter {
             _ => Lobe::Cone(-1.0),
         };
         let mut own_power = 1.0;
+        // Drawn where the scene gives no spectrum; without, by the rays' own wavelengths or the run's.
+        let mut list_spectrum = None;
         let mut coloured_list = false;
         match loaded {
             Some(Loaded::Intensity(sampler, kind, flux)) => {
@@ -102,6 +106,7 @@ impl Emitter {
             Some(Loaded::Rays(list)) => {
                 own_power = list.power();
                 coloured_list = list.rays.iter().any(|r| r.wavelength_nm.is_some());
+                list_spectrum = list.spectrum.clone();
                 shape = Shape::List(list);
             }
             None => {}
@@ -109,6 +114,7 @@ impl Emitter {
         let wavelengths = match (&s.spectrum, light.coloured) {
             (_, false) => None,
             (None, true) if coloured_list => None,
+            (None, true) if list_spectrum.is_some() => list_spectrum,
             (None, true) => Spectrum::line(scene.run.wavelength_nm).sampler().ok(),
             (Some(key), true) => key.wavelengths(scene.run.unit).ok(),
         };

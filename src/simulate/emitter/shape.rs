@@ -1,7 +1,7 @@
 //! Where on a source its rays start and which way they go: the formulas that one ray and a packet of rays share.
 
 use super::area::Area;
-use super::measured::RayList;
+use super::ray_list::RayList;
 use crate::math::Vector;
 use crate::optics::IntensitySampler;
 use crate::optics::sampling::sin_cos_turns;

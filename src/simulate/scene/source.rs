@@ -18,7 +18,7 @@ pub struct Source {
     /// Power, watts (or lumens, as the run says); 1 unless said otherwise, or what the source's file says.
     #[schemars(range(min = 1e-30, max = 1e30))]
     pub power: Option<f64>,
-    /// IES LM-63, EULUMDAT, ray list (CSV or NPZ) or Data_1, relative to the scene file.
+    /// IES LM-63, EULUMDAT, ray file (IES TM-25, Zemax or LightTools binary, CSV or NPZ) or Data_1, relative to the scene file.
     ///
     /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
     /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
@@ -98,7 +98,7 @@ pub enum SourceKind {
     Ies,
     /// The intensity of a EULUMDAT file.
     Eulumdat,
-    /// The rays of a CSV or NPZ file.
+    /// The rays of a TM-25, Zemax binary, LightTools binary, CSV or NPZ file, known by its content.
     Rays,
     /// The rays of a Data_1 file.
     #[serde(rename = "data_1")]
