@@ -54,6 +54,10 @@ pub fn trace(
     // What was traced of a run that has grown since is a part of the larger one.
     before.grows = context.plan.grows();
     before.replicates = before.replicates.max(context.plan.replicates);
+    // A smaller run kept the paths of more of its rays, among them all that are kept of this one.
+    if before.grows && settings.path_samples > 0 {
+        before.tallies.paths.retain(|vertex| context.plan.samples(vertex.ray));
+    }
     let shard = shard_replicates(context.plan.first_replicate..context.plan.replicates, settings.shard);
     let todo: Vec<u32> = shard.clone().filter(|r| before.done.binary_search(r).is_err()).collect();
     let threads = thread_count(settings);

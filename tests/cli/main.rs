@@ -6,6 +6,7 @@ mod cluster;
 mod demo;
 #[path = "../support/files.rs"]
 mod files;
+mod growing;
 mod info;
 mod mishaps;
 mod names;

@@ -46,9 +46,10 @@ pub(crate) struct MeshingOptions {
 /// Options of everything that traces.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TracingOptions {
-    /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command
-    #[arg(long, help_heading = "Rays", value_name = "N", value_parser = count, allow_hyphen_values = true)]
-    pub(crate) rays: Option<u64>,
+    /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command. For trace also A..B: the rays
+    /// from A up to B, whose tally joins those of the rays before it
+    #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = ray_range, allow_hyphen_values = true)]
+    pub(crate) ray_range: Option<RayRange>,
     /// Seed of all random numbers
     #[arg(long, help_heading = "Rays", value_name = "S")]
     pub(crate) seed: Option<u64>,
@@ -130,6 +131,35 @@ fn part(text: &str) -> Result<(String, [f64; 2]), String> {
         return Err("the name of the part is missing; write NAME=MIN..MAX, as in cover=0.01..0.05".into());
     }
     Ok((name.trim().to_owned(), tolerance(range)?))
+}
+
+/// Rays of a run: so many, or those from one up to another of a run that grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct RayRange {
+    /// The first, where a range was given.
+    pub(crate) first: Option<u64>,
+    /// Past the last.
+    pub(crate) end: u64,
+}
+
+impl TracingOptions {
+    /// The number of rays that was asked for.
+    pub(crate) fn rays(&self) -> Option<u64> {
+        self.ray_range.map(|range| range.end)
+    }
+}
+
+/// `N`, or `A..B`.
+fn ray_range(text: &str) -> Result<RayRange, String> {
+    let Some((first, end)) = text.split_once("..") else {
+        return Ok(RayRange { first: None, end: count(text)? });
+    };
+    let first = if first.trim() == "0" { 0 } else { count(first.trim())? };
+    let end = count(end.trim())?;
+    if first >= end {
+        return Err(format!("the rays of A..B rise, not as in {text}"));
+    }
+    Ok(RayRange { first: Some(first), end })
 }
 
 /// Largest number of rays: doubles, in which it may be written, count singly up to it.

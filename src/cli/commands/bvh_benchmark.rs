@@ -77,7 +77,7 @@ impl BvhBenchmark {
         tracing: &TracingOptions,
         threads: usize,
     ) {
-        let count = tracing.rays.unwrap_or(RAYS);
+        let count = tracing.rays().unwrap_or(RAYS);
         let seed = tracing.seed.unwrap_or(1);
         let octree = Octree::build(mesh, &octree::Settings::default());
         let textbook = Octree::build(mesh, &octree::Settings::textbook());

@@ -211,7 +211,7 @@ fn own_rays(
     tracing: &TracingOptions,
     lift: f64,
 ) -> Result<Vec<Ray>, Failure> {
-    let count = tracing.rays.unwrap_or(RAYS);
+    let count = tracing.rays().unwrap_or(RAYS);
     let Some(scene) = scene else {
         let seed = tracing.seed.unwrap_or(1);
         let (bounds, third) = (mesh.bounds(), (count / 3).max(1));

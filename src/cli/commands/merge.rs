@@ -5,14 +5,14 @@ use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
-use crate::cli::work::checkpoint::CHECKPOINT;
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::cross_check;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
-use crate::cli::work::shards::replicates_of_shard;
+use crate::cli::work::shards::{is_tally, replicates_of_shard};
 use crate::cli::work::tally_file::{TallyHeader, fingerprint};
 use crate::cli::work::{input_files, lost_rays, results_folder};
-use crate::simulate::PartialRun;
+use crate::simulate::{GROWING_REPLICATE, PartialRun};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -42,18 +42,25 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     })?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let job = SceneJob { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, accuracy: None };
-    let prepared = scene_run::prepare(job, console)?;
+    let mut prepared = scene_run::prepare(job, console)?;
     let mut whole = sum(&part_files(command.parts)?, &header, &prepared)?;
-    while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, header.shard)) {
+    while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, &header)) {
         whole = sum(&part_files(command.parts)?, &header, &prepared)?;
     }
+    if is_tally(command.folder) {
+        return write_sum(command, &prepared, &scene_path, &whole, console);
+    }
     if !whole.is_whole() {
-        let failure = Failure::input(missing_parts(&whole, header.shard));
+        let failure = Failure::input(missing_parts(&whole, &header));
         return Err(
             failure.with_help("merge all parts at once; --wait SECONDS waits for those that are still traced")
         );
     }
 
+    if whole.grows {
+        // As large as it has grown, whichever part came first.
+        prepared.rays = Some(u64::from(whole.replicates) * GROWING_REPLICATE);
+    }
     let _owned = OutputPlace::folder(command.folder)?;
     results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
@@ -73,6 +80,26 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
         .and(refused))
+}
+
+/// Writes the sum of the parts as a tally, for a merge of merges.
+fn write_sum(
+    command: &MergeCommand,
+    prepared: &PreparedScene,
+    scene: &Path,
+    sum: &PartialRun,
+    console: &Console,
+) -> Result<Completion, Failure> {
+    let file = command.folder.to_path_buf();
+    let _owned = OutputPlace::file(&file)?;
+    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save(sum)?;
+    console.say(format_args!(
+        "{} of {} replicates in {}",
+        sum.done.len(),
+        sum.replicates,
+        command.folder.display()
+    ));
+    Ok(Completion::Complete)
 }
 
 /// How long to wait for parts.
@@ -151,6 +178,11 @@ fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Res
         }
         Err(if h.fingerprint == header.fingerprint {
             format!("the scene {} or the program has changed since this part was traced", h.scene().display())
+        } else if h.accuracy != header.accuracy {
+            format!(
+                "it is part of another run ({}): traced with {}, the first part with {}; give both the same",
+                h.command, h.accuracy, header.accuracy
+            )
         } else {
             format!("it is part of another run ({}) than the first one", h.command)
         })
@@ -166,17 +198,33 @@ fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Res
     sum.ok_or_else(|| Failure::arguments("merge: no parts given"))
 }
 
-/// Which shards are not there.
-fn missing_parts(whole: &PartialRun, shard: Option<[u32; 2]>) -> String {
+/// Which shards are not there, or which rays of a run that grows.
+fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
     let absent = |r: &u32| whole.done.binary_search(r).is_err();
     let count = (0..whole.replicates).filter(absent).count();
     let mut text = format!("{count} of the {} replicates of the run are missing", whole.replicates);
-    if let Some([_, n]) = shard {
+    if whole.grows && (header.first_ray.is_some() || header.shard.is_none()) {
+        text += &format!(": rays {}", missing_rays(whole).join(", "));
+    } else if let Some([_, n]) = header.shard {
         let shards: Vec<String> = (0..n)
-            .filter(|&k| replicates_of_shard(whole.replicates, [k, n]).any(|r| absent(&r)))
+            .filter(|&k| replicates_of_shard(0..whole.replicates, [k, n]).any(|r| absent(&r)))
             .map(|k| format!("{}/{n}", k + 1))
             .collect();
         text += &format!(": those of shard {}", shards.join(", "));
     }
     text
+}
+
+/// The ranges of rays that are not there, of a run that grows.
+fn missing_rays(whole: &PartialRun) -> Vec<String> {
+    let mut ranges = Vec::new();
+    let mut next = 0;
+    for &replicate in whole.done.iter().chain([&whole.replicates]) {
+        if replicate > next {
+            let [first, end] = [next, replicate].map(|r| u64::from(r) * GROWING_REPLICATE);
+            ranges.push(format!("{first}..{end}"));
+        }
+        next = replicate + 1;
+    }
+    ranges
 }

@@ -85,7 +85,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     let given = [
         ("--intersector", t.intersector.is_some(), traces_scene, "it compares those that it is about"),
         ("--normals", t.normals.is_some(), traces_scene, "it compares those that it is about"),
-        ("--rays", t.rays.is_some(), kind != Stability, "its questions are fixed"),
+        ("--rays", t.ray_range.is_some(), kind != Stability, "its questions are fixed"),
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
         ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
         ("--angle", m.angle.is_some(), faceted, "it goes through facets of its own"),
@@ -189,7 +189,7 @@ fn study_accuracy(
     if let Some(range) = command.meshing.tolerance {
         settings.tolerances = vec![range];
     }
-    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let Some(scene) = scene else {
         let study = accuracy::accuracy(&name, &product, &settings, progress);
         return StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes);
@@ -234,7 +234,7 @@ fn study_interpolation(
     let named: Vec<(&str, &dyn MeshSource)> =
         models.iter().zip(&products).map(|((n, _), p)| (n.as_str(), p as &dyn MeshSource)).collect();
     let mut settings = interpolation::Settings { seed, ..Default::default() };
-    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let study = interpolation::interpolation(&named, &settings, progress);
     StudyResult::new(&study.rows, study.answer)
 }
@@ -277,7 +277,7 @@ fn study_complexity(
         },
     ];
     let mut settings = complexity::Settings { seed, threads, ..Default::default() };
-    settings.rays = command.tracing.rays.unwrap_or(settings.rays);
+    settings.rays = command.tracing.rays().unwrap_or(settings.rays);
     let study = complexity::complexity(&methods, &settings, progress)?;
     StudyResult::new(&study.rows, study.answer)
 }
@@ -317,7 +317,7 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
     let (made, _) = facets::facets(&loaded.model, &settings, console);
     let choice = IntersectorChoice::new(command.tracing, Some(&scene))?;
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
-    run.rays = command.tracing.rays.unwrap_or(run.rays.min(1_000_000));
+    run.rays = command.tracing.rays().unwrap_or(run.rays.min(1_000_000));
     run.seed = command.tracing.seed.unwrap_or(run.seed);
     let rows = intersectors::with_intersector(choice, &loaded.model, &made.mesh, console, |who, _| {
         effects::effects(&name, &bound, who, &run, 5)

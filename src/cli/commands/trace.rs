@@ -2,7 +2,7 @@
 
 use super::replay;
 use crate::cli::arguments::command::TraceOptions;
-use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
+use crate::cli::arguments::options::{MeshingOptions, RayRange, TracingOptions};
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -16,7 +16,7 @@ use crate::cli::work::path_file::PathFile;
 use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
 use crate::cli::work::{accuracy_target, input_files, lost_rays, results_folder, shards};
 use crate::report::{bytes, grouped, seconds};
-use crate::simulate::PartialRun;
+use crate::simulate::{GROWING_REPLICATE, PartialRun, grows};
 use serde_json::json;
 use std::path::Path;
 
@@ -71,7 +71,10 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         replay::run(&prepared, &replay, folder, console)?;
         return Ok(refused);
     }
-    let done = match shard {
+    check_growing(&prepared, console)?;
+    // A range of rays is part of a run that grows: its tally joins those of the other rays.
+    let is_range = tracing.ray_range.is_some_and(|range| range.first.is_some());
+    let done = match shard.or(is_range.then_some([0, 1])) {
         Some(shard) => trace_shard(&prepared, command, shard, console)?,
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
     };
@@ -227,6 +230,26 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
     Ok(())
 }
 
+/// Whether the run can grow, where a range of its rays was asked for.
+///
+/// # Errors
+/// When it cannot, or the range does not begin and end with a replicate.
+fn check_growing(prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
+    let Some(RayRange { first: Some(first), end }) = prepared.job.tracing.ray_range else { return Ok(()) };
+    if !grows(&prepared.bound, &prepared.run_settings()) {
+        let failure = Failure::arguments("--rays A..B: a source of this scene has `rays` of its own");
+        return Err(failure.with_help("leave the `rays` of sources out: their power shares out the rays"));
+    }
+    if !(first.is_multiple_of(GROWING_REPLICATE) && end.is_multiple_of(GROWING_REPLICATE)) {
+        let message = format!("--rays {first}..{end}: both must be multiples of {GROWING_REPLICATE}");
+        return Err(Failure::arguments(message).with_help("rays are traced in replicates of that many"));
+    }
+    if console.verbose > 0 {
+        console.say(format_args!("rays {} to {} of a run that grows", grouped(first), grouped(end)));
+    }
+    Ok(())
+}
+
 /// Traces a shard, or goes on with it, into its file.
 fn trace_shard(
     prepared: &PreparedScene,
@@ -234,21 +257,14 @@ fn trace_shard(
     shard: [u32; 2],
     console: &Console,
 ) -> Result<Completion, Failure> {
-    let [_, shard_count] = shard;
-    let replicates = prepared.replicates();
-    if shard_count > replicates {
-        let message = format!(
-            "--shard: the run has {replicates} replicates and so at most as many shards, not {shard_count}"
-        );
-        return Err(Failure::arguments(message).with_help("raise `replicates` in [run] of the scene"));
-    }
-    let file = shards::shard_file(command.folder, shard);
+    let replicates = prepared.replicate_range();
+    let file = shards::shard_file(command.folder, shard, prepared.job.tracing.ray_range);
     let _owned = OutputPlace::file(&file)?;
     require_space(&folder_of(&file), LEAST_TALLY_BYTES)?;
     let checkpoint =
         Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console)?;
     let from = checkpoint.read()?;
-    if let Some(portion) = from.as_ref().filter(|p| shards::is_complete(p, shard)) {
+    if let Some(portion) = from.as_ref().filter(|p| shards::is_complete(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
         say_shard(&checkpoint.file, portion, shard, console)?;
         return Ok(Completion::Complete);
@@ -266,7 +282,7 @@ fn trace_shard(
         ..TraceRequest::default()
     };
     let portion = prepared.trace_part(request, console);
-    if !shards::is_complete(&portion, shard) {
+    if !shards::is_complete(&portion, replicates, shard) {
         return Err(checkpoint.stopped(&portion, "interrupted"));
     }
     let file = checkpoint.save_anywhere(&portion)?;

@@ -32,7 +32,7 @@ pub(crate) fn meshing_for(
         return Err(failure.with_help("leave out --accuracy, or the intersector"));
     }
     ask.seed = tracing.seed.unwrap_or(ask.seed);
-    ask.job_rays = tracing.rays.or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
+    ask.job_rays = tracing.rays().or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
     if let Some(normals) = tracing.normals {
         ask.kinds = vec![normals];
     }

@@ -146,7 +146,14 @@ fn facet_effects(
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
     let rays = (FACETING_SEGMENTS / segments_a_ray.max(1.0)).clamp(FEWEST_FACETING_RAYS, FACETING_RAYS) as u64;
     let run = prepared.run_settings();
-    let settings =
-        RunSettings { rays: rays.min(run.rays), replicates: FACETING_REPLICATES, path_samples: 0, ..run };
+    // In replicates of their own, however the run itself is divided.
+    let settings = RunSettings {
+        rays: rays.min(run.rays),
+        first_ray: 0,
+        grows: false,
+        replicates: FACETING_REPLICATES,
+        path_samples: 0,
+        ..run
+    };
     Some(geometric_error(&prepared.bound, facets_and_spline, &settings))
 }

@@ -76,7 +76,7 @@ impl ErrorTarget {
 
     /// Traces until the error is small enough, the most rays are traced, or a signal asks to stop: then not all is traced.
     pub(crate) fn trace(&self, prepared: &mut PreparedScene, console: &Console) -> (PartialRun, TargetResult) {
-        let most = prepared.job.tracing.rays.unwrap_or(MOST_RAYS);
+        let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
         let mut rays = FIRST_RAYS.min(most);
         loop {
             prepared.rays = Some(rays);

@@ -19,7 +19,7 @@ pub(crate) fn trace_both(
     console: &Console,
 ) -> Vec<PowerComparison> {
     let settings = RunSettings {
-        rays: tracing.rays.unwrap_or(scene.run.rays).min(MOST_RAYS),
+        rays: tracing.rays().unwrap_or(scene.run.rays).min(MOST_RAYS),
         seed: tracing.seed.unwrap_or(scene.run.seed),
         threads: tracing.threads.unwrap_or(0),
         ..RunSettings::from(&scene.run)

@@ -42,7 +42,7 @@ pub(crate) struct PreparedScene<'a> {
     pub(crate) tessellation_seconds: f64,
     pub(crate) choice: IntersectorChoice,
     pub(crate) threads: usize,
-    /// Rays to trace in place of what the options and the scene say.
+    /// Rays to trace from the first on, in place of what the options and the scene say.
     pub(crate) rays: Option<u64>,
     /// Why it is traced as it is, where nobody asked for it.
     pub(crate) chosen: Option<Chosen>,
@@ -108,16 +108,20 @@ impl PreparedScene<'_> {
     /// The run's settings: the scene's, with the options over them.
     pub(crate) fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);
-        settings.rays = self.rays.or(self.job.tracing.rays).unwrap_or(settings.rays);
+        settings.rays = self.rays.or(self.job.tracing.rays()).unwrap_or(settings.rays);
+        if let Some(first) = self.job.tracing.ray_range.and_then(|range| range.first) {
+            settings.first_ray = if self.rays.is_some() { 0 } else { first };
+            settings.grows = true;
+        }
         settings.seed = self.job.tracing.seed.unwrap_or(settings.seed);
         settings.threads = self.threads;
         settings.path_samples = RECORDED_PATHS.min(settings.rays);
         settings
     }
 
-    /// Number of independent parts that the run is divided into.
-    pub(crate) fn replicates(&self) -> u32 {
-        crate::simulate::replicates(&self.bound, &self.run_settings())
+    /// The replicates that are asked for: those of the rays from the first up to the last.
+    pub(crate) fn replicate_range(&self) -> std::ops::Range<u32> {
+        crate::simulate::replicate_range(&self.bound, &self.run_settings())
     }
 
     /// Traces the replicates that are asked for and gives their sums.

@@ -1,8 +1,10 @@
 //! Parts of a run that are traced by themselves: which one, and where it goes.
 
+use crate::cli::arguments::options::RayRange;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::simulate::PartialRun;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// More shards than any cluster starts; a typing error beyond it is refused.
@@ -109,24 +111,35 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         .with_help(format!("it takes {}; else write --shard I/N", known.join(", "))))
 }
 
-/// The replicates of a shard: from the first to before the second.
-pub(crate) fn replicates_of_shard(replicates: u32, [index, count]: [u32; 2]) -> std::ops::Range<u32> {
-    let first = |k: u32| (u64::from(replicates) * u64::from(k) / u64::from(count.max(1))) as u32;
+/// The replicates of a shard of these.
+pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> Range<u32> {
+    let whole = u64::from(all.end.saturating_sub(all.start));
+    let first = |k: u32| all.start + (whole * u64::from(k) / u64::from(count.max(1))) as u32;
     first(index)..first(index + 1)
 }
 
-/// Whether all replicates of the shard are done.
-pub(crate) fn is_complete(portion: &PartialRun, shard: [u32; 2]) -> bool {
-    replicates_of_shard(portion.replicates, shard).all(|r| portion.done.binary_search(&r).is_ok())
+/// Whether all replicates of the shard of these are done.
+pub(crate) fn is_complete(portion: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
+    replicates_of_shard(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 
 /// Where the tally of a shard goes: the file that was asked for, or one in the folder that was.
-pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2]) -> PathBuf {
-    if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("tally")) {
-        output.to_path_buf()
-    } else {
-        output.join(format!("shard-{}-of-{n}.tally", i + 1))
+pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>) -> PathBuf {
+    if is_tally(output) {
+        return output.to_path_buf();
     }
+    let shard = format!("shard-{}-of-{n}", i + 1);
+    let name = match rays {
+        Some(RayRange { first: Some(first), end }) if n == 1 => format!("rays-{first}-{end}"),
+        Some(RayRange { first: Some(first), end }) => format!("rays-{first}-{end}-{shard}"),
+        _ => shard,
+    };
+    output.join(name + ".tally")
+}
+
+/// Whether a path names a tally file.
+pub(crate) fn is_tally(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tally"))
 }
 
 #[cfg(test)]
@@ -180,7 +193,10 @@ mod tests {
 
     #[test]
     fn a_shard_goes_to_its_file_or_into_its_folder() {
-        assert_eq!(shard_file(Path::new("a.tally"), [1, 4]), Path::new("a.tally"));
-        assert_eq!(shard_file(Path::new("out"), [1, 4]), Path::new("out/shard-2-of-4.tally"));
+        assert_eq!(shard_file(Path::new("a.tally"), [1, 4], None), Path::new("a.tally"));
+        assert_eq!(shard_file(Path::new("out"), [1, 4], None), Path::new("out/shard-2-of-4.tally"));
+        let range = Some(RayRange { first: Some(5_000), end: 10_000 });
+        assert_eq!(shard_file(Path::new("out"), [0, 1], range), Path::new("out/rays-5000-10000.tally"));
+        assert_eq!(shard_file(Path::new("o"), [1, 4], range), Path::new("o/rays-5000-10000-shard-2-of-4.tally"));
     }
 }

@@ -1,11 +1,12 @@
 //! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
 
+use super::intersectors::IntersectorChoice;
 use super::scene_run::PreparedScene;
-use crate::cli::arguments::options::{IntersectorKind, MeshingOptions, TracingOptions};
+use crate::cli::arguments::options::{IntersectorKind, MeshingOptions, RayRange, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::intersect::NormalMode;
-use crate::simulate::{Fingerprint, RunSettings};
+use crate::simulate::{Fingerprint, RunSettings, grows};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,12 @@ pub(crate) struct TallyHeader {
     #[serde(default)]
     role: Vec<(String, [u64; 2])>,
     rays: Option<u64>,
+    /// The first ray, where the run was asked for as a range of rays.
+    #[serde(default)]
+    pub(crate) first_ray: Option<u64>,
+    /// The options that ask for what was chosen, where the command line did not.
+    #[serde(default)]
+    pub(crate) accuracy: String,
     seed: Option<u64>,
     intersector: Option<String>,
     normals: Option<String>,
@@ -54,7 +61,9 @@ impl TallyHeader {
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
-            rays: prepared.rays.or(t.rays),
+            rays: prepared.rays.or(t.rays()),
+            first_ray: t.ray_range.and_then(|range| range.first),
+            accuracy: accuracy_options(prepared),
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
@@ -90,7 +99,7 @@ impl TallyHeader {
     /// The options that decided the rays.
     pub(crate) fn tracing(&self) -> TracingOptions {
         TracingOptions {
-            rays: self.rays,
+            ray_range: self.rays.map(|end| RayRange { first: self.first_ray, end }),
             seed: self.seed,
             threads: None,
             intersector: self.intersector.as_ref().and_then(|n| IntersectorKind::from_str(n, true).ok()),
@@ -99,17 +108,30 @@ impl TallyHeader {
     }
 }
 
+/// The options that ask for the facets, normals and intersector of a run.
+fn accuracy_options(prepared: &PreparedScene) -> String {
+    let [low, high] = prepared.mesh_settings.tolerance;
+    let IntersectorChoice { intersector, normals } = prepared.choice;
+    format!("--tolerance {low}..{high} --normals {normals} --intersector {intersector}")
+}
+
 /// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
 pub(crate) fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Failure> {
     let scene = prepared.job.scene;
     let defaults = RunSettings::default();
+    let asked = prepared.run_settings();
+    // How far a run has grown decides the bits of no ray.
+    let grows = grows(&prepared.bound, &asked);
     let settings = RunSettings {
+        rays: if grows { 0 } else { asked.rays },
+        first_ray: 0,
+        grows,
         threads: 0,
         batch: 0,
         kernel: defaults.kernel,
         shard: [0, 1],
         path_samples: 0,
-        ..prepared.run_settings()
+        ..asked
     };
     let words = format!(
         "{} {} {:?} {:?} {settings:?}",

@@ -1,0 +1,120 @@
+//! Runs that grow and trees of merges, with the real binary.
+
+use crate::files::fixture;
+use crate::runs::without_times;
+use crate::support::lampyris_in;
+use serde_json::Value;
+use std::path::Path;
+
+/// Facets and normals that are asked for, so that no pilot chooses them.
+const SETTINGS: [&str; 4] = ["--tolerance", "0.1", "--normals", "bilinear"];
+
+/// A folder with the lens of scene S1 and so many rays.
+fn lens(rays: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(fixture("step/lens_planoconvex_nurbs.stp"), folder.path().join("model.stp")).unwrap();
+    let scene = std::fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
+    let scene = scene.replace("../step/lens_planoconvex_nurbs.stp", "model.stp").replace("1_000_000", rays);
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    folder
+}
+
+fn trace(folder: &Path, options: &[&str]) {
+    let (code, _, err) =
+        lampyris_in(folder, &[&["trace", "scene.toml"], options, &SETTINGS, &["--no-report"]].concat());
+    assert_eq!(code, 0, "{options:?}: {err}");
+}
+
+fn merge(folder: &Path, parts: &[&str], to: &str) {
+    let (code, _, err) = lampyris_in(folder, &[&["merge"], parts, &["-o", to, "--no-report"]].concat());
+    assert_eq!(code, 0, "{parts:?}: {err}");
+}
+
+/// Every number but times is the same, and every file of a receiver byte for byte.
+fn assert_same(folder: &Path, one: &str, other: &str) {
+    let document = |name: &str| -> Value {
+        let text = std::fs::read_to_string(folder.join(name).join("results.json")).unwrap();
+        without_times(serde_json::from_str(&text).unwrap())
+    };
+    assert_eq!(document(one), document(other), "{other}");
+    for file in ["focus.csv", "focus.data3", "paths.vtp"] {
+        let read = |name: &str| std::fs::read(folder.join(name).join(file)).unwrap();
+        assert!(read(one) == read(other), "{file} of {other}");
+    }
+}
+
+/// Rays that follow others, traced in parts and merged in a tree or flat, are one run of all of them.
+#[test]
+fn ranges_of_rays_merge_to_the_bits_of_one_run() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    trace(path, &["--rays", "640000", "-o", "whole"]);
+    trace(path, &["--rays", "0..200000", "-o", "parts"]);
+    for shard in ["1/2", "2/2"] {
+        trace(path, &["--rays", "200000..640000", "--shard", shard, "-o", "parts"]);
+    }
+    let [first, second, third] = ["", "-shard-1-of-2", "-shard-2-of-2"].map(|shard| {
+        let range = if shard.is_empty() { "0-200000" } else { "200000-640000" };
+        format!("parts/rays-{range}{shard}.tally")
+    });
+    merge(path, &["parts"], "flat");
+    assert_same(path, "whole", "flat");
+    merge(path, &[&third, &first], "some.tally");
+    merge(path, &["some.tally", &second], "tree");
+    assert_same(path, "whole", "tree");
+    // A later range alone is no run; what is missing is named.
+    let (code, _, err) = lampyris_in(path, &["merge", &second, &third, "-o", "no"]);
+    assert!(code == 3 && err.contains("rays 0..200000"), "{err}");
+    let (code, _, err) = lampyris_in(path, &["merge", "some.tally", "-o", "no"]);
+    assert!(code == 3 && err.contains("rays 200000..420000"), "{err}");
+}
+
+#[test]
+fn ranges_that_do_not_fit_are_refused_with_what_would() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    for (range, says) in [("5..10000", "multiples of 5000"), ("10000..5000", "rise"), ("0..x", "number")] {
+        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", range, "-o", "parts"]);
+        assert!(code == 2 && err.contains(says), "{range}: {err}");
+    }
+    trace(path, &["--rays", "0..5000", "-o", "parts"]);
+    let finer = ["trace", "scene.toml", "--rays", "5000..10000", "-o", "parts", "--tolerance", "0.05"];
+    assert_eq!(lampyris_in(path, &finer).0, 0);
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "no"]);
+    let err = err.replace('\n', " ");
+    assert!(code == 3 && err.contains("--tolerance 0.05..0.05") && err.contains("--tolerance 0.1..0.1"), "{err}");
+}
+
+/// More parts than replicates: some hold nothing, and together they hold everything once.
+#[test]
+fn there_may_be_more_parts_than_replicates() {
+    in_parts("2_000", 12);
+}
+
+/// A thousand processes, merged in one go and by a tree of merges.
+#[test]
+#[ignore = "starts a thousand processes"]
+fn a_thousand_parts_are_one_run() {
+    in_parts("20_000", 1000);
+}
+
+fn in_parts(rays: &str, count: usize) {
+    let folder = lens(rays);
+    let path = folder.path();
+    let scene = std::fs::read_to_string(path.join("scene.toml")).unwrap();
+    std::fs::write(path.join("scene.toml"), scene.replace("[run]", "[run]\nreplicates = 8")).unwrap();
+    trace(path, &["-o", "whole"]);
+    for k in 1..=count {
+        trace(path, &["--shard", &format!("{k}/{count}"), "--threads", "1", "-o", "parts", "-q"]);
+    }
+    merge(path, &["parts"], "flat");
+    assert_same(path, "whole", "flat");
+    let files: Vec<String> = (1..=count).map(|k| format!("parts/shard-{k}-of-{count}.tally")).collect();
+    let mut sums = Vec::new();
+    for (i, group) in files.chunks(count.isqrt()).enumerate() {
+        sums.push(format!("sum{i}.tally"));
+        merge(path, &group.iter().map(String::as_str).collect::<Vec<_>>(), &sums[i]);
+    }
+    merge(path, &sums.iter().rev().map(String::as_str).collect::<Vec<_>>(), "tree");
+    assert_same(path, "whole", "tree");
+}
