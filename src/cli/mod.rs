@@ -19,6 +19,8 @@ mod output;
 mod work;
 
 use crate::formats::{is_unprintable, printable};
+use crate::tessellate::is_panic_guarded;
+use crate::truck::baseline;
 use arguments::command::Arguments;
 use clap::Parser;
 use completion::Completion;
@@ -51,9 +53,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let Arguments { command, json, quiet, verbose } = arguments;
     let console = Console::new(json, quiet, verbose, &typed);
     interruption::watch();
+    keep_caught_panics_quiet();
     match commands::execute(command, &console) {
         Ok(Completion::Complete) => ExitCode::SUCCESS,
         Ok(Completion::Incomplete) => ExitCode::from(4),
         Err(failure) => failure.print(&console),
     }
+}
+
+/// Panics of other people's code that cost one face, or one row of a comparison, are counted and named where they are caught: their
+/// messages and places in source are no news to a user.
+fn keep_caught_panics_quiet() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let caught = is_panic_guarded() || std::thread::current().name() == Some(baseline::THREAD);
+        if !caught {
+            usual(panic);
+        }
+    }));
 }

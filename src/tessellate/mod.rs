@@ -47,6 +47,7 @@ pub use report::{
 };
 pub use settings::{Acceptance, FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
 pub use tessellation::{FacetQuality, Tessellation};
+pub use triangulator::is_panic_guarded;
 
 /// Tessellates every placed face of a model. Faces of which nothing can be made are counted in the report.
 ///

@@ -1,6 +1,17 @@
 //! The door to the triangulation library: whatever it does with one face costs that face alone.
 
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+thread_local! {
+    /// Whether this thread is inside [`guarded`] work.
+    static GUARDED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a panic on this thread would be caught and reported as the failure of one face: a program's own panic hook keeps quiet then.
+pub fn is_panic_guarded() -> bool {
+    GUARDED.get()
+}
 
 /// The library gave up on a face by a panic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -8,9 +19,12 @@ pub(super) struct GaveUp;
 
 /// Runs work that calls the library. What the work owns is dropped when the library panics, so that no state broken half-way is seen.
 ///
-/// The panic's message still goes to the panic hook.
+/// The panic hook of the process still runs; it learns from [`is_panic_guarded`] that nothing is lost.
 pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, GaveUp> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|_| GaveUp)
+    let outer = GUARDED.replace(true);
+    let result = catch_unwind(AssertUnwindSafe(work)).map_err(|_| GaveUp);
+    GUARDED.set(outer);
+    result
 }
 
 #[cfg(test)]
@@ -21,5 +35,7 @@ mod tests {
     fn a_panic_is_caught() {
         assert_eq!(guarded(|| 3), Ok(3));
         assert_eq!(guarded(|| -> u32 { panic!("as the library does") }), Err(GaveUp));
+        assert_eq!(guarded(is_panic_guarded), Ok(true));
+        assert!(!is_panic_guarded());
     }
 }
