@@ -8,7 +8,9 @@ use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 
 fuzz_target!(|text: &str| {
-    for lamp in [parse_ies(Path::new("fuzz.ies"), text), parse_eulumdat(Path::new("fuzz.ldt"), text)].into_iter().flatten() {
+    for lamp in
+        [parse_ies(Path::new("fuzz.ies"), text), parse_eulumdat(Path::new("fuzz.ldt"), text)].into_iter().flatten()
+    {
         let _ = lamp.expanded().flux();
     }
 });
