@@ -73,6 +73,7 @@ pub mod mesh;
 pub mod model;
 pub mod nurbs;
 pub mod optics;
+pub mod pipeline;
 pub mod regulation;
 #[cfg(feature = "report")]
 pub mod report;

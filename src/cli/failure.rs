@@ -2,6 +2,7 @@
 
 use super::console::Console;
 use crate::formats::{printable, printable_in_place, printable_line};
+use crate::{pipeline, simulate, step};
 use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
 use std::io::Write;
@@ -117,6 +118,37 @@ impl From<crate::formats::Error> for Failure {
             ErrorKind::Read(_) => Self::input(e.to_string()),
             _ => Self::running(e.to_string()),
         }
+    }
+}
+
+impl From<pipeline::Error> for Failure {
+    fn from(e: pipeline::Error) -> Self {
+        // What a setting is called on the command line.
+        let option = e.setting_name().map_or_else(String::new, |name| format!("--{} ", name.replace('_', "-")));
+        let message = option + e.message();
+        let mut failure = match e.kind() {
+            pipeline::ErrorKind::Input => Self::input(message),
+            _ => Self::arguments(message),
+        };
+        if let Some(advice) = e.advice() {
+            failure = failure.with_help(advice);
+        }
+        match e.excerpt() {
+            Some(x) => failure.with_excerpt(&x.file, &x.text, x.span.clone(), x.label),
+            None => failure,
+        }
+    }
+}
+
+impl From<simulate::Error> for Failure {
+    fn from(e: simulate::Error) -> Self {
+        pipeline::Error::from(e).into()
+    }
+}
+
+impl From<step::Error> for Failure {
+    fn from(e: step::Error) -> Self {
+        pipeline::Error::from(e).into()
     }
 }
 

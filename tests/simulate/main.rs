@@ -14,6 +14,7 @@ mod hard;
 mod imaging;
 mod laid;
 mod laws;
+mod pipeline;
 mod polished;
 mod refusals;
 mod scenes;

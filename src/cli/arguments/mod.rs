@@ -3,4 +3,3 @@
 pub(super) mod command;
 mod help_text;
 pub(super) mod options;
-pub(super) mod suggest;

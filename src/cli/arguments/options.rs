@@ -2,6 +2,7 @@
 //! negative number gets an answer about the number, not about an unknown option.
 
 use crate::intersect::NormalMode;
+use crate::pipeline::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
@@ -14,9 +15,10 @@ pub(crate) struct AccuracyOption {
         help_heading = "Facets",
         value_name = "Xdeg",
         conflicts_with = "tolerance",
+        value_parser = accuracy,
         allow_hyphen_values = true
     )]
-    pub(crate) accuracy: Option<String>,
+    pub(crate) accuracy: Option<f64>,
 }
 
 /// Options of everything that tessellates.
@@ -38,9 +40,20 @@ pub(crate) struct MeshingOptions {
     /// Tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given several times
     #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = part)]
     pub(crate) role: Vec<(String, [f64; 2])>,
-    /// Local tolerances that an accuracy came to.
-    #[arg(skip)]
-    pub(crate) plan: Option<crate::study::accuracy_target::TolerancePlan>,
+}
+
+impl MeshingOptions {
+    /// What they ask for.
+    pub(crate) fn settings(&self) -> MeshingSettings {
+        MeshingSettings {
+            tolerance: self.tolerance,
+            angle_deg: self.angle,
+            part: self.part.clone(),
+            face: self.face.clone(),
+            role: self.role.clone(),
+            plan: None,
+        }
+    }
 }
 
 /// Options of everything that traces.
@@ -64,24 +77,26 @@ pub(crate) struct TracingOptions {
     pub(crate) normals: Option<NormalMode>,
 }
 
-/// What finds the hits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum IntersectorKind {
-    #[default]
-    Octree,
-    Bvh2,
-    Cwbvh,
-    Exact,
+impl TracingOptions {
+    /// What they ask for.
+    pub(crate) fn settings(&self) -> TracingSettings {
+        TracingSettings {
+            ray_range: self.ray_range,
+            seed: self.seed,
+            threads: self.threads,
+            intersector: self.intersector,
+            normals: self.normals,
+        }
+    }
 }
 
-impl std::fmt::Display for IntersectorKind {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Octree => "octree",
-            Self::Bvh2 => "bvh2",
-            Self::Cwbvh => "cwbvh",
-            Self::Exact => "exact",
-        })
+impl ValueEnum for IntersectorKind {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()))
     }
 }
 
@@ -107,7 +122,7 @@ fn length(text: &str) -> Result<f64, String> {
 }
 
 /// `MIN..MAX` or one number.
-pub(crate) fn tolerance(text: &str) -> Result<[f64; 2], String> {
+fn tolerance(text: &str) -> Result<[f64; 2], String> {
     let (low, high) = text.split_once("..").unwrap_or((text, text));
     let (low, high) = (length(low)?, length(high)?);
     if low <= high {
@@ -131,22 +146,6 @@ fn part(text: &str) -> Result<(String, [f64; 2]), String> {
         return Err("the name of the part is missing; write NAME=MIN..MAX, as in cover=0.01..0.05".into());
     }
     Ok((name.trim().to_owned(), tolerance(range)?))
-}
-
-/// Rays of a run: so many, or those from one up to another of a run that grows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct RayRange {
-    /// The first, where a range was given.
-    pub(crate) first: Option<u64>,
-    /// Past the last.
-    pub(crate) end: u64,
-}
-
-impl TracingOptions {
-    /// The number of rays that was asked for.
-    pub(crate) fn rays(&self) -> Option<u64> {
-        self.ray_range.map(|range| range.end)
-    }
 }
 
 /// `N`, or `A..B`.
@@ -183,7 +182,7 @@ fn count(text: &str) -> Result<u64, String> {
 }
 
 /// `0.05deg`: a direction error in degrees.
-pub(crate) fn accuracy(text: &str) -> Result<f64, String> {
+fn accuracy(text: &str) -> Result<f64, String> {
     let number = text.strip_suffix("deg").or_else(|| text.strip_suffix('°')).unwrap_or(text);
     let value = number.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && *v < 90.0);
     value.ok_or_else(|| format!("an accuracy is an angle above 0, as in 0.05deg, not '{text}'"))

@@ -2,7 +2,6 @@
 //! thread and on all; answers that differ are judged with twice the digits.
 
 use super::demo;
-use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::octree_shape::OctreeShape;
@@ -12,6 +11,7 @@ use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
+use crate::pipeline::{MeshingSettings, TracingSettings};
 use crate::report::{figures, grouped};
 use crate::study::Progress;
 use crate::study::arbiter::{Verdict, arbitrate, same_distance};
@@ -42,8 +42,8 @@ pub(crate) struct BvhBenchmark {
 
 pub(crate) fn run(
     file: Option<&Path>,
-    meshing: &MeshingOptions,
-    tracing: &TracingOptions,
+    meshing: &MeshingSettings,
+    tracing: &TracingSettings,
     console: &Console,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<BvhBenchmark, Failure> {
@@ -74,7 +74,7 @@ impl BvhBenchmark {
         name: &str,
         mesh: &FacetMesh,
         tolerance: f64,
-        tracing: &TracingOptions,
+        tracing: &TracingSettings,
         threads: usize,
     ) {
         let count = tracing.rays().unwrap_or(RAYS);

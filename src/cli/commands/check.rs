@@ -1,7 +1,6 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
 use crate::cli::arguments::command::CheckCommand;
-use crate::cli::arguments::options::TracingOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -9,18 +8,20 @@ use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, time_all};
-use crate::cli::work::cross_check::LIFT_IN_TOLERANCES;
 use crate::cli::work::input_files::{self, Input};
-use crate::cli::work::intersectors::IntersectorChoice;
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
-use crate::cli::work::ray_sampler::RaySampler;
-use crate::cli::work::{accuracy_target, facets, paired_receivers, threads};
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::{paired_receivers, threads};
 use crate::formats::{open_file, write_atomic};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
+use crate::pipeline::{
+    AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RaySampler, TracingSettings, mesh_settings,
+    settings_for_accuracy, tessellate_model,
+};
 use crate::report::{CheckReport, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyPlan;
@@ -50,11 +51,12 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
     let model = &loaded.model;
-    let options = (&command.meshing, &command.tracing);
-    let (meshing, tracing, reached) =
-        accuracy_target::meshing_for(command.precision.accuracy.as_deref(), options, scene, model, console)?;
-    let settings = facets::mesh_settings(&meshing, scene, model)?;
-    let (tessellation, _) = facets::facets(model, &settings, console);
+    let monitor = TerminalMonitor::new(console);
+    let requested = (command.meshing.settings(), command.tracing.settings());
+    let AccurateSettings { meshing, tracing, plan: reached } =
+        settings_for_accuracy(command.precision.accuracy, requested, scene, model, &monitor)?;
+    let settings = mesh_settings(&meshing, scene, model)?;
+    let (tessellation, _) = tessellate_model(model, &settings, &monitor);
     let mesh = &tessellation.mesh;
     let normals = IntersectorChoice::new(&tracing, scene)?.normals;
     let contenders = Contenders::build(mesh, model, normals.on_facets(), console);
@@ -208,7 +210,7 @@ fn own_rays(
     model: &Model,
     mesh: &FacetMesh,
     octree: &dyn Intersector,
-    tracing: &TracingOptions,
+    tracing: &TracingSettings,
     lift: f64,
 ) -> Result<Vec<Ray>, Failure> {
     let count = tracing.rays().unwrap_or(RAYS);

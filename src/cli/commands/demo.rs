@@ -1,16 +1,17 @@
 //! `lampyris demo`: the main job on the built-in three-cavity lamp, in any folder, with nothing else installed.
 
 use crate::cli::arguments::command::PageOption;
-use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::output::closing;
-use crate::cli::work::cross_check;
-use crate::cli::work::input_files::{self, LoadedModel};
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::results_folder;
-use crate::cli::work::scene_run::{self, SceneJob, TraceRequest};
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::write_atomic;
+use crate::pipeline::{
+    LoadedModel, MeshingSettings, PreparedScene, SceneJob, TraceRequest, TracingSettings, read_models,
+};
 use crate::report::{figures, grouped, seconds};
 use crate::simulate::Scene;
 use crate::step;
@@ -29,8 +30,8 @@ const REFERENCE: [f64; 2] = [0.75595, 3.694];
 
 pub(crate) fn run(
     folder: &Path,
-    meshing: &MeshingOptions,
-    tracing: &TracingOptions,
+    meshing: MeshingSettings,
+    tracing: TracingSettings,
     page: PageOption,
     console: &Console,
 ) -> Result<Completion, Failure> {
@@ -41,8 +42,10 @@ pub(crate) fn run(
         console.say(format_args!("  {name:<12} {what:<58} {:>9}", seconds(time)));
     };
     say_step("read", format!("{faces} faces of {} parts", loaded.model.parts.len()), loaded.seconds);
-    let job = SceneJob { scene: &scene, loaded: &loaded, meshing, tracing, accuracy: None };
-    let prepared = scene_run::prepare(job, console)?;
+    set_threads(tracing.threads)?;
+    let monitor = TerminalMonitor::new(console);
+    let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
+    let prepared = PreparedScene::new(job, &monitor)?;
     let mesh = &prepared.tessellation.mesh;
     let [low, high] = prepared.mesh_settings.tolerance;
     let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
@@ -51,7 +54,8 @@ pub(crate) fn run(
     let _owned = OutputPlace::folder(folder)?;
     let with_page = page.is_wanted();
     results_folder::try_folder(&prepared, folder, with_page)?;
-    let mut run = cross_check::trace_and_check(&prepared, TraceRequest::default(), console)
+    let mut run = prepared
+        .trace(TraceRequest::default(), &monitor)
         .map_err(|_| Failure::running("demo: the run was stopped"))?;
     let both = start.elapsed().as_secs_f64();
     let r = &run.results;
@@ -80,9 +84,8 @@ pub(crate) fn run(
 /// The built-in lamp with its scene.
 pub(crate) fn lamp() -> Result<(Scene, LoadedModel), Failure> {
     let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
-    let loaded = input_files::scene_models(&scene, |_| {
-        Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?)
-    })?;
+    let loaded =
+        read_models(&scene, |_| Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?))?;
     Ok((scene, loaded))
 }
 

@@ -5,11 +5,13 @@ use crate::cli::console::{Console, print};
 use crate::cli::output::appearance;
 use crate::cli::output::json::json_text;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::cli::work::{accuracy_target, facets, input_files, threads};
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure, machine};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
+use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
 use crate::report::{bytes, figures, grouped, seconds};
 use crate::tessellate::{Report, sampled_sag};
 use crate::truck::baseline;
@@ -28,15 +30,16 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     }
     threads::set_threads(command.threads)?;
     let loaded = input_files::model_file(&command.file, console)?;
-    let (meshing, reached) = accuracy_target::meshing_for_facets(
-        command.precision.accuracy.as_deref(),
-        &command.meshing,
+    let monitor = TerminalMonitor::new(console);
+    let (meshing, reached) = settings_for_accurate_facets(
+        command.precision.accuracy,
+        command.meshing.settings(),
         &loaded.model,
-        console,
+        &monitor,
     )?;
-    let mut settings = facets::mesh_settings(&meshing, None, &loaded.model)?;
+    let mut settings = mesh_settings(&meshing, None, &loaded.model)?;
     settings.measure = true;
-    let (mut made, _) = facets::facets(&loaded.model, &settings, console);
+    let (mut made, _) = tessellate_model(&loaded.model, &settings, &monitor);
     made.report.seconds.read = loaded.seconds;
     made.report.peak_bytes = machine::peak_bytes();
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);

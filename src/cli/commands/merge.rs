@@ -6,12 +6,13 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
-use crate::cli::work::cross_check;
 use crate::cli::work::output_place::OutputPlace;
-use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
 use crate::cli::work::shards::{is_tally, replicates_of_shard};
-use crate::cli::work::tally_file::{TallyHeader, fingerprint};
+use crate::cli::work::tally_file::TallyHeader;
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::threads::set_threads;
 use crate::cli::work::{input_files, lost_rays, results_folder};
+use crate::pipeline::{PreparedScene, SceneJob, TraceRequest, fingerprint, read_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -33,16 +34,18 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// Puts the parts together and writes the results of the whole run.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
+    let monitor = TerminalMonitor::new(console);
     let first = first_part(command, &patience, console)?;
     let header: TallyHeader = PartialRun::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
-    let (scene, loaded) = input_files::scene_file(&scene_path, console).map_err(|failure| match command.scene {
-        Some(_) => failure,
-        None => failure.with_help("where the scene has moved since, --scene FILE says where it is"),
+    let (scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
+        Some(_) => Failure::from(error),
+        None => Failure::from(error).with_help("where the scene has moved since, --scene FILE says where it is"),
     })?;
+    set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
-    let job = SceneJob { scene: &scene, loaded: &loaded, meshing: &meshing, tracing: &tracing, accuracy: None };
-    let mut prepared = scene_run::prepare(job, console)?;
+    let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
+    let mut prepared = PreparedScene::new(job, &monitor)?;
     let mut whole = sum(&part_files(command.parts)?, &header, &prepared)?;
     while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, &header)) {
         whole = sum(&part_files(command.parts)?, &header, &prepared)?;
@@ -64,8 +67,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let _owned = OutputPlace::folder(command.folder)?;
     results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
-    let mut run = cross_check::trace_and_check(&prepared, request, console)
-        .map_err(|_| Failure::running("merge: the run is not whole"))?;
+    let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     let written =
         results_folder::write(&prepared, command.folder, &mut run, Vec::new(), command.with_page, console);
     let (document, answer) = match written {
@@ -77,7 +79,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         }
     };
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
-    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
+    let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console);
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
         .and(refused))
 }

@@ -23,15 +23,17 @@ use crate::cli::{completion::Completion, failure::Failure};
 /// Does what a command asks for.
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     match command {
-        Command::Demo { output, page, meshing, tracing } => demo::run(&output, &meshing, &tracing, page, console),
+        Command::Demo { output, page, meshing, tracing } => {
+            demo::run(&output, meshing.settings(), tracing.settings(), page, console)
+        }
         Command::Info { file, faces, limits } => info::run(&file, faces, limits, console),
         Command::Facet(command) => facet::run(&command, console),
         Command::Trace { scene, output, meshing, tracing, extra } => {
             let command = trace::TraceCommand {
                 scene: &scene,
                 folder: &output,
-                meshing: &meshing,
-                tracing: &tracing,
+                meshing: meshing.settings(),
+                tracing: tracing.settings(),
                 extra: &extra,
             };
             trace::run(&command, console)
@@ -40,7 +42,14 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
         Command::Study { kind, file, output, page, meshing, tracing } => {
             let (file, output) = (file.as_deref(), output.as_ref());
             study::run(
-                &study::StudyCommand { kind, file, output, page, meshing: &meshing, tracing: &tracing },
+                &study::StudyCommand {
+                    kind,
+                    file,
+                    output,
+                    page,
+                    meshing: meshing.settings(),
+                    tracing: tracing.settings(),
+                },
                 console,
             )
         }

@@ -5,8 +5,9 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::json_text;
 use crate::cli::work::lost_rays::{self, COLUMNS};
-use crate::cli::work::scene_run::PreparedScene;
+use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::formats::{read_text, write_vtp};
+use crate::pipeline::PreparedScene;
 use crate::report::path_lines;
 use crate::simulate::{PathVertex, Results, RunSettings, replay};
 use serde_json::{Value, json};
@@ -73,8 +74,9 @@ pub(crate) fn run(
     let settings = prepared.run_settings();
     let [seed, rays] = request.run.unwrap_or([settings.seed, settings.rays]);
     let settings = RunSettings { seed, rays, ..settings };
-    let found = prepared
-        .with_intersector(console, |intersector, _| replay(&prepared.bound, intersector, &settings, &request.rays));
+    let found = prepared.with_intersector(&TerminalMonitor::new(console), |intersector, _| {
+        replay(&prepared.bound, intersector, &settings, &request.rays)
+    });
     if found.rays < request.rays.len() as u64 {
         let message = format!("--replay: the run has {rays} rays, counted from 0");
         return Err(Failure::arguments(message).with_help("give the number of rays that the run had with --rays"));

@@ -2,17 +2,13 @@
 
 use super::demo;
 use crate::cli::arguments::command::{PageOption, StudyKind};
-use crate::cli::arguments::options::{MeshingOptions, TracingOptions};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{octree_shape, terminal_tables};
-use crate::cli::work::input_files::{self, Input, LoadedModel};
+use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::output_place::OutputPlace;
-use crate::cli::work::{
-    facets,
-    intersectors::{self, IntersectorChoice},
-    threads,
-};
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::threads;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ColourMap, write_atomic};
 use crate::intersect::bvh::{self, Bvh};
@@ -22,6 +18,10 @@ use crate::intersect::exact::{
 };
 use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
+use crate::pipeline::{
+    IntersectorChoice, LoadedModel, MeshingSettings, TracingSettings, mesh_settings, tessellate_model,
+    with_intersector,
+};
 use crate::report::{Section, View, study_report};
 use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
@@ -39,8 +39,8 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
     pub(crate) page: PageOption,
-    pub(crate) meshing: &'a MeshingOptions,
-    pub(crate) tracing: &'a TracingOptions,
+    pub(crate) meshing: MeshingSettings,
+    pub(crate) tracing: TracingSettings,
 }
 
 /// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
@@ -78,8 +78,8 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
             failure.with_help("leave it out; `lampyris study accuracy FILE` and `study bvh FILE` take a file")
         );
     }
-    let m = command.meshing;
-    let t = command.tracing;
+    let m = &command.meshing;
+    let t = &command.tracing;
     let traces_scene = kind == Effects;
     let faceted = matches!(kind, Effects | Bvh | Accuracy);
     let given = [
@@ -88,7 +88,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ("--rays", t.ray_range.is_some(), kind != Stability, "its questions are fixed"),
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
         ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
-        ("--angle", m.angle.is_some(), faceted, "it goes through facets of its own"),
+        ("--angle", m.angle_deg.is_some(), faceted, "it goes through facets of its own"),
         ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
     ];
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
@@ -115,7 +115,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         StudyKind::Stability => study_stability(&progress)?,
         StudyKind::Bvh => {
             let benchmark =
-                super::bvh_benchmark::run(command.file, command.meshing, command.tracing, console, &progress)?;
+                super::bvh_benchmark::run(command.file, &command.meshing, &command.tracing, console, &progress)?;
             shapes = benchmark.shapes;
             StudyResult::new(&benchmark.rows, benchmark.answer)?
         }
@@ -205,8 +205,8 @@ fn study_accuracy(
 /// Where on the surface the normals err, on facets of the tolerance asked for.
 fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Failure> {
     let (scene, loaded, _) = read_model(command.file, console)?;
-    let settings = facets::mesh_settings(command.meshing, scene.as_ref(), &loaded.model)?;
-    let (made, _) = facets::facets(&loaded.model, &settings, console);
+    let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;
+    let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
     let (errors, _) = super::facet::normal_errors(&loaded.model, &made.mesh);
     let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, scene.as_ref());
     let [low, high] = settings.tolerance;
@@ -313,13 +313,13 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
         return Err(failure.with_help("give a scene file (.toml), or nothing for the built-in lamp"));
     };
     let bound = scene.bind(&loaded.model)?;
-    let settings = facets::mesh_settings(command.meshing, Some(&scene), &loaded.model)?;
-    let (made, _) = facets::facets(&loaded.model, &settings, console);
-    let choice = IntersectorChoice::new(command.tracing, Some(&scene))?;
+    let settings = mesh_settings(&command.meshing, Some(&scene), &loaded.model)?;
+    let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
+    let choice = IntersectorChoice::new(&command.tracing, Some(&scene))?;
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
     run.rays = command.tracing.rays().unwrap_or(run.rays.min(1_000_000));
     run.seed = command.tracing.seed.unwrap_or(run.seed);
-    let rows = intersectors::with_intersector(choice, &loaded.model, &made.mesh, console, |who, _| {
+    let rows = with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |who, _| {
         effects::effects(&name, &bound, who, &run, 5)
     });
     StudyResult::new(&rows, effects::answer(&rows))

@@ -2,21 +2,23 @@
 
 use super::replay;
 use crate::cli::arguments::command::TraceOptions;
-use crate::cli::arguments::options::{MeshingOptions, RayRange, TracingOptions};
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
-use crate::cli::work::cross_check::{self, SceneResults};
-use crate::cli::work::error_target::ErrorTarget;
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
 use crate::cli::work::path_file::PathFile;
-use crate::cli::work::scene_run::{self, PreparedScene, SceneJob, TraceRequest};
-use crate::cli::work::{accuracy_target, input_files, lost_rays, results_folder, shards};
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::cli::work::threads::set_threads;
+use crate::cli::work::{input_files, lost_rays, results_folder, shards};
+use crate::pipeline::{
+    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TraceRequest,
+    TracingSettings, read_scene, settings_for_accuracy,
+};
 use crate::report::{bytes, grouped, seconds};
-use crate::simulate::{GROWING_REPLICATE, PartialRun, grows};
+use crate::simulate::{GROWING_REPLICATE, PartialRun, PathSink, PathVertex, grows};
 use serde_json::json;
 use std::path::Path;
 
@@ -27,8 +29,8 @@ const LEAST_TALLY_BYTES: u64 = 100_000;
 pub(crate) struct TraceCommand<'a> {
     pub(crate) scene: &'a Path,
     pub(crate) folder: &'a Path,
-    pub(crate) meshing: &'a MeshingOptions,
-    pub(crate) tracing: &'a TracingOptions,
+    pub(crate) meshing: MeshingSettings,
+    pub(crate) tracing: TracingSettings,
     pub(crate) extra: &'a TraceOptions,
 }
 
@@ -42,38 +44,35 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
-    let (scene, loaded) = input_files::scene_file(command.scene, console)?;
-    let accuracy = extra.precision.accuracy.as_deref();
+    let monitor = TerminalMonitor::new(console);
+    let (scene, loaded) = read_scene(command.scene, &monitor)?;
+    let accuracy = extra.precision.accuracy;
     if accuracy.is_some() && (shard.is_some() || extra.resume) {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
         return Err(
             Failure::arguments(message).with_help("give --tolerance and --normals with --shard and --resume")
         );
     }
-    let options = (command.meshing, command.tracing);
-    let (meshing, tracing, reached) =
-        accuracy_target::meshing_for(accuracy, options, Some(&scene), &loaded.model, console)?;
-    let job = SceneJob {
-        scene: &scene,
-        loaded: &loaded,
-        meshing: &meshing,
-        tracing: &tracing,
-        accuracy: reached.as_ref(),
-    };
-    let mut prepared = scene_run::prepare(job, console)?;
-    let target = extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &scene)).transpose()?;
+    set_threads(command.tracing.threads)?;
+    let requested = (command.meshing.clone(), command.tracing.clone());
+    let AccurateSettings { meshing, tracing, plan } =
+        settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
+    let job = SceneJob { meshing, tracing, accuracy: plan, ..SceneJob::new(scene, loaded) };
+    let mut prepared = PreparedScene::new(job, &monitor)?;
+    let target =
+        extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &prepared.job.scene)).transpose()?;
     lost_rays::warn(&prepared, console);
     if extra.dry_run {
         return dry_run(&prepared, folder, console);
     }
-    let refused = input_files::report_refusals(&loaded.reports, extra.limits.max_refused, console);
+    let refused = input_files::report_refusals(&prepared.job.loaded.reports, extra.limits.max_refused, console);
     if !replay.is_empty() {
         replay::run(&prepared, &replay, folder, console)?;
         return Ok(refused);
     }
     check_growing(&prepared, console)?;
     // A range of rays is part of a run that grows: its tally joins those of the other rays.
-    let is_range = tracing.ray_range.is_some_and(|range| range.first.is_some());
+    let is_range = prepared.job.tracing.ray_range.is_some_and(|range| range.first.is_some());
     let done = match shard.or(is_range.then_some([0, 1])) {
         Some(shard) => trace_shard(&prepared, command, shard, console)?,
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
@@ -97,7 +96,7 @@ fn trace_whole(
     let paths = try_outputs(prepared, command, &file)?;
 
     // With an error to reach, the number of rays is found by tracing.
-    let found = target.map(|target| target.trace(prepared, console));
+    let found = target.map(|target| target.trace(prepared, &TerminalMonitor::of_saveable(console, None)));
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
     let (traced, result) = match found {
@@ -119,16 +118,17 @@ fn trace_whole(
     }
 
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
+    let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
         finished: traced.is_none().then_some(&save),
         from: traced.or(saved),
         every: checkpoint.interval(),
-        is_saveable: true,
-        paths: paths.as_ref(),
+        paths: take.as_ref().map(|take| take as PathSink<'_>),
         ..TraceRequest::default()
     };
-    let mut run = match cross_check::trace_and_check(prepared, request, console) {
+    let monitor = TerminalMonitor::of_saveable(console, paths.as_ref());
+    let mut run = match prepared.trace(request, &monitor) {
         Ok(run) => run,
         Err(portion) => {
             let because = paths.and_then(|p| p.finish().err()).map_or("interrupted".into(), |e| e.to_string());
@@ -141,7 +141,7 @@ fn trace_whole(
     };
     say_verification(&run, console)?;
 
-    let sentences: Vec<String> = target.zip(result.as_ref()).map(|(t, r)| t.sentence(r)).into_iter().collect();
+    let sentences: Vec<String> = result.as_ref().map(closing::error_sentence).into_iter().collect();
     for sentence in &sentences {
         console.say(sentence.replace("**", ""));
     }
@@ -278,10 +278,9 @@ fn trace_shard(
         shard: Some(shard),
         finished: Some(&save),
         every: checkpoint.interval(),
-        is_saveable: true,
         ..TraceRequest::default()
     };
-    let portion = prepared.trace_part(request, console);
+    let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
     if !shards::is_complete(&portion, replicates, shard) {
         return Err(checkpoint.stopped(&portion, "interrupted"));
     }
@@ -323,7 +322,7 @@ fn say_shard(
 fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
     let settings = prepared.run_settings();
     let mesh = &prepared.tessellation.mesh;
-    let loaded = prepared.job.loaded;
+    let loaded = &prepared.job.loaded;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let effects = crate::simulate::Required::new(&prepared.bound);
     if console.json {

@@ -4,7 +4,8 @@ use super::json::json_text;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
-use crate::report::file_stem;
+use crate::pipeline::TargetResult;
+use crate::report::{figures, file_stem, grouped};
 use crate::simulate::Results;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -67,6 +68,19 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     }
     files.push((folder.join("facets.glb"), "facets and ray paths in 3-D, for any glTF viewer".into()));
     files
+}
+
+/// What came of an error that was asked for.
+pub(crate) fn error_sentence(result: &TargetResult) -> String {
+    let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
+    let verdict = if result.reached { "reached" } else { "**not reached**" };
+    format!(
+        "Asked for a statistical error of {} % of the {} on {}: {verdict} with {} rays ({found}).",
+        result.asked_percent,
+        result.quantity,
+        result.receiver,
+        grouped(result.rays)
+    )
 }
 
 /// Words in lines of at most `width` characters.

@@ -1,11 +1,11 @@
 //! The file that a run is saved to while it goes on, for `--resume`.
 
 use super::output_place::{folder_of, make_folder, rescue_folders};
-use super::scene_run::PreparedScene;
-use super::tally_file::{TallyHeader, fingerprint};
+use super::tally_file::TallyHeader;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::{read_bytes, write_atomic};
+use crate::pipeline::{PreparedScene, fingerprint};
 use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -19,7 +19,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(250);
 
 /// The file of one run, with what stands at its head.
 pub(crate) struct Checkpoint<'a> {
-    pub(crate) prepared: &'a PreparedScene<'a>,
+    pub(crate) prepared: &'a PreparedScene,
     header: TallyHeader,
     pub(crate) file: PathBuf,
     every: Duration,
@@ -33,7 +33,7 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     /// When a file of the scene can no longer be read.
     pub(crate) fn new(
-        prepared: &'a PreparedScene<'a>,
+        prepared: &'a PreparedScene,
         scene: &Path,
         file: PathBuf,
         shard: Option<[u32; 2]>,

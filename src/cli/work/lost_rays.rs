@@ -1,11 +1,11 @@
 //! The lost-ray ledger: one line a lost ray, with all that is needed to trace it again.
 
-use super::scene_run::PreparedScene;
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::formats::{csv_quoted_text, write_atomic};
+use crate::pipeline::PreparedScene;
 use crate::report::figures;
 use crate::simulate::{LostCause, LostRay, Results};
 use std::collections::BTreeMap;

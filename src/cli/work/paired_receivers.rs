@@ -1,8 +1,8 @@
 //! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
 
-use crate::cli::arguments::options::TracingOptions;
 use crate::cli::console::Console;
 use crate::intersect::Intersector;
+use crate::pipeline::TracingSettings;
 use crate::report::{Cell, Table, figures};
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{PowerComparison, compare_power};
@@ -15,7 +15,7 @@ pub(crate) fn trace_both(
     scene: &Scene,
     bound: &BoundScene,
     [facets, exact]: [&dyn Intersector; 2],
-    tracing: &TracingOptions,
+    tracing: &TracingSettings,
     console: &Console,
 ) -> Vec<PowerComparison> {
     let settings = RunSettings {

@@ -1,10 +1,7 @@
 //! The folder that a traced scene leaves: receiver files, ray paths, facets, `results.json` and the page.
 
-use super::cross_check::SceneResults;
 use super::lost_rays;
 use super::output_place::{make_folder, require_space, rescue_folders};
-use super::scene_run::PreparedScene;
-use crate::cli::arguments::options::IntersectorKind;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
@@ -12,11 +9,10 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
+use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, path_lines};
 use crate::simulate::arrivals;
-use crate::simulate::scene::PowerUnit;
-use crate::study;
-use crate::study::figures::{ReceiverFigures, Surface};
+use crate::study::figures::ReceiverFigures;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +28,7 @@ const FACET_BYTES: u64 = 50;
 /// # Errors
 /// When it cannot.
 pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: bool) -> Result<(), Failure> {
-    let scene = prepared.job.scene;
+    let scene = &prepared.job.scene;
     let cells: u64 = scene.receivers.iter().map(|r| r.cells.iter().map(|&n| n as u64).product::<u64>()).sum();
     let facets = prepared.tessellation.mesh.facets.len() as u64;
     let page = if with_page { PAGE_BYTES } else { 0 };
@@ -83,22 +79,23 @@ pub(crate) fn write(
     for k in 0..run.results.receivers.len() {
         let rays = arrivals(&prepared.bound, k, &run.results);
         let receiver = &run.results.receivers[k];
-        let geometric = geometric_layer(prepared, run, k);
+        let geometric = run.geometric_cells(prepared, k);
         run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
     }
-    let all_figures = figures(prepared, run);
+    let all_figures = run.figures(prepared);
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &prepared.tessellation.mesh;
     let bounds = mesh.bounds();
     let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
-    let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(prepared.job.scene));
+    let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.job.scene));
     facets.paths = Some(&near);
     write_facets(&folder.join("facets.glb"), &facets)?;
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
-    let mut document = document(prepared, run, &all_figures, &provenance)?;
+    let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
+    document["provenance"] = json_value(&provenance)?;
     if has_lost_rays {
         document["ledger"] = LEDGER.into();
     }
@@ -113,66 +110,6 @@ pub(crate) fn write(
     Ok((document, answer))
 }
 
-/// Unit of powers.
-fn power_unit(prepared: &PreparedScene) -> &'static str {
-    match prepared.job.scene.run.unit {
-        PowerUnit::Lumen => "lm",
-        PowerUnit::Watt => "W",
-    }
-}
-
-/// The figures of every receiver with both their errors.
-fn figures(prepared: &PreparedScene, run: &SceneResults) -> Vec<ReceiverFigures> {
-    let surface = match (prepared.choice.intersector, &run.geometric) {
-        (IntersectorKind::Exact, _) => Surface::Spline,
-        (_, Some(error)) => Surface::Facets(error),
-        (_, None) => Surface::Unmeasured,
-    };
-    study::figures::figures(&run.results, surface, power_unit(prepared))
-}
-
-/// The errors of a receiver's cells from the facets, where they are known.
-fn geometric_layer(prepared: &PreparedScene, run: &SceneResults, receiver: usize) -> Option<Vec<f64>> {
-    let none = vec![0.0; run.results.receivers[receiver].cells.len()];
-    match (prepared.choice.intersector, &run.geometric) {
-        (IntersectorKind::Exact, _) => Some(none),
-        // Facets that are the surface itself were not compared cell by cell.
-        (_, Some(error)) if error.rays == 0 => Some(none),
-        (_, measured) => measured.as_ref().and_then(|error| Some(error.receivers.get(receiver)?.cells.clone())),
-    }
-}
-
-/// The document of `results.json`, without the name of the ledger.
-fn document(
-    prepared: &PreparedScene,
-    run: &SceneResults,
-    all_figures: &[ReceiverFigures],
-    provenance: &Provenance,
-) -> Result<Value, Failure> {
-    let mut document = json_value(&run.results)?;
-    if let Some(verification) = &run.verification {
-        document["pruning"] = json_value(verification)?;
-    }
-    if let Some(check) = &run.check {
-        document["check"] = json_value(check)?;
-    }
-    for (k, figures) in all_figures.iter().enumerate() {
-        document["receivers"][k]["figures"] = json_value(figures)?;
-    }
-    document["halving"] = json_value(&study::figures::halving(&run.results, run.geometric.as_ref()))?;
-    if let Some(chosen) = &prepared.chosen {
-        document["chosen"] = json_value(chosen)?;
-    }
-    if let Some(geometric) = run.geometric.as_ref().filter(|g| g.rays > 0) {
-        document["faceting"] = json_value(geometric)?;
-    }
-    if let Some(accuracy) = prepared.job.accuracy {
-        document["accuracy"] = json_value(accuracy)?;
-    }
-    document["provenance"] = json_value(provenance)?;
-    Ok(document)
-}
-
 /// The page of a traced scene.
 fn page<'a>(
     prepared: &'a PreparedScene,
@@ -182,13 +119,13 @@ fn page<'a>(
     sentences: Vec<String>,
     provenance: Provenance,
 ) -> SimulationReport<'a> {
-    let scene = prepared.job.scene;
+    let scene = &prepared.job.scene;
     let title = if scene.title.is_empty() { prepared.job.loaded.model.name.clone() } else { scene.title.clone() };
     SimulationReport {
         title,
         results: &run.results,
         facets,
-        unit: power_unit(prepared),
+        unit: prepared.power_unit(),
         check: run.check.as_ref(),
         figures: all_figures,
         geometric: run.geometric.as_ref(),

@@ -1,8 +1,8 @@
 //! Parts of a run that are traced by themselves: which one, and where it goes.
 
-use crate::cli::arguments::options::RayRange;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::pipeline::RayRange;
 use crate::simulate::PartialRun;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

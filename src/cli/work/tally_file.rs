@@ -1,12 +1,11 @@
 //! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
 
-use super::intersectors::IntersectorChoice;
-use super::scene_run::PreparedScene;
-use crate::cli::arguments::options::{IntersectorKind, MeshingOptions, RayRange, TracingOptions};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::intersect::NormalMode;
-use crate::simulate::{Fingerprint, RunSettings, grows};
+use crate::pipeline::{
+    IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, RayRange, TracingSettings, fingerprint,
+};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -48,8 +47,8 @@ impl TallyHeader {
         shard: Option<[u32; 2]>,
         console: &Console,
     ) -> Result<Self, Failure> {
-        let m = prepared.job.meshing;
-        let t = prepared.job.tracing;
+        let m = &prepared.job.meshing;
+        let t = &prepared.job.tracing;
         let scene = std::path::absolute(scene).unwrap_or_else(|_| scene.to_path_buf());
         let bits = |x: [f64; 2]| x.map(f64::to_bits);
         Ok(Self {
@@ -57,7 +56,7 @@ impl TallyHeader {
             scene_bytes: scene.to_str().is_none().then(|| scene.as_os_str().as_encoded_bytes().to_vec()),
             scene: scene.to_string_lossy().into_owned(),
             tolerance: m.tolerance.map(bits),
-            angle: m.angle.map(f64::to_bits),
+            angle: m.angle_deg.map(f64::to_bits),
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
@@ -83,11 +82,11 @@ impl TallyHeader {
     }
 
     /// The options that decided the facets.
-    pub(crate) fn meshing(&self) -> MeshingOptions {
+    pub(crate) fn meshing(&self) -> MeshingSettings {
         let back = |x: [u64; 2]| x.map(f64::from_bits);
-        MeshingOptions {
+        MeshingSettings {
             tolerance: self.tolerance.map(back),
-            angle: self.angle.map(f64::from_bits),
+            angle_deg: self.angle.map(f64::from_bits),
             part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             face: self.face.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             role: self.role.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
@@ -97,8 +96,8 @@ impl TallyHeader {
     }
 
     /// The options that decided the rays.
-    pub(crate) fn tracing(&self) -> TracingOptions {
-        TracingOptions {
+    pub(crate) fn tracing(&self) -> TracingSettings {
+        TracingSettings {
             ray_range: self.rays.map(|end| RayRange { first: self.first_ray, end }),
             seed: self.seed,
             threads: None,
@@ -107,47 +106,9 @@ impl TallyHeader {
         }
     }
 }
-
 /// The options that ask for the facets, normals and intersector of a run.
 fn accuracy_options(prepared: &PreparedScene) -> String {
     let [low, high] = prepared.mesh_settings.tolerance;
     let IntersectorChoice { intersector, normals } = prepared.choice;
     format!("--tolerance {low}..{high} --normals {normals} --intersector {intersector}")
-}
-
-/// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
-pub(crate) fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Failure> {
-    let scene = prepared.job.scene;
-    let defaults = RunSettings::default();
-    let asked = prepared.run_settings();
-    // How far a run has grown decides the bits of no ray.
-    let grows = grows(&prepared.bound, &asked);
-    let settings = RunSettings {
-        rays: if grows { 0 } else { asked.rays },
-        first_ray: 0,
-        grows,
-        threads: 0,
-        batch: 0,
-        kernel: defaults.kernel,
-        shard: [0, 1],
-        path_samples: 0,
-        ..asked
-    };
-    let words = format!(
-        "{} {} {:?} {:?} {settings:?}",
-        env!("CARGO_PKG_VERSION"),
-        env!("LAMPYRIS_COMMIT"),
-        prepared.mesh_settings,
-        prepared.choice
-    );
-    let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
-    let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
-    for file in files {
-        let path = scene.resolve(file);
-        let read =
-            crate::formats::read_bytes(&path).map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
-        pieces.push(read);
-    }
-    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
-    Ok(Fingerprint::new(&pieces))
 }

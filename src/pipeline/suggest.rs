@@ -1,7 +1,7 @@
 //! Names close to a mistyped one.
 
 /// A sentence with the closest known name first: `did you mean "cover"? its parts are cover, housing`.
-pub(crate) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
+pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
     let mut unique: Vec<&str> = Vec::new();
     for name in known {
         if !unique.contains(name) {

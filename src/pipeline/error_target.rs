@@ -1,13 +1,12 @@
-//! `--until-error P%@RECEIVER`: as many rays as the error asks for.
+//! `P%@RECEIVER`: as many rays as the error asks for.
 //!
 //! Runs of growing length are traced, each from its beginning, until one is good enough; so the result is the very one of
 //! `--rays N`, whatever number of threads found the N. The runs before the last cost about half of it at most.
 
-use super::scene_run::{PreparedScene, TraceRequest};
-use crate::cli::arguments::suggest;
-use crate::cli::console::Console;
-use crate::cli::failure::Failure;
-use crate::report::{figures, grouped};
+use super::error::Error;
+use super::monitor::Monitor;
+use super::prepared_scene::{PreparedScene, TraceRequest};
+use super::suggest;
 use crate::simulate::{PartialRun, ReceiverResult, Results, Scene};
 use serde::Serialize;
 
@@ -24,36 +23,46 @@ const GROWTH_MARGIN: f64 = 1.1;
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
 /// What is asked for.
-#[derive(Debug, PartialEq)]
-pub(crate) struct ErrorTarget {
-    percent: f64,
-    receiver: String,
-    cells: bool,
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorTarget {
+    /// Relative error, percent.
+    pub percent: f64,
+    /// Name of the receiver.
+    pub receiver: String,
+    /// Whether it is the error of the cells, each weighted by its light, and not that of the power.
+    pub cells: bool,
 }
 
 /// What came of it.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct TargetResult {
-    pub(crate) receiver: String,
+pub struct TargetResult {
+    /// Name of the receiver.
+    pub receiver: String,
+    /// `power` or `cells`.
     #[serde(rename = "of")]
-    quantity: &'static str,
-    asked_percent: f64,
-    found_percent: Option<f64>,
-    pub(crate) rays: u64,
-    pub(crate) reached: bool,
+    pub quantity: &'static str,
+    /// Error that was asked for, percent.
+    pub asked_percent: f64,
+    /// Error that was found, percent; absent where nothing arrived.
+    pub found_percent: Option<f64>,
+    /// Rays of the run.
+    pub rays: u64,
+    /// Whether the error found is at most the one asked for.
+    pub reached: bool,
 }
 
 impl ErrorTarget {
-    pub(crate) fn new(text: &str, scene: &Scene) -> Result<Self, Failure> {
-        let form = || {
-            Failure::arguments(format!("--until-error {text}: write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells"))
-        };
+    /// From `P%@RECEIVER` or `P%@RECEIVER:cells`.
+    ///
+    /// # Errors
+    /// When the text is neither, or the scene has no such receiver.
+    pub fn new(text: &str, scene: &Scene) -> Result<Self, Error> {
+        let about = |message: String| Error::setting("until_error", format!("{text}: {message}"));
+        let form = || about("write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells".into());
         let (percent, receiver) = text.split_once('@').ok_or_else(form)?;
         let percent = percent.trim().trim_end_matches('%').trim().parse::<f64>().map_err(|_| form())?;
         if !(percent > 0.0 && percent < 100.0) {
-            return Err(Failure::arguments(format!(
-                "--until-error {text}: {percent} % is not above 0 and below 100"
-            )));
+            return Err(about(format!("{percent} % is not above 0 and below 100")));
         }
         let (receiver, cells) = match receiver.strip_suffix(":cells") {
             Some(name) => (name, true),
@@ -61,8 +70,8 @@ impl ErrorTarget {
         };
         let names: Vec<&str> = scene.receivers.iter().map(|r| r.name.as_str()).collect();
         if !names.contains(&receiver) {
-            let failure = Failure::arguments(format!("--until-error: the scene has no receiver '{receiver}'"));
-            return Err(failure.with_help(suggest::closest_name("its receivers are", receiver, &names)));
+            let error = about(format!("the scene has no receiver '{receiver}'"));
+            return Err(error.help(suggest::closest_name("its receivers are", receiver, &names)));
         }
         Ok(Self { percent, receiver: receiver.into(), cells })
     }
@@ -74,13 +83,13 @@ impl ErrorTarget {
         (power > 0.0).then(|| 100.0 * error / power)
     }
 
-    /// Traces until the error is small enough, the most rays are traced, or a signal asks to stop: then not all is traced.
-    pub(crate) fn trace(&self, prepared: &mut PreparedScene, console: &Console) -> (PartialRun, TargetResult) {
+    /// Traces until the error is small enough, the most rays are traced, or the monitor asks to stop: then not all is traced.
+    pub fn trace(&self, prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, TargetResult) {
         let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
         let mut rays = FIRST_RAYS.min(most);
         loop {
             prepared.rays = Some(rays);
-            let (portion, found) = self.attempt(prepared, console);
+            let (portion, found) = self.attempt(prepared, monitor);
             let reached = found.is_some_and(|e| e <= self.percent);
             let is_stopped = !portion.is_whole();
             if reached || is_stopped || rays >= most {
@@ -100,35 +109,17 @@ impl ErrorTarget {
                 (GROWTH_MARGIN * (e / self.percent).powi(2)).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1])
             });
             rays = ((rays as f64 * growth) as u64).min(most);
-            console.say(format_args!(
-                "{} %: going on with {} rays",
-                found.map_or("nothing arrives".into(), |e| figures(e, 2)),
-                grouped(rays)
-            ));
+            monitor.grows(found, rays);
         }
     }
 
-    fn attempt(&self, prepared: &PreparedScene, console: &Console) -> (PartialRun, Option<f64>) {
+    fn attempt(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Option<f64>) {
         let settings = prepared.run_settings();
-        prepared.with_intersector(console, |intersector, _| {
-            let request = TraceRequest { is_saveable: true, ..TraceRequest::default() };
-            let traced = prepared.run(intersector, &settings, request, console);
+        prepared.with_intersector(monitor, |intersector, _| {
+            let traced = prepared.run(intersector, &settings, TraceRequest::default(), monitor);
             let portion = traced.partial.clone();
             (portion, self.error(&Results::new(&prepared.bound, &settings, traced)))
         })
-    }
-
-    /// What came of it, in words.
-    pub(crate) fn sentence(&self, result: &TargetResult) -> String {
-        let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
-        let what = if self.cells { "the cells" } else { "the power" };
-        let verdict = if result.reached { "reached" } else { "**not reached**" };
-        format!(
-            "Asked for a statistical error of {} % of {what} on {}: {verdict} with {} rays ({found}).",
-            self.percent,
-            self.receiver,
-            grouped(result.rays)
-        )
     }
 }
 

@@ -1,23 +1,25 @@
 //! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
 //! change of its light.
 
+use super::monitor::{Monitor, Stage, in_stage};
+use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::ray_sampler::RaySampler;
-use super::scene_run::{PreparedScene, TraceRequest};
-use crate::cli::arguments::options::IntersectorKind;
-use crate::cli::console::Console;
+use super::scene_results::SceneResults;
+use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::simulate::{PartialRun, Results, RunSettings, Verification, replay, verify_pruning};
+use crate::simulate::{PartialRun, Results, RunSettings, replay, verify_pruning};
+use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
 use crate::study::geometric_error::{GeometricError, geometric_error};
 
 /// Segments of a run that are asked again of BVH and spline.
 const RECHECKED: usize = 10_000;
 /// Tolerances above a surface that a ray which left it starts at, so that facets and spline are asked the same question.
-pub(crate) const LIFT_IN_TOLERANCES: f64 = 4.0;
+pub const LIFT_IN_TOLERANCES: f64 = 4.0;
 
 /// Rays traced on facets and on the spline: some 16,000 tell widths within a few per cent.
 const FACETING_RAYS: f64 = 16_384.0;
@@ -28,47 +30,33 @@ const FACETING_SEGMENTS: f64 = 100_000.0;
 /// Replicates of these rays: enough for the error of a difference.
 const FACETING_REPLICATES: u32 = 64;
 
-/// The results of a run with what else was found out about it.
-pub(crate) struct SceneResults {
-    pub(crate) results: Results,
-    pub(crate) check: Option<CrossCheck>,
-    /// What the facets change of the light, where the run was on facets.
-    pub(crate) geometric: Option<GeometricError>,
-    /// The pruned kernel against the full one, when asked for.
-    pub(crate) verification: Option<Verification>,
-    /// The sums that the results were made of, to be saved where they cannot be written; none of a verified run.
-    pub(crate) sums: Option<PartialRun>,
-}
-
-/// Traces the scene, and asks some of its rays again of BVH and spline.
-///
-/// # Errors
-/// What was traced, when the run was stopped before its end.
-pub(crate) fn trace_and_check(
-    prepared: &PreparedScene,
-    request: TraceRequest,
-    console: &Console,
-) -> Result<SceneResults, Box<PartialRun>> {
-    prepared.with_intersector(console, |intersector, build_seconds| {
-        let settings = prepared.run_settings();
-        let (mut results, verification, sums) = if request.verify_pruning {
-            let (results, verification) = verify_pruning(&prepared.bound, intersector, &settings, &|_| true);
-            (results, Some(verification), None)
-        } else {
-            let traced = prepared.run(intersector, &settings, request, console);
-            if !traced.partial.is_whole() {
-                return Err(Box::new(traced.partial));
-            }
-            let sums = traced.partial.clone();
-            (Results::new(&prepared.bound, &settings, traced), None, Some(sums))
-        };
-        // What was done before tracing.
-        results.seconds.read = prepared.job.loaded.seconds;
-        results.seconds.tessellate = prepared.tessellation_seconds;
-        results.seconds.build = build_seconds;
-        let (check, geometric) = recheck(prepared, &results, intersector, console);
-        Ok(SceneResults { results, check, geometric, verification, sums })
-    })
+impl PreparedScene {
+    /// Traces the scene, and asks some of its rays again of BVH and spline.
+    ///
+    /// # Errors
+    /// What was traced, when the monitor ended the run early.
+    pub fn trace(&self, request: TraceRequest<'_>, monitor: &dyn Monitor) -> Result<SceneResults, Box<PartialRun>> {
+        self.with_intersector(monitor, |intersector, build_seconds| {
+            let settings = self.run_settings();
+            let (mut results, verification, sums) = if request.verify_pruning {
+                let (results, verification) = verify_pruning(&self.bound, intersector, &settings, &|_| true);
+                (results, Some(verification), None)
+            } else {
+                let traced = self.run(intersector, &settings, request, monitor);
+                if !traced.partial.is_whole() {
+                    return Err(Box::new(traced.partial));
+                }
+                let sums = traced.partial.clone();
+                (Results::new(&self.bound, &settings, traced), None, Some(sums))
+            };
+            // What was done before tracing.
+            results.seconds.read = self.job.loaded.seconds;
+            results.seconds.tessellate = self.tessellation_seconds;
+            results.seconds.build = build_seconds;
+            let (check, geometric) = recheck(self, &results, intersector, monitor);
+            Ok(SceneResults { results, check, geometric, verification, sums })
+        })
+    }
 }
 
 /// Asks a sample of the run's rays again, and traces some of them on facets and on the spline.
@@ -78,7 +66,7 @@ fn recheck(
     prepared: &PreparedScene,
     results: &Results,
     intersector: &dyn Intersector,
-    console: &Console,
+    monitor: &dyn Monitor,
 ) -> (Option<CrossCheck>, Option<GeometricError>) {
     // What the pilot found need not be measured again.
     let pilot = prepared.chosen.as_ref().and_then(|chosen| chosen.geometric.clone());
@@ -86,10 +74,10 @@ fn recheck(
     if rays.is_empty() {
         return (None, pilot);
     }
-    let spinner = console.spinner("building the spline for the cross-check");
-    let exact = Exact::build(&prepared.job.loaded.model, &exact::Settings::for_few_rays());
-    spinner.finish_and_clear();
-    let check = check_rays(prepared, intersector, &exact, &rays, console);
+    let exact = in_stage(monitor, Stage::BuildingCheck("the spline"), || {
+        Exact::build(&prepared.job.loaded.model, &exact::Settings::for_few_rays())
+    });
+    let check = check_rays(prepared, intersector, &exact, &rays, monitor);
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &exact])))
 }
 
@@ -111,10 +99,10 @@ fn check_rays(
     intersector: &dyn Intersector,
     exact: &Exact,
     rays: &[Ray],
-    console: &Console,
+    monitor: &dyn Monitor,
 ) -> CrossCheck {
     let (model, mesh) = (&prepared.job.loaded.model, &prepared.tessellation.mesh);
-    let spinner = console.spinner("building BVH for the cross-check");
+    monitor.begin(Stage::BuildingCheck("BVH"));
     // With the normals of the run: those of facets with others differ without a fault.
     let normals = prepared.choice.normals.on_facets();
     let bvh = Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() });
@@ -123,14 +111,17 @@ fn check_rays(
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
     let built = (!on_octree).then(|| Octree::build(mesh, &octree::Settings { normals, ..Default::default() }));
     let octree = built.as_ref().map_or(intersector, |octree| octree as &dyn Intersector);
-    spinner.finish_and_clear();
-    let bar = console.progress_bar("checking", "rays", rays.len() as u64);
+    monitor.end();
+    monitor.begin(Stage::Checking(rays.len() as u64));
     let intersectors = Intersectors { model, mesh, octree, bvh: &bvh, exact };
     let settings =
         cross_check::Settings { fallback_band_mm: prepared.mesh_settings.loosest(), ..Default::default() };
     let total = rays.len() as f64;
-    let found = cross_check(&intersectors, rays, &settings, &|p| bar.set_position((p.done * total) as u64));
-    bar.finish_and_clear();
+    let progress = |p: Progress| {
+        monitor.advance((p.done * total) as u64, rays.len() as u64);
+    };
+    let found = cross_check(&intersectors, rays, &settings, &progress);
+    monitor.end();
     found
 }
 

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 const SPARE: f64 = 1.2;
 
 /// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
-pub(crate) struct RaySampler<'a> {
+pub struct RaySampler<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
     sample: Mutex<Vec<(u64, Ray)>>,
@@ -17,7 +17,7 @@ pub(crate) struct RaySampler<'a> {
 
 impl<'a> RaySampler<'a> {
     /// Notes about `wanted` and a fifth more of `expected` rays.
-    pub(crate) fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
+    pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
         Self { inner, threshold: (share * u64::MAX as f64) as u64, sample: Mutex::new(Vec::new()) }
     }
@@ -32,7 +32,7 @@ impl<'a> RaySampler<'a> {
     /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts `lift` mm
     /// above it, in free space, so that all intersectors are asked the same question whatever they take for the surface; one that
     /// left a ready mesh, which has no surface, is left out.
-    pub(crate) fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
+    pub fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
         noted.sort_by_key(|(hash, _)| *hash);

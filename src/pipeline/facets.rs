@@ -1,26 +1,29 @@
-//! From options and scene to the mesher's settings, and to facets.
+//! From settings and scene to the mesher's settings, and to facets.
 
-use crate::cli::arguments::options::MeshingOptions;
-use crate::cli::arguments::suggest;
-use crate::cli::console::Console;
-use crate::cli::failure::Failure;
+use super::error::Error;
+use super::monitor::{Monitor, Stage, in_stage};
+use super::settings::MeshingSettings;
+use super::suggest;
 use crate::model::Model;
 use crate::simulate::{BoundScene, Scene};
 use crate::tessellate::{self, FaceSelector, Tessellation, ToleranceOverride, tessellate};
 use std::time::Instant;
 
-/// The mesher's settings from options and scene.
-pub(crate) fn mesh_settings(
-    meshing: &MeshingOptions,
+/// The mesher's settings from what is asked and the scene.
+///
+/// # Errors
+/// When a part, face or role is not there.
+pub fn mesh_settings(
+    meshing: &MeshingSettings,
     scene: Option<&Scene>,
     model: &Model,
-) -> Result<tessellate::Settings, Failure> {
+) -> Result<tessellate::Settings, Error> {
     let mut settings = tessellate::Settings::default();
     let accuracy = scene.map(|s| &s.accuracy);
     if let Some(range) = meshing.tolerance.or(accuracy.and_then(|a| a.tolerance_mm)) {
         settings.tolerance = range;
     }
-    settings.angle_deg = meshing.angle.or(accuracy.and_then(|a| a.angle_deg));
+    settings.angle_deg = meshing.angle_deg.or(accuracy.and_then(|a| a.angle_deg));
     // Faces that are one interface for light are faceted once.
     settings.glue_mm = scene.map_or(0.0, |s| s.run.glue_mm);
     if let Some(plan) = &meshing.plan {
@@ -43,29 +46,33 @@ pub(crate) fn mesh_settings(
 }
 
 /// The faces of an optical role, which only a scene knows.
-fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Failure> {
+fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Error> {
     if !BoundScene::ROLES.contains(&role) {
-        let failure = Failure::arguments(format!("--role {role}: there is no such optical role"));
-        return Err(failure.with_help(format!("use one of {}", BoundScene::ROLES.join(", "))));
+        let error = Error::setting("role", format!("{role}: there is no such optical role"));
+        return Err(error.help(format!("use one of {}", BoundScene::ROLES.join(", "))));
     }
     let Some(scene) = scene else {
-        let failure = Failure::arguments(format!("--role {role}: only a scene says what faces are for light"));
-        return Err(failure.with_help("name the faces or the part: --face NAME=0.01 or --part NAME=0.01"));
+        let error = Error::setting("role", format!("{role}: only a scene says what faces are for light"));
+        return Err(error
+            .help("name the face or the part instead, as the command's --face NAME=0.01 and --part NAME=0.01 do"));
     };
     Ok(FaceSelector::Placed(scene.bind(model)?.faces_in_role(role)))
 }
 
-fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Failure> {
+fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     if model.parts.iter().any(|p| p.name == name) {
         return Ok(FaceSelector::Part(name.to_owned()));
     }
     let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
-    Err(Failure::arguments(format!("--part {name}: the model has no part of this name"))
-        .with_help(suggest::closest_name("its parts are", name, &known)))
+    Err(Error::setting("part", format!("{name}: the model has no part of this name")).help(suggest::closest_name(
+        "its parts are",
+        name,
+        &known,
+    )))
 }
 
 /// A face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
-fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Failure> {
+fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
     let faces = || model.placed_faces().filter_map(|f| f.face);
     if faces().any(|f| f.name == name) {
@@ -75,19 +82,21 @@ fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Failure> {
         return Ok(FaceSelector::Entity(id));
     }
     let known: Vec<&str> = faces().map(|f| f.name.as_str()).filter(|n| !n.is_empty()).collect();
-    let failure = Failure::arguments(format!("--face {name}: the model has no face of this name or number"));
-    Err(failure.with_help(if known.is_empty() {
+    let error = Error::setting("face", format!("{name}: the model has no face of this name or number"));
+    Err(error.help(if known.is_empty() {
         "its faces have no names; write the number of the entity in the file, as in #17=0.01".into()
     } else {
         suggest::closest_name("its faces are", name, &known)
     }))
 }
 
-/// Facets with the time they took.
-pub(crate) fn facets(model: &Model, settings: &tessellate::Settings, console: &Console) -> (Tessellation, f64) {
+/// Facets with the seconds they took.
+pub fn tessellate_model(
+    model: &Model,
+    settings: &tessellate::Settings,
+    monitor: &dyn Monitor,
+) -> (Tessellation, f64) {
     let start = Instant::now();
-    let spinner = console.spinner("making facets");
-    let tessellation = tessellate(model, settings);
-    spinner.finish_and_clear();
+    let tessellation = in_stage(monitor, Stage::Tessellating, || tessellate(model, settings));
     (tessellation, start.elapsed().as_secs_f64())
 }

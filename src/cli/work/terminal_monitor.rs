@@ -1,0 +1,104 @@
+//! A job as a terminal shows it: a sign of life or a bar for each stage, and a line for what was decided.
+
+use super::path_file::PathFile;
+use crate::cli::console::{Console, show_progress};
+use crate::cli::interruption::{self, SaveableRun};
+use crate::pipeline::{Monitor, Stage};
+use crate::report::{figures, grouped};
+use crate::study;
+use crate::study::default_accuracy::Chosen;
+use indicatif::ProgressBar;
+use std::sync::{Mutex, MutexGuard};
+
+/// Shows the stages of a job on the terminal; stops tracing when a signal asks a run to stop that can be saved, and when its paths can
+/// no longer be written.
+pub(crate) struct TerminalMonitor<'a> {
+    console: &'a Console,
+    is_saveable: bool,
+    paths: Option<&'a PathFile>,
+    shown: Mutex<Shown>,
+}
+
+/// The stage that is on the terminal.
+#[derive(Default)]
+struct Shown {
+    bar: Option<ProgressBar>,
+    saveable: Option<SaveableRun>,
+}
+
+impl<'a> TerminalMonitor<'a> {
+    pub(crate) fn new(console: &'a Console) -> Self {
+        Self { console, is_saveable: false, paths: None, shown: Mutex::default() }
+    }
+
+    /// Of a run that is saved when a signal asks it to stop.
+    pub(crate) fn of_saveable(console: &'a Console, paths: Option<&'a PathFile>) -> Self {
+        Self { is_saveable: true, paths, ..Self::new(console) }
+    }
+
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        self.shown.lock().unwrap_or_else(|e| e.into_inner())
+    }
+}
+
+impl Monitor for TerminalMonitor<'_> {
+    fn begin(&self, stage: Stage<'_>) {
+        let console = self.console;
+        let mut shown = self.shown();
+        shown.bar = Some(match stage {
+            Stage::Reading(path) => console.spinner(&format!("reading {}", path.display())),
+            Stage::Tessellating => console.spinner("making facets"),
+            Stage::Choosing => console.spinner("choosing facets or spline by a pilot"),
+            Stage::Aiming => console.stage_bar("aiming"),
+            Stage::Building(kind) => console.spinner(&format!("building {kind}")),
+            Stage::BuildingCheck(what) => console.spinner(&format!("building {what} for the cross-check")),
+            Stage::Tracing(rays) => {
+                shown.saveable = self.is_saveable.then(SaveableRun::begin);
+                console.progress_bar("tracing", "rays", rays)
+            }
+            Stage::Checking(rays) => console.progress_bar("checking", "rays", rays),
+        });
+    }
+
+    fn advance(&self, done: u64, total: u64) -> bool {
+        let shown = self.shown();
+        if let Some(bar) = &shown.bar {
+            bar.set_length(total);
+            bar.set_position(done);
+        }
+        let is_stopped = shown.saveable.is_some() && interruption::is_requested();
+        !is_stopped && self.paths.is_none_or(|paths| !paths.has_failed())
+    }
+
+    fn study_progress(&self, progress: &study::Progress) {
+        if let Some(bar) = &self.shown().bar {
+            show_progress(bar, progress);
+        }
+    }
+
+    fn end(&self) {
+        let mut shown = self.shown();
+        if let Some(bar) = shown.bar.take() {
+            bar.finish_and_clear();
+        }
+        shown.saveable = None;
+    }
+
+    fn chosen(&self, chosen: &Chosen) {
+        let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
+        let how = match chosen.intersector {
+            "exact" => "on the spline".to_owned(),
+            _ => format!("on facets of {low}..{high} mm with {} normals", chosen.normals),
+        };
+        self.console.say(format_args!("tracing {how}: {}", chosen.because));
+    }
+
+    fn aimed(&self, answer: &str) {
+        self.console.say(answer);
+    }
+
+    fn grows(&self, found_percent: Option<f64>, rays: u64) {
+        let found = found_percent.map_or("nothing arrives".into(), |e| figures(e, 2));
+        self.console.say(format_args!("{found} %: going on with {} rays", grouped(rays)));
+    }
+}

@@ -1,0 +1,115 @@
+//! A direction error asked for in place of a tolerance.
+
+use super::error::Error;
+use super::intersectors::IntersectorChoice;
+use super::monitor::{Monitor, Stage};
+use super::ray_sampler::RaySampler;
+use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
+use crate::intersect::{Intersector, NormalMode};
+use crate::math::Ray;
+use crate::model::Model;
+use crate::simulate::{RunSettings, Scene, simulate};
+use crate::study::accuracy_target::{AccuracyPlan, AccuracyTarget, meet_target, meet_target_for_rays};
+use crate::study::{ModelMeshSource, Progress};
+
+/// How far above a surface a ray starts that left it, mm: facets lie at most 0.8 mm off the surface here.
+const RAY_LIFT_MM: f64 = 1.0;
+
+/// Settings that keep an accuracy, and how that was reached; unchanged where none was asked for.
+#[derive(Clone, Debug)]
+pub struct AccurateSettings {
+    /// How to make facets.
+    pub meshing: MeshingSettings,
+    /// How to trace.
+    pub tracing: TracingSettings,
+    /// How the accuracy was reached.
+    pub plan: Option<AccuracyPlan>,
+}
+
+/// The settings with tolerances and normals put in that keep a direction error of so many degrees. With a scene, its own rays are what
+/// the accuracy is about.
+///
+/// # Errors
+/// When the settings say otherwise how fine the facets are, or that there are none.
+pub fn settings_for_accuracy(
+    accuracy_deg: Option<f64>,
+    (mut meshing, mut tracing): (MeshingSettings, TracingSettings),
+    scene: Option<&Scene>,
+    model: &Model,
+    monitor: &dyn Monitor,
+) -> Result<AccurateSettings, Error> {
+    let Some(mut ask) = target(accuracy_deg, &meshing)? else {
+        return Ok(AccurateSettings { meshing, tracing, plan: None });
+    };
+    let choice = IntersectorChoice::new(&tracing, scene)?;
+    if choice.intersector == IntersectorKind::Exact {
+        let error = Error::setting("accuracy", "with the exact intersector: there is nothing to choose");
+        return Err(error.help("leave out the accuracy, or the intersector"));
+    }
+    ask.seed = tracing.seed.unwrap_or(ask.seed);
+    ask.job_rays = tracing.rays().or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
+    if let Some(normals) = tracing.normals {
+        ask.kinds = vec![normals];
+    }
+    let product = ModelMeshSource::new(model);
+    monitor.begin(Stage::Aiming);
+    let progress = |p: Progress| monitor.study_progress(&p);
+    let found = match scene {
+        None => meet_target(model, &product, &ask, &progress),
+        Some(scene) => {
+            let bound = scene.bind(model)?;
+            let rays = |seed: u64, count: u64| {
+                let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
+                scene_rays(&product, model, &settings, &bound)
+            };
+            meet_target_for_rays(model, &product, &ask, &rays, &progress)
+        }
+    };
+    monitor.end();
+    monitor.aimed(&found.answer);
+    meshing.plan = Some(found.plan.clone());
+    tracing.normals = Some(found.normals);
+    Ok(AccurateSettings { meshing, tracing, plan: Some(found) })
+}
+
+/// The same for facets alone, whose readers interpolate the normals of their corners.
+///
+/// # Errors
+/// When the settings say otherwise how fine the facets are.
+pub fn settings_for_accurate_facets(
+    accuracy_deg: Option<f64>,
+    meshing: MeshingSettings,
+    model: &Model,
+    monitor: &dyn Monitor,
+) -> Result<(MeshingSettings, Option<AccuracyPlan>), Error> {
+    let Some(ask) = target(accuracy_deg, &meshing)? else { return Ok((meshing, None)) };
+    let ask = AccuracyTarget { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
+    monitor.begin(Stage::Aiming);
+    let found = meet_target(model, &ModelMeshSource::new(model), &ask, &|p| monitor.study_progress(&p));
+    monitor.end();
+    monitor.aimed(&found.answer);
+    Ok((MeshingSettings { plan: Some(found.plan.clone()), ..meshing }, Some(found)))
+}
+
+/// What is asked for; `None` without an accuracy.
+fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option<AccuracyTarget>, Error> {
+    let Some(degrees) = accuracy_deg else { return Ok(None) };
+    if meshing.tolerance.is_some() {
+        let error = Error::setting("accuracy", "and the tolerance both say how fine the facets are to be");
+        return Err(error.help("leave one of them out; tolerances of single parts may stand beside an accuracy"));
+    }
+    Ok(Some(AccuracyTarget::degrees(degrees)))
+}
+
+/// Rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as asked.
+fn scene_rays(
+    product: &ModelMeshSource<'_>,
+    model: &Model,
+    settings: &RunSettings,
+    bound: &crate::simulate::BoundScene,
+) -> Vec<Ray> {
+    let exact: &dyn Intersector = product.spline();
+    let sampler = RaySampler::new(exact, settings.rays, settings.rays);
+    simulate(bound, &sampler, settings, &|_| true);
+    sampler.rays(settings.rays as usize, model, RAY_LIFT_MM)
+}

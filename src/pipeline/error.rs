@@ -1,0 +1,131 @@
+//! Why a job cannot be done, and what to do about it.
+
+use crate::{simulate, step};
+use std::ops::Range;
+
+/// What kind of mistake an [`Error`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The settings or the scene ask for what cannot be.
+    Request,
+    /// A file cannot be read, or is not what it should be.
+    Input,
+}
+
+/// Why a job cannot be done: names the setting, the file or the key, and what to do.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{}{message}{}", self.place(), self.advice_clause())]
+pub struct Error {
+    kind: ErrorKind,
+    setting: Option<&'static str>,
+    message: String,
+    help: Option<String>,
+    excerpt: Option<Box<Excerpt>>,
+}
+
+/// The stretch of a text file that an error is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Excerpt {
+    /// The file, as it was named.
+    pub file: String,
+    /// All of its text.
+    pub text: String,
+    /// The bytes of `text` that are meant.
+    pub span: Range<usize>,
+    /// A word or two about them.
+    pub label: &'static str,
+}
+
+impl Error {
+    fn new(kind: ErrorKind, setting: Option<&'static str>, message: impl Into<String>) -> Self {
+        Self { kind, setting, message: message.into(), help: None, excerpt: None }
+    }
+
+    /// About what was asked.
+    pub(crate) fn request(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Request, None, message)
+    }
+
+    /// About the value of a setting; the message goes on after its name.
+    pub(crate) fn setting(setting: &'static str, message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Request, Some(setting), message)
+    }
+
+    /// About a file.
+    pub(crate) fn input(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Input, None, message)
+    }
+
+    pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    pub(crate) fn excerpt_of(
+        mut self,
+        (file, text, span): (&str, &str, Range<usize>),
+        label: &'static str,
+    ) -> Self {
+        self.excerpt = Some(Box::new(Excerpt { file: file.into(), text: text.into(), span, label }));
+        self
+    }
+
+    /// What kind of mistake it is.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// The setting that it is about, as `part`, `rays` or `until_error`.
+    pub fn setting_name(&self) -> Option<&'static str> {
+        self.setting
+    }
+
+    /// The message, without the setting before it and the advice behind it.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What to do about it.
+    pub fn advice(&self) -> Option<&str> {
+        self.help.as_deref()
+    }
+
+    /// The place in a text file that is at fault.
+    pub fn excerpt(&self) -> Option<&Excerpt> {
+        self.excerpt.as_deref()
+    }
+
+    fn place(&self) -> String {
+        self.setting.map_or_else(String::new, |setting| format!("{setting} "))
+    }
+
+    fn advice_clause(&self) -> String {
+        self.help.as_ref().map_or_else(String::new, |help| format!("; {help}"))
+    }
+}
+
+impl From<step::Error> for Error {
+    fn from(e: step::Error) -> Self {
+        Self::input(e.to_string())
+    }
+}
+
+impl From<simulate::Error> for Error {
+    fn from(e: simulate::Error) -> Self {
+        let place = match (e.file(), e.line()) {
+            ("", _) => String::new(),
+            (file, None) => format!("{file}: "),
+            (file, Some((line, column))) => format!("{file}:{line}:{column}: "),
+        };
+        let mut error = match e.kind() {
+            simulate::ErrorKind::Unreadable => Self::input(e.message()),
+            _ => Self::request(format!("{place}{}", e.message())),
+        };
+        error.help = e.advice().map(str::to_owned);
+        match (e.text(), e.span()) {
+            (Some(text), Some(span)) => error.excerpt_of((e.file(), text, span), "here"),
+            _ => error,
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! What decides the bits of a run, as one hash: parts with the same one belong together.
+
+use super::error::Error;
+use super::prepared_scene::PreparedScene;
+use crate::formats::read_bytes;
+use crate::simulate::{Fingerprint, RunSettings, grows};
+
+/// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
+///
+/// # Errors
+/// When a file of the scene cannot be read.
+pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
+    let scene = &prepared.job.scene;
+    let defaults = RunSettings::default();
+    let asked = prepared.run_settings();
+    // How far a run has grown decides the bits of no ray.
+    let grows = grows(&prepared.bound, &asked);
+    let settings = RunSettings {
+        rays: if grows { 0 } else { asked.rays },
+        first_ray: 0,
+        grows,
+        threads: 0,
+        batch: 0,
+        kernel: defaults.kernel,
+        shard: [0, 1],
+        path_samples: 0,
+        ..asked
+    };
+    let words = format!(
+        "{} {} {:?} {:?} {settings:?}",
+        env!("CARGO_PKG_VERSION"),
+        env!("LAMPYRIS_COMMIT"),
+        prepared.mesh_settings,
+        prepared.choice
+    );
+    let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
+    let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
+    for file in files {
+        let path = scene.resolve(file);
+        let read = read_bytes(&path).map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
+        pieces.push(read);
+    }
+    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
+    Ok(Fingerprint::new(&pieces))
+}

@@ -1,0 +1,77 @@
+//! From settings to the intersector of a run.
+
+use super::error::Error;
+use super::monitor::{Monitor, Stage};
+use super::settings::{IntersectorKind, TracingSettings, normal_mode};
+use crate::intersect::bvh::{self, Bvh};
+use crate::intersect::exact::{self, Exact};
+use crate::intersect::octree::{self, Octree};
+use crate::intersect::polish::Polished;
+use crate::intersect::{Footprint, Intersector, NormalMode};
+use crate::mesh::FacetMesh;
+use crate::model::Model;
+use crate::simulate::Scene;
+
+/// What finds the hits, and how the normal there is got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct IntersectorChoice {
+    /// What finds the hits.
+    pub intersector: IntersectorKind,
+    /// How the normal there is got.
+    pub normals: NormalMode,
+}
+
+impl IntersectorChoice {
+    /// The settings, else the scene, else octree and bilinear.
+    ///
+    /// # Errors
+    /// When the scene names an intersector or normals that are not known.
+    pub fn new(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<Self, Error> {
+        let accuracy = scene.map(|s| &s.accuracy);
+        let intersector = match (tracing.intersector, accuracy.and_then(|a| a.intersector.as_deref())) {
+            (Some(intersector), _) => intersector,
+            (None, Some(name)) => name.parse()?,
+            (None, None) => IntersectorKind::default(),
+        };
+        let normals = match (tracing.normals, accuracy.and_then(|a| a.normals.as_deref())) {
+            (Some(normals), _) => normals,
+            (None, Some(name)) => normal_mode(name)?,
+            (None, None) => NormalMode::default(),
+        };
+        Ok(Self { intersector, normals })
+    }
+}
+
+/// Builds the chosen intersector and hands it to `work`, with what it took to build.
+pub fn with_intersector<T>(
+    choice: IntersectorChoice,
+    model: &Model,
+    mesh: &FacetMesh,
+    monitor: &dyn Monitor,
+    work: impl FnOnce(&dyn Intersector, Footprint) -> T,
+) -> T {
+    monitor.begin(Stage::Building(choice.intersector));
+    if choice.intersector == IntersectorKind::Exact {
+        let exact = Exact::build(model, &exact::Settings::default());
+        monitor.end();
+        return work(&exact, exact.footprint());
+    }
+    let normals = choice.normals.on_facets();
+    let facets: Box<dyn Intersector + '_> = match choice.intersector {
+        IntersectorKind::Bvh2 => {
+            Box::new(Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, normals, ..Default::default() }))
+        }
+        IntersectorKind::Cwbvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
+        IntersectorKind::Octree | IntersectorKind::Exact => {
+            Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() }))
+        }
+    };
+    if choice.normals != NormalMode::Exact {
+        monitor.end();
+        return work(&*facets, facets.footprint());
+    }
+    let exact = Exact::build(model, &exact::Settings::default());
+    let polished = Polished::new(&*facets, mesh, &exact);
+    monitor.end();
+    work(&polished, polished.footprint())
+}

@@ -1,0 +1,75 @@
+//! Scenes and the models that they name.
+
+use super::error::Error;
+use super::monitor::{Monitor, Stage, in_stage};
+use crate::model::Model;
+use crate::simulate::Scene;
+use crate::simulate::scene::ModelUse;
+use crate::step::{self, Import, ImportReport};
+use std::path::Path;
+use std::time::Instant;
+
+/// A model with the accounts of the files it was read from.
+#[derive(Clone, Debug)]
+pub struct LoadedModel {
+    /// All models of the scene in one.
+    pub model: Model,
+    /// What each file held, in the order of the scene.
+    pub reports: Vec<ImportReport>,
+    /// Seconds that reading took.
+    pub seconds: f64,
+}
+
+/// Reads the models of a scene with `read`, which gets each entry of the scene.
+///
+/// # Errors
+/// Those of `read`, and where the models cannot be put together.
+pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Error>) -> Result<LoadedModel, Error> {
+    let start = Instant::now();
+    let (mut models, mut reports) = (Vec::new(), Vec::new());
+    for (i, entry) in scene.models.iter().enumerate() {
+        let shown = |error: Error| match scene.place_of_model(i) {
+            Some(place) => error.excerpt_of(place, "named here"),
+            None => error,
+        };
+        // Of a file that stands in many places one reading is enough: 4 ms each for a thousand lenses.
+        let same = |e: &ModelUse| (&e.file, e.unit_mm) == (&entry.file, entry.unit_mm);
+        let import = match scene.models[..i].iter().position(same) {
+            Some(k) => Import { model: Model::clone(&models[k]), report: ImportReport::clone(&reports[k]) },
+            None => read(entry).map_err(shown)?,
+        };
+        models.push(import.model);
+        reports.push(import.report);
+    }
+    let model = scene.assemble(models)?;
+    Ok(LoadedModel { model, reports, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Reads the models that a scene names, from its folder.
+///
+/// # Errors
+/// When one cannot be read, or they cannot be put together.
+pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedModel, Error> {
+    read_models(scene, |entry| {
+        let path = scene.resolve(&entry.file);
+        let settings = step::Settings { length_unit_mm: entry.unit_mm, ..step::Settings::default() };
+        Ok(in_stage(monitor, Stage::Reading(&path), || step::read(&path, &settings))?)
+    })
+}
+
+/// Reads a scene file and the models it names.
+///
+/// # Errors
+/// When the file is no scene, or a model cannot be read.
+pub fn read_scene(path: &Path, monitor: &dyn Monitor) -> Result<(Scene, LoadedModel), Error> {
+    let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    if ["stp", "step", "p21"].into_iter().any(is) {
+        let error = Error::request(format!("{}: a STEP file, where a scene (.toml) is needed", path.display()));
+        let advice = "a STEP file alone has no light: name it under [[model]] of a scene with sources and receivers \
+            (`lampyris schema` says how), or use `lampyris info`, `facet` or `check` on it";
+        return Err(error.help(advice));
+    }
+    let scene = Scene::read(path)?;
+    let loaded = read_scene_models(&scene, monitor)?;
+    Ok((scene, loaded))
+}

@@ -1,0 +1,51 @@
+//! The main job: a scene and its models are read, faceted, given tolerance, normals and intersector where nobody asked for them,
+//! traced, and every figure comes with both its errors. The command and the Python package run it through here alone.
+//!
+//! ```no_run
+//! use lampyris::pipeline::{PreparedScene, SceneJob, Silent, TraceRequest, read_scene};
+//!
+//! let (scene, loaded) = read_scene("lamp.toml".as_ref(), &Silent)?;
+//! let prepared = PreparedScene::new(SceneJob::new(scene, loaded), &Silent)?;
+//! let run = prepared.trace(TraceRequest::default(), &Silent).expect("nothing stops it");
+//! for (receiver, figures) in run.results.receivers.iter().zip(run.figures(&prepared)) {
+//!     let power = figures.power;
+//!     println!("{}: {} ± {} ± {:?}", receiver.name, power.value, power.statistical, power.geometric);
+//! }
+//! # Ok::<(), lampyris::pipeline::Error>(())
+//! ```
+//!
+//! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
+//!
+//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `facets` and
+//! `intersectors` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
+//! `cross_check` (the run), `fingerprint` and `error_target` (what is made of it).
+
+mod accuracy_target;
+mod cross_check;
+mod default_accuracy;
+mod error;
+mod error_target;
+mod facets;
+mod fingerprint;
+mod intersectors;
+mod loading;
+mod monitor;
+mod prepared_scene;
+mod ray_sampler;
+mod scene_results;
+mod settings;
+mod suggest;
+
+pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
+pub use cross_check::LIFT_IN_TOLERANCES;
+pub use error::{Error, ErrorKind, Excerpt};
+pub use error_target::{ErrorTarget, TargetResult};
+pub use facets::{mesh_settings, tessellate_model};
+pub use fingerprint::fingerprint;
+pub use intersectors::{IntersectorChoice, with_intersector};
+pub use loading::{LoadedModel, read_models, read_scene, read_scene_models};
+pub use monitor::{Monitor, Silent, Stage};
+pub use prepared_scene::{PreparedScene, SceneJob, TraceRequest};
+pub use ray_sampler::RaySampler;
+pub use scene_results::SceneResults;
+pub use settings::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};

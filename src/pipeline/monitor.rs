@@ -1,0 +1,68 @@
+//! What a job tells while it runs.
+
+use super::settings::IntersectorKind;
+use crate::study;
+use crate::study::default_accuracy::Chosen;
+use std::path::Path;
+
+/// A stage of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage<'a> {
+    /// A model is read from this file.
+    Reading(&'a Path),
+    /// Facets are made.
+    Tessellating,
+    /// A pilot chooses between facets and spline.
+    Choosing,
+    /// Facets that keep an accuracy are looked for; [`Monitor::study_progress`] tells how far.
+    Aiming,
+    /// An intersector is built.
+    Building(IntersectorKind),
+    /// What the results are checked with is built: the spline or a BVH.
+    BuildingCheck(&'static str),
+    /// Rays are traced, so many at most.
+    Tracing(u64),
+    /// So many rays are asked again of the other intersectors.
+    Checking(u64),
+}
+
+/// Hears how far a job is; nothing has to be heard.
+pub trait Monitor: Sync {
+    /// A stage begins.
+    fn begin(&self, _stage: Stage<'_>) {}
+
+    /// So many rays of the stage are done, of so many; called from any thread. `false` ends tracing early.
+    fn advance(&self, _done: u64, _total: u64) -> bool {
+        true
+    }
+
+    /// How far a study has come.
+    fn study_progress(&self, _progress: &study::Progress) {}
+
+    /// The stage is over.
+    fn end(&self) {}
+
+    /// Tolerance, normals and intersector were chosen.
+    fn chosen(&self, _chosen: &Chosen) {}
+
+    /// The facets keep the accuracy that was asked for as this sentence says.
+    fn aimed(&self, _answer: &str) {}
+
+    /// The error of a run was so many per cent, or unknown where nothing arrived, so that it goes on with so many rays.
+    fn grows(&self, _found_percent: Option<f64>, _rays: u64) {}
+}
+
+/// Hears nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Monitor for Silent {}
+
+/// Does a stage of work.
+pub(super) fn in_stage<T>(monitor: &dyn Monitor, stage: Stage<'_>, work: impl FnOnce() -> T) -> T {
+    monitor.begin(stage);
+    let made = work();
+    monitor.end();
+    made
+}

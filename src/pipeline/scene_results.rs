@@ -1,0 +1,75 @@
+//! What a traced scene hands back: its figures with both errors, and the document that says it all.
+
+use super::prepared_scene::PreparedScene;
+use super::settings::IntersectorKind;
+use crate::simulate::{PartialRun, Results, Verification};
+use crate::study::cross_check::CrossCheck;
+use crate::study::figures::{self, ReceiverFigures, Surface};
+use crate::study::geometric_error::GeometricError;
+use serde_json::Value;
+
+/// The results of a run with what else was found out about it.
+#[derive(Clone, Debug)]
+pub struct SceneResults {
+    /// What was counted.
+    pub results: Results,
+    /// Some of the rays asked again of BVH and spline.
+    pub check: Option<CrossCheck>,
+    /// What the facets change of the light, where the run was on facets.
+    pub geometric: Option<GeometricError>,
+    /// The pruned kernel against the full one, when asked for.
+    pub verification: Option<Verification>,
+    /// The sums that the results were made of, to be saved where they cannot be written; none of a verified run.
+    pub sums: Option<PartialRun>,
+}
+
+impl SceneResults {
+    /// The figures of every receiver with both their errors.
+    pub fn figures(&self, prepared: &PreparedScene) -> Vec<ReceiverFigures> {
+        let surface = match (prepared.choice.intersector, &self.geometric) {
+            (IntersectorKind::Exact, _) => Surface::Spline,
+            (_, Some(error)) => Surface::Facets(error),
+            (_, None) => Surface::Unmeasured,
+        };
+        figures::figures(&self.results, surface, prepared.power_unit())
+    }
+
+    /// The errors of a receiver's cells from the facets, where they are known.
+    pub fn geometric_cells(&self, prepared: &PreparedScene, receiver: usize) -> Option<Vec<f64>> {
+        let none = vec![0.0; self.results.receivers[receiver].cells.len()];
+        match (prepared.choice.intersector, &self.geometric) {
+            (IntersectorKind::Exact, _) => Some(none),
+            // Facets that are the surface itself were not compared cell by cell.
+            (_, Some(error)) if error.rays == 0 => Some(none),
+            (_, measured) => measured.as_ref().and_then(|error| Some(error.receivers.get(receiver)?.cells.clone())),
+        }
+    }
+
+    /// The document of `results.json`, without what only its writer knows: files and where the numbers come from.
+    ///
+    /// # Errors
+    /// When a piece cannot be written as JSON.
+    pub fn document(&self, prepared: &PreparedScene) -> serde_json::Result<Value> {
+        let mut document = serde_json::to_value(&self.results)?;
+        if let Some(verification) = &self.verification {
+            document["pruning"] = serde_json::to_value(verification)?;
+        }
+        if let Some(check) = &self.check {
+            document["check"] = serde_json::to_value(check)?;
+        }
+        for (k, figures) in self.figures(prepared).iter().enumerate() {
+            document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
+        }
+        document["halving"] = serde_json::to_value(figures::halving(&self.results, self.geometric.as_ref()))?;
+        if let Some(chosen) = &prepared.chosen {
+            document["chosen"] = serde_json::to_value(chosen)?;
+        }
+        if let Some(geometric) = self.geometric.as_ref().filter(|g| g.rays > 0) {
+            document["faceting"] = serde_json::to_value(geometric)?;
+        }
+        if let Some(accuracy) = &prepared.job.accuracy {
+            document["accuracy"] = serde_json::to_value(accuracy)?;
+        }
+        Ok(document)
+    }
+}

@@ -1,0 +1,125 @@
+//! What a job is asked for beside its scene: how fine the facets are, what finds the hits, which rays.
+
+use super::error::Error;
+use crate::intersect::NormalMode;
+use crate::study::accuracy_target::TolerancePlan;
+use std::fmt;
+use std::str::FromStr;
+
+/// More threads than any machine has; a typing error beyond it is cut here.
+const MOST_THREADS: usize = 4096;
+
+/// How facets are made; what is not said here the scene says, else the defaults of [`crate::tessellate::Settings`].
+#[derive(Clone, Debug, Default)]
+pub struct MeshingSettings {
+    /// Smallest and largest distance from the facets to the surface, mm.
+    pub tolerance: Option<[f64; 2]>,
+    /// Largest angle between facet and surface normal, degrees.
+    pub angle_deg: Option<f64>,
+    /// Tolerance of parts by name, mm.
+    pub part: Vec<(String, [f64; 2])>,
+    /// Tolerance of faces by name, or by `#` and the number of their entity, mm; wins over that of their part.
+    pub face: Vec<(String, [f64; 2])>,
+    /// Tolerance of all faces of one optical role, mm.
+    pub role: Vec<(String, [f64; 2])>,
+    /// Local tolerances that an accuracy came to.
+    pub plan: Option<TolerancePlan>,
+}
+
+/// How rays are traced; what is not said here the scene says.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TracingSettings {
+    /// Rays of the run.
+    pub ray_range: Option<RayRange>,
+    /// Seed of all random numbers.
+    pub seed: Option<u64>,
+    /// Threads that trace; as many as the machine has where none are asked for.
+    pub threads: Option<usize>,
+    /// What finds the hits.
+    pub intersector: Option<IntersectorKind>,
+    /// How the normal at a hit is got.
+    pub normals: Option<NormalMode>,
+}
+
+impl TracingSettings {
+    /// The number of rays that was asked for.
+    pub fn rays(&self) -> Option<u64> {
+        self.ray_range.map(|range| range.end)
+    }
+
+    /// The number of threads to trace with.
+    ///
+    /// # Errors
+    /// When none are asked for.
+    pub fn thread_count(&self) -> Result<usize, Error> {
+        match self.threads {
+            None => Ok(std::thread::available_parallelism().map_or(1, |n| n.get())),
+            Some(0) => Err(Error::setting("threads", "0: at least one thread is needed")),
+            Some(n) => Ok(n.min(MOST_THREADS)),
+        }
+    }
+}
+
+/// Rays of a run: so many, or those from one up to another of a run that grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RayRange {
+    /// The first, where a range was given.
+    pub first: Option<u64>,
+    /// Past the last.
+    pub end: u64,
+}
+
+/// What finds the hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum IntersectorKind {
+    /// The octree on facets.
+    #[default]
+    Octree,
+    /// A binary BVH on facets.
+    Bvh2,
+    /// An eight-wide BVH on facets.
+    Cwbvh,
+    /// The spline itself.
+    Exact,
+}
+
+impl IntersectorKind {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Octree, Self::Bvh2, Self::Cwbvh, Self::Exact];
+
+    /// Its name on the command line and in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Octree => "octree",
+            Self::Bvh2 => "bvh2",
+            Self::Cwbvh => "cwbvh",
+            Self::Exact => "exact",
+        }
+    }
+}
+
+impl fmt::Display for IntersectorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for IntersectorKind {
+    type Err = Error;
+
+    /// By its name, in any case.
+    fn from_str(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+            Error::setting("intersector", format!("{name}: it is not known"))
+                .help(format!("use one of {}", Self::ALL.map(Self::name).join(", ")))
+        })
+    }
+}
+
+/// The mode of this name, in any case.
+pub(super) fn normal_mode(name: &str) -> Result<NormalMode, Error> {
+    NormalMode::ALL.into_iter().find(|mode| mode.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
+        Error::setting("normals", format!("{name}: they are not known"))
+            .help(format!("use one of {}", NormalMode::ALL.map(NormalMode::name).join(", ")))
+    })
+}
