@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::border::edges::Division;
-use super::border::polygons::{self, BorderPolygons, ImprintedPoints};
+use super::border::polygons::{self, BorderPolygons, ImprintedPoints, crosses_ray_from};
 use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
@@ -11,11 +11,12 @@ use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
-use super::nodes::edge_key;
+use super::nodes::{ProvedFacet, edge_key};
 use super::proof::prover::Prover;
 use super::report::Repair;
+use super::taken_chords::TakenChords;
 use super::transition::creases::crease_lines;
-use super::transition::delaunay::{self, Outline};
+use super::transition::delaunay::{self, Outline, Transition};
 use super::transition::pairing::{self, TransitionFacet};
 use super::triangulator::{GaveUp, guarded};
 use crate::math::{Point, Uv};
@@ -27,6 +28,10 @@ use rustc_hash::{FxHashMap, FxHashSet};
 const SCALE_CELLS: usize = 64;
 const SCALE_PLACES: usize = 5;
 const FEW_CELLS: usize = 4;
+
+/// By how much what facets cover may differ from what the border bounds: share of it, and of the box around it. Corners of cells are
+/// put on corners of the border up to 1e-7 of the box away.
+const COVERED: [f64; 2] = [1e-4, 1e-6];
 
 /// Why a face has no facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +58,8 @@ pub(super) struct FaceInput<'i, 'a> {
     /// The part's shared positions.
     pub(super) shared: &'i [Point],
     pub(super) settings: &'i Settings,
+    /// Chords that others have.
+    pub(super) taken: &'i TakenChords,
 }
 
 /// Meshes a face.
@@ -65,7 +72,7 @@ pub(super) fn mesh_with_imprint(
     input: &FaceInput<'_, '_>,
     imprint: &Imprint,
 ) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
-    let FaceInput { part, face, surface, divisions, shared, settings } = *input;
+    let FaceInput { part, face, surface, divisions, shared, settings, taken } = *input;
     // The border as polygons of the parameter plane, and the tree of cells over it.
     let loops = polygons::loops(face);
     let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
@@ -83,9 +90,13 @@ pub(super) fn mesh_with_imprint(
     let kept = border.segments.iter().chain(&border.imprinted);
     let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
     let (lo, hi) = polygons.bounds();
-    let input =
-        GridInput { nodes: &mut border.nodes, chords: &border.chords, resolution: parameter_resolution(lo, hi) };
-    let grid = grid::build(&mut prover, &cells, input);
+    let input = GridInput {
+        nodes: &mut border.nodes,
+        chords: &border.chords,
+        resolution: parameter_resolution(lo, hi),
+        taken,
+    };
+    let mut grid = grid::build(&mut prover, &cells, input);
     border.divide_poles(&cells);
     // What is left between them and the border is triangulated. Where cells reach the border, both are done.
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
@@ -95,12 +106,20 @@ pub(super) fn mesh_with_imprint(
     let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
-    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale };
+    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
     let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
     let mut transition = guarded(triangulate)?.ok_or(Unmeshed::Empty)?;
     transition.triangles.extend(&grid.triangles);
+    // What covers more or less than the border bounds proves nothing, however near to the surface each of its facets lies.
+    let is_covered = covers_border(&transition, &grid.quads, &polygons);
+    if !is_covered {
+        transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+        grid.quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+    }
     let repaired = if !transition.conflicts.is_empty() {
         Some(Repair::CrossingBorder)
+    } else if !is_covered {
+        Some(Repair::AreaOff)
     } else {
         cells.exhausted.then_some(Repair::CoarserCells)
     };
@@ -125,6 +144,37 @@ pub(super) fn mesh_with_imprint(
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
     Ok((FaceMesh { own, coarse, coincident, repaired, ..made }, carrier))
+}
+
+/// Whether facets cover as much of the parameter plane as the border bounds: more where they lie over each other or beyond a border that
+/// crosses itself, less where something is left out.
+fn covers_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
+    let doubled_area = |corners: &[Uv]| -> f64 {
+        let o = corners[0];
+        corners.windows(2).map(|w| (w[0] - o).perp_dot(w[1] - o)).sum()
+    };
+    let uv = |n: u32| transition.nodes[n].uv;
+    let triangles = transition.triangles.iter().map(|f| doubled_area(&f.nodes.map(uv)).abs());
+    let quads = quads.iter().map(|f| doubled_area(&f.nodes.map(uv)).abs());
+    let covered: f64 = triangles.chain(quads).sum();
+    let loops: Vec<Vec<Uv>> = polygons.polygons.iter().map(|p| p.iter().map(|v| v.uv).collect()).collect();
+    let loops: Vec<Vec<Uv>> = loops.into_iter().filter(|p| !p.is_empty()).collect();
+    let (lo, hi) = polygons.bounds();
+    let around = 2.0 * (hi - lo).x * (hi - lo).y;
+    let is_near = |bounded: f64| (covered - bounded).abs() <= COVERED[0] * bounded + COVERED[1] * around;
+    if is_near(loops.iter().map(|p| doubled_area(p)).sum::<f64>().abs()) {
+        return true;
+    }
+    // Loops may run either way: one inside an odd number of others is a hole.
+    let sides = |p: &Vec<Uv>| (0..p.len()).map(|k| [p[k], p[(k + 1) % p.len()]]).collect::<Vec<_>>();
+    let sides: Vec<Vec<[Uv; 2]>> = loops.iter().map(sides).collect();
+    let is_hole = |k: usize| {
+        let holds = |j: &usize| sides[*j].iter().filter(|s| crosses_ray_from(loops[k][0], **s)).count() % 2 == 1;
+        (0..loops.len()).filter(|&j| j != k).filter(holds).count() % 2 == 1
+    };
+    let bounded =
+        |k: usize| if is_hole(k) { -doubled_area(&loops[k]).abs() } else { doubled_area(&loops[k]).abs() };
+    is_near((0..loops.len()).map(bounded).sum::<f64>())
 }
 
 /// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that

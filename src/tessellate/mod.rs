@@ -28,12 +28,14 @@ mod face_surface;
 mod fallback;
 mod imprint;
 mod nodes;
+mod placement;
 mod proof;
 mod repairs;
 mod report;
 mod sample;
 mod second_derivatives;
 mod settings;
+mod taken_chords;
 mod tessellation;
 mod transition;
 mod triangulator;
@@ -73,7 +75,7 @@ pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
     let parts = assemble::mesh_parts(model, settings);
     let joined = contact::join(model, settings, &parts);
-    let assemble::Placed { mut made, failed, repairs } = assemble::place_instances(model, &parts, &joined);
+    let placement::Placed { mut made, failed, repairs } = placement::place_instances(model, &parts, &joined);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
     evaluation::fill_report(&mut made, model, settings, &failed, &repairs);
     made

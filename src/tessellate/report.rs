@@ -145,8 +145,11 @@ pub struct Seconds {
 pub enum Repair {
     /// Its budget of facets ended: what was left has coarser cells.
     CoarserCells,
-    /// Its border crosses itself in the parameter plane: parts of it are not kept.
+    /// Its border crosses itself in the parameter plane: parts of it are not kept. Its facets are certified only if they cover as much as
+    /// the border bounds.
     CrossingBorder,
+    /// Its facets cover more or less of its parameter plane than its border bounds: none of them is certified.
+    AreaOff,
     /// Its parameter plane gave nothing: only its border was triangulated.
     BorderOnly,
     /// The triangulation library gave up on it: only its border was triangulated.

@@ -10,4 +10,5 @@ mod nurbs_properties;
 mod offsets;
 mod recipes;
 mod seams;
+mod shells;
 mod support;

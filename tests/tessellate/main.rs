@@ -14,6 +14,7 @@ mod promises;
 mod proof;
 mod repairs;
 mod shapes;
+mod shared_edges;
 mod support;
 #[path = "../support/turned.rs"]
 mod turned;

@@ -196,6 +196,25 @@ fn a_loop_that_crosses_itself_is_named() {
     assert_eq!((r.faces.failed, r.faces.repaired), (0, 1));
     assert_eq!(r.repaired[0].how, Repair::CrossingBorder);
     assert!((r.area_mm2 - 50.0).abs() < 1e-9, "{}", r.area_mm2);
+    assert_eq!(r.certified, 0);
+}
+
+/// A hole that stands out of its face: by parity what stands out is inside, and nothing of such a face is proved. Two faces in one, each
+/// with its own loop, are no such case, whichever way the loops run.
+#[test]
+fn facets_that_cover_more_than_the_border_bounds_are_not_certified() {
+    let outer = flat(&square(0.0, 6.0));
+    let mut hole = square(5.0, 9.0);
+    hole.reverse();
+    let made = tessellate(&face(plane(), &[outer.clone(), flat(&hole)]), &measured(0.1));
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired, r.certified), (0, 1, 0), "{:?}", r.repaired);
+    for second in [square(7.0, 9.0), square(7.0, 9.0).into_iter().rev().collect()] {
+        let made = tessellate(&face(plane(), &[outer.clone(), flat(&second)]), &measured(0.1));
+        let r = &made.report;
+        assert_eq!((r.faces.failed, r.faces.repaired, r.certified), (0, 0, r.facets), "{:?}", r.repaired);
+        assert!((r.area_mm2 - 40.0).abs() < 1e-9, "{}", r.area_mm2);
+    }
 }
 
 /// Slivers far thinner than the tolerance, straight and around a cylinder.

@@ -3,7 +3,7 @@
 use super::free_surfaces::convert_free_surfaces;
 use super::loop_order::{DirectedUse, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
-use super::orientation::is_inside_out;
+use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
@@ -104,6 +104,7 @@ fn add_edges(
     edges: Vec<Outcome<TrimmedEdge>>,
     part: &mut Part,
 ) -> Vec<Option<EdgeId>> {
+    let joined = vertices_of_empty_edges(geometry.file, keys, &edges);
     let mut vertices: FxHashMap<Option<u64>, VertexId> = FxHashMap::default();
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
@@ -112,7 +113,7 @@ fn add_edges(
             continue;
         };
         let [a, b] = curve.domain();
-        let ends = vertex_ids(geometry.file, *key);
+        let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| first_of(&joined, id)));
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             *vertices.entry(id).or_insert_with(|| {
                 let given = id.and_then(|id| geometry.vertex(id).ok());
@@ -125,6 +126,33 @@ fn add_edges(
         part.edges.push(Edge { curve, vertices, entity });
     }
     numbers
+}
+
+/// For the second vertex of each edge without length the first: such an edge is left out, and the faces on both of its sides would
+/// meet in two places, with a slit between them.
+fn vertices_of_empty_edges(
+    file: &File<'_>,
+    keys: &[EdgeKey],
+    edges: &[Outcome<TrimmedEdge>],
+) -> FxHashMap<u64, u64> {
+    let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
+    for (key, edge) in keys.iter().zip(edges) {
+        if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
+            let (a, b) = (first_of(&joined, a), first_of(&joined, b));
+            if a != b {
+                joined.insert(b, a);
+            }
+        }
+    }
+    joined
+}
+
+/// The vertex that stands for all that empty edges join with one.
+fn first_of(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
+    while let Some(&before) = joined.get(&vertex) {
+        vertex = before;
+    }
+    vertex
 }
 
 /// Puts the faces into their shells; the shell of a solid that is inside out is turned.
@@ -152,6 +180,12 @@ fn add_shells(
             face.reversed ^= flip;
             face.layer = face.layer.or_else(|| layer.clone());
             own.push(face);
+        }
+        for k in faces_against_neighbours(&own) {
+            own[k].reversed ^= true;
+            let reason =
+                "its sense contradicts its edges, which run against those of its neighbours: the edges decide";
+            out.repaired.extend(own[k].entity.map(|id| remark(file, id, reason.into())));
         }
         // Only a whole shell tells by its volume which way it faces.
         if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {

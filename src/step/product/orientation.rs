@@ -1,17 +1,74 @@
-//! Whether the shell of a solid is inside out: its normals look into what it encloses.
+//! Which way shells and their faces look: faces that contradict their neighbours, and shells of solids that are inside out.
+//!
+//! Neighbours run along their common edge in opposite directions. A face whose flag of sense says otherwise is turned, if few do.
 //!
 //! Some exporters write the shell of a mirrored part so, and its readers turn it. The volume tells, by the divergence theorem over a
 //! grid of points on each face. First on few; where that says inside out on more, and with a bound on the error that thin walls
 //! fail, for which the file is believed.
 
 use crate::math::{Aabb, Point, Uv};
-use crate::model::Face;
+use crate::model::{EdgeId, Face};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// Points across a face of the first look and of the two that decide.
 const GRIDS: [usize; 3] = [4, 16, 23];
 /// Points on each edge of a loop.
 const EDGE: usize = 6;
+
+/// Faces that look inwards where their neighbours look outwards: of two groups that contradict each other along all edges between them,
+/// the smaller one. None where edges give no two groups (a Möbius band) or groups of one size.
+pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
+    // For each edge the faces that use it and whether they run along it.
+    let mut uses: FxHashMap<EdgeId, Vec<(usize, bool)>> = FxHashMap::default();
+    for (k, face) in faces.iter().enumerate() {
+        for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
+            if let Some(edge) = edge_use.edge {
+                uses.entry(edge).or_default().push((k, edge_use.reversed != face.reversed));
+            }
+        }
+    }
+    // Neighbours, and whether they agree; seams are no edges between faces.
+    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); faces.len()];
+    for both in uses.into_values() {
+        if let [(a, along_a), (b, along_b)] = both[..]
+            && a != b
+        {
+            neighbours[a].push((b, along_a != along_b));
+            neighbours[b].push((a, along_a != along_b));
+        }
+    }
+    let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
+    let mut out = Vec::new();
+    for first in 0..faces.len() {
+        if turned[first].is_some() {
+            continue;
+        }
+        turned[first] = Some(false);
+        let (mut group, mut next, mut is_consistent) = (vec![(first, false)], 0, true);
+        while next < group.len() {
+            let (k, own) = group[next];
+            for &(other, agrees) in &neighbours[k] {
+                let wanted = own == agrees;
+                match turned[other] {
+                    None => {
+                        turned[other] = Some(wanted);
+                        group.push((other, wanted));
+                    }
+                    Some(known) => is_consistent &= known == wanted,
+                }
+            }
+            next += 1;
+        }
+        let count = group.iter().filter(|(_, turned)| *turned).count();
+        if is_consistent && 2 * count != group.len() {
+            let fewer = 2 * count < group.len();
+            out.extend(group.into_iter().filter(|(_, turned)| *turned == fewer).map(|(k, _)| k));
+        }
+    }
+    out.sort_unstable();
+    out
+}
 
 /// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
 pub(crate) fn is_inside_out(faces: &[Face]) -> bool {

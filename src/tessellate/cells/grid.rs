@@ -8,6 +8,7 @@ use crate::tessellate::proof::border_chord::BorderChords;
 use crate::tessellate::proof::facet::prove_triangle;
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use crate::tessellate::proof::prover::Prover;
+use crate::tessellate::taken_chords::TakenChords;
 use rustc_hash::FxHashMap;
 
 /// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
@@ -43,6 +44,8 @@ pub(in crate::tessellate) struct GridInput<'g> {
     pub(in crate::tessellate) chords: &'g BorderChords,
     /// Parameters nearer than this are one.
     pub(in crate::tessellate) resolution: Uv,
+    /// Chords that no side of a facet may be.
+    pub(in crate::tessellate) taken: &'g TakenChords,
 }
 
 /// Makes facets of the cells inside; those that cannot be resolved within their tolerance are left to the transition.
@@ -179,13 +182,18 @@ impl CellFacets<'_, '_, '_, '_> {
 
     /// The facet of a cell with corners on the border.
     fn at_border(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
+        let at = corners.map(|c| self.input.nodes[c].position);
+        if (0..4).any(|k| self.input.taken.has([at[k], at[(k + 1) % 4]])) {
+            return None;
+        }
         self.with_proof_of_cell(proved, corners).or_else(|| self.quad(proved.slack, *corners))
     }
 
     /// A facet with corners on the border: it must hold with the border's own points, and follow its curve.
     fn quad(&mut self, slack: f64, corners: [u32; 4]) -> Option<ProvedFacet<4>> {
         let n = corners.map(|c| self.input.nodes[c]);
-        if (0..4).any(|i| (0..i).any(|j| n[i].position == n[j].position)) {
+        let is_taken = |k: usize| self.input.taken.has([n[k].position, n[(k + 1) % 4].position]);
+        if (0..4).any(|i| is_taken(i) || (0..i).any(|j| n[i].position == n[j].position)) {
             return None;
         }
         let middle = self.prover.surface.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
@@ -293,7 +301,7 @@ impl CellFacets<'_, '_, '_, '_> {
         for t in triangles {
             let t = t.map(|i| polygon[i]);
             let p = t.map(|n| self.input.nodes[n].position);
-            if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
+            if (0..3).any(|k| p[k] == p[(k + 1) % 3] || self.input.taken.has([p[k], p[(k + 1) % 3]])) {
                 return None;
             }
             let proved = self.prove(t, slack);

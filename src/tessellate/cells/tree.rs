@@ -223,11 +223,12 @@ impl Tree<'_, '_> {
         })
     }
 
-    /// A crease of the surface across the cell.
+    /// A crease of the surface across the cell, not but for the rounding of its trims: what would be cut off there is a facet folded flat.
     fn crease(&self, cell: Cell) -> Option<(usize, f64)> {
         (0..2).find_map(|d| {
             let c = &self.surface.creases[d];
-            let (i, j) = (c.partition_point(|&x| x <= cell.lo[d]), c.partition_point(|&x| x < cell.hi[d]));
+            let (lo, hi) = (cell.lo[d] + self.resolution[d], cell.hi[d] - self.resolution[d]);
+            let (i, j) = (c.partition_point(|&x| x <= lo), c.partition_point(|&x| x < hi));
             (i < j).then(|| (d, c[(i + j) / 2]))
         })
     }

@@ -22,6 +22,7 @@ use super::border::polygons::{self, ImprintedPoints};
 use super::face::{FaceInput, mesh_with_imprint};
 use super::imprint::{CarrierFacets, Imprint};
 use super::settings::Settings;
+use super::taken_chords::TakenChords;
 use crate::math::Point;
 use crate::model::{Face, Model};
 use detection::{CARRIER_SHARE, Contact};
@@ -108,6 +109,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
                     divisions: &divisions,
                     shared: &shared,
                     settings: self.settings,
+                    taken: TakenChords::none(),
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
@@ -124,6 +126,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             divisions: &mesh.divisions,
             shared: &mesh.shared,
             settings: self.settings,
+            taken: TakenChords::none(),
         }
     }
 

@@ -10,6 +10,7 @@ use crate::tessellate::proof::border_chord::BorderChords;
 use crate::tessellate::proof::facet::prove_triangle;
 use crate::tessellate::proof::prover::Prover;
 use crate::tessellate::settings::Acceptance;
+use crate::tessellate::taken_chords::TakenChords;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use spade::handles::{FaceHandle, FixedVertexHandle, InnerTag};
@@ -28,6 +29,8 @@ pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) chords: &'t BorderChords,
     /// Multiplies parameters before triangulating.
     pub(in crate::tessellate) scale: Uv,
+    /// Chords that no side of a triangle may be, but for those of the border.
+    pub(in crate::tessellate) taken: &'t TakenChords,
 }
 
 /// Triangles on the outline's nodes; refinement appends some.
@@ -127,9 +130,16 @@ pub(in crate::tessellate) fn triangulate(
     outline: Outline<'_>,
     budget: usize,
 ) -> Option<Transition> {
-    let Outline { nodes, segments, creases, imprinted, chords, scale } = outline;
-    let mut mesh =
-        Refinement { surface, nodes, scale, cdt: Cdt::new(), border: FxHashMap::default(), handles: Vec::new() };
+    let Outline { nodes, segments, creases, imprinted, chords, scale, taken } = outline;
+    let mut mesh = Refinement {
+        surface,
+        nodes,
+        scale,
+        taken,
+        cdt: Cdt::new(),
+        border: FxHashMap::default(),
+        handles: Vec::new(),
+    };
     mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_all(&segments);
     // Crossed twice, a line bounds nothing.
@@ -153,7 +163,7 @@ pub(in crate::tessellate) fn triangulate(
         known.extend(new.iter().map(|&t| sorted(t)).zip(proved));
         let triangles: Vec<ProvedFacet<3>> =
             triangles.iter().map(|&nodes| ProvedFacet { nodes, ..known[&sorted(nodes)] }).collect();
-        let fails = |f: &&ProvedFacet<3>| f.bound > f.tolerance || mesh.steep_side(f.nodes).is_some();
+        let fails = |f: &&ProvedFacet<3>| f.bound > f.tolerance || mesh.side_to_divide(f.nodes).is_some();
         let mut failing: Vec<ProvedFacet<3>> = triangles.iter().filter(fails).copied().collect();
         // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
         // 12 times the corners of its border.
@@ -187,6 +197,7 @@ pub(super) struct Refinement<'s, 'a> {
     pub(super) surface: &'s FaceSurface<'a>,
     pub(super) nodes: Nodes,
     scale: Uv,
+    pub(super) taken: &'s TakenChords,
     cdt: Cdt,
     /// How often each edge of the triangulation that lies on the outline turns outside into inside.
     pub(super) border: FxHashMap<[u32; 2], u32>,

@@ -21,8 +21,24 @@ struct Wish {
 }
 
 impl Refinement<'_, '_> {
+    /// The side for which a triangle is divided even where it is near enough to the surface.
+    pub(super) fn side_to_divide(&self, t: [u32; 3]) -> Option<usize> {
+        self.steep_side(t).or_else(|| self.taken_side(t))
+    }
+
+    /// The free side of a triangle that is a chord of others.
+    fn taken_side(&self, t: [u32; 3]) -> Option<usize> {
+        if self.taken.is_empty() {
+            return None;
+        }
+        let is_taken = |a: u32, b: u32| {
+            self.is_inner(a, b) && self.taken.has([self.nodes[a].position, self.nodes[b].position])
+        };
+        (0..3).find(|&k| is_taken(t[k], t[(k + 1) % 3]))
+    }
+
     /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
-    pub(super) fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
+    fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
         let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
@@ -92,7 +108,7 @@ impl Refinement<'_, '_> {
         let t = f.nodes;
         let end = |k: usize| t[(k + 1) % 3];
         let middles = pole::side_middles(self.surface, t.map(|n| self.nodes[n].uv));
-        if let Some(k) = self.steep_side(t).filter(|_| f.bound <= f.tolerance) {
+        if let Some(k) = self.side_to_divide(t).filter(|_| f.bound <= f.tolerance) {
             return divided
                 .insert(edge_key(t[k], end(k)))
                 .then_some(Wish { triangle: *f, places: [middles[k]; 2] });

@@ -1,0 +1,123 @@
+//! Meshes of parts are copied to where their instances stand.
+
+use super::assemble::PartMesh;
+use super::face_mesh::FaceMesh;
+use super::nodes::Position;
+use super::report::Repair;
+use super::tessellation::{FacetQuality, Tessellation};
+use crate::math::{FaceId, Frame};
+use crate::mesh::{Facet, FacetMesh, MeshVertex};
+use crate::model::{Instance, Model, TessellatedFace};
+use rustc_hash::FxHashMap;
+
+/// What placing gives.
+pub(super) struct Placed {
+    pub(super) made: Tessellation,
+    /// Faces without facets.
+    pub(super) failed: Vec<FaceId>,
+    /// Faces of which something was given up.
+    pub(super) repairs: Vec<(FaceId, Repair)>,
+}
+
+/// Puts every instance's facets where they belong; `joined` are instances with a mesh of their own.
+pub(super) fn place_instances(
+    model: &Model,
+    parts: &[Option<PartMesh>],
+    joined: &FxHashMap<usize, PartMesh>,
+) -> Placed {
+    let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new() };
+    for (i, instance) in model.instances.iter().enumerate() {
+        let first = model.first_face(i);
+        let part = model.part(instance.part);
+        let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
+        let shared = out.made.mesh.positions.len() as u32;
+        out.made.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
+        for (k, face) in mesh.faces.iter().enumerate() {
+            let id = FaceId(first.0 + k as u32);
+            match face {
+                Some(face) => {
+                    out.repairs.extend(face.repaired.map(|how| (id, how)));
+                    place_face(&mut out.made, instance, shared, face, id);
+                }
+                None => out.failed.push(id),
+            }
+        }
+        for (k, ready) in part.tessellated.iter().enumerate() {
+            let id = FaceId(first.0 + (mesh.faces.len() + k) as u32);
+            place_ready(&mut out.made, &instance.placement, ready, id);
+        }
+    }
+    drop_unused(&mut out.made.mesh);
+    out
+}
+
+/// Adds the facets of a face whose part's shared positions start at `shared`.
+fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &FaceMesh, id: FaceId) {
+    let frame = &instance.placement;
+    let own = out.mesh.positions.len() as u32;
+    out.mesh.positions.extend(face.own.iter().map(|&p| frame.point(p)));
+    let first = out.mesh.vertices.len() as u32;
+    out.mesh.vertices.extend(face.corners.iter().map(|corner| MeshVertex {
+        position: match corner.position {
+            Position::Shared(p) => shared + p,
+            Position::Own(p) => own + p,
+        },
+        normal: frame.normal(corner.normal),
+        uv: corner.uv,
+    }));
+    for facet in &face.facets {
+        let vertices = turned(facet.corners.map(|c| c + first), frame);
+        out.mesh.facets.push(Facet { vertices, face: id });
+        let (bound, tolerance) = (facet.bound * frame.scale, facet.tolerance * frame.scale);
+        let certified = bound <= tolerance;
+        out.mesh.sag.push(if certified { bound } else { f64::INFINITY });
+        out.quality.push(FacetQuality { tolerance, bound, certified });
+    }
+}
+
+/// A mirrored placement turns facets around, so that they stay counter-clockwise from outside.
+fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
+    if !frame.is_mirrored() {
+        [a, b, c, d]
+    } else if c == d {
+        [a, c, b, b]
+    } else {
+        [a, d, c, b]
+    }
+}
+
+/// A face that is a mesh in the file is copied as it is: it is its own truth.
+fn place_ready(out: &mut Tessellation, frame: &Frame, ready: &TessellatedFace, id: FaceId) {
+    let (p, v) = (out.mesh.positions.len() as u32, out.mesh.vertices.len() as u32);
+    out.mesh.positions.extend(ready.mesh.positions.iter().map(|&x| frame.point(x)));
+    out.mesh.vertices.extend(ready.mesh.vertices.iter().map(|x| MeshVertex {
+        position: x.position + p,
+        normal: frame.normal(x.normal),
+        uv: x.uv,
+    }));
+    for f in &ready.mesh.facets {
+        out.mesh.facets.push(Facet { vertices: turned(f.vertices.map(|c| c + v), frame), face: id });
+        out.mesh.sag.push(0.0);
+        out.quality.push(FacetQuality { tolerance: 0.0, bound: 0.0, certified: true });
+    }
+}
+
+/// Removes positions that no facet uses: ends of edges without faces, hanging samples of failed faces.
+fn drop_unused(mesh: &mut FacetMesh) {
+    let mut name = vec![u32::MAX; mesh.positions.len()];
+    for v in mesh.facets.iter().flat_map(|f| f.vertices) {
+        name[mesh.vertices[v as usize].position as usize] = 0;
+    }
+    let mut kept = Vec::new();
+    for (slot, &p) in name.iter_mut().zip(&mesh.positions) {
+        if *slot == 0 {
+            *slot = kept.len() as u32;
+            kept.push(p);
+        }
+    }
+    mesh.positions = kept;
+    for v in &mut mesh.vertices {
+        // A corner without facets can only come with a ready mesh; it may point anywhere.
+        v.position = name[v.position as usize].min(mesh.positions.len().saturating_sub(1) as u32);
+    }
+}

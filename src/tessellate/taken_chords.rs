@@ -1,0 +1,100 @@
+//! Chords that an edge of the mesh has already: an edge between two positions belongs to two facets, be they of one face or of two.
+//!
+//! Two faces that share two vertices, such as both flanks of a blade, may each have a diagonal between them, and a diagonal may run
+//! where an edge of the file is one chord. The mesh would have one edge with four facets there. All but one of the faces are meshed
+//! again without it.
+
+use super::face_mesh::FaceMesh;
+use super::nodes::Position;
+use crate::model::Part;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::ops::Range;
+use std::sync::LazyLock;
+
+/// Chords between shared positions that a face must not have inside.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TakenChords(FxHashSet<[u32; 2]>);
+
+static NONE: LazyLock<TakenChords> = LazyLock::new(TakenChords::default);
+
+impl TakenChords {
+    /// Nothing is taken.
+    pub(super) fn none() -> &'static Self {
+        &NONE
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether the chord between two positions is taken.
+    pub(super) fn has(&self, ends: [Position; 2]) -> bool {
+        match ends {
+            [Position::Shared(a), Position::Shared(b)] => self.0.contains(&[a.min(b), a.max(b)]),
+            _ => false,
+        }
+    }
+
+    pub(super) fn extend(&mut self, more: impl IntoIterator<Item = [u32; 2]>) {
+        self.0.extend(more);
+    }
+}
+
+/// For faces of a part that have a diagonal where others of their shell have a chord: the faces, by number, and those diagonals. The last of
+/// several diagonals stays where no other chord is; `taken` are those that each face was asked to give up before.
+pub(super) fn doubled_chords(
+    part: &Part,
+    meshes: &[Option<FaceMesh>],
+    taken: &[TakenChords],
+) -> Vec<(usize, Vec<[u32; 2]>)> {
+    let mut doubled: Vec<(usize, Vec<[u32; 2]>)> = Vec::new();
+    let mut first = 0;
+    for shell in &part.shells {
+        let range = first..first + shell.faces.len();
+        first = range.end;
+        let (uses, diagonals) = chords_of_faces(meshes, range);
+        let mut uses = uses;
+        for (k, chord) in diagonals {
+            let asked_before = taken[k].0.contains(&chord);
+            // Where only diagonals are, one of them stays.
+            let Some(left) = uses.get_mut(&chord).filter(|left| **left > 2 && !asked_before) else { continue };
+            *left -= 2;
+            match doubled.last_mut() {
+                Some((last, chords)) if *last == k => chords.push(chord),
+                _ => doubled.push((k, vec![chord])),
+            }
+        }
+    }
+    doubled
+}
+
+/// Uses of each chord by the facets of some faces, and those that a face uses twice, in order.
+fn chords_of_faces(
+    meshes: &[Option<FaceMesh>],
+    range: Range<usize>,
+) -> (FxHashMap<[u32; 2], u32>, Vec<(usize, [u32; 2])>) {
+    let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+    let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();
+    for k in range {
+        let Some(mesh) = &meshes[k] else { continue };
+        let mut own: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+        for facet in &mesh.facets {
+            let at = facet.corners.map(|c| mesh.corners[c as usize].position);
+            for i in 0..4 {
+                if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
+                    && a != b
+                {
+                    *own.entry([a.min(b), a.max(b)]).or_default() += 1;
+                }
+            }
+        }
+        for (chord, count) in own {
+            *uses.entry(chord).or_default() += count;
+            if count > 1 {
+                diagonals.push((k, chord));
+            }
+        }
+    }
+    diagonals.sort_unstable();
+    (uses, diagonals)
+}

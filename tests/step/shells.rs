@@ -1,0 +1,144 @@
+//! Closed shells whose files have edges or flags of sense that no solid can have: they close all the same.
+
+use lampyris::step::{Import, Settings, read_bytes};
+use lampyris::tessellate::{self, tessellate};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Length of the side of a cube, mm.
+const SIDE: f64 = 10.0;
+/// How far apart two vertices stand that the file joins by an edge of nothing, mm.
+const APART: f64 = 2e-5;
+
+/// A solid with plane faces, given by the corners of each, counter-clockwise from outside. `senses` are the faces' flags; `tiny` is a pair of
+/// corners whose edge has a curve that leaves both at one parameter.
+fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> Import {
+    let mut data = String::new();
+    let triple = |p: [f64; 3]| format!("({:?},{:?},{:?})", p[0], p[1], p[2]);
+    let minus = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| a[i] - b[i]);
+    let unit = |a: [f64; 3]| a.map(|x| x / a.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+    };
+    for (k, &p) in corners.iter().enumerate() {
+        writeln!(
+            data,
+            "#{}=CARTESIAN_POINT('',{});#{}=VERTEX_POINT('',#{});",
+            100 + k,
+            triple(p),
+            200 + k,
+            100 + k
+        )
+        .unwrap();
+    }
+    let mut edges: BTreeMap<[usize; 2], usize> = BTreeMap::new();
+    let mut next = 1000;
+    let mut shell = Vec::new();
+    for (f, (face, sense)) in faces.iter().zip(senses).enumerate() {
+        let mut uses = Vec::new();
+        for (i, &a) in face.iter().enumerate() {
+            let b = face[(i + 1) % face.len()];
+            let ends = [a.min(b), a.max(b)];
+            let edge = *edges.entry(ends).or_insert_with(|| {
+                next += 10;
+                let [p, q] = ends.map(|k| corners[k]);
+                let way = unit(minus(q, p));
+                if tiny == Some(ends) {
+                    // Across the way from one to the other: both are nearest to its start.
+                    let end = [0, 1, 2].map(|i| p[i] + APART * way[(i + 1) % 3]);
+                    writeln!(data, "#{next}=CARTESIAN_POINT('',{});#{}=CARTESIAN_POINT('',{});", triple(p), next + 1, triple(end)).unwrap();
+                    writeln!(data, "#{}=B_SPLINE_CURVE_WITH_KNOTS('',1,(#{next},#{}),.UNSPECIFIED.,.F.,.F.,(2,2),(0.,1.),.UNSPECIFIED.);", next + 3, next + 1).unwrap();
+                } else {
+                    writeln!(data, "#{next}=DIRECTION('',{});#{}=VECTOR('',#{next},1.);#{}=LINE('',#{},#{});", triple(way), next + 1, next + 3, 100 + ends[0], next + 1).unwrap();
+                }
+                writeln!(data, "#{}=EDGE_CURVE('',#{},#{},#{},.T.);", next + 4, 200 + ends[0], 200 + ends[1], next + 3).unwrap();
+                next + 4
+            });
+            next += 10;
+            let flag = if a < b { ".T." } else { ".F." };
+            writeln!(data, "#{next}=ORIENTED_EDGE('',*,*,#{edge},{flag});").unwrap();
+            uses.push(format!("#{next}"));
+        }
+        let c = face.iter().map(|&k| corners[k]).collect::<Vec<_>>();
+        let along = unit(minus(c[1], c[0]));
+        let normal = unit(cross(minus(c[1], c[0]), minus(c[c.len() - 1], c[0])));
+        let id = 100_000 + 10 * f;
+        writeln!(
+            data,
+            "#{id}=DIRECTION('',{});#{}=DIRECTION('',{});#{}=AXIS2_PLACEMENT_3D('',#{},#{id},#{});#{}=PLANE('',#{});",
+            triple(normal), id + 1, triple(along), id + 2, 100 + face[0], id + 1, id + 3, id + 2
+        ).unwrap();
+        writeln!(
+            data,
+            "#{}=EDGE_LOOP('',({}));#{}=FACE_OUTER_BOUND('',#{},.T.);#{}=ADVANCED_FACE('',(#{}),#{},{sense});",
+            id + 4,
+            uses.join(","),
+            id + 5,
+            id + 4,
+            id + 6,
+            id + 5,
+            id + 3
+        )
+        .unwrap();
+        shell.push(format!("#{}", id + 6));
+    }
+    let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+                 #5=MANIFOLD_SOLID_BREP('',#4);\n#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);\n";
+    let text = format!(
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{frame}#4=CLOSED_SHELL('',({}));\n{data}ENDSEC;\nEND-ISO-10303-21;\n",
+        shell.join(",")
+    );
+    read_bytes("solid.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+}
+
+/// Corners of a cube; the last one stands a little before the one at (0, 10, 10) on the edge from (0, 0, 10).
+fn cube_corners() -> Vec<[f64; 3]> {
+    let s = SIDE;
+    vec![
+        [0.0, 0.0, 0.0],
+        [s, 0.0, 0.0],
+        [s, s, 0.0],
+        [0.0, s, 0.0],
+        [0.0, 0.0, s],
+        [s, 0.0, s],
+        [s, s, s],
+        [0.0, s, s],
+        [0.0, s - APART, s],
+    ]
+}
+
+const CUBE: [&[usize]; 6] =
+    [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+
+fn assert_closes(import: &Import) {
+    assert_eq!(
+        (import.report.faces.converted, import.report.faces.refused),
+        (6, 0),
+        "{:?}",
+        import.report.refusals
+    );
+    let made = tessellate(&import.model, &tessellate::Settings::uniform(0.1));
+    let r = &made.report;
+    assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.closed), (0, 0, 1));
+    let volume = r.volume_mm3.expect("closed");
+    assert!((volume - SIDE.powi(3)).abs() < 0.01, "{volume}");
+}
+
+/// An edge whose curve leaves nothing between two vertices is left out; the faces beside it meet in one vertex.
+#[test]
+fn vertices_at_the_ends_of_an_edge_of_nothing_are_one() {
+    let faces: [&[usize]; 6] = [CUBE[0], &[4, 5, 6, 7, 8], CUBE[2], CUBE[3], CUBE[4], &[3, 0, 4, 8, 7]];
+    assert_closes(&solid(&cube_corners(), &faces, &[".T."; 6], Some([7, 8])));
+}
+
+/// Edges of a closed shell run once in each direction: a face whose flag of sense says that it looks inwards is turned.
+#[test]
+fn a_face_whose_flag_contradicts_its_edges_looks_outwards() {
+    let mut senses = [".T."; 6];
+    senses[3] = ".F.";
+    let import = solid(&cube_corners(), &CUBE, &senses, None);
+    assert_closes(&import);
+    let said = import.report.repairs.iter().filter(|r| r.reason.contains("its sense contradicts")).count();
+    assert_eq!(said, 1, "{:?}", import.report.repairs);
+}

@@ -1,0 +1,115 @@
+//! Every edge of the mesh belongs to two facets, at every tolerance: also where faces share more than an edge, where rims nearly touch,
+//! and where a crease runs beside a trim.
+
+use crate::support::trimmed::{chain, face};
+use lampyris::math::{Frame, Point, Uv};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::nurbs::{Curve, Surface, UvCurve, sweep};
+use lampyris::tessellate::{Settings, tessellate};
+use std::f64::consts::PI;
+
+const TOLERANCES: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
+
+/// Both sides of a flat polygon as one closed shell: every diagonal of one side could be one of the other.
+fn both_sides_of(corners: &[[f64; 2]]) -> Model {
+    let plane = sweep::plane(&Frame::IDENTITY, [[-10.0, 10.0]; 2]);
+    let uv: Vec<Uv> = corners.iter().map(|&[x, y]| Uv::new(x, y)).collect();
+    let place = |k: usize| Point::new(uv[k].x, uv[k].y, 0.0);
+    let n = uv.len();
+    let edge = |k: usize| Edge {
+        curve: Curve::line(place(k), place((k + 1) % n), [0.0, 1.0]),
+        vertices: [VertexId(k as u32), VertexId(((k + 1) % n) as u32)],
+        entity: None,
+    };
+    let edge_use = |k: usize| EdgeUse {
+        edge: Some(EdgeId(k as u32)),
+        reversed: false,
+        uv: UvCurve::line(uv[k], uv[(k + 1) % n], [0.0, 1.0]),
+    };
+    let side = |reversed: bool| {
+        let rim = TrimLoop { uses: (0..n).map(edge_use).collect() };
+        Face { loops: vec![rim], reversed, ..Face::whole(plane.clone()) }
+    };
+    let shell = Shell { faces: vec![side(false), side(true)], closed: true, ..Shell::default() };
+    Model::from_part(Part {
+        vertices: (0..n).map(place).collect(),
+        edges: (0..n).map(edge).collect(),
+        shells: vec![shell],
+        ..Part::default()
+    })
+}
+
+#[test]
+fn no_diagonal_is_in_two_faces() {
+    for n in [5, 6, 8, 13] {
+        let corners: Vec<[f64; 2]> = (0..n)
+            .map(|k| 2.0 * PI * f64::from(k) / f64::from(n))
+            .map(|angle| [6.0 * angle.cos(), 4.0 * angle.sin()])
+            .collect();
+        let made = tessellate(&both_sides_of(&corners), &Settings::uniform(0.1));
+        let r = &made.report;
+        assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.closed), (0, 0, 1), "{n} corners");
+        assert_eq!(r.certified, r.facets);
+        // Twice the area of the polygon, by the formula of the ellipse's inscribed polygon.
+        let area = 6.0 * 4.0 * f64::from(n) * (2.0 * PI / f64::from(n)).sin();
+        assert!((r.area_mm2 / area - 1.0).abs() < 1e-12, "{n} corners: {}", r.area_mm2);
+    }
+}
+
+/// Two rims nearer than a chord's sag: chords cross until they are short enough.
+#[test]
+fn rings_thinner_than_the_tolerance_are_faces() {
+    let plane = || sweep::plane(&Frame::IDENTITY, [[-10.0, 10.0]; 2]);
+    let at = |r: f64, turn: f64| Uv::new(r * (PI * turn).cos(), r * (PI * turn).sin());
+    let radius = 5.25;
+    for width in [0.1, 0.01, 0.002] {
+        let inner = radius - width;
+        let half = vec![vec![
+            chain(4000, |f| at(radius, f)),
+            chain(1, |f| at(radius - width * f, 1.0)),
+            chain(4000, |f| at(inner, 1.0 - f)),
+            chain(1, |f| at(inner + width * f, 0.0)),
+        ]];
+        let ring = vec![vec![chain(4000, |f| at(radius, 2.0 * f))], vec![chain(4000, |f| at(inner, -2.0 * f))]];
+        let area = 0.5 * PI * (radius * radius - inner * inner);
+        for (loops, area) in [(half, area), (ring, 2.0 * area)] {
+            for tolerance in TOLERANCES {
+                let made = tessellate(&face(plane(), &loops), &Settings::uniform(tolerance));
+                let r = &made.report;
+                assert_eq!((r.faces.failed, r.faces.repaired), (0, 0), "{width} {tolerance}");
+                // Chords leave of the area at most what both rims sag.
+                assert!((r.area_mm2 / area - 1.0).abs() < 1.0, "{width} {tolerance}: {} {area}", r.area_mm2);
+                let topology = made.mesh.topology(0..made.mesh.facets.len());
+                assert_eq!((topology.nonmanifold_edges, topology.turned_edges), (0, 0), "{width} {tolerance}");
+            }
+        }
+    }
+}
+
+/// A roof whose trim ends a few roundings beyond its ridge: no facet lies between the two.
+#[test]
+fn a_trim_a_rounding_beside_a_crease_leaves_no_folded_facets() {
+    let points =
+        [[0.0, 0.0, 0.0], [0.0, 5.0, 3.0], [0.0, 10.0, 0.0], [10.0, 0.0, 0.0], [10.0, 5.0, 3.0], [10.0, 10.0, 0.0]];
+    // Bent along u, so that it is cut into cells.
+    let row = |x: f64, lift: f64| {
+        points[..3].iter().map(move |p| Point::new(x, p[1], p[2] + lift).extend(1.0)).collect::<Vec<_>>()
+    };
+    let roof = Surface {
+        degree: [2, 1],
+        knots: [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 2.0, 2.0]],
+        points: [row(0.0, 0.0), row(5.0, 2.0), row(10.0, 0.0)].concat(),
+    };
+    let beyond = 1.0 + 6.0 * f64::EPSILON;
+    let c = [Uv::new(0.0, 0.0), Uv::new(1.0, 0.0), Uv::new(1.0, beyond), Uv::new(0.0, beyond)];
+    let sides = (0..4).map(|k| chain(64, |f| c[k].lerp(c[(k + 1) % 4], f))).collect();
+    let model = face(roof, &[sides]);
+    for tolerance in TOLERANCES {
+        let made = tessellate(&model, &Settings::uniform(tolerance));
+        let n = made.mesh.facets.len();
+        let topology = made.mesh.topology(0..n);
+        assert_eq!((topology.nonmanifold_edges, topology.turned_edges), (0, 0), "{tolerance}");
+        let smallest = (0..n).map(|f| made.mesh.facet_area(f)).fold(f64::INFINITY, f64::min);
+        assert!(smallest > 1e-6, "{tolerance}: a facet of {smallest} mm²");
+    }
+}
