@@ -52,7 +52,8 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
 pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedModel, Error> {
     read_models(scene, |entry| {
         let path = scene.resolve(&entry.file);
-        let settings = step::Settings { length_unit_mm: entry.unit_mm, ..step::Settings::default() };
+        let length_unit_mm = entry.unit_mm;
+        let settings = step::Settings { length_unit_mm, measure_box: false, ..step::Settings::default() };
         Ok(in_stage(monitor, Stage::Reading(&path), || step::read(&path, &settings))?)
     })
 }

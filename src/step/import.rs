@@ -11,7 +11,7 @@ use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
 use crate::formats;
-use crate::math::Frame;
+use crate::math::{Aabb, Frame};
 use crate::model::{Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
@@ -56,7 +56,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
     let model = assemble(&file, name, settings, &mut report)?;
-    let bounds = model.bounds();
+    let bounds = if settings.measure_box { model.bounds() } else { Aabb::EMPTY };
     if !bounds.is_empty() {
         report.bbox_mm = Some([bounds.min.to_array(), bounds.max.to_array()]);
     }

@@ -26,7 +26,7 @@ pub struct ImportReport {
     pub faces_placed: PlacedCounts,
     /// ConvertedPart distinct faces by the kind of surface.
     pub by_surface: SurfaceCounts,
-    /// Lower and upper corner of the trimmed faces, mm; `None` without any.
+    /// Lower and upper corner of the trimmed faces, mm; `None` without any, or when it was not asked for.
     pub bbox_mm: Option<[[f64; 3]; 2]>,
     /// Faces and shapes that were refused.
     pub refusals: Vec<Note>,

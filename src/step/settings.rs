@@ -13,12 +13,20 @@ pub struct Settings {
     pub face_budget: u64,
     /// Most products and shapes that the assemblies of a file may place; each takes about 500 bytes. Beyond it the file is refused.
     pub max_placed: u64,
+    /// Whether the report gets [`super::ImportReport::bbox_mm`], which takes longer than reading where trims are long.
+    pub measure_box: bool,
     /// Millimetres per unit of length, for files whose own unit is wrong; every context of the file then has it.
     pub length_unit_mm: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { uv_tolerance: UV_TOLERANCE_MM, face_budget: 3_000_000, max_placed: 1 << 20, length_unit_mm: None }
+        Self {
+            uv_tolerance: UV_TOLERANCE_MM,
+            face_budget: 3_000_000,
+            max_placed: 1 << 20,
+            measure_box: true,
+            length_unit_mm: None,
+        }
     }
 }

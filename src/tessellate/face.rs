@@ -20,7 +20,7 @@ use super::transition::delaunay::{self, Outline, Transition};
 use super::transition::pairing::{self, TransitionFacet};
 use super::triangulator::{GaveUp, guarded};
 use crate::math::{Point, Uv};
-use crate::model::{Face, Part};
+use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::FundamentalForms;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -126,7 +126,8 @@ pub(super) fn mesh_with_imprint(
     // Where the budget has ended, shorter chords only cost more.
     let unproved = if cells.exhausted { Vec::new() } else { transition.unproved_chords(&chords, &followed) };
     let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
-    let coarse = coarse.filter_map(|s| followed.get(&edge_key(s[0], s[1])).copied()).collect();
+    let mut coarse: Vec<EdgeId> = coarse.filter_map(|s| followed.get(&edge_key(s[0], s[1])).copied()).collect();
+    coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     // Pairs of triangles become quads.
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
     let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);

@@ -84,8 +84,8 @@ pub(crate) fn run(
 /// The built-in lamp with its scene.
 pub(crate) fn lamp() -> Result<(Scene, LoadedModel), Failure> {
     let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
-    let loaded =
-        read_models(&scene, |_| Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &step::Settings::default())?))?;
+    let settings = step::Settings { measure_box: false, ..step::Settings::default() };
+    let loaded = read_models(&scene, |_| Ok(step::read_bytes("lamp_multicavity.stp", LAMP, &settings)?))?;
     Ok((scene, loaded))
 }
 

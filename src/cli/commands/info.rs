@@ -8,7 +8,7 @@ use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::report::{bytes, figures, grouped, seconds};
-use crate::step::ImportReport;
+use crate::step::{self, ImportReport};
 use std::path::Path;
 
 /// Names and notes shown without -v: what fits a screen.
@@ -21,7 +21,7 @@ pub(crate) fn run(
     limits: RefusalLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
-    let import = input_files::step_file(path, None, console)?;
+    let import = input_files::step_file(path, &step::Settings::default(), console)?;
     let report = import.report;
     if faces {
         print_faces(&import.model, console)?;

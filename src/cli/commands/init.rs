@@ -77,7 +77,7 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     if rest > 0 {
         text += &format!("# … and {rest} more parts: `lampyris info` names them\n\n");
     }
-    text + &light(model, loaded)
+    text + &light(model)
 }
 
 /// A rule for one part, with what may be said of it.
@@ -98,9 +98,10 @@ fn rule(part: &Part) -> String {
 }
 
 /// A beam along z that covers the model, and a plane behind it.
-fn light(model: &Model, loaded: &LoadedModel) -> String {
-    let bounds = loaded.reports.iter().find_map(|r| r.bbox_mm).unwrap_or([[-1.0; 3], [1.0; 3]]);
-    let [low, high] = bounds;
+fn light(model: &Model) -> String {
+    let bounds = model.bounds();
+    let [low, high] =
+        if bounds.is_empty() { [[-1.0; 3], [1.0; 3]] } else { [bounds.min.to_array(), bounds.max.to_array()] };
     let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
     let diagonal = 2.0 * half.iter().map(|h| h * h).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     // A middle that is off by rounding alone stands at 0.

@@ -17,10 +17,10 @@ pub(crate) enum Input {
     Scene(Box<Scene>, LoadedModel),
 }
 
-/// Reads one STEP file, its lengths in the file's own unit or in one of so many mm.
-pub(crate) fn step_file(path: &Path, unit_mm: Option<f64>, console: &Console) -> Result<Import, Failure> {
+/// Reads one STEP file.
+pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Console) -> Result<Import, Failure> {
     let spinner = console.spinner(&format!("reading {}", path.display()));
-    let import = step::read(path, &step::Settings { length_unit_mm: unit_mm, ..step::Settings::default() });
+    let import = step::read(path, settings);
     spinner.finish_and_clear();
     Ok(import?)
 }
@@ -28,7 +28,8 @@ pub(crate) fn step_file(path: &Path, unit_mm: Option<f64>, console: &Console) ->
 /// A STEP file as a model.
 pub(crate) fn model_file(path: &Path, console: &Console) -> Result<LoadedModel, Failure> {
     let start = Instant::now();
-    let Import { model, report } = step_file(path, None, console)?;
+    let settings = step::Settings { measure_box: false, ..step::Settings::default() };
+    let Import { model, report } = step_file(path, &settings, console)?;
     if model.placed_face_count() == 0 {
         let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
         return Err(failure.with_help("run `lampyris info` on it to see what it holds and what was refused"));

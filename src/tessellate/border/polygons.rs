@@ -3,7 +3,7 @@
 use super::curve_chords;
 use super::edges::Division;
 use crate::math::{Point, Uv};
-use crate::model::{EdgeUse, Face, Part, TrimLoop};
+use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::nurbs::UvCurve;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
@@ -54,6 +54,39 @@ impl BorderPolygons {
         let all = self.polygons.iter().flatten();
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
     }
+}
+
+/// Corners of a polygon from which on it is no longer asked whether its chords leave anything of its loop.
+const MANY_CORNERS: usize = 8;
+/// Share of a loop's area that the polygon of its chords keeps.
+const KEPT_AREA: f64 = 0.1;
+
+/// Edges of loops of which chords leave next to nothing, or turn inside out: an arc and a flat hyperbola over one chord, whose polygon
+/// is a line of the parameter plane but for rounding.
+pub(in crate::tessellate) fn edges_of_collapsed_loops(
+    loops: &[TrimLoop],
+    polygons: &BorderPolygons,
+) -> Vec<EdgeId> {
+    let doubled_area =
+        |p: &[Uv]| -> f64 { (1..p.len().saturating_sub(1)).map(|i| (p[i] - p[0]).perp_dot(p[i + 1] - p[0])).sum() };
+    let mut found = Vec::new();
+    for (trim, polygon) in loops.iter().zip(&polygons.polygons).filter(|(_, p)| p.len() <= MANY_CORNERS) {
+        let mut curves: Vec<Uv> = Vec::new();
+        for u in &trim.uses {
+            let ([t0, t1], first) = (u.uv.domain(), curves.len());
+            let at = |i: u32| u.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(SHAPE_STEPS));
+            curves.extend((0..=SHAPE_STEPS).map(at));
+            if u.reversed {
+                curves[first..].reverse();
+            }
+        }
+        let chords: Vec<Uv> = polygon.iter().map(|v| v.uv).collect();
+        let (chords, curves) = (doubled_area(&chords), doubled_area(&curves));
+        if chords * curves < KEPT_AREA * curves * curves {
+            found.extend(trim.uses.iter().filter_map(|u| u.edge));
+        }
+    }
+    found
 }
 
 /// The loops of a face; of an untrimmed one, the rim of its domain.
