@@ -52,8 +52,7 @@ pub(super) fn doubled_chords(
     for shell in &part.shells {
         let range = first..first + shell.faces.len();
         first = range.end;
-        let (uses, diagonals) = chords_of_faces(meshes, range);
-        let mut uses = uses;
+        let Chords { mut uses, diagonals } = Chords::new(meshes, range);
         for (k, chord) in diagonals {
             let asked_before = taken[k].0.contains(&chord);
             // Where only diagonals are, one of them stays.
@@ -68,33 +67,39 @@ pub(super) fn doubled_chords(
     doubled
 }
 
-/// Uses of each chord by the facets of some faces, and those that a face uses twice, in order.
-fn chords_of_faces(
-    meshes: &[Option<FaceMesh>],
-    range: Range<usize>,
-) -> (FxHashMap<[u32; 2], u32>, Vec<(usize, [u32; 2])>) {
-    let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-    let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();
-    for k in range {
-        let Some(mesh) = &meshes[k] else { continue };
-        let mut own: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-        for facet in &mesh.facets {
-            let at = facet.corners.map(|c| mesh.corners[c as usize].position);
-            for i in 0..4 {
-                if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
-                    && a != b
-                {
-                    *own.entry([a.min(b), a.max(b)]).or_default() += 1;
+/// The chords between shared positions of some faces.
+struct Chords {
+    /// How many sides of facets each is.
+    uses: FxHashMap<[u32; 2], u32>,
+    /// Those that a face has twice, in order of the faces.
+    diagonals: Vec<(usize, [u32; 2])>,
+}
+
+impl Chords {
+    fn new(meshes: &[Option<FaceMesh>], range: Range<usize>) -> Self {
+        let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+        let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();
+        for k in range {
+            let Some(mesh) = &meshes[k] else { continue };
+            let mut own: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+            for facet in &mesh.facets {
+                let at = facet.corners.map(|c| mesh.corners[c as usize].position);
+                for i in 0..4 {
+                    if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
+                        && a != b
+                    {
+                        *own.entry([a.min(b), a.max(b)]).or_default() += 1;
+                    }
+                }
+            }
+            for (chord, count) in own {
+                *uses.entry(chord).or_default() += count;
+                if count > 1 {
+                    diagonals.push((k, chord));
                 }
             }
         }
-        for (chord, count) in own {
-            *uses.entry(chord).or_default() += count;
-            if count > 1 {
-                diagonals.push((k, chord));
-            }
-        }
+        diagonals.sort_unstable();
+        Self { uses, diagonals }
     }
-    diagonals.sort_unstable();
-    (uses, diagonals)
 }
