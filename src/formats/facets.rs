@@ -19,6 +19,8 @@ pub struct Facets<'a> {
     pub curvature_per_mm: Vec<f64>,
     /// Ray paths to show with the facets (GLB alone).
     pub paths: Option<&'a Polylines>,
+    /// What tells each face apart, by [`FaceId`], for views that show it; empty when nobody asks.
+    pub labels: Vec<String>,
 }
 
 /// A named set of faces.
@@ -52,6 +54,7 @@ impl<'a> Facets<'a> {
             normal_error_deg: Vec::new(),
             curvature_per_mm: Vec::new(),
             paths: None,
+            labels: Vec::new(),
         }
     }
 

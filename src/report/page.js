@@ -24,9 +24,30 @@
     const twin = [...box.childNodes];
     const figure = JSON.parse(data.textContent);
     box.replaceChildren();
+    figure.data.forEach(label);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
-      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); })
+      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); })
       .catch(() => { box.replaceChildren(...twin); });
+  };
+
+  // Each point of a mesh belongs to one face, whose selector it shows.
+  const label = (trace) => {
+    const faces = trace.meta?.selectors && trace.meta;
+    if (!faces) return;
+    const plain = (text) => text.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+    trace.text = faces.first.flatMap((first, k) => Array((faces.first[k + 1] ?? faces.points) - first).fill(plain(faces.selectors[k])));
+    trace.hovertemplate = "%{text}<extra>%{fullData.name}</extra>";
+  };
+  const pick = (box) => {
+    const shown = Object.assign(document.createElement("output"), { className: "selector", textContent: "Click a face for the selector that a rule of the scene can name it by." });
+    box.after(shown);
+    box.on("plotly_click", ({ points: [point] }) => {
+      const faces = point.data.meta;
+      if (!faces?.selectors) return;
+      const selector = faces.selectors[faces.first.findLastIndex((first) => first <= point.pointNumber)];
+      shown.textContent = selector;
+      navigator.clipboard?.writeText(selector).then(() => { shown.textContent = `${selector}  (copied)`; }, () => {});
+    });
   };
 
   const keys = (box) => {

@@ -153,7 +153,7 @@ pub(super) fn view(view: &View) -> Value {
 
 fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
-        Shape::Surface { name, points, triangles, colour, opacity, values } => {
+        Shape::Surface { name, points, triangles, colour, opacity, values, labels } => {
             let mut mesh = json!({"type": "mesh3d", "name": name, "showlegend": values.is_none(),
                 "x": singles(points.iter().map(|p| p[0])), "y": singles(points.iter().map(|p| p[1])),
                 "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
@@ -161,6 +161,11 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 "opacity": opacity, "flatshading": true, "hoverinfo": "name",
                 "lighting": {"ambient": 0.6, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6},
                 "lightposition": {"x": 600, "y": -1500, "z": 2500}});
+            if !labels.is_empty() {
+                let (first, selectors): (Vec<u32>, Vec<&str>) =
+                    labels.iter().map(|(k, s)| (*k, s.as_str())).unzip();
+                mesh["meta"] = json!({"points": points.len(), "first": first, "selectors": selectors});
+            }
             match values {
                 Some(v) => {
                     mesh["intensity"] = singles(v.values.iter().copied());

@@ -35,6 +35,8 @@ pub enum Shape {
         opacity: f64,
         /// A value for each triangle in place of the colour.
         values: Option<Values>,
+        /// What the points from one on belong to, by rising first point: selectors of faces.
+        labels: Vec<(u32, String)>,
     },
     /// Polylines.
     Lines {
@@ -79,10 +81,12 @@ impl View {
         let mut merged = 0.0f64;
         let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
         for shown in shown(facets) {
-            let (points, triangles) = triangles_of(facets, &shown.facets);
-            let limit = (SHOWN * triangles.len()).div_ceil(total.max(1)).max(2000);
-            let (points, triangles, cell) = simplified(points, triangles, limit);
+            let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
+            let limit = (SHOWN * traced.triangles.len()).div_ceil(total.max(1)).max(2000);
+            let (FaceTriangles { points, faces, triangles }, cell) = simplified(traced, limit);
             merged = merged.max(cell);
+            let labels =
+                runs(&faces).filter_map(|(first, f)| Some((first, facets.labels.get(f as usize)?.clone())));
             view.shapes.push(Shape::Surface {
                 name: shown.name,
                 points,
@@ -90,6 +94,7 @@ impl View {
                 colour: shown.group.colour,
                 opacity: shown.group.opacity,
                 values: None,
+                labels: labels.collect(),
             });
         }
         if merged > 0.0 {
@@ -119,7 +124,7 @@ impl View {
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
         for shown in shown(facets) {
-            let (mut points, mut triangles) = triangles_of(facets, &shown.facets);
+            let FaceTriangles { mut points, mut triangles, .. } = triangles_of(facets, &shown.facets, false);
             let mut per_triangle: Vec<f32> = Vec::with_capacity(triangles.len());
             for &i in &shown.facets {
                 let value = values.get(i).map_or(f32::NAN, |v| *v as f32);
@@ -140,6 +145,7 @@ impl View {
                 colour: [0.6; 3],
                 opacity,
                 values,
+                labels: Vec::new(),
             });
         }
         view
@@ -203,6 +209,14 @@ impl View {
 
 type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
+/// Triangles whose points know their faces.
+struct FaceTriangles {
+    points: Vec<[f32; 3]>,
+    /// The face of each point; 0 for all where faces do not matter.
+    faces: Vec<u32>,
+    triangles: Vec<[u32; 3]>,
+}
+
 /// Parts that are shown under names of their own; of more, those that look the same are one surface, for a thousand entries of a
 /// legend tell nothing and took 20 s.
 const NAMED: usize = 40;
@@ -240,16 +254,28 @@ fn shown<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
     looks.into_iter().map(named).collect()
 }
 
-/// The traced triangles of some facets, positions shared.
-fn triangles_of(facets: &Facets, wanted: &[usize]) -> Triangles {
+/// The first of each run of equal numbers, and the number.
+fn runs(numbers: &[u32]) -> impl Iterator<Item = (u32, u32)> {
+    let starts = numbers.iter().enumerate().filter(|(k, n)| *k == 0 || numbers[k - 1] != **n);
+    starts.map(|(k, n)| (k as u32, *n))
+}
+
+/// The traced triangles of some facets. Positions are shared; with `by_face` within each face alone, and face comes after face.
+fn triangles_of(facets: &Facets, wanted: &[usize], by_face: bool) -> FaceTriangles {
     let mesh = facets.mesh;
+    let mut wanted = wanted.to_vec();
+    if by_face {
+        wanted.sort_by_key(|&i| mesh.facets[i].face);
+    }
     let mut index = FxHashMap::default();
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
-    for &i in wanted {
+    let (mut points, mut faces, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
+    for i in wanted {
         let facet = &mesh.facets[i];
+        let face = if by_face { facet.face.0 } else { 0 };
         let [a, b, c, d] = mesh.corner_positions(i).map(|p| {
-            *index.entry(p).or_insert_with(|| {
+            *index.entry((p, face)).or_insert_with(|| {
                 points.push(mesh.positions[p as usize].as_vec3().to_array());
+                faces.push(face);
                 points.len() as u32 - 1
             })
         });
@@ -258,7 +284,7 @@ fn triangles_of(facets: &Facets, wanted: &[usize]) -> Triangles {
             triangles.push([a, c, d]);
         }
     }
-    (points, triangles)
+    FaceTriangles { points, faces, triangles }
 }
 
 /// The points that triangles use, and no others.
@@ -277,14 +303,11 @@ fn used(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
 
 /// Merges corners within cells of a grid until no more than `limit` triangles remain: no holes, unlike leaving triangles out.
 /// Also gives the cell size in mm, 0 when nothing had to be merged.
-fn simplified(
-    points: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    limit: usize,
-) -> (Vec<[f32; 3]>, Vec<[u32; 3]>, f64) {
-    if triangles.len() <= limit {
-        return (points, triangles, 0.0);
+fn simplified(traced: FaceTriangles, limit: usize) -> (FaceTriangles, f64) {
+    if traced.triangles.len() <= limit {
+        return (traced, 0.0);
     }
+    let FaceTriangles { points, faces, triangles } = traced;
     let span = (0..3).fold(0f32, |s, k| {
         let (lo, hi) = points.iter().fold((f32::MAX, f32::MIN), |(l, h), p| (l.min(p[k]), h.max(p[k])));
         s.max(hi - lo)
@@ -293,10 +316,12 @@ fn simplified(
     for _ in 0..40 {
         let mut index = FxHashMap::default();
         let mut merged: Vec<[f32; 3]> = Vec::new();
-        let of: Vec<u32> = (points.iter())
-            .map(|p| {
-                *index.entry(p.map(|x| (x / cell).floor() as i64)).or_insert_with(|| {
+        let mut merged_faces = Vec::new();
+        let of: Vec<u32> = (points.iter().zip(&faces))
+            .map(|(p, face)| {
+                *index.entry((p.map(|x| (x / cell).floor() as i64), *face)).or_insert_with(|| {
                     merged.push(*p);
+                    merged_faces.push(*face);
                     merged.len() as u32 - 1
                 })
             })
@@ -306,11 +331,12 @@ fn simplified(
             .filter(|[a, b, c]| a != b && b != c && c != a)
             .collect();
         if kept.len() <= limit {
-            return (merged, kept, f64::from(cell));
+            let simplified = FaceTriangles { points: merged, faces: merged_faces, triangles: kept };
+            return (simplified, f64::from(cell));
         }
         cell *= 1.3;
     }
-    (points, triangles, 0.0)
+    (FaceTriangles { points, faces, triangles }, 0.0)
 }
 
 #[cfg(test)]
@@ -355,7 +381,9 @@ mod tests {
         let points: Vec<[f32; 3]> = (0..n * n).map(|k| [(k % n) as f32 * 0.1, (k / n) as f32 * 0.1, 0.0]).collect();
         let quads = (0..n - 1).flat_map(|j| (0..n - 1).map(move |i| j * n + i));
         let triangles: Vec<[u32; 3]> = quads.flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]]).collect();
-        let (merged, kept, cell) = simplified(points, triangles, 5000);
+        let faces = vec![0; points.len()];
+        let (FaceTriangles { points: merged, triangles: kept, .. }, cell) =
+            simplified(FaceTriangles { points, faces, triangles }, 5000);
         assert!(kept.len() <= 5000 && kept.len() > 1000 && cell > 0.0);
         let far = merged.iter().map(|p| p[0]).fold(0f32, f32::max);
         assert!(f64::from(far) > 19.9 - cell);

@@ -70,6 +70,41 @@ fn the_faces_of_a_file_are_listed_with_what_selects_them() {
     assert!(code == 0 && out.contains("solid 0") && out.contains("sphere r "), "{out}");
 }
 
+/// What selects a face is printed beside it, and stands in a rule as it is; a dry run shows which faces that rule decides.
+#[test]
+fn selectors_are_pasted_and_shown_with_their_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::copy(fixture("step/lens_planoconvex_analytic.stp"), path.join("lens.stp")).unwrap();
+    let (_, out, _) = lampyris_in(path, &["info", "lens.stp", "--faces", "--json"]);
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let faces = found["parts"][0]["solids"][0]["faces"].as_array().unwrap();
+    let selector = faces.iter().find(|f| f["kind"] == "sphere").unwrap()["select"].as_str().unwrap();
+    let (_, out, _) = lampyris_in(path, &["info", "lens.stp", "--faces"]);
+    assert!(out.contains(selector), "{out}");
+    let scene = format!(
+        "[run]\nrays = 2000\n[[model]]\nfile = 'lens.stp'\n[[material]]\n{selector}\nsurface = 'mirror'\n\
+         [[material]]\nkind = 'plane'\nsurface = 'diffuse'\n[[source]]\nkind = 'point'\nat = [0, 0, -50]\n"
+    );
+    fs::write(path.join("s.toml"), scene).unwrap();
+    let (code, out, err) = lampyris_in(path, &["trace", "s.toml", "--dry-run", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let rules = found["rules"].as_array().unwrap();
+    assert_eq!((&rules[0]["faces"], rules[0]["first"][0].as_str()), (&Value::from(1), Some(selector)));
+    assert_eq!(rules[1]["gives"], "surface diffuse");
+    let unnamed = rules.last().unwrap();
+    assert!(unnamed["rule"].is_null() && unnamed["gives"].as_str().unwrap().contains("absorber"), "{unnamed}");
+    let (_, out, _) = lampyris_in(path, &["trace", "s.toml", "--dry-run"]);
+    assert!(out.contains("Rules and their faces") && out.contains("no rule names them"), "{out}");
+    // The page has the table, and the selector of every face for its 3-D view.
+    let (code, _, err) = lampyris_in(path, &["trace", "s.toml", "-o", "out"]);
+    assert_eq!(code, 0, "{err}");
+    let page = fs::read_to_string(path.join("out/report.html")).unwrap();
+    let escaped = serde_json::to_string(selector).unwrap();
+    assert!(page.contains("Rules and their faces") && page.contains(escaped.trim_matches('"')), "{escaped}");
+}
+
 /// Folders of outputs are made where they are missing, whatever is written into them.
 #[test]
 fn folders_of_outputs_are_made() {

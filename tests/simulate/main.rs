@@ -18,6 +18,7 @@ mod pipeline;
 mod polished;
 mod refusals;
 mod scenes;
+mod selectors;
 mod sources;
 mod support;
 mod touching;

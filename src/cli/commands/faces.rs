@@ -3,8 +3,9 @@
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
-use crate::model::{FaceAccount, Model, PartAccount, SolidAccount};
+use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount};
 use crate::report::{figures, grouped};
+use crate::simulate::face_selectors;
 use serde_json::json;
 
 /// Faces of a solid that are listed without -v; of more, the first ones and how many there are.
@@ -13,35 +14,64 @@ const SHOWN_FACES: usize = 60;
 /// Prints the tree; with `--json` the document that holds the same.
 pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
+    let mut selectors = part_selectors(model).into_iter();
     if console.json {
-        return Ok(print(&json_text(&json!({"parts": json_value(&parts)?}))?)?);
+        let mut document = json!({"parts": json_value(&parts)?});
+        let solids =
+            document["parts"].as_array_mut().into_iter().flatten().flat_map(|part| part["solids"].as_array_mut());
+        for face in solids.flatten().flat_map(|solid| solid["faces"].as_array_mut()).flatten() {
+            face["select"] = selectors.next().flatten().into();
+        }
+        return Ok(print(&json_text(&document)?)?);
     }
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_FACES };
-    let tree: String = parts.iter().map(|part| part_text(part, most)).collect();
+    let tree: String = parts.iter().map(|part| part_text(part, most, &mut selectors)).collect();
     print(&tree)?;
     console.say(console.dim(
-        "  a rule of a scene selects by part, face (name), entity (the #id), colour or at (a point near the face)",
+        "  behind each face: what selects it in a rule of a scene; rules also take solid, layer, kind, radius_mm, colour and at (a point)",
     ));
     Ok(())
 }
 
-fn part_text(part: &PartAccount, most: usize) -> String {
+/// For each face in the order of the account the selector that means it, wherever its part stands; `None` for a part that stands nowhere.
+fn part_selectors(model: &Model) -> Vec<Option<String>> {
+    let mut first: Vec<Option<usize>> = vec![None; model.parts.len()];
+    for (k, instance) in model.instances.iter().enumerate() {
+        first[instance.part.0 as usize].get_or_insert(k);
+    }
+    let mut faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    faces.retain(|f| first[f.part.0 as usize] == Some(f.instance));
+    faces.sort_by_key(|f| (f.part.0, f.id));
+    let mut texts = face_selectors(model, &faces).into_iter().map(|s| Some(s.as_key()));
+    let mut selectors = Vec::new();
+    for (part, first) in model.parts.iter().zip(first) {
+        match first {
+            Some(_) => selectors.extend(texts.by_ref().take(part.face_count())),
+            None => selectors.extend(std::iter::repeat_n(None, part.face_count())),
+        }
+    }
+    selectors
+}
+
+fn part_text(part: &PartAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let placed = if part.instances == 1 { String::new() } else { format!(", placed {} times", part.instances) };
     let mut text = format!("part {}{placed}\n", named(&part.name));
     for solid in &part.solids {
-        text += &solid_text(solid, most);
+        text += &solid_text(solid, most, selectors);
     }
     text
 }
 
-fn solid_text(solid: &SolidAccount, most: usize) -> String {
+fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let closed = if solid.closed { "closed" } else { "open" };
     let name = if solid.name.is_empty() { String::new() } else { format!(" {}", named(&solid.name)) };
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
     let count = grouped(solid.faces.len() as u64);
     let mut text = format!("  solid {}{name}: {closed}, {count} faces, {} mm²\n", solid.index, figures(area, 5));
-    for face in solid.faces.iter().take(most) {
-        text += &face_text(face);
+    for (k, (face, selector)) in solid.faces.iter().zip(selectors).enumerate() {
+        if k < most {
+            text += &face_text(face, selector.as_deref());
+        }
     }
     if solid.faces.len() > most {
         text += &format!("    and {} more faces; -v shows all, --json too\n", solid.faces.len() - most);
@@ -49,7 +79,7 @@ fn solid_text(solid: &SolidAccount, most: usize) -> String {
     text
 }
 
-fn face_text(face: &FaceAccount) -> String {
+fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     let id = face.id.map_or_else(|| "–".to_owned(), |id| format!("#{id}"));
     let kind = serde_json::to_value(face.kind).ok().and_then(|k| k.as_str().map(str::to_owned)).unwrap_or_default();
     let radius = face.radius_mm.map_or(String::new(), |r| format!(" r {} mm", figures(r, 5)));
@@ -57,8 +87,9 @@ fn face_text(face: &FaceAccount) -> String {
     let colour = face.colour.map_or(String::new(), |c| format!("  {c}"));
     let name = if face.name.is_empty() { String::new() } else { format!("  {}", named(&face.name)) };
     let layer = face.layer.as_ref().map_or(String::new(), |l| format!("  layer {}", named(l)));
+    let selector = selector.map_or(String::new(), |s| format!("  {s}"));
     format!(
-        "    {id:>8}  {:<22} {:>12} mm²  at [{point}]{colour}{layer}{name}\n",
+        "    {id:>8}  {:<22} {:>12} mm²  at [{point}]{colour}{layer}{name}{selector}\n",
         format!("{kind}{radius}"),
         figures(face.area_mm2, 5)
     )

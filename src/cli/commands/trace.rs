@@ -7,6 +7,8 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::rule_table::{rule_document, rule_table};
+use crate::cli::output::terminal_tables::table_text;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
 use crate::cli::work::path_file::PathFile;
@@ -157,6 +159,9 @@ fn trace_whole(
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
+    // What was missed comes before what was found.
+    let missed = result.as_ref().is_some_and(|result| !result.reached);
+    let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     checkpoint.remove();
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
@@ -329,6 +334,7 @@ fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result
         let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
+            "rules": rule_document(&prepared.bound, &loaded.model),
             "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
             "seconds": {"read": loaded.seconds, "tessellate": prepared.tessellation_seconds}});
         print(&json_text(&document)?)?;
@@ -350,6 +356,9 @@ fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result
     ))?;
     for because in &effects.simulated {
         print(&format!("simulated: {:?}, because {}\n", because.effect, because.because))?;
+    }
+    if !prepared.bound.rules().is_empty() {
+        print(&table_text(&rule_table(&prepared.bound, &loaded.model), console.width()))?;
     }
     Ok(Completion::Complete)
 }

@@ -5,4 +5,5 @@ pub(super) mod closing;
 pub(super) mod json;
 pub(super) mod octree_shape;
 pub(super) mod receiver_files;
+pub(super) mod rule_table;
 pub(super) mod terminal_tables;

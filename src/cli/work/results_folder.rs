@@ -6,7 +6,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::output::{appearance, octree_shape, receiver_files};
+use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
@@ -101,6 +101,9 @@ pub(crate) fn write(
     }
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
+    if with_page {
+        facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
+    }
     let report = page(prepared, run, &all_figures, &facets, sentences, provenance);
     let answer = report.answer();
     if with_page {
@@ -131,7 +134,15 @@ fn page<'a>(
         geometric: run.geometric.as_ref(),
         chosen: prepared.chosen.as_ref(),
         views: Vec::new(),
-        tables: vec![model_table(prepared), facet_table(prepared)],
+        tables: [
+            (!prepared.bound.rules().is_empty())
+                .then(|| rule_table::rule_table(&prepared.bound, &prepared.job.loaded.model)),
+            Some(model_table(prepared)),
+            Some(facet_table(prepared)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         comparison: sentences,
         provenance,
     }

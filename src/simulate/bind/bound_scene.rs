@@ -6,6 +6,20 @@ use crate::simulate::emitter::Emitter;
 use crate::simulate::receiver::Receiver;
 use crate::simulate::scene::Scene;
 use crate::simulate::surfaces::{FaceOptics, SceneLight, Surface};
+use serde::Serialize;
+
+/// The faces that one rule decides; of several that select a face, the last one does.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RuleFaces {
+    /// Number of the `[[material]]`, from 1; `None` for the faces that no rule names.
+    pub rule: Option<usize>,
+    /// Its selectors as the scene file has them; empty for all faces.
+    pub selects: String,
+    /// What it gives: the medium, the surface.
+    pub gives: String,
+    /// The faces, as their numbers in the model.
+    pub faces: Vec<u32>,
+}
 
 /// A scene whose rules have found their faces: everything a simulation needs but the intersector.
 #[derive(Clone, Debug)]
@@ -26,6 +40,8 @@ pub struct BoundScene {
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,
     pub(crate) instance_of_face: Vec<u32>,
+    /// Which faces each rule decides.
+    pub(crate) rules: Vec<RuleFaces>,
     /// Sentences about what in the scene is open or beyond its tables.
     pub(crate) notes: Vec<String>,
 }
@@ -39,6 +55,11 @@ impl BoundScene {
     /// What someone who reads the results must know: bodies that are open, light beyond the wavelengths of a table.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// Which faces each rule of the scene decides; last, if there are any, those that no rule names.
+    pub fn rules(&self) -> &[RuleFaces] {
+        &self.rules
     }
 
     /// The instance of a face, by the face's index in the model.

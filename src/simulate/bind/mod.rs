@@ -1,16 +1,18 @@
 //! A scene bound to a model: what every placed face does to light, as tables indexed by [`FaceId`](crate::math::FaceId).
 //!
-//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `chosen`,
-//! `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
+//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `face_selectors`,
+//! `chosen`, `rule_table`, `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
 
 mod bodies;
 mod bound_scene;
 mod chosen;
 mod contacts;
+mod face_selectors;
 mod materials;
 mod nearest;
 mod notes;
 mod role;
+mod rule_table;
 mod select;
 mod wavelengths;
 
@@ -22,8 +24,9 @@ use super::surfaces::{FaceOptics, Surface};
 use super::{Error, ErrorKind};
 use crate::math::{Aabb, Vector};
 use crate::model::Model;
-pub use bound_scene::BoundScene;
+pub use bound_scene::{BoundScene, RuleFaces};
 use chosen::ChosenRules;
+pub use face_selectors::face_selectors;
 
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
@@ -80,6 +83,7 @@ impl Scene {
             region,
             instances: (0..model.instances.len()).map(|k| model.label(k)).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
+            rules: rule_table::rule_table(self, &chosen),
             notes: notes::beyond_tables(self, &chosen, &ranges),
         };
         bound.notes.extend(file_notes);

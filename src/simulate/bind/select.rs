@@ -2,13 +2,16 @@
 
 use super::nearest::Nearest;
 use crate::math::Point;
-use crate::model::{Model, PlacedFace};
+use crate::model::{Model, PlacedFace, SurfaceKind};
 use crate::simulate::emitter::Area;
-use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, suggest};
+use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey, suggest};
 use crate::simulate::{Error, ErrorKind};
 
 /// Difference up to which two shares of a colour are the same: half a step of `#rrggbb`, 1/255.
 const COLOUR_STEP: f64 = 2e-3;
+
+/// Share of a radius that one may be given wrong by: reports give five digits.
+const RADIUS_ROUNDING: f64 = 1e-4;
 
 /// Messages give places in steps of a thousandth of a millimetre.
 const DECIMALS: f64 = 1e3;
@@ -33,6 +36,44 @@ fn any_fits(patterns: &Option<OneOrMany<String>>, name: &str) -> bool {
     patterns.as_ref().is_none_or(|p| p.as_slice().iter().any(|p| fits(p, name)))
 }
 
+/// Whether a solid is one of those that are meant.
+fn solid_fits(wanted: &Option<OneOrMany<SolidKey>>, face: &PlacedFace<'_>, model: &Model) -> bool {
+    let Some(wanted) = wanted else { return true };
+    let name = solid_name(face, model);
+    wanted.as_slice().iter().any(|key| match key {
+        SolidKey::Number(number) => *number == face.solid,
+        SolidKey::Name(pattern) => name.is_some_and(|name| fits(pattern, name)),
+    })
+}
+
+/// The name of the solid of a face; the shell of a void is its solid's.
+fn solid_name<'m>(face: &PlacedFace<'_>, model: &'m Model) -> Option<&'m str> {
+    let shells = &model.part(face.part).shells[..=face.shell?];
+    shells.iter().rfind(|s| !s.void).or(shells.first()).map(|s| s.name.as_str())
+}
+
+/// Whether a face has everything that a rule asks for, places left out.
+fn has_all(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
+    let same_radius = |wanted: &f64, have: f64| (wanted - have).abs() <= RADIUS_ROUNDING * have;
+    let same_colour =
+        |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
+    any_fits(&rule.part, &model.part(face.part).name)
+        && any_fits(&rule.instance, &model.instances[face.instance].name)
+        && any_fits(&rule.face, face.name())
+        && any_fits(&rule.kind, face.kind().word())
+        && rule.entity.as_ref().is_none_or(|e| face.entity().is_some_and(|id| e.as_slice().contains(&id)))
+        && (rule.layer.is_none() || face.layer().is_some_and(|layer| any_fits(&rule.layer, layer)))
+        && rule.radius_mm.as_ref().is_none_or(|radii| {
+            face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| same_radius(wanted, have)))
+        })
+        && solid_fits(&rule.solid, face, model)
+        && rule
+            .colour
+            .as_ref()
+            .and_then(|c| c.rgb())
+            .is_none_or(|wanted| face.colour(model).is_some_and(|have| same_colour(wanted, have.0)))
+}
+
 /// Selects the placed faces that a rule means; an error when there is none, or when one of its points or names means none.
 pub(super) fn faces(
     scene: &Scene,
@@ -42,17 +83,8 @@ pub(super) fn faces(
     nearest: &mut Nearest<'_>,
 ) -> Result<Vec<usize>, Error> {
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
-    let colour = rule.colour.as_ref().and_then(|c| c.rgb());
-    let selected = |f: &PlacedFace<'_>| {
-        any_fits(&rule.part, &model.part(f.part).name)
-            && any_fits(&rule.instance, &model.instances[f.instance].name)
-            && any_fits(&rule.face, f.name())
-            && rule.entity.as_ref().is_none_or(|e| f.entity().is_some_and(|id| e.as_slice().contains(&id)))
-            && colour.is_none_or(|c| {
-                f.colour(model).is_some_and(|have| have.0.iter().zip(c).all(|(a, b)| (a - b).abs() < COLOUR_STEP))
-            })
-    };
-    let candidates: Vec<usize> = model.placed_faces().filter(selected).map(|f| f.id.index()).collect();
+    let candidates: Vec<usize> =
+        model.placed_faces().filter(|f| has_all(rule, f, model)).map(|f| f.id.index()).collect();
     each_name_means_something(scene, base, rule, model)?;
     if candidates.is_empty() {
         let message = "this matches no face of the model";
@@ -88,10 +120,25 @@ fn each_name_means_something(
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
     let instances = model.instances.iter().map(|i| i.name.as_str());
     let faces = model.placed_faces().map(|f| f.face.map_or("", |f| f.name.as_str()));
+    let layers = model.parts.iter().flat_map(|part| {
+        let of_faces = part.shells.iter().flat_map(|s| &s.faces).filter_map(|f| f.layer.as_deref());
+        of_faces.chain(part.tessellated.iter().filter_map(|t| t.layer.as_deref()))
+    });
+    let solids = model.parts.iter().flat_map(|part| part.shells.iter().map(|s| s.name.as_str()));
+    let solid_names = rule.solid.as_ref().map(|keys| {
+        let names = keys.as_slice().iter().filter_map(|key| match key {
+            SolidKey::Name(name) => Some(name.clone()),
+            SolidKey::Number(_) => None,
+        });
+        OneOrMany::Many(names.collect())
+    });
     let lists = [
         ("part", &rule.part, parts.collect::<Vec<_>>()),
         ("instance", &rule.instance, instances.collect()),
         ("face", &rule.face, faces.collect()),
+        ("layer", &rule.layer, layers.collect()),
+        ("solid", &solid_names, solids.collect()),
+        ("kind", &rule.kind, SurfaceKind::ALL.map(SurfaceKind::word).to_vec()),
     ];
     for (key, patterns, names) in lists {
         for pattern in patterns.iter().flat_map(|p| p.as_slice()) {
@@ -120,6 +167,11 @@ pub(super) fn luminous_area(scene: &Scene, index: usize, model: &Model) -> Resul
 /// The faces whose absorbed power a receiver counts.
 pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Result<Vec<u32>, Error> {
     let receiver = &scene.receivers[index];
+    if let Some(on) = &receiver.on {
+        let base = [Key::Name("receiver"), Key::Index(index), Key::Name("on")];
+        let chosen = faces(scene, &base, on, model, &mut Nearest::new(model))?;
+        return Ok(chosen.into_iter().map(|f| f as u32).collect());
+    }
     let rule = FaceSelector {
         part: receiver.part.clone(),
         instance: receiver.instance.clone(),

@@ -21,7 +21,7 @@ pub(super) fn add(schema: &mut Value) {
         {"if": never(&["kind"]), "then": needs(&["size"])},
         of_kind(&["plane"], needs(&["size"])),
         of_kind(&["sphere"], needs(&["radius"])),
-        of_kind(&["absorbed"], json!({"anyOf": [needs(&["part"]), needs(&["instance"])]})),
+        of_kind(&["absorbed"], json!({"anyOf": [needs(&["part"]), needs(&["instance"]), needs(&["on"])]})),
         of_kind(&["plane", "far_field", "absorbed"], never(&["radius"])),
         of_kind(&["sphere", "far_field", "absorbed"], never(&["size"])),
     ]});

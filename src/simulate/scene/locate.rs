@@ -99,6 +99,7 @@ fn typed(message: &str, key: &str) -> Error {
     }
     for (form, plain) in [
         ("did not match any variant of untagged enum OneOrMany", "neither one value nor a list of them"),
+        ("did not match any variant of untagged enum SolidKey", "neither the number of a solid nor its name"),
         ("did not match any variant of untagged enum ColourKey", "neither \"#rrggbb\" nor [r, g, b]"),
         (
             "did not match any variant of untagged enum Reflectance",

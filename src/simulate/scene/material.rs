@@ -1,5 +1,6 @@
 //! The keys `[[model]]` and `[[material]]`: CAD files, and what their faces are made of.
 
+use super::selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use super::{Error, ErrorKind, Key, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -71,26 +72,6 @@ impl Default for Placement {
     }
 }
 
-/// One value or a list of them.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum OneOrMany<T> {
-    /// One.
-    One(T),
-    /// Several.
-    Many(Vec<T>),
-}
-
-impl<T> OneOrMany<T> {
-    /// All values.
-    pub fn as_slice(&self) -> &[T] {
-        match self {
-            Self::One(x) => std::slice::from_ref(x),
-            Self::Many(xs) => xs,
-        }
-    }
-}
-
 /// What the faces that a rule selects are made of. All selectors that are given must hold; `*` in a name stands for anything.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -99,14 +80,25 @@ pub struct Material {
     pub part: Option<OneOrMany<String>>,
     /// Name of the instance.
     pub instance: Option<OneOrMany<String>>,
+    /// Number of the solid in its part, from 0 as `lampyris info --faces` counts, or its name.
+    pub solid: Option<OneOrMany<SolidKey>>,
     /// Name of the face.
     pub face: Option<OneOrMany<String>>,
+    /// Layer of the face, or of the solid that it belongs to.
+    pub layer: Option<OneOrMany<String>>,
     /// Colour that the face shows, red, green, blue in `[0, 1]` or `"#rrggbb"`.
     pub colour: Option<ColourKey>,
+    /// Kind of surface: `plane`, `cylinder`, `cone`, `sphere`, `torus`, `revolution`, `extrusion`, `offset`, `bspline`, `rational`,
+    /// `tessellated` or `other`.
+    pub kind: Option<OneOrMany<String>>,
+    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; within 1e-4 of it.
+    pub radius_mm: Option<OneOrMany<f64>>,
     /// `#id` of the face in the STEP file.
     pub entity: Option<OneOrMany<u64>>,
     /// The face nearest to each of these points, mm.
     pub at: Option<OneOrMany<[f64; 3]>>,
+    /// The same selectors as one value, in place of the keys above: `on = { part = "lens", entity = 12 }`.
+    pub on: Option<FaceSelector>,
     /// Name of the medium inside; its faces become interfaces unless `surface` says otherwise.
     pub medium: Option<String>,
     /// What happens at the surface.
@@ -156,53 +148,24 @@ pub enum LobeKind {
     Abg,
 }
 
-/// Faces of a model. All selectors that are given must hold; `*` in a name stands for anything.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct FaceSelector {
-    /// Name of the part.
-    pub part: Option<OneOrMany<String>>,
-    /// Name of the instance.
-    pub instance: Option<OneOrMany<String>>,
-    /// Name of the face.
-    pub face: Option<OneOrMany<String>>,
-    /// Colour that the face shows.
-    pub colour: Option<ColourKey>,
-    /// `#id` of the face in the STEP file.
-    pub entity: Option<OneOrMany<u64>>,
-    /// The face nearest to each of these points, mm.
-    pub at: Option<OneOrMany<[f64; 3]>>,
-}
-
 impl Material {
+    /// Whether the rule selects by keys of its own and by `on`.
+    pub(super) fn selects_twice(&self) -> bool {
+        self.on.is_some() && self.own_selectors() != FaceSelector::default()
+    }
+
     /// Its selectors.
     pub(crate) fn faces(&self) -> FaceSelector {
-        let Self { part, instance, face, colour, entity, at, .. } = self.clone();
-        FaceSelector { part, instance, face, colour, entity, at }
-    }
-}
-
-/// A colour as three numbers or as `#rrggbb`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum ColourKey {
-    /// Red, green, blue in `[0, 1]`.
-    Rgb([f64; 3]),
-    /// `#rrggbb`.
-    Hex(String),
-}
-
-impl ColourKey {
-    /// As three numbers, when it is a colour.
-    pub fn rgb(&self) -> Option<[f64; 3]> {
-        match self {
-            Self::Rgb(c) => Some(*c),
-            Self::Hex(s) => {
-                let hex = s.strip_prefix('#').filter(|h| h.len() == 6 && h.is_ascii())?;
-                let byte = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).ok().map(|b| f64::from(b) / 255.0);
-                Some([byte(0)?, byte(2)?, byte(4)?])
-            }
+        if let Some(on) = &self.on {
+            return on.clone();
         }
+        self.own_selectors()
+    }
+
+    /// Those that stand in the rule itself.
+    fn own_selectors(&self) -> FaceSelector {
+        let Self { part, instance, solid, face, layer, colour, kind, radius_mm, entity, at, .. } = self.clone();
+        FaceSelector { part, instance, solid, face, layer, colour, kind, radius_mm, entity, at }
     }
 }
 

@@ -11,6 +11,7 @@ mod material;
 pub(crate) mod medium;
 mod receiver;
 mod run;
+mod selector;
 mod source;
 mod spectrum;
 pub(crate) mod suggest;
@@ -18,14 +19,12 @@ mod surface;
 
 use super::{Error, ErrorKind};
 use crate::formats::file_stem;
-pub use material::{
-    ColourKey, FaceSelector, LobeKind, Material, ModelUse, OneOrMany, Placement, Reflectance, ScatterKey,
-    SurfaceKind,
-};
+pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceKind};
 pub use medium::{ByWavelength, Medium};
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
 use schemars::JsonSchema;
+pub use selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use serde::{Deserialize, Serialize};
 pub(crate) use source::POWERS;
 pub use source::{Source, SourceKind};

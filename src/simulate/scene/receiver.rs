@@ -1,6 +1,6 @@
 //! The key `[[receiver]]`: where light is counted.
 
-use super::{Key, OneOrMany, PowerUnit, Scene};
+use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,8 @@ pub struct Receiver {
     pub part: Option<OneOrMany<String>>,
     /// Instance whose absorbed flux is counted.
     pub instance: Option<OneOrMany<String>>,
+    /// Faces whose absorbed flux is counted, in place of `part` and `instance`.
+    pub on: Option<FaceSelector>,
 }
 
 impl Default for Receiver {
@@ -75,6 +77,7 @@ impl Default for Receiver {
             bins_nm: None,
             part: None,
             instance: None,
+            on: None,
         }
     }
 }
@@ -149,7 +152,7 @@ impl Receiver {
     fn misplaced(&self) -> Option<(&'static str, &'static str)> {
         use ReceiverKind::{Absorbed, FarField, Plane, Sphere};
         let unset = Self::default();
-        let keys: [(&str, bool, &[ReceiverKind], &str); 12] = [
+        let keys: [(&str, bool, &[ReceiverKind], &str); 13] = [
             ("at", self.at != unset.at, &[Plane, Sphere], "plane or sphere"),
             ("normal", self.normal != unset.normal, &[Plane, Sphere, FarField], "plane, sphere or far_field"),
             ("x", self.x.is_some(), &[Plane], "plane"),
@@ -162,6 +165,7 @@ impl Receiver {
             ("v_deg", self.v_deg != unset.v_deg, &[FarField], "far_field"),
             ("part", self.part.is_some(), &[Absorbed], "absorbed"),
             ("instance", self.instance.is_some(), &[Absorbed], "absorbed"),
+            ("on", self.on.is_some(), &[Absorbed], "absorbed"),
         ];
         keys.into_iter().find(|(_, given, kinds, _)| *given && !kinds.contains(&self.kind)).map(|k| (k.0, k.3))
     }
@@ -224,8 +228,11 @@ impl Receiver {
                 }
                 Ok(())
             }
-            ReceiverKind::Absorbed if self.part.is_none() && self.instance.is_none() => {
-                fail("part", "say whose absorbed flux is meant: `part` or `instance`")
+            ReceiverKind::Absorbed if self.part.is_none() && self.instance.is_none() && self.on.is_none() => {
+                fail("part", "say whose absorbed flux is meant: `part`, `instance` or `on`")
+            }
+            ReceiverKind::Absorbed if self.on.is_some() && (self.part.is_some() || self.instance.is_some()) => {
+                fail("on", "`on` has its own `part` and `instance`: put them there")
             }
             ReceiverKind::Absorbed => Ok(()),
         }

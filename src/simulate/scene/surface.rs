@@ -132,6 +132,10 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
             return Err(error.help("add one of them"));
         }
         m.optics().map_err(|(key, message)| scene.error(ErrorKind::Value, &at(key), message))?;
+        if m.selects_twice() {
+            let error = scene.error(ErrorKind::Value, &at("on"), "this rule has `on` and selectors beside it");
+            return Err(error.help("put all of them into `on`"));
+        }
         if m.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
             return Err(scene
                 .error(ErrorKind::Value, &at("colour"), "not a colour")

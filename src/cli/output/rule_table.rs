@@ -1,0 +1,59 @@
+//! Rules of a scene and the faces that each decides, as a table and as JSON.
+
+use crate::model::{Model, PlacedFace};
+use crate::report::Table;
+use crate::simulate::scene::FaceSelector;
+use crate::simulate::{BoundScene, face_selectors};
+use serde_json::{Value, json};
+
+/// Faces of a rule that are named; `info --faces` lists all.
+const NAMED_FACES: usize = 3;
+
+/// Most faces of a model whose selectors stand in a page: a megabyte of them.
+const MOST_LABELLED: usize = 20_000;
+
+/// The selector of every placed face; of none where there are too many for a page.
+pub(crate) fn face_labels(model: &Model) -> Vec<String> {
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    if faces.len() > MOST_LABELLED {
+        return Vec::new();
+    }
+    face_selectors(model, &faces).iter().map(FaceSelector::as_key).collect()
+}
+
+/// The selectors of the first faces of each rule.
+fn examples(bound: &BoundScene, model: &Model) -> Vec<Vec<String>> {
+    let labels = face_labels(model);
+    let label = |face: &u32| labels.get(*face as usize).cloned();
+    bound.rules().iter().map(|r| r.faces.iter().take(NAMED_FACES).filter_map(label).collect()).collect()
+}
+
+/// A row a rule, and one for the faces that none names.
+pub(crate) fn rule_table(bound: &BoundScene, model: &Model) -> Table {
+    let columns = [("[[material]]", ""), ("selects", ""), ("gives", ""), ("faces", ""), ("which", "")];
+    let caption = "Of several rules that select a face the last one decides, for its medium and its surface apart. A row without faces is \
+        a rule that later ones replace everywhere.";
+    let mut table = Table::new("rules", "Rules and their faces", &columns).caption(caption);
+    for (rule, named) in bound.rules().iter().zip(examples(bound, model)) {
+        let more = rule.faces.len() - named.len();
+        let which = named.join(" | ");
+        let which = if more > 0 && !which.is_empty() { format!("{which} and {more} more") } else { which };
+        let selects = if rule.selects.is_empty() { "all faces" } else { &rule.selects };
+        table.row([
+            rule.rule.map_or_else(|| "none".into(), Into::into),
+            selects.into(),
+            rule.gives.as_str().into(),
+            rule.faces.len().into(),
+            which.into(),
+        ]);
+    }
+    table
+}
+
+/// The same as JSON.
+pub(crate) fn rule_document(bound: &BoundScene, model: &Model) -> Value {
+    let rows = bound.rules().iter().zip(examples(bound, model)).map(|(rule, named)| {
+        json!({"rule": rule.rule, "selects": rule.selects, "gives": rule.gives, "faces": rule.faces.len(), "first": named})
+    });
+    rows.collect()
+}

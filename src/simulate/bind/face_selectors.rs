@@ -1,0 +1,92 @@
+//! The selector of each face: the shortest one that means this face alone, to be put into a rule.
+
+use crate::model::{Model, PlacedFace};
+use crate::simulate::scene::{FaceSelector, OneOrMany, SolidKey};
+use std::collections::HashMap;
+
+/// What a selector is made of; the earlier, the longer a face is likely to keep it when its file is written anew.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Key {
+    Part,
+    Instance,
+    Solid,
+    Name,
+    Entity,
+}
+
+/// Combinations that are tried, in this order.
+const COMBINATIONS: [&[Key]; 10] = [
+    &[Key::Name],
+    &[Key::Part, Key::Name],
+    &[Key::Instance, Key::Name],
+    &[Key::Entity],
+    &[Key::Part, Key::Entity],
+    &[Key::Instance, Key::Entity],
+    &[Key::Instance, Key::Solid, Key::Entity],
+    &[Key::Part, Key::Instance, Key::Entity],
+    &[Key::Part, Key::Instance, Key::Solid],
+    &[Key::Part, Key::Instance, Key::Solid, Key::Entity],
+];
+
+/// A name that can stand in a selector: there is one, and no `*` makes it a pattern.
+fn usable(name: &str) -> Option<&str> {
+    (!name.is_empty() && !name.contains('*')).then_some(name)
+}
+
+/// The selector of these keys; `None` where the face has not all of them.
+fn combined(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Option<FaceSelector> {
+    let mut selector = FaceSelector::default();
+    let name = |name: &str| Some(OneOrMany::One(usable(name)?.to_owned()));
+    for key in keys {
+        match key {
+            Key::Part => selector.part = Some(name(&model.part(face.part).name)?),
+            Key::Instance => selector.instance = Some(name(&model.instances[face.instance].name)?),
+            Key::Solid => selector.solid = Some(OneOrMany::One(SolidKey::Number(face.solid))),
+            Key::Name => selector.face = Some(name(face.name())?),
+            Key::Entity => selector.entity = Some(OneOrMany::One(face.entity()?)),
+        }
+    }
+    Some(selector)
+}
+
+/// For each of these faces of a model the shortest selector that means it alone among them: by its name, its `#id`, with part, instance and
+/// solid where these are needed, and by a point on it where nothing else tells it apart.
+pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelector> {
+    let mut chosen: Vec<Option<FaceSelector>> = vec![None; faces.len()];
+    for keys in COMBINATIONS {
+        if chosen.iter().all(Option::is_some) {
+            break;
+        }
+        let selectors: Vec<Option<FaceSelector>> = faces.iter().map(|f| combined(keys, f, model)).collect();
+        let texts: Vec<Option<String>> = selectors.iter().map(|s| Some(s.as_ref()?.to_string())).collect();
+        let mut uses: HashMap<&str, u32> = HashMap::new();
+        for text in texts.iter().flatten() {
+            *uses.entry(text).or_insert(0) += 1;
+        }
+        for ((slot, selector), text) in chosen.iter_mut().zip(selectors).zip(&texts) {
+            if slot.is_none() && text.as_ref().is_some_and(|text| uses.get(text.as_str()) == Some(&1)) {
+                *slot = selector;
+            }
+        }
+    }
+    chosen.into_iter().zip(faces).map(|(chosen, face)| chosen.unwrap_or_else(|| by_point(face, model))).collect()
+}
+
+/// A selector by a point on the face, with all else that it has.
+fn by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
+    let name = |name: &str| usable(name).map(|name| OneOrMany::One(name.to_owned()));
+    let on_surface = face.face.map(|f| f.surface.evaluate(f.inner_parameters()));
+    let on_mesh = || {
+        let mesh = &face.tessellated?.mesh;
+        let [a, b, c, _] = (!mesh.facets.is_empty()).then(|| mesh.corners(0))?;
+        Some((a + b + c) / 3.0)
+    };
+    FaceSelector {
+        part: name(&model.part(face.part).name),
+        instance: name(&model.instances[face.instance].name),
+        solid: Some(OneOrMany::One(SolidKey::Number(face.solid))),
+        entity: face.entity().map(OneOrMany::One),
+        at: on_surface.or_else(on_mesh).map(|p| OneOrMany::One(face.placement.point(p).to_array())),
+        ..FaceSelector::default()
+    }
+}

@@ -1,0 +1,54 @@
+//! Which faces each rule of a scene decides, and which none does.
+
+use super::bound_scene::RuleFaces;
+use super::chosen::ChosenRules;
+use crate::simulate::scene::{Scene, SurfaceKind};
+
+/// One entry a rule, those without a face included, and a last one for the faces that no rule names, if there are any.
+pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> {
+    let mut table: Vec<RuleFaces> = (scene.materials.iter().enumerate())
+        .map(|(k, material)| {
+            let medium = material.medium.as_ref().map(|m| format!("medium {m}"));
+            let surface = material.surface.map(|s| format!("surface {}", surface_word(s)));
+            let scatter = material.scatter.as_ref().map(|_| "scatter".to_owned());
+            let gives: Vec<String> = [medium, surface, scatter].into_iter().flatten().collect();
+            RuleFaces {
+                rule: Some(k + 1),
+                selects: material.faces().to_string(),
+                gives: gives.join(", "),
+                faces: Vec::new(),
+            }
+        })
+        .collect();
+    let mut unnamed = Vec::new();
+    for (face, (surface, medium)) in chosen.iter().enumerate() {
+        let rules = [*surface, medium.filter(|m| Some(*m) != *surface)];
+        for rule in rules.into_iter().flatten() {
+            table[rule].faces.push(face as u32);
+        }
+        if rules == [None; 2] {
+            unnamed.push(face as u32);
+        }
+    }
+    if !unnamed.is_empty() {
+        let gives = match scene.default_surface {
+            SurfaceKind::Absorber => "surface absorber: light that meets them ends there".to_owned(),
+            other => format!("surface {}, the scene's default_surface", surface_word(other)),
+        };
+        let selects = "no rule names them".to_owned();
+        table.push(RuleFaces { rule: None, selects, gives, faces: unnamed });
+    }
+    table
+}
+
+/// A surface in the scene file's word.
+fn surface_word(kind: SurfaceKind) -> &'static str {
+    match kind {
+        SurfaceKind::Absorber => "absorber",
+        SurfaceKind::Mirror => "mirror",
+        SurfaceKind::Interface => "interface",
+        SurfaceKind::Diffuse => "diffuse",
+        SurfaceKind::Coating => "coating",
+        SurfaceKind::Metal => "metal",
+    }
+}

@@ -1,0 +1,139 @@
+//! Rules of a scene find the faces that they mean: by solid, layer, kind, radius and `#id` beside names and places; and every face has a
+//! selector of its own.
+
+use crate::files::{corpus, read_model, step_files};
+use crate::support::{Shape, World};
+use lampyris::math::{Frame, Point, Vector};
+use lampyris::model::{Analytic, Model, PlacedFace};
+use lampyris::simulate::{Error, RuleFaces, Scene, face_selectors};
+use std::collections::HashSet;
+use std::path::Path;
+
+/// Two spheres of one part, each a solid of one face called NONE, as CAD systems write them; the second is larger and on a layer.
+fn twins() -> Model {
+    let mut world = World::default();
+    for (x, radius) in [(0.0, 1.0), (10.0, 2.0)] {
+        world.sphere("pair", Point::new(x, 0.0, 0.0), radius);
+    }
+    let mut model = world.model;
+    let mut second = model.parts.pop().unwrap().shells.pop().unwrap();
+    model.instances.pop();
+    second.name = "big".into();
+    let part = &mut model.parts[0];
+    part.shells.push(second);
+    for (shell, (radius, layer)) in part.shells.iter_mut().zip([(1.0, None), (2.0, Some("optics".into()))]) {
+        let face = &mut shell.faces[0];
+        face.name = "NONE".into();
+        face.entity = Some(7);
+        face.analytic = Analytic::Sphere { frame: Frame::IDENTITY, radius };
+        face.layer = layer;
+    }
+    model
+}
+
+fn rules(model: &Model, materials: &str) -> Result<Vec<RuleFaces>, Error> {
+    let text = format!("[[source]]\nkind = 'point'\nat = [50, 0, 0]\n{materials}");
+    Scene::parse(&text, "s.toml", Path::new("."))?.bind(model).map(|bound| bound.rules().to_vec())
+}
+
+#[test]
+fn two_solids_of_one_part_are_told_apart() {
+    let model = twins();
+    for (selector, face) in [
+        ("solid = 0", 0),
+        ("solid = 1", 1),
+        ("solid = 'big'", 1),
+        ("layer = 'opt*'", 1),
+        ("radius_mm = 1", 0),
+        ("kind = 'sphere', radius_mm = 2.0001", 1),
+        ("part = 'pair', at = [9, 0, 0]", 1),
+    ] {
+        let table = rules(&model, &format!("[[material]]\non = {{ {selector} }}\nsurface = 'mirror'\n")).unwrap();
+        assert_eq!(table[0].faces, [face], "{selector}");
+        assert_eq!(table[1].rule, None);
+        assert_eq!(table[1].faces, [1 - face], "{selector}");
+        assert!(table[1].gives.contains("absorber"), "{}", table[1].gives);
+    }
+}
+
+#[test]
+fn the_last_rule_decides_and_the_table_says_so() {
+    let materials = "[[material]]\nsurface = 'mirror'\n[[material]]\nsolid = [0, 1]\nsurface = 'diffuse'\n";
+    let table = rules(&twins(), materials).unwrap();
+    assert_eq!(table.len(), 2, "every face is named");
+    assert_eq!((table[0].faces.as_slice(), table[0].gives.as_str()), (&[][..], "surface mirror"));
+    assert_eq!((table[1].faces.as_slice(), table[1].selects.as_str()), (&[0, 1][..], "solid = [0,1]"));
+}
+
+#[test]
+fn what_selects_nothing_is_refused_with_what_there_is() {
+    for (selector, says) in [
+        ("kind = 'spere'", "did you mean 'sphere'?"),
+        ("layer = 'lens'", "there are: optics"),
+        ("solid = 'bigg'", "did you mean 'big'?"),
+        ("solid = 5", "matches no face"),
+        ("radius_mm = 1.5", "matches no face"),
+    ] {
+        let error = rules(&twins(), &format!("[[material]]\n{selector}\nsurface = 'mirror'\n")).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+    }
+}
+
+/// Receivers count what single faces absorb.
+#[test]
+fn absorbed_power_is_counted_by_face() {
+    let mut world = World::default();
+    world.cuboid("box", Point::new(-1.0, -1.0, 0.0), Point::new(1.0, 1.0, 1.0));
+    let text = "[[source]]\nkind = 'collimated'\nat = [0, 0, 9]\ndirection = [0, 0, -1]\nradius = 0.5\n\
+        [[receiver]]\nname = 'top'\nkind = 'absorbed'\non = { face = 'z1' }\n\
+        [[receiver]]\nname = 'side'\nkind = 'absorbed'\non = { face = ['x0', 'x1'] }\n";
+    let results = world.run(&format!("[run]\nrays = 2000\n{text}"), |_| ());
+    assert_eq!([results.receivers[0].power, results.receivers[1].power], [1.0, 0.0]);
+}
+
+/// Every selector, put into a rule, selects its face and no other.
+fn assert_each_selects_its_own(model: &Model, step: usize) -> usize {
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    let selectors = face_selectors(model, &faces);
+    let distinct: HashSet<String> = selectors.iter().map(ToString::to_string).collect();
+    assert_eq!(distinct.len(), faces.len(), "two faces with one selector");
+    for (k, selector) in selectors.iter().enumerate().step_by(step) {
+        let table = rules(model, &format!("[[material]]\n{}\nsurface = 'mirror'\n", selector.as_key()));
+        let table = table.unwrap_or_else(|e| panic!("{selector}: {e}"));
+        assert_eq!(table[0].faces, [k as u32], "{selector}");
+    }
+    faces.len()
+}
+
+#[test]
+fn every_face_has_a_selector_of_its_own() {
+    assert_eq!(assert_each_selects_its_own(&twins(), 1), 2);
+    // Copies of one part under one name: nothing but their place tells them apart.
+    let mut model = twins();
+    for k in 1..4 {
+        let mut copy = model.instances[0].clone();
+        copy.placement = Frame::translation(Vector::Y * (20.0 * f64::from(k)));
+        model.instances.push(copy);
+    }
+    assert_eq!(assert_each_selects_its_own(&model, 1), 8);
+    let mut world = World::default();
+    world.cuboid("a", Point::ZERO, Point::ONE).cuboid("b *", Point::ZERO, Point::ONE);
+    world.part("", false, &[("", Shape::Rectangle { frame: Frame::IDENTITY, half: [1.0; 2] })]);
+    let faces: Vec<PlacedFace<'_>> = world.model.placed_faces().collect();
+    let selectors = face_selectors(&world.model, &faces);
+    assert_eq!(selectors[0].to_string(), r#"part = "a", face = "x0""#);
+}
+
+/// Over real files: all faces, of which some hundred a file are tried in a scene.
+#[test]
+#[ignore = "reads the corpus of real files; minutes"]
+fn every_face_of_the_corpus_has_a_selector_of_its_own() {
+    let mut total = 0;
+    for path in step_files(&corpus()) {
+        let Some(model) = read_model(&path) else { continue };
+        let count = model.placed_face_count();
+        total += assert_each_selects_its_own(&model, count.div_ceil(100).max(1));
+        println!("{}: {count} faces", path.display());
+    }
+    println!("{total} faces, each with a selector of its own");
+}
