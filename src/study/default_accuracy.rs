@@ -6,7 +6,7 @@
 //! they are cheaper than the spline by counted work and pass a pilot of their own, else the spline.
 //!
 //! Guarantee: the choice follows from model, scene, seed, number of rays and counted work, never from a clock, so that every
-//! machine, number of threads and shard makes the same one.
+//! machine, number of threads and shard makes the same one, and so does every range of a run that grows.
 //! Known weakness: errors that the pilot is too short to tell from none count as large, so that the spline is taken where facets
 //! might have done.
 
@@ -27,6 +27,9 @@ const SHARE: u64 = 32;
 const PILOT_RAYS: [u64; 2] = [4096, 65_536];
 /// Runs of at most so many rays take the spline at once: a pilot would cost a good part of what facets could save.
 const SHORT_RUN: u64 = 32_768;
+/// A run that grows is judged as of so many rays, whichever of them are asked for: all its ranges take the same settings, so that they
+/// merge, and what it took holds until it has grown so far.
+const GROWN_RAYS: u64 = 100_000_000;
 /// Replicates of a pilot, which tell the standard error of a difference within 9 %.
 const REPLICATES: u32 = 64;
 /// Standard errors of sums over a scrambled net fall with the number of rays to this power: 0.52 to 0.68 for power, positions and
@@ -107,7 +110,7 @@ pub struct Undecided<'a> {
     pub model: &'a Model,
     /// The scene.
     pub bound: &'a BoundScene,
-    /// Its settings: rays and seed decide, threads and shard do not.
+    /// Its settings: seed and rays decide, of a run that grows not how many; threads and shard do not.
     pub run: &'a RunSettings,
     /// Makes finer facets and the spline.
     pub source: &'a dyn MeshSource,
@@ -129,12 +132,12 @@ struct Worst {
 /// Chooses; with the finer facets, where these are taken.
 pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
     let start = Instant::now();
-    let Undecided { bound, run, facets, tolerance, .. } = *undecided;
+    let Undecided { bound, facets, tolerance, .. } = *undecided;
     if let Some(chosen) = undecided.without_pilot() {
         return (chosen, None);
     }
     let settings = undecided.pilot_settings();
-    let scale = run.rays as f64 / settings.rays as f64;
+    let scale = undecided.judged_rays() as f64 / settings.rays as f64;
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
     let error = undecided.measure(facets, &settings, &spline);
     let worst = worst_figure(&error, &settings, scale);
@@ -201,9 +204,9 @@ impl Undecided<'_> {
             ("octree", "the model holds ready meshes, which have no true surface")
         } else if self.is_flat() {
             ("octree", "all faces are flat, so that facets are the surface itself")
-        } else if self.run.rays <= SHORT_RUN {
+        } else if self.judged_rays() <= SHORT_RUN {
             ("exact", "the run is so short that the spline costs less than to find out whether facets do")
-        } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.run.rays / SHARE)) {
+        } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
             ("exact", "the rays of a file cannot be divided for a pilot")
         } else if self.has_huge_map() {
             ("exact", "a map of so many cells takes longer to compare than the spline to trace")
@@ -234,9 +237,23 @@ impl Undecided<'_> {
         self.model.placed_faces().filter_map(|p| p.face).all(is_polygon)
     }
 
+    /// The number of rays whose statistical error facets must stay below.
+    fn judged_rays(&self) -> u64 {
+        if self.run.grows { GROWN_RAYS } else { self.run.rays }
+    }
+
     fn pilot_settings(&self) -> RunSettings {
-        let rays = (self.run.rays / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.run.rays);
-        RunSettings { rays, replicates: REPLICATES, path_samples: 0, shard: [0, 1], ..self.run.clone() }
+        let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());
+        // The first rays, whichever are asked for.
+        RunSettings {
+            rays,
+            first_ray: 0,
+            grows: false,
+            replicates: REPLICATES,
+            path_samples: 0,
+            shard: [0, 1],
+            ..self.run.clone()
+        }
     }
 
     /// Compares facets with the spline's run of the same rays.
@@ -249,7 +266,7 @@ impl Undecided<'_> {
     /// How much finer facets would have to be, where they would be cheaper than the spline.
     fn finer(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let factor = MARGIN * worst.ratio;
-        let hits = error.segments_per_ray * self.run.rays as f64;
+        let hits = error.segments_per_ray * self.judged_rays() as f64;
         let saved = hits * (SPLINE_HIT - FACET_HIT * (1.0 + 0.1 * factor.log2()));
         let spent = factor * self.facets.facets.len() as f64 * FACET;
         (factor <= MOST_FINER && spent < saved).then_some(factor)

@@ -30,27 +30,31 @@ fn bind(known: &KnownScene) -> (BoundScene, RunSettings) {
 }
 
 fn default_answer(known: &KnownScene, rays: u64, threads: usize) -> Answer {
-    let (bound, settings) = bind(known);
-    let run = RunSettings { rays, threads, ..settings };
+    let (_, settings) = bind(known);
+    default_answer_of(known, &RunSettings { rays, threads, ..settings })
+}
+
+fn default_answer_of(known: &KnownScene, run: &RunSettings) -> Answer {
+    let (bound, _) = bind(known);
     let mesher = tessellate::Settings::default();
     let facets = tessellate(&known.model, &mesher).mesh;
     let source = ModelMeshSource::new(&known.model);
     let undecided = Undecided {
         model: &known.model,
         bound: &bound,
-        run: &run,
+        run,
         source: &source,
         facets: &facets,
         tolerance: mesher.tolerance,
     };
     let (chosen, finer) = choose(&undecided);
     let results = if chosen.intersector == "exact" {
-        simulate(&bound, source.exact(), &run, &|_| true)
+        simulate(&bound, source.exact(), run, &|_| true)
     } else {
         let mesh = finer.map_or(facets, |f| f.mesh);
         let octree =
             Octree::build(&mesh, &octree::Settings { normals: NormalMode::Bilinear, ..Default::default() });
-        simulate(&bound, &octree, &run, &|_| true)
+        simulate(&bound, &octree, run, &|_| true)
     };
     let surface = chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
     let figures = figures(&results, surface, "W");
@@ -124,6 +128,25 @@ fn the_choice_does_not_depend_on_threads() {
         assert_eq!(one.results.digest, three.results.digest);
         assert_eq!(one.chosen.geometric.map(|g| g.receivers), three.chosen.geometric.map(|g| g.receivers));
     }
+}
+
+/// Ranges of a run that grows take the same settings, so that they merge; the short one alone would take the spline untried.
+#[test]
+fn ranges_of_a_growing_run_choose_alike() {
+    let known = known_scenes::freeform(0.008, 0.004);
+    let (_, settings) = bind(&known);
+    let range = |first_ray, rays| {
+        let run = RunSettings { rays, first_ray, grows: true, threads: 2, ..settings.clone() };
+        let chosen = default_answer_of(&known, &run).chosen;
+        (
+            chosen.intersector,
+            chosen.tolerance_mm,
+            chosen.because,
+            chosen.pilot_rays,
+            chosen.geometric.map(|g| g.receivers),
+        )
+    };
+    assert_eq!(range(0, 20_000), range(20_000, 100_000));
 }
 
 /// Faces that are polygons are traced on facets, which cost less and are the faces themselves.
