@@ -8,8 +8,6 @@ mod frame;
 mod interval;
 mod ray;
 mod roots;
-// AVX-512 is offered to loops that other modules dispatch one after the other.
-#[allow(dead_code)]
 pub(crate) mod simd;
 pub mod units;
 

@@ -177,6 +177,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "write",
         ],
     ),
+    ("math", &["mod", "simd", "ray", "aabb", "frame", "interval", "roots", "units"]),
     (
         "intersect",
         &["mod", "prefetch", "exact", "polish", "slopes", "facet_hit", "facet", "normals", "bvh", "octree"],
@@ -209,6 +210,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "traversal",
             "answer",
             "newton",
+            "newton_lanes",
+            "newton_batch",
             "traditional",
             "audit",
         ],

@@ -2,8 +2,9 @@
 
 use crate::support::*;
 use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
-use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
+use lampyris::intersect::{Beam, Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
 use lampyris::math::{Aabb, Departure, FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::Model;
@@ -175,5 +176,53 @@ fn short_flat_rays_meet_the_sphere() {
         let ray = Ray::new(Point::ZERO + 20.0 * out - 1e-3 * d, d).with_range(0.0, 2e-3).with_departure(from);
         let hit = polished.intersect(&ray, &mut Cost::default());
         assert!(hit.is_some_and(|h| (h.t - 1e-3).abs() < 1e-9 && h.face == FaceId(0)), "{ray:?} {hit:?}");
+    }
+}
+
+/// What `rays` meet, bit by bit.
+fn bits(hits: &[Option<Hit>]) -> Vec<Option<(u32, [u64; 6])>> {
+    let of = |h: &Hit| (h.face.0, [h.t, h.uv.x, h.uv.y, h.normal.x, h.normal.y, h.normal.z].map(f64::to_bits));
+    hits.iter().map(|h| h.as_ref().map(of)).collect()
+}
+
+/// Rays of a point and of a disc, others from all around, and what goes on from where they hit: a batch answers them as if each were
+/// asked alone, and whether or not it was told of the sources.
+#[test]
+fn a_batch_gives_the_bits_of_rays_asked_alone() {
+    for (name, surface) in [("sphere", sphere(50.0)), ("torus", torus(50.0, 15.0)), ("freeform", reflector(6))] {
+        let model = model([surface]);
+        let mesh = mesh(&model, 0.2);
+        let exact = Exact::build(&model, &Settings::default());
+        let octree = Octree::build(&mesh, &octree::Settings::default());
+        let polished = Polished::new(&octree, &mesh, &exact);
+        let (b, mut s) = (bounds(&mesh), Stream(10));
+        let lamp = b.center() + 3.0 * b.size();
+        let down = (b.center() - lamp).normalize();
+        let mut rays: Vec<Ray> = (0..2000)
+            .map(|k| match k % 3 {
+                0 => Ray::from_points(lamp, b.center() + 0.4 * s.direction() * b.size()).unwrap(),
+                1 => Ray::new(lamp + 0.4 * down.cross(s.direction()) * b.size().max_element(), down),
+                _ => s.ray(b.center(), 0.5 * b.size()),
+            })
+            .collect();
+        let mut hits = vec![None; rays.len()];
+        polished.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        for k in 0..rays.len() {
+            if let Some(h) = hits[k] {
+                let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+                rays.push(Ray::new(rays[k].point_at(h.t), s.direction()).with_departure(from));
+            }
+        }
+        hits.resize(rays.len(), None);
+        polished.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        let alone: Vec<_> = rays.iter().map(|r| polished.intersect(r, &mut Cost::default())).collect();
+        assert_eq!(bits(&hits), bits(&alone), "{name}");
+        let met = hits.iter().flatten().filter(|h| h.certainty == Certainty::Polished).count();
+        assert!(met > rays.len() / 4, "{name}: {met} of {}", rays.len());
+        let beams = [(Beam::Point(lamp), 1 << 40), (Beam::Collimated { origin: lamp, direction: down }, 1 << 40)];
+        polished.prepare_for(&ExpectedRays { rays: 1 << 40, threads: 2, beams: &beams });
+        let mut prepared = vec![None; rays.len()];
+        polished.intersect_batch(&rays, &mut prepared, &mut Cost::default());
+        assert_eq!(bits(&prepared), bits(&alone), "{name}");
     }
 }

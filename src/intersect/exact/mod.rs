@@ -34,6 +34,8 @@ mod leaf_test;
 mod linearization;
 mod net;
 mod newton;
+mod newton_batch;
+mod newton_lanes;
 mod patch;
 mod query;
 mod reference;
@@ -54,4 +56,5 @@ use crate::intersect::Certainty;
 
 pub use answer::{Answer, Passage};
 pub use newton::SurfacePoint;
+pub(super) use newton_batch::Seed;
 pub use structure::{Exact, Settings};

@@ -9,14 +9,14 @@ use crate::math::{FaceId, Ray, Uv, Vector, orthonormal_pair};
 /// After a step this short, as a share of a patch, the point is moved along and not evaluated again. The normal stays that of the
 /// place before the step, always on the side that Newton's method comes from: with 3e-10 the angular momentum of a ray in a mirror
 /// ball drifted by 2.6e-7 in 20,000 bounces.
-const LAST_STEP: f64 = 1e-14;
+pub(super) const LAST_STEP: f64 = 1e-14;
 /// Steps stall within this share of the patch of the ray where rounding or a singular point leaves no more: so near is on the ray.
-const STALLED: f64 = 1e-11;
+pub(super) const STALLED: f64 = 1e-11;
 /// Ulps of the largest coordinate that a point's place across the ray is off.
-const ROUNDING: f64 = 8.0;
+pub(super) const ROUNDING: f64 = 8.0;
 
 /// Share of the bound of rounding across the ray within which a point needs no further step: most are rounded by less.
-const SETTLED: f64 = 0.25;
+pub(super) const SETTLED: f64 = 0.25;
 
 /// A point of a face on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +120,22 @@ impl Exact {
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
         let jet = patch.jet(patch.local(uv));
         Some((point - patch.center - project(&jet).0).length())
+    }
+
+    /// The patch of a face that holds the parameters; `None` where the face has no surface that is traced.
+    pub(in crate::intersect) fn patch_at(&self, face: FaceId, uv: Uv) -> Option<u32> {
+        let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
+        uv.is_finite().then(|| self.geometry.patch_at(record, uv))
+    }
+
+    /// The patch of a face that holds all the corners of a facet, which is `None` where several do; `None` where the face has no surface
+    /// that is traced.
+    pub(in crate::intersect) fn patch_around(&self, face: FaceId, corners: &[Uv; 4]) -> Option<Option<u32>> {
+        let middle = 0.25 * corners.iter().sum::<Uv>();
+        let patch = self.patch_at(face, middle)?;
+        let [u, v] = self.geometry.patches[patch as usize].domain;
+        let holds = |uv: &Uv| uv.x >= u[0] && uv.x <= u[1] && uv.y >= v[0] && uv.y <= v[1];
+        Some(corners.iter().all(holds).then_some(patch))
     }
 
     /// Whether a face has a surface that is traced; ready meshes have none.

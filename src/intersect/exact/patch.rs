@@ -137,9 +137,9 @@ pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
 
 /// A derivative shorter than so many times the rounding of the net's points is not trusted: 1e-9 mm from the pole of a sphere
 /// of radius 50 the normal was off by 1e-5 rad otherwise.
-const TRUSTED: f64 = 1e6;
+pub(super) const TRUSTED: f64 = 1e6;
 /// Square of the least sine between two derivatives that give a normal: seven digits of it are right.
-const LEAST_SINE_SQUARED: f64 = 1e-18;
+pub(super) const LEAST_SINE_SQUARED: f64 = 1e-18;
 /// Ulps of a parameter that are a larger share of a patch's rectangle than this leave too few digits of places in it: of 10 mm a
 /// micrometre's thousandth.
 const LARGEST_ULP: f64 = 1e-10;

@@ -1,7 +1,7 @@
 //! Facet hits moved to the spline: exact position, normal and parameters for a small surcharge.
 //!
-//! A facet hit carries the parameters of its place on the surface; Newton's method takes three or four steps from there,
-//! across patches. What the facets mislead about is put right: a root outside the trims, or none, is sought in a short window
+//! A facet hit carries the parameters of its place on the surface; Newton's method takes three or four steps from there, for eight hits
+//! at a time ([`batch`]), and across patches where a hit is asked alone. What the facets mislead about is put right: a root outside the trims, or none, is sought in a short window
 //! of the ray on the exact model; the root that the ray leaves is recognised by face, parameters and place, and the search
 //! goes on behind it; a ray that leaves its own surface so flat that its next root hides inside the sag is asked exactly.
 //! A ray that goes into a closed solid must come out of it, and the other way round: an answer that says otherwise, as beside an
@@ -12,10 +12,17 @@
 //! facets, so a silhouette that they miss stays missed: polishing is never a check. Hits that find no root fall back to the facet
 //! and are counted in [`Cost::fallbacks`].
 
+mod batch;
+mod clear_start;
+mod facet_record;
+
 use super::exact::{Exact, SurfacePoint};
-use super::{Certainty, Cost, Footprint, Hit, Intersector};
+use super::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Departure, Ray, Vector};
 use crate::mesh::FacetMesh;
+use clear_start::ClearStart;
+use facet_record::FacetRecord;
+use std::sync::{PoisonError, RwLock};
 
 /// Newton steps before the exact window is asked: residual p99 1e-11 after three on a sphere at 0.05 mm.
 const STEPS: u32 = 6;
@@ -62,6 +69,10 @@ pub struct Polished<'a> {
     exact: &'a Exact,
     /// Largest proved sag.
     sag: f64,
+    /// Of every facet.
+    records: Vec<FacetRecord>,
+    /// Of the sources whose rays are expected.
+    clear_starts: RwLock<Vec<ClearStart>>,
 }
 
 /// What became of a facet hit.
@@ -82,7 +93,8 @@ impl<'a> Polished<'a> {
         } else {
             proved
         };
-        Self { facets, mesh, exact, sag }
+        let records = FacetRecord::of_mesh(mesh, exact, sag);
+        Self { facets, mesh, exact, sag, records, clear_starts: RwLock::default() }
     }
 
     fn sag_of(&self, facet: u32) -> f64 {
@@ -281,8 +293,9 @@ fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::Surf
     exact.distance_at(from.face, from.uv, ray.point_at(point.t)).is_some_and(|d| d <= tolerance)
 }
 
-impl Intersector for Polished<'_> {
-    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+impl Polished<'_> {
+    /// The nearest root of a ray, with all that may be asked about it.
+    fn intersect_alone(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let normal = |f: &Departure| self.exact.normal_at(f.face, f.uv);
         let Some(left) = ray.departure.as_ref().and_then(|f| Some((f, normal(f)?))) else {
             return self.search_from_outside(ray, cost);
@@ -297,11 +310,30 @@ impl Intersector for Polished<'_> {
         let exact = asked.unwrap_or_else(|| self.on_spline(ray));
         if self.is_impossible(ray, left, exact.as_ref()) { answer } else { exact }
     }
+}
+
+impl Intersector for Polished<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        let mut hit = [None];
+        self.polish_batch(std::slice::from_ref(ray), &mut hit, cost);
+        hit[0]
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        self.polish_batch(rays, hits, cost);
+    }
+
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
+        let clear = ClearStart::of_expected(expected, self.mesh, 2.0 * self.sag);
+        *self.clear_starts.write().unwrap_or_else(PoisonError::into_inner) = clear;
+        // No more than the beams: what stands around a facet is not known of the spline above it.
+        self.facets.prepare_for(&ExpectedRays { rays: 0, ..*expected });
+    }
 
     fn footprint(&self) -> Footprint {
         let (a, b) = (self.facets.footprint(), self.exact.footprint());
         Footprint {
-            bytes: a.bytes + b.bytes,
+            bytes: a.bytes + b.bytes + std::mem::size_of_val(self.records.as_slice()),
             primitives: a.primitives,
             build_seconds: a.build_seconds + b.build_seconds,
         }

@@ -9,6 +9,8 @@
 //! the processor is asked first; the standard library caches its answer.
 #![allow(unsafe_code)]
 
+pub(crate) mod f64x8;
+
 /// An instruction set, known while compiling.
 pub(crate) trait Instructions {
     /// Whether AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT may be used.

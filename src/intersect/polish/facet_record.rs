@@ -1,0 +1,96 @@
+//! What polishing asks of a facet again and again, in half a cache line.
+
+use crate::intersect::exact::Exact;
+use crate::math::{FaceId, Ray, Uv};
+use crate::mesh::FacetMesh;
+use rustc_hash::FxHashMap;
+
+/// A ray whose sine to the facet that it leaves, times the facet's length, is above so many sags is told by the facet's own normal, which is
+/// off the spline's by four sags over that length where the curvature does not change: twice what a root may hide below.
+const CLEAR_OF_SAGS: f64 = 2.0 * super::HIDDEN_BELOW;
+/// And it is above this: a hundred times what `f32` rounds.
+const LEAST_CLEAR_SINE: f64 = 1e-5;
+/// In [`FacetRecord::patch`]: the facet lies on several patches.
+const SEVERAL_PATCHES: u32 = u32::MAX;
+/// In [`FacetRecord::patch`]: its face has no surface that is traced.
+const NO_PATCH: u32 = u32::MAX - 1;
+/// In [`FacetRecord::solid`]: its face is part of no closed shell.
+const NO_SOLID: u32 = u32::MAX;
+
+/// One facet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FacetRecord {
+    normal: [f32; 3],
+    /// Rays that leave it at a larger sine leave the spline to the same side, and their next root hides from no facet.
+    least_sine: f32,
+    /// Distance from the spline, mm.
+    pub(super) sag: f32,
+    patch: u32,
+    solid: u32,
+    pub(super) face: FaceId,
+}
+
+impl FacetRecord {
+    /// Of every facet; where no sag was proved it is `sag`.
+    pub(super) fn of_mesh(mesh: &FacetMesh, exact: &Exact, sag: f64) -> Vec<Self> {
+        let mut solids: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+        let mut solid_of = |face| {
+            let next = solids.len() as u32;
+            exact.solid_of(face).map_or(NO_SOLID, |solid| *solids.entry(solid).or_insert(next))
+        };
+        (0..mesh.facets.len())
+            .map(|f| {
+                let facet = &mesh.facets[f];
+                let [a, b, c, d] = mesh.corners(f);
+                let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(super::NO_SAG);
+                let least_sine = (CLEAR_OF_SAGS * sag / length).max(LEAST_CLEAR_SINE);
+                let corners = facet.vertices.map(|v| mesh.vertices[v as usize].uv);
+                let patch = match exact.patch_around(facet.face, &corners) {
+                    None => NO_PATCH,
+                    Some(None) => SEVERAL_PATCHES,
+                    Some(Some(patch)) => patch,
+                };
+                Self {
+                    normal: normal.as_vec3().to_array(),
+                    least_sine: least_sine as f32,
+                    sag: sag as f32,
+                    patch,
+                    solid: solid_of(facet.face),
+                    face: facet.face,
+                }
+            })
+            .collect()
+    }
+
+    /// The sine of a ray's angle to the facet, negative for rays that go in; `None` where that tells nothing of the spline.
+    #[inline(always)]
+    pub(super) fn clear_sine(&self, ray: &Ray) -> Option<f32> {
+        let ([x, y, z], d) = (self.normal, ray.direction.as_vec3());
+        let sine = x * d.x + y * d.y + z * d.z;
+        (sine.abs() > self.least_sine).then_some(sine)
+    }
+
+    /// The patch that a place of the facet lies on; `None` where there is none.
+    #[inline(always)]
+    pub(super) fn patch(&self, exact: &Exact, uv: Uv) -> Option<u32> {
+        match self.patch {
+            NO_PATCH => None,
+            SEVERAL_PATCHES => exact.patch_at(self.face, uv),
+            patch => Some(patch),
+        }
+    }
+
+    /// Whether its face is part of a closed shell.
+    #[inline(always)]
+    pub(super) fn is_of_solid(&self) -> bool {
+        self.solid != NO_SOLID
+    }
+
+    /// Whether both are of one closed shell, or of none.
+    #[inline(always)]
+    pub(super) fn shares_solid(&self, other: &Self) -> bool {
+        self.solid == other.solid
+    }
+}
