@@ -177,9 +177,9 @@ impl Surface {
         self.limit_normal(uv)
     }
 
-    /// The normal just inside the domain, seen from a singular point: along the mixed derivative where one partial
+    /// The unit normal just inside the domain, seen from a singular point: along the mixed derivative where one partial
     /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre.
-    fn limit_normal(&self, uv: Uv) -> Option<Vector> {
+    pub(crate) fn limit_normal(&self, uv: Uv) -> Option<Vector> {
         let [[u0, u1], [v0, v1]] = self.domain();
         let d = self.second_derivatives(uv);
         let inward_u = if uv.x > 0.5 * (u0 + u1) { -1.0 } else { 1.0 };

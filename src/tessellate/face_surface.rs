@@ -164,7 +164,9 @@ impl<'a> FaceSurface<'a> {
 
     /// Outward unit normal, where there is one.
     pub(super) fn normal(&self, uv: Uv) -> Option<Vector> {
-        self.spline.normal(uv).map(|n| if self.flip { -n } else { n })
+        // Where the control points of a pole were rounded, be it by a centre far away, the two derivatives there span any plane.
+        let normal = if self.pole(uv).is_some() { self.spline.limit_normal(uv) } else { self.spline.normal(uv) };
+        normal.map(|n| if self.flip { -n } else { n })
     }
 
     /// Whether the surface has creases.

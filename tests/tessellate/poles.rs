@@ -5,11 +5,12 @@
 
 use crate::support::judge::{Found, judge};
 use crate::support::{config, knots, seeded, seeds};
-use lampyris::math::{Homogeneous, Point};
+use lampyris::math::{Frame, Homogeneous, Point, Vector};
 use lampyris::model::{Face, Model, Part, Shell};
-use lampyris::nurbs::Surface;
+use lampyris::nurbs::{Surface, sweep};
 use lampyris::tessellate::{Settings, tessellate};
 use proptest::prelude::*;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A fan of rational surface with the side at the first (or last) parameter of one direction in one point; weights run over four decades.
 fn fans() -> impl Strategy<Value = Surface> {
@@ -89,4 +90,32 @@ fn a_ring_of_sectors_that_no_two_can_be_joined_of_comes_to_an_end() {
     let knots = [[[0.0; 6], [1.0; 6]].concat(), vec![0.0, 0.0, 0.59375, 1.59375, 1.59375]];
     let surface = Surface { degree: [5, 1], knots, points: points.map(Homogeneous::from_array).to_vec() };
     assert!(fan(&surface, 0.3).unwrap().proved > 0);
+}
+
+/// Caps of spheres of a kilometre and more as splines, four metres from the origin and aslant, so that every control point is rounded, those
+/// of the pole one by one: every vertex normal is that of the sphere, as near as rounded control points tell it.
+#[test]
+fn poles_of_large_spheres_have_their_normals() {
+    let axis = Vector::new(0.48, -0.6, 0.64);
+    for radius in [1e6, 3e6, 1e7] {
+        for aperture in [5.0, 25.0, 100.0] {
+            for apex in [Point::new(4000.0, 0.0, 0.0), Point::new(1234.5, -3456.7, 1600.3)] {
+                let center = apex - axis * radius;
+                let latitudes = [FRAC_PI_2 - (aperture / radius), FRAC_PI_2];
+                let frame = Frame::from_axis(center, axis, None);
+                let surface = sweep::sphere(&frame, radius, [0.0, TAU], latitudes);
+                let shell = Shell { faces: vec![Face::whole(surface)], ..Shell::default() };
+                let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+                let mesh = tessellate(&model, &Settings::default()).mesh;
+                // Control points are rounded by some ulps of the radius; a normal is told by two that lie a part of the aperture apart.
+                let rounding = 64.0 * f64::EPSILON * radius / aperture;
+                let worst = mesh.vertices.iter().map(|v| {
+                    let place = mesh.positions[v.position as usize];
+                    (v.normal - (place - center).normalize()).length()
+                });
+                let worst = worst.fold(0.0, f64::max);
+                assert!(worst < 1e-9 + rounding, "R {radius:e}, aperture {aperture}: {worst:e} > {rounding:e}");
+            }
+        }
+    }
 }
