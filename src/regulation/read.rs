@@ -37,7 +37,9 @@ impl IntensityMap {
         for (number, line) in lines {
             let values: Vec<&str> = line.split(',').map(str::trim).collect();
             let value = |place: usize| -> Result<f64, String> {
-                let text = values.get(place).copied().unwrap_or_default();
+                let text = values.get(place).ok_or_else(|| {
+                    format!("line {}: {} values, where the header names {}", number + 1, values.len(), names.len())
+                })?;
                 text.parse().map_err(|_| format!("line {}: '{text}' is not a number", number + 1))
             };
             let (centre_h, centre_v) = (value(h)?, value(v)?);

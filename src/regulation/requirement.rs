@@ -118,15 +118,10 @@ pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, ro
     match (row.kind.as_str(), point) {
         ("point" | "distribution_point", Some(p)) => bounds(photometer, row, &photometer.near(p), [lenient; 2]),
         ("line", _) => {
-            let directions = ends.map(|((h0, v0), (h1, v1))| photometer.line([h0, v0], [h1, v1]));
-            bounds(photometer, row, &directions.unwrap_or_default(), [false; 2])
+            let directions = ends.map(|((h0, v0), (h1, v1))| (photometer.line([h0, v0], [h1, v1]), true));
+            bounds_over(photometer, row, directions)
         }
-        ("zone", _) => {
-            let (directions, complete) = row.polygon.as_deref().map(|p| photometer.zone(p)).unwrap_or_default();
-            let mut requirements = bounds(photometer, row, &directions, [false; 2]);
-            requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
-            requirements
-        }
+        ("zone", _) => bounds_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone(p))),
         // Some direction must reach the least maximum, and none may pass the greatest.
         ("imax", _) => bounds(photometer, row, &photometer.everywhere(), [true, false]),
         ("sum" | "group_sum", _) => sum(photometer, row).into_iter().collect(),
@@ -157,6 +152,15 @@ fn bounds(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [boo
         Some(requirement)
     };
     limits.into_iter().filter_map(requirement).collect()
+}
+
+/// A row's least and greatest value over all directions of a line or zone, given with whether the far field holds them all. A row
+/// that does not say where counts as not seen: nothing that was read can meet it.
+fn bounds_over(photometer: &Photometer, row: &Row, place: Option<(Vec<[f64; 2]>, bool)>) -> Vec<Requirement> {
+    let (directions, complete) = place.unwrap_or((Vec::new(), false));
+    let mut requirements = bounds(photometer, row, &directions, [false; 2]);
+    requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
+    requirements
 }
 
 /// The sum of readings at several points.

@@ -201,6 +201,7 @@ fn read(prefix: &str, text: &str) -> Vec<Regulation> {
             let rules = Rules {
                 sensor_half_deg: sensor.unwrap_or(if signal { SIGNAL_SENSOR_DEG } else { SENSOR_65MM_DEG }),
                 sensor_round: prefix == "FMVSS 108",
+                // Where the text grants no tolerance, a row holds in its very direction.
                 tolerance_deg: tolerance.unwrap_or(0.0),
                 cut_off,
             };

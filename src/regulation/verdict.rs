@@ -288,6 +288,21 @@ mod tests {
         assert!(error.contains("0.500°") && error.contains("0.149°"), "{error}");
     }
 
+    #[test]
+    fn a_row_that_does_not_say_where_is_not_met() {
+        let regulation = Regulation::find("UN R112 B passing").unwrap();
+        let bright = map(|_, _| 1e6, 1e-3, 0.0);
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.0745, round: false };
+        let photometer = Photometer { map: &bright, aim: &aim, sensor, tolerance_deg: 0.0 };
+        let table = row(&assess(&bright, &regulation, &Assumptions::default()).unwrap(), "75R").row;
+        for kind in ["line", "zone"] {
+            let nowhere = Row { kind: kind.into(), h: None, v: None, min: Some(1.0), max: None, ..table.clone() };
+            let judged = judge_row(&photometer, &regulation, &Assumptions::default(), &nowhere);
+            assert_eq!(judged.verdict, Some(Verdict::Unsure), "{kind}");
+        }
+    }
+
     /// Ten thousand lamps whose true intensity lies within a few errors of a limit, read with a normal error: wrong verdicts stay
     /// below 0.3 %, and none is unsure farther than three errors from the limit of its reading.
     #[test]
