@@ -40,8 +40,8 @@ pub enum Content {
     Bars {
         /// Names under the bars.
         categories: Vec<String>,
-        /// Name and heights of each layer, from the bottom up or the left.
-        layers: Vec<(String, Vec<f64>)>,
+        /// Name of each layer, from the bottom up or the left, and its heights; where there is none, no bar is drawn.
+        layers: Vec<(String, Vec<Option<f64>>)>,
         /// Whether layers stand on one another (parts of a whole) or side by side (rivals).
         stacked: bool,
     },

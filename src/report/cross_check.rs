@@ -293,7 +293,7 @@ impl CheckReport<'_> {
         }
         let content = Content::Bars {
             categories: bars.iter().map(|b| b.0.to_owned()).collect(),
-            layers: vec![("rate".into(), bars.iter().map(|b| b.1).collect())],
+            layers: vec![("rate".into(), bars.iter().map(|b| Some(b.1)).collect())],
             stacked: true,
         };
         let axes = [AxisStyle::linear("", ""), AxisStyle::linear("rate", "million rays/s")];

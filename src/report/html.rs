@@ -98,8 +98,10 @@ fn content(block: &Block) -> Markup {
             figure(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
         }
         Block::View(view) => {
-            let png = raster::render(view).to_png().map(|bytes| base64(&bytes)).unwrap_or_default();
-            let drawing = html! { img src={ "data:image/png;base64," (png) } alt=(view.title); };
+            let drawing = match raster::render(view).to_png() {
+                Ok(png) => html! { img src={ "data:image/png;base64," (base64(&png)) } alt=(view.title); },
+                Err(e) => html! { p { "This view could not be drawn: " (e) } },
+            };
             figure(&view.name, &view.title, &view.caption, drawing, &plotly::view(view), true)
         }
     }

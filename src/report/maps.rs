@@ -69,15 +69,15 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
-/// The values along both axes through the peak, with their statistical errors.
-pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Chart {
+/// The values along both axes through the peak, with their statistical errors; `None` for a grid without cells.
+pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
-    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y])).unwrap_or(0);
+    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y]))?;
     let (column, row) = (peak % a.cells, peak / a.cells);
     let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
         name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
         points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
-        errors: grid.error.as_ref().map(|e| (0..axis.cells).map(|k| e[cell(k)]).collect()).unwrap_or_default(),
+        errors: grid.error.iter().flat_map(|e| (0..axis.cells).map(|k| e[cell(k)])).collect(),
         style: SeriesStyle::Line,
         ..Series::default()
     };
@@ -87,7 +87,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Chart {
         [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
     let name = format!("{}-cuts", file_stem(&r.name));
     let caption = "One row and one column of cells; bars are one standard error.";
-    Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series)
+    Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series))
 }
 
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {

@@ -26,8 +26,11 @@ pub fn figures(value: f64, digits: usize) -> String {
     }
     let digits = digits.clamp(1, 17);
     let scientific = format!("{:.*e}", digits - 1, value);
-    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
-    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let parts = scientific.split_once('e').and_then(|(m, e)| Some((m, e.parse::<i32>().ok()?)));
+    let Some((mantissa, exponent)) = parts else {
+        debug_assert!(false, "{scientific} has no exponent");
+        return scientific;
+    };
     if !(-4..9).contains(&exponent) {
         return format!("{}e{exponent}", trimmed(mantissa)).replace('-', "−");
     }

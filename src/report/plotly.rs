@@ -99,7 +99,9 @@ pub(super) fn chart(chart: &Chart) -> Value {
     let along = |k: usize| -> Vec<f64> {
         match &chart.content {
             Content::Series(series) => series.iter().flat_map(|s| s.points.iter().map(|p| p[k])).collect(),
-            Content::Bars { layers, .. } if k == 1 => layers.iter().flat_map(|l| l.1.iter().copied()).collect(),
+            Content::Bars { layers, .. } if k == 1 => {
+                layers.iter().flat_map(|l| l.1.iter().copied().flatten()).collect()
+            }
             _ => Vec::new(),
         }
     };

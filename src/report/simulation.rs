@@ -117,8 +117,8 @@ impl SimulationReport<'_> {
             }
         );
         text += &self.cut_off();
-        text += &self.geometric.map(|g| errors::limits(g, self.figures)).unwrap_or_default();
-        text += &self.chosen.map(errors::choice).unwrap_or_default();
+        text.extend(self.geometric.map(|g| errors::limits(g, self.figures)));
+        text.extend(self.chosen.map(errors::choice));
         if let Some(check) = self.check {
             text += &verdict(check);
         }
@@ -194,7 +194,10 @@ impl SimulationReport<'_> {
             section = section.with_block(Chart::map(&name, &title, &reading(r, &grid), grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
-                section = section.with_block(view).with_block(cuts);
+                section = section.with_block(view);
+                if let Some(cuts) = cuts {
+                    section = section.with_block(cuts);
+                }
             }
         }
         if let Some(view) = view {
@@ -318,9 +321,7 @@ impl SimulationReport<'_> {
             ));
         for (list, word) in [(&used.simulated, "yes"), (&used.not_simulated, "no")] {
             for b in list {
-                let name = serde_json::to_value(b.effect).ok().and_then(|v| v.as_str().map(spoken));
-                let name = name.unwrap_or_else(|| format!("{:?}", b.effect));
-                table.row([name.into(), word.into(), b.because.as_str().into()]);
+                table.row([spoken(b.effect.name()).into(), word.into(), b.because.as_str().into()]);
             }
         }
         Section::new("What was simulated, what not, and why").with_block(table)

@@ -201,11 +201,13 @@ fn bar_chart(
     elements: &mut Vec<Element>,
     chart: &Chart,
     categories: &[String],
-    layers: &[(String, Vec<f64>)],
+    layers: &[(String, Vec<Option<f64>>)],
     stacked: bool,
 ) {
     let [left, top, right, bottom] = AREA;
-    let heights = |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().unwrap_or(0.0).max(0.0));
+    // What has no value gets a bar of no height, so that the others keep their places and colours.
+    let heights =
+        |c: usize| layers.iter().map(move |(_, v)| v.get(c).copied().flatten().map_or(0.0, |h| h.max(0.0)));
     let tallest = |c: usize| if stacked { heights(c).sum::<f64>() } else { heights(c).fold(0.0, f64::max) };
     // Parts of a whole add up on a linear axis only; rivals may stand on a logarithmic one.
     let log = chart.y.log && !stacked;

@@ -66,7 +66,7 @@ fn sample(n: u32) -> Report {
     let bars = Chart {
         content: Content::Bars {
             categories: vec!["octree".into(), "bvh".into()],
-            layers: vec![("build".into(), vec![1.0, 2.0]), ("trace".into(), vec![3.0, 1.0])],
+            layers: vec![("build".into(), vec![Some(1.0), None]), ("trace".into(), vec![Some(3.0), Some(1.0)])],
             stacked: true,
         },
         ..Chart::series(

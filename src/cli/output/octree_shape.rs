@@ -157,11 +157,11 @@ fn box_edges(b: &Aabb) -> [Point; 16] {
 
 /// The section of the report.
 pub(crate) fn octree_section(shapes: &[OctreeShape]) -> Section {
-    let deepest = shapes.iter().map(|s| s.statistics.depths.len()).max().unwrap_or(0);
+    let deepest = shapes.iter().map(|s| s.statistics.depths.len()).fold(0, usize::max);
     let layer = |s: &OctreeShape| {
         let share = |depth: usize| {
-            let blocks = s.statistics.depths.get(depth).copied().unwrap_or(0);
-            100.0 * blocks as f64 / s.statistics.blocks.max(1) as f64
+            let blocks = s.statistics.depths.get(depth)?;
+            Some(100.0 * *blocks as f64 / s.statistics.blocks.max(1) as f64)
         };
         (format!("{} facets", grouped(s.facets as u64)), (0..deepest).map(share).collect())
     };

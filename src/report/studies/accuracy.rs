@@ -12,15 +12,19 @@ const WANTED_DEG: f64 = 0.05;
 
 struct Point<'a> {
     row: &'a Value,
+    /// Of the whole job, and of it for the rays alone.
     seconds: f64,
+    trace_seconds: f64,
     error: f64,
 }
 
 impl<'a> Point<'a> {
     fn from_row(row: &'a Value) -> Option<Self> {
-        let part = |key: &str| number(row, key).unwrap_or(0.0);
-        let seconds = part("seconds_tessellate") + part("seconds_build") + number(row, "seconds_trace_median")?;
-        Some(Self { row, seconds, error: number(row, "direction_error_deg_p99")? })
+        // The spline has no facets to make.
+        let prepare = number(row, "seconds_tessellate").unwrap_or(0.0) + number(row, "seconds_build")?;
+        let trace_seconds = number(row, "seconds_trace_median")?;
+        let seconds = prepare + trace_seconds;
+        Some(Self { row, seconds, trace_seconds, error: number(row, "direction_error_deg_p99")? })
     }
 
     /// The tolerance of its facets; nothing for the spline.
@@ -110,7 +114,6 @@ fn best(points: &[Point]) -> Table {
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let three = |x: f64| Cell::Number(x, 3);
     for p in front {
-        let trace = number(p.row, "seconds_trace_median").unwrap_or(0.0);
         table.row([
             p.tolerance(),
             text(p.row, "normals").into(),
@@ -118,8 +121,8 @@ fn best(points: &[Point]) -> Table {
             p.row["facets"].as_u64().filter(|_| text(p.row, "intersector") != "exact").into(),
             three(p.error),
             number(p.row, "hit_error_mm_p99").map_or(Cell::Empty, three),
-            three(p.seconds - trace),
-            three(trace),
+            three(p.seconds - p.trace_seconds),
+            three(p.trace_seconds),
             three(p.seconds),
         ]);
     }
@@ -231,9 +234,7 @@ fn stacked(rows: &[&Value]) -> Chart {
         (_, Some(true)) => "adaptive".to_owned(),
         _ => number(r, "tolerance_mm").map_or("?".into(), |t| format!("{} mm", figures(t, 3))),
     };
-    let layer = |title: &str, key: &str| {
-        (title.to_owned(), shown.iter().map(|r| number(r, key).unwrap_or(0.0)).collect::<Vec<f64>>())
-    };
+    let layer = |title: &str, key: &str| (title.to_owned(), shown.iter().map(|r| number(r, key)).collect());
     let layers = vec![
         layer("tessellate", "seconds_tessellate"),
         layer("build", "seconds_build"),

@@ -18,9 +18,9 @@ fn label(row: &Value) -> String {
 
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let categories: Vec<String> = rows.iter().map(|r| label(r)).collect();
-    let times: Vec<f64> = rows.iter().map(|r| number(r, "seconds_trace_median").unwrap_or(0.0)).collect();
+    let times: Vec<Option<f64>> = rows.iter().map(|r| number(r, "seconds_trace_median")).collect();
     let answer = match (times.first(), times.last()) {
-        (Some(&pruned), Some(&full)) if pruned > 0.0 && full > 0.0 => format!(
+        (Some(&Some(pruned)), Some(&Some(full))) if pruned > 0.0 && full > 0.0 => format!(
             "What the scene needs takes **{}**, everything together {}: leaving out what is not called for is **{} ×** as \
              fast, with {} results.",
             seconds(pruned),

@@ -12,8 +12,9 @@ use serde_json::Value;
 
 /// The report of a study document as `lampyris study … --json` prints it.
 pub fn study_report(document: &Value, provenance: Provenance) -> Report {
-    let rows: Vec<&Value> = document["rows"].as_array().map(|r| r.iter().collect()).unwrap_or_default();
-    let kind = document["study"].as_str().unwrap_or_default();
+    let list = |key: &str| -> Vec<&Value> { document[key].as_array().into_iter().flatten().collect() };
+    let (rows, lit) = (list("rows"), list("receivers"));
+    let kind = rows::text(document, "study");
     let (title, mut answer, mut sections) = match kind {
         "accuracy" => accuracy::report(&rows),
         "interpolation" => others::interpolation(&rows),
@@ -27,7 +28,6 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     if let Some(own) = document["answer"].as_str().filter(|a| !a.is_empty()) {
         answer = own.to_owned();
     }
-    let lit: Vec<&Value> = document["receivers"].as_array().map(|r| r.iter().collect()).unwrap_or_default();
     if !lit.is_empty() {
         sections.push(receivers::section(&lit));
     }

@@ -22,7 +22,7 @@ fn bars(
         .map(|layer| {
             let height = |category: &&str| {
                 let fits = |r: &&&Value| text(r, by) == *category && text(r, split) == layer;
-                rows.iter().filter(fits).filter_map(|r| number(r, value)).next_back().unwrap_or(0.0)
+                rows.iter().filter(fits).filter_map(|r| number(r, value)).next_back()
             };
             (layer.to_owned(), categories.iter().map(height).collect())
         })
@@ -266,7 +266,7 @@ fn rates(rows: &[&Value]) -> Table {
             row["threads"].as_u64().into(),
             format!("{}{build}", text(row, "intersector")).into(),
             rate.map_or(Cell::Empty, |r| Cell::Number(r, 3)),
-            ratio.unwrap_or_default(),
+            ratio.unwrap_or(Cell::Empty),
             number(row, "build_seconds").map_or(Cell::Empty, |b| Cell::Number(b, 3)),
             number(row, "bytes_per_facet").map_or(Cell::Empty, |b| Cell::Number(b, 3)),
         ]);

@@ -19,8 +19,8 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let verdicts: Vec<String> =
         names.iter().map(|n| format!("{n} **{}** wrong of {}", sum(n, "wrong"), grouped(sum(n, "rays")))).collect();
     let answer = format!("Rays through edges, vertices, tangents and other trouble: {}.", verdicts.join(", "));
-    let layers = ["flagged", "wrong"]
-        .map(|key| (key.to_owned(), names.iter().map(|n| sum(n, key) as f64).collect::<Vec<f64>>()));
+    let layers =
+        ["flagged", "wrong"].map(|key| (key.to_owned(), names.iter().map(|n| Some(sum(n, key) as f64)).collect()));
     let content = Content::Bars {
         categories: names.iter().map(|n| (*n).to_owned()).collect(),
         layers: layers.into(),
