@@ -57,7 +57,7 @@ pub(crate) fn watch() {}
 /// Whether whoever started the command asked that the signal be ignored, as `nohup` does; known on Linux alone.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return false };
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let bits = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     bits.is_some_and(|bits| bits >> (signal - 1) & 1 == 1)

@@ -11,8 +11,10 @@ pub(crate) fn hardware() -> String {
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemTotal"));
-    let memory = memory.map(|kb| format!(", {:.0} GB", kb as f64 / KILOBYTES_PER_GB)).unwrap_or_default();
-    format!("{cpu}, {cores} cores{memory}, {}", std::env::consts::OS)
+    let mut parts = vec![cpu, format!("{cores} cores")];
+    parts.extend(memory.map(|kb| format!("{:.0} GB", kb as f64 / KILOBYTES_PER_GB)));
+    parts.push(std::env::consts::OS.to_owned());
+    parts.join(", ")
 }
 
 /// Largest resident size of this process so far, bytes; `None` where the system does not tell.

@@ -1,5 +1,6 @@
 //! Files that are whole or not there, and names that are safe in a path.
 
+use super::file_names::file_name;
 use super::{Error, ErrorKind};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -59,7 +60,7 @@ pub fn remove_unfinished_files() {
 
 /// A name in the same folder (renaming across devices is a copy) that no other process or thread uses.
 fn unfinished(path: &Path) -> PathBuf {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(path);
     let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
     path.with_file_name(format!(".{name}.{}-{serial}.part", std::process::id()))
 }
@@ -74,7 +75,7 @@ pub(super) fn remove_stale(path: &Path) {
         let file = entry.file_name();
         let file = file.to_string_lossy();
         let Some(rest) = file.strip_prefix(&name).and_then(|f| f.strip_suffix(".part")) else { continue };
-        let digits = rest.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
         let Ok(process) = digits.parse::<u32>() else { continue };
         let gone = match fs::exists("/proc/self") {
             Ok(true) => matches!(fs::exists(format!("/proc/{process}")), Ok(false)),

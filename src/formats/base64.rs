@@ -5,7 +5,10 @@ pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        let word = (0..3).fold(0u32, |w, k| w << 8 | u32::from(chunk.get(k).copied().unwrap_or(0)));
+        // A last chunk of one or two bytes is filled up with zero bits, RFC 4648 §3.5.
+        let mut bytes = [0; 4];
+        bytes[1..=chunk.len()].copy_from_slice(chunk);
+        let word = u32::from_be_bytes(bytes);
         for k in 0..4 {
             let used = k <= chunk.len();
             text.push(if used { ALPHABET[(word >> (18 - 6 * k) & 63) as usize] as char } else { '=' });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// What went wrong with a file, and where.
 #[derive(Debug, thiserror::Error)]
-#[error("{}{}: {kind}", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
+#[error("{}: {kind}", self.place())]
 pub struct Error {
     path: PathBuf,
     line: Option<usize>,
@@ -50,6 +50,14 @@ impl Error {
     /// What went wrong.
     pub fn kind(&self) -> &ErrorKind {
         &self.kind
+    }
+
+    /// The file and, where it is known, the line: `scene.csv:12`.
+    fn place(&self) -> String {
+        match self.line {
+            Some(line) => format!("{}:{line}", self.path.display()),
+            None => self.path.display().to_string(),
+        }
     }
 
     /// The file concerned.

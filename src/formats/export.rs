@@ -1,6 +1,7 @@
 //! Facets to files: the extension decides the format.
 
 use super::facets::Facets;
+use super::file_names::lower_extension;
 use super::{Error, ErrorKind, data2, glb, obj, ply, stl, vtk};
 use std::path::Path;
 
@@ -28,9 +29,4 @@ pub fn write_facets(path: &Path, facets: &Facets) -> Result<(), Error> {
 pub fn is_facet_file(path: &Path) -> bool {
     let extension = lower_extension(path);
     FACET_EXTENSIONS.split(' ').any(|known| known[1..] == extension)
-}
-
-/// The extension in lower case; empty where a name has none.
-fn lower_extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }

@@ -1,5 +1,6 @@
 //! Lists of light rays: origin, direction, power and wavelength, as CSV or NPZ.
 
+use super::file_names::lower_extension;
 use super::input::{open_file, read_text};
 use super::{Error, ErrorKind, NpyArray, write_atomic, write_npz};
 use crate::math::{Point, Vector};
@@ -85,7 +86,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
 /// When the extension is another, or the file cannot be written.
 pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
     let spectral = rays.first().is_some_and(|r| r.wavelength_nm.is_some());
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let extension = lower_extension(path);
     match extension.as_str() {
         "npz" => {
             let origin: Vec<f64> = rays.iter().flat_map(|r| r.origin.to_array()).collect();
@@ -125,7 +126,7 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
 fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     let mut rays = Vec::new();
     // Position of each of `COLUMNS` in a line.
-    let mut order: Option<Vec<usize>> = None;
+    let mut order: Vec<usize> = Vec::new();
     let mut wanted = 0;
     for (n, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
@@ -144,15 +145,15 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
         while cells.last().is_some_and(|c| c.is_empty()) {
             cells.pop();
         }
-        if order.is_none() {
+        // The first line that is no comment says how many columns there are and, if it is a header, in which order.
+        if order.is_empty() {
             let header = cells.iter().any(|c| COLUMNS.contains(&c.to_lowercase().as_str()));
-            order = Some(columns(&cells, header).map_err(&fail)?);
+            order = columns(&cells, header).map_err(&fail)?;
             wanted = cells.len();
             if header {
                 continue;
             }
         }
-        let order = order.as_deref().unwrap_or_default();
         let last = order.iter().max().map_or(0, |k| k + 1);
         if cells.len() < last || cells.len() > wanted {
             let message = match cells.len() {
@@ -164,7 +165,7 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
         let numbers: Vec<f64> = order
             .iter()
             .map(|&k| {
-                let cell = cells.get(k).copied().unwrap_or_default();
+                let cell = cells[k];
                 let number = if points { cell.replace(',', ".").parse::<f64>() } else { cell.parse() };
                 number.map_err(|_| fail(format!("'{cell}' is not a number (column {})", k + 1)))
             })
@@ -255,8 +256,9 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
     } else {
         return Err("its numbers are not little-endian f64 or f32".into());
     };
-    let shape =
-        header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')).map(|(s, _)| s).unwrap_or_default();
+    let Some((shape, _)) = header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')) else {
+        return Err("its header tells no shape".into());
+    };
     let dims: Vec<u64> = shape.split(',').filter(|d| !d.is_empty()).map_while(|d| d.parse().ok()).collect();
     let fits = match width {
         1 => dims.len() == 1,

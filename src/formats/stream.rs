@@ -4,6 +4,7 @@
 //! are known, and is then packed; the disk holds the rows twice for that while.
 
 use super::atomic::{Unfinished, remove_stale};
+use super::file_names::file_name;
 use super::npz::header;
 use super::{Error, ErrorKind, write_atomic};
 use std::fs::{self, File};
@@ -40,7 +41,7 @@ impl NpzStream {
     /// When the folder cannot be written.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, Error> {
         let mut stream = Self { path: path.to_path_buf(), columns: Vec::new(), rows: 0, unfinished: Vec::new() };
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = file_name(path);
         remove_stale(path);
         for column in columns {
             let beside = path.with_file_name(format!(".{name}.{}.{}.part", std::process::id(), column.name));

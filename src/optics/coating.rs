@@ -172,6 +172,7 @@ impl CoatingTable {
 
     /// The angle that the table is read at.
     fn angle_deg(&self, cos_i: f64, eta: f64) -> f64 {
+        // Beyond the critical angle no ray is refracted: the table is read at its end, grazing in the rarer medium.
         let cos = if eta <= 1.0 || self.is_opaque() { cos_i } else { cos_transmitted(cos_i, eta).unwrap_or(0.0) };
         cos.clamp(0.0, 1.0).acos().to_degrees()
     }

@@ -36,7 +36,7 @@ impl Scene {
             let alike = self.models[..i].iter().position(same).map(|k| firsts[k]);
             let like = |(a, b): (&Part, &Part)| (&a.name, a.face_count()) == (&b.name, b.face_count());
             let known = |first: &u32| {
-                let there = whole.parts.get(*first as usize..).unwrap_or_default();
+                let there = &whole.parts[*first as usize..];
                 there.len() >= model.parts.len() && there.iter().zip(&model.parts).all(like)
             };
             let first = alike.filter(known).unwrap_or(whole.parts.len() as u32);

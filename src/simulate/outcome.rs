@@ -20,6 +20,19 @@ pub enum LostCause {
     NotANumber,
 }
 
+impl LostCause {
+    /// Its name in files and messages, the same as in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoExit => "no_exit",
+            Self::ImpossibleMedium => "impossible_medium",
+            Self::InsideSolid => "inside_solid",
+            Self::TooDeep => "too_deep",
+            Self::NotANumber => "not_a_number",
+        }
+    }
+}
+
 /// A ray that was lost, with all that is needed to trace it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LostRay {
@@ -127,6 +140,18 @@ impl Counts {
         self.overlaps += times;
         if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {
             self.overlapping = pair;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LostCause::{self, ImpossibleMedium, InsideSolid, NoExit, NotANumber, TooDeep};
+
+    #[test]
+    fn names_are_those_of_json() {
+        for cause in [NoExit, ImpossibleMedium, InsideSolid, TooDeep, NotANumber] {
+            assert_eq!(serde_json::to_value(cause).unwrap(), LostCause::name(cause));
         }
     }
 }

@@ -163,16 +163,16 @@ impl PartialRun {
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
         let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u16, r.u64()? as u16]);
         t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
-        let ledger: Vec<(LostRay, Vec<[u64; 3]>)> = r.json()?;
-        let paths: Vec<(PathVertex, Vec<[u64; 3]>, u64)> = r.json()?;
-        let place = |b: &[[u64; 3]], k: usize| b.get(k).map(|b| b.map(f64::from_bits).into()).unwrap_or_default();
+        let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
+        let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
+        let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
         t.ledger = ledger
             .into_iter()
-            .map(|(l, b)| LostRay { origin: place(&b, 0), direction: place(&b, 1), ..l })
+            .map(|(l, [origin, direction])| LostRay { origin: point(origin), direction: point(direction), ..l })
             .collect();
         t.paths = paths
             .into_iter()
-            .map(|(v, b, power)| PathVertex { point: place(&b, 0), power: f64::from_bits(power), ..v })
+            .map(|(v, [place], power)| PathVertex { point: point(place), power: f64::from_bits(power), ..v })
             .collect();
         Ok(p)
     }

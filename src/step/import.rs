@@ -34,7 +34,7 @@ pub struct Import {
 pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
     let bytes = formats::read_bytes(path)
         .map_err(|source| Error::new(ErrorKind::Io { path: path.to_path_buf(), source }))?;
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = formats::file_name(path);
     read_bytes(&name, &bytes, settings)
 }
 
@@ -249,7 +249,7 @@ impl Reader<'_, '_, '_> {
 
 /// Largest resident size of this process; 0 where the system does not tell.
 fn peak_bytes() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return 0 };
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).map_or(0, |kb| kb * 1024)
 }

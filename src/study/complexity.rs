@@ -209,7 +209,8 @@ fn sentence(rows: &[Row]) -> String {
         let each = rows.iter().filter_map(|r| r.ratio_to_traditional).map(|x| format!("{x:.0}"));
         each.collect::<Vec<_>>().join(" / ")
     };
-    let Some((row, difference)) = octree.last().and_then(|r| Some((r, r.receiver_difference?))) else {
+    let compared = octree.last().and_then(|r| Some((r, r.rays?, r.receiver_difference?)));
+    let Some((row, rays, difference)) = compared else {
         return "Nothing to compare: the traditional method or the octree was not run.".into();
     };
     let apart = |n: u64| {
@@ -230,7 +231,7 @@ fn sentence(rows: &[Row]) -> String {
          {:.3} %.{beside} The seed paper's savings make 1.23 / 1.34 / 1.87 times on its own three lamps.",
         ratios(&octree),
         patches.join(" / "),
-        apart(row.rays.unwrap_or(0)),
+        apart(rays),
         row.model,
         100.0 * difference
     )

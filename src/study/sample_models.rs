@@ -98,6 +98,7 @@ fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, fac
         for &v in &vs {
             let uv = Uv::new(u, v);
             let position = weld.position(placed.placement.point(face.surface.evaluate(uv)), &mut mesh.positions);
+            // Only facets without area meet at a point where the surface has no normal.
             let n = placed.placement.normal(face.surface.normal(uv).unwrap_or(Vector::Z));
             mesh.vertices.push(MeshVertex { position, normal: if face.reversed { -n } else { n }, uv });
         }

@@ -16,7 +16,9 @@ pub struct SurfacePaths<'a> {
     mesh: &'a FacetMesh,
     guide: &'a dyn Intersector,
     /// Area of the facets up to each, mm².
+    /// Of the facets up to each, and of all, mm².
     areas: Vec<f64>,
+    area: f64,
     seed: u64,
     count: u64,
 }
@@ -33,7 +35,7 @@ impl<'a> SurfacePaths<'a> {
             .collect();
         // Without area there is nowhere to start.
         let count = if sum > 0.0 { count } else { 0 };
-        Self { mesh, guide, areas, seed, count }
+        Self { mesh, guide, areas, area: sum, seed, count }
     }
 
     /// The rays of a path: at the end of a shorter one the others start anew, so that each has its index.
@@ -59,8 +61,7 @@ impl<'a> SurfacePaths<'a> {
     /// A ray from anywhere on the first triangle of a facet.
     fn first(&self, random: &mut Random) -> Ray {
         loop {
-            let all = self.areas.last().copied().unwrap_or(0.0);
-            let wanted = random.unit() * all;
+            let wanted = random.unit() * self.area;
             let facet = self.areas.partition_point(|&area| area < wanted).min(self.areas.len() - 1);
             let [a, b, c, _] = self.mesh.corners(facet);
             let (mut u, mut v) = (random.unit(), random.unit());

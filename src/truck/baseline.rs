@@ -143,6 +143,7 @@ fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &Polygon
             out.positions.len() as u32 - 1
         });
         let uv = v.uv.map_or(Uv::ZERO, |i| Uv::new(m.uv_coords()[i].x, m.uv_coords()[i].y));
+        // A vertex that truck gave no normal keeps none, as everything truck made is shown as it was made.
         let normal = v.nor.map(|i| vector(m.normals()[i])).unwrap_or_default();
         out.vertices.push(MeshVertex { position, normal, uv });
         out.vertices.len() as u32 - 1

@@ -54,6 +54,18 @@ impl Conic {
         (inside > 0.0).then(|| c * h * h / (1.0 + inside.sqrt()))
     }
 
+    /// Depth at an aperture.
+    ///
+    /// # Errors
+    /// When the conic does not reach it.
+    pub(super) fn sag_within(&self, aperture: f64) -> Result<f64, ShapeError> {
+        self.sag(aperture).ok_or(ShapeError {
+            what: "the half aperture",
+            value: aperture,
+            allowed: "smaller than the reach of the conic, R/√(1+K)",
+        })
+    }
+
     /// dz/dh.
     fn slope(&self, h: f64) -> f64 {
         if self.radius.is_infinite() {
@@ -68,13 +80,7 @@ impl Conic {
         checked("a radius of curvature", 1.0 / self.radius, self.radius != 0.0, "anything but zero")?;
         checked("a conic constant", self.conic, true, "a finite number")?;
         checked("the half aperture", reach, reach > 0.0, "positive")?;
-        let Some(sag) = self.sag(reach) else {
-            return Err(ShapeError {
-                what: "the half aperture",
-                value: reach,
-                allowed: "smaller than the reach of the conic, R/√(1+K)",
-            });
-        };
+        let sag = self.sag_within(reach)?;
         let start = Point3::new(0.0, 0.0, z0);
         let end = Point3::new(reach, 0.0, z0 + sag);
         if sag == 0.0 {

@@ -120,9 +120,8 @@ impl Reflector {
         if self.hole > 0.0 {
             profile = self.cut(profile)?;
         }
-        let sag = |h: f64| self.shape.sag(h).unwrap_or_default();
-        let at = |h: f64| builder::vertex(Point3::new(h, 0.0, sag(h)));
-        let (inner, outer) = (at(self.hole), at(self.half_aperture));
+        let at = |h: f64| Ok(builder::vertex(Point3::new(h, 0.0, self.shape.sag_within(h)?)));
+        let (inner, outer) = (at(self.hole)?, at(self.half_aperture)?);
         let wire = Wire::from(vec![Edge::new(&inner, &outer, profile)]);
         Ok(if self.hole > 0.0 {
             builder::rsweep(&wire, Point3::new(0.0, 0.0, 0.0), Vector3::unit_z(), TURN)

@@ -157,7 +157,8 @@ fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
         (0..=SAMPLES).map(|k| axis.local_point(meridian.evaluate(t0 + (t1 - t0) * k as f64 / SAMPLES as f64)));
     let samples: Vec<Point> = samples.collect();
     let radius = |p: &Point| p.x.hypot(p.y);
-    let farthest = samples.iter().copied().max_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default();
+    let farther = |far: Point, p: Point| if radius(&p) >= radius(&far) { p } else { far };
+    let farthest = samples.iter().copied().fold(samples[0], farther);
     let reach = radius(&farthest);
     if reach < 1e-9 * (1.0 + size) {
         return Err("a curve on the axis it is turned about".into());

@@ -104,6 +104,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "base64",
             "error",
+            "file_names",
             "atomic",
             "input",
             "printable",

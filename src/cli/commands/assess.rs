@@ -3,6 +3,7 @@
 use crate::cli::console::{Console, print};
 use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
+use crate::cli::work::output_place::folder_of;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::regulation::{Assessment, Assumptions, IntensityMap, Regulation, RowVerdict, Traffic, Verdict, assess};
 use crate::report::figures;
@@ -31,7 +32,7 @@ pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
         );
         print(&json_text(&rows.collect::<Vec<_>>())?)?;
     } else {
-        let width = all.iter().map(|r| r.id.len()).max().unwrap_or_default();
+        let width = all.iter().map(|r| r.id.len()).fold(0, usize::max);
         print(&all.iter().map(|r| format!("{:<width$}  {}\n", r.id, r.function.name)).collect::<String>())?;
     }
     Ok(Completion::Complete)
@@ -47,7 +48,7 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
     let assumptions = Assumptions {
         traffic: if command.left_hand { Traffic::Left } else { Traffic::Right },
         as_placed: command.as_placed,
-        rays: run.results["rays"].as_u64().unwrap_or_default(),
+        rays: run.rays()?,
         tolerance_mm: run.tolerance_mm(),
     };
     let assessment = assess(&map, &regulation, &assumptions).map_err(|e| {
@@ -77,16 +78,15 @@ impl ResultsFile {
         let text = std::fs::read_to_string(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
         let results: Value =
             serde_json::from_str(&text).map_err(|e| failure(format!("not the results of a run: {e}")))?;
-        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        let folder = folder_of(&path);
         Ok(Self { folder, path, results })
     }
 
     /// The far field over H and V, of this name where there are several.
     fn far_field(&self, name: Option<&str>) -> Result<&Value, Failure> {
-        let all = self.results["receivers"].as_array().map(Vec::as_slice).unwrap_or_default();
         let fits = |r: &&Value| r["kind"] == "far_field" && r["angles"] == "A" && r["unit"] == "cd";
         let named = |r: &&Value| name.is_none_or(|n| r["name"] == n);
-        let mut found = all.iter().filter(fits).filter(named);
+        let mut found = self.results["receivers"].as_array().into_iter().flatten().filter(fits).filter(named);
         let failure = |what: &str| {
             let help = "a verdict needs a receiver of kind \"far_field\" with angles \"A\" in a run that counts lm";
             Failure::arguments(format!("{}: {what}", self.path.display())).with_help(help)
@@ -101,9 +101,15 @@ impl ResultsFile {
         }
     }
 
+    /// How many rays were traced, on which the errors' prediction for more rays rests.
+    fn rays(&self) -> Result<u64, Failure> {
+        let rays = self.results["rays"].as_u64();
+        rays.ok_or_else(|| Failure::input(format!("{}: no number of rays", self.path.display())))
+    }
+
     fn intensities(&self, receiver: &Value) -> Result<IntensityMap, Failure> {
-        let files = receiver["files"].as_array().map(Vec::as_slice).unwrap_or_default();
-        let csv = files.iter().filter_map(Value::as_str).find(|f| f.ends_with(".csv"));
+        let files = receiver["files"].as_array().into_iter().flatten();
+        let csv = files.filter_map(Value::as_str).find(|f| f.ends_with(".csv"));
         let csv = csv.ok_or_else(|| {
             Failure::input(format!("{}: no CSV file of {}", self.path.display(), receiver["name"]))
         })?;
@@ -192,14 +198,16 @@ fn cells(row: &RowVerdict) -> [String; 8] {
         let rays = format!("{:.1e} rays", s.rays as f64);
         s.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
     });
+    // What a note or a condition has not is an empty cell.
+    let cell = |text: Option<String>| text.map_or(String::new(), |t| t);
     [
         row.row.id.clone(),
-        direction.unwrap_or_default(),
+        cell(direction),
         asked,
         read(|r| r.value),
         read(|r| r.statistical),
         read(|r| r.geometric),
         row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
-        settles.unwrap_or_default(),
+        cell(settles),
     ]
 }

@@ -12,7 +12,7 @@ use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{paired_receivers, threads};
-use crate::formats::{open_file, write_atomic};
+use crate::formats::{file_name, open_file, write_atomic};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
@@ -94,7 +94,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     if let Some(folder) = &command.output {
         let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
         let report = CheckReport {
-            title: command.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+            title: file_name(&command.file),
             check: &found,
             facets: &appearance::grouped_facets(model, mesh, scene),
             normals: &normals.to_string(),

@@ -81,7 +81,7 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
 
 fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     let id = face.id.map_or_else(|| "–".to_owned(), |id| format!("#{id}"));
-    let kind = serde_json::to_value(face.kind).ok().and_then(|k| k.as_str().map(str::to_owned)).unwrap_or_default();
+    let kind = face.kind.word();
     let radius = face.radius_mm.map_or(String::new(), |r| format!(" r {} mm", figures(r, 5)));
     let point = face.at.map(|x| figures(x, 6)).join(", ");
     let colour = face.colour.map_or(String::new(), |c| format!("  {c}"));

@@ -8,7 +8,7 @@ use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure, machine};
-use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, write_facets};
+use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension, write_facets};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
@@ -20,10 +20,8 @@ use serde::Serialize;
 pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
     if let Some(path) = command.output.iter().find(|p| !is_facet_file(p)) {
-        let given = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-        return Err(
-            crate::formats::Error::new(path, ErrorKind::Extension { given, known: FACET_EXTENSIONS }).into()
-        );
+        let kind = ErrorKind::Extension { given: lower_extension(path), known: FACET_EXTENSIONS };
+        return Err(crate::formats::Error::new(path, kind).into());
     }
     for path in &command.output {
         make_folder(&folder_of(path))?;
@@ -112,19 +110,20 @@ impl Baseline {
 
     /// Both meshers, one below the other.
     fn comparison(&self, r: &Report) -> String {
-        let sag = |max: f64, mean: f64| format!("{} ({})", figures(max, 4), figures(mean, 3));
+        let shown = |x: Option<f64>, digits| x.map_or("–".to_owned(), |x| figures(x, digits));
+        let sag = |max, mean| format!("{} ({})", shown(max, 4), shown(mean, 3));
         let rows = [
             (
                 "lampyris",
                 r.facets,
-                sag(r.sag_mm.sampled_max.unwrap_or(0.0), r.sag_mm.sampled_mean.unwrap_or(0.0)),
+                sag(r.sag_mm.sampled_max, r.sag_mm.sampled_mean),
                 r.faces.failed,
                 r.seconds.tessellate,
             ),
             (
                 self.mesher,
                 self.facets,
-                sag(self.sampled_max_mm, self.sampled_mean_mm),
+                sag(Some(self.sampled_max_mm), Some(self.sampled_mean_mm)),
                 self.failed_faces,
                 self.seconds,
             ),

@@ -6,11 +6,12 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::formats::{printable_line, write_atomic};
+use crate::formats::{file_name, printable_line, write_atomic};
 use crate::model::{Model, Part};
 use crate::pipeline::LoadedModel;
 use crate::report::figures;
 use serde_json::json;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Parts that get a rule of their own; of more, a comment says how many there are.
@@ -28,7 +29,7 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
     let loaded = input_files::model_file(file, console)?;
     let scene_file = match output {
         Some(path) => path.to_path_buf(),
-        None => PathBuf::from(file.file_stem().unwrap_or_default()).with_extension("toml"),
+        None => PathBuf::from(last_component(file)).with_extension("toml"),
     };
     if scene_file.exists() {
         let failure = Failure::arguments(format!("{}: is there already", scene_file.display()));
@@ -49,18 +50,23 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
     Ok(Completion::Complete)
 }
 
+/// The name of a file without its folder; a path that ends in no name is left whole.
+fn last_component(file: &Path) -> &OsStr {
+    file.file_name().unwrap_or(file.as_os_str())
+}
+
 /// The model as the scene names it: relative where both are in one folder.
 fn model_reference(file: &Path, scene_file: &Path) -> String {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
-    let path = if is_beside { PathBuf::from(file.file_name().unwrap_or_default()) } else { absolute(file) };
+    let path = if is_beside { PathBuf::from(last_component(file)) } else { absolute(file) };
     path.to_string_lossy().into_owned()
 }
 
 /// The whole scene.
 fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     let model = &loaded.model;
-    let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(file);
     let mut text = format!(
         "# A scene for {}: lengths in mm, powers in W. `lampyris schema` says what else may stand here.\n\
          title = {}\n\n[run]\nrays = 1_000_000\n\n[[model]]\nfile = {}\n\n",

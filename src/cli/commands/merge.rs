@@ -112,9 +112,11 @@ struct Patience {
 
 impl Patience {
     fn new(seconds: Option<f64>) -> Result<Self, Failure> {
-        let limit = Duration::try_from_secs_f64(seconds.unwrap_or(0.0)).map_err(|_| {
-            Failure::arguments(format!("--wait {}: not a number of seconds", seconds.unwrap_or(0.0)))
-        })?;
+        let limit = match seconds {
+            Some(s) => Duration::try_from_secs_f64(s)
+                .map_err(|_| Failure::arguments(format!("--wait {s}: not a number of seconds")))?,
+            None => Duration::ZERO,
+        };
         Ok(Self { start: Instant::now(), limit })
     }
 

@@ -4,7 +4,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::json_text;
-use crate::cli::work::lost_rays::{self, COLUMNS};
+use crate::cli::work::lost_rays::COLUMNS;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::formats::{read_text, write_vtp};
 use crate::pipeline::PreparedScene;
@@ -109,7 +109,7 @@ fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure>
         }
         for l in found.ledger.iter().filter(|l| (l.ray, l.branch) == (path[0].ray, path[0].branch)) {
             let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]);
-            print(&format!("  lost: {}, in {medium} of {instance}\n", lost_rays::cause_name(l).replace('_', " ")))?;
+            print(&format!("  lost: {}, in {medium} of {instance}\n", l.cause.name().replace('_', " ")))?;
         }
     }
     Ok(())
@@ -120,7 +120,7 @@ fn document_of(path: &[PathVertex], found: &Results) -> Value {
     let lost: Vec<Value> = (found.ledger.iter())
         .filter(|l| l.ray == path[0].ray)
         .map(|l| {
-            json!({"branch": l.branch, "bounce": l.bounce, "cause": lost_rays::cause_name(l), "face": l.face,
+            json!({"branch": l.branch, "bounce": l.bounce, "cause": l.cause.name(), "face": l.face,
             "origin": l.origin.to_array(), "direction": l.direction.to_array()})
         })
         .collect();

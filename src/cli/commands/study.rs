@@ -168,7 +168,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
         let (scene, loaded) = demo::lamp()?;
         return Ok((Some(scene), loaded, "three-cavity lamp".into()));
     };
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
     Ok(match input_files::either(path, console)? {
         Input::Step(loaded) => (None, loaded, name),
         Input::Scene(scene, loaded) => (Some(*scene), loaded, name),

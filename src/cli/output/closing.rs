@@ -43,7 +43,7 @@ fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: 
     if !with_page {
         files.remove(0);
     }
-    let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).max().unwrap_or(0);
+    let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).fold(0, usize::max);
     for (k, (path, what)) in files.iter().enumerate() {
         let name = format!("{:<widest$}", path.display().to_string());
         let name = if k == 0 { console.bold(&name) } else { name };

@@ -7,7 +7,7 @@ use crate::cli::output::closing::LEDGER;
 use crate::formats::{csv_quoted_text, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::report::figures;
-use crate::simulate::{LostCause, LostRay, Results};
+use crate::simulate::{LostCause, Results};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,7 +30,8 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
             let power = l.quanta as f64 * results.quantum;
             let (o, d) = (l.origin, l.direction);
             let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(csv_quoted_text);
-            let face = l.face.map(|f| f.to_string()).unwrap_or_default();
+            // A ray that left the scene was lost at no face: an empty cell.
+            let face = l.face.map_or(String::new(), |f| f.to_string());
             let hit = csv_quoted_text(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
             writeln!(
                 w,
@@ -38,7 +39,7 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
                 l.ray,
                 l.branch,
                 l.bounce,
-                cause_name(l),
+                l.cause.name(),
                 o.x,
                 o.y,
                 o.z,
@@ -110,10 +111,4 @@ fn meaning(cause: LostCause) -> &'static str {
         }
         _ => "had a distance or direction that is no number",
     }
-}
-
-/// Name of the cause, as in the ledger.
-pub(crate) fn cause_name(l: &LostRay) -> String {
-    let name = serde_json::to_value(l.cause).ok();
-    name.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }

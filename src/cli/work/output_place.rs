@@ -1,6 +1,7 @@
 //! Where results go: tried before any work is done, and owned by one process at a time.
 
 use crate::cli::failure::Failure;
+use crate::formats::file_name;
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ impl OutputPlace {
     /// # Errors
     /// As [`OutputPlace::folder`].
     pub(crate) fn file(path: &Path) -> Result<Self, Failure> {
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = file_name(path);
         Self::claim(&folder_of(path), path.with_file_name(format!(".{name}.lock")))
     }
 

@@ -18,11 +18,12 @@ pub(crate) fn trace_both(
     tracing: &TracingSettings,
     console: &Console,
 ) -> Vec<PowerComparison> {
+    let of_scene = RunSettings::from(&scene.run);
     let settings = RunSettings {
         rays: tracing.rays().unwrap_or(scene.run.rays).min(MOST_RAYS),
         seed: tracing.seed.unwrap_or(scene.run.seed),
-        threads: tracing.threads.unwrap_or(0),
-        ..RunSettings::from(&scene.run)
+        threads: tracing.threads.unwrap_or(of_scene.threads),
+        ..of_scene
     };
     let spinner = console.spinner("tracing the scene on facets and on the spline");
     let found = compare_power(bound, facets, exact, &settings);

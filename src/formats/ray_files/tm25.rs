@@ -109,7 +109,7 @@ impl Tm25Reader {
         let place = if flux == Flux::Radiant { self.places.radiant } else { self.places.luminous };
         let place = place.ok_or_else(|| self.file.malformed("no column of the flux"))?;
         let single = Some(f64::from(self.header.wavelengths[0])).filter(|w| *w > 0.0);
-        let tables: Vec<Spectrum> = self.header.spectra.iter().map(|t| Spectrum::new(t)).collect();
+        let tables: Vec<Option<Spectrum>> = self.header.spectra.iter().map(|t| Spectrum::new(t)).collect();
         let mut drawn = vec![0u64; tables.len()];
 
         let places = self.places;
@@ -123,8 +123,10 @@ impl Tm25Reader {
                     let number = places.spectrum_index.map_or(0.0, |p| row[p]);
                     let table = (number as usize).checked_sub(1).filter(|t| *t < tables.len());
                     let table = table.ok_or_else(|| format!("spectral table {number}, of {}", tables.len()))?;
+                    let spectrum = tables[table].as_ref();
+                    let spectrum = spectrum.ok_or_else(|| format!("spectral table {number}, which is empty"))?;
                     drawn[table] += 1;
-                    Some(tables[table].wavelength((drawn[table] as f64 * GOLDEN).fract()))
+                    Some(spectrum.wavelength((drawn[table] as f64 * GOLDEN).fract()))
                 }
             };
             let numbers: [f32; 7] = std::array::from_fn(|k| if k < 6 { row[k] } else { row[place] });
@@ -148,28 +150,34 @@ impl Tm25Reader {
 
 /// A spectral table as a density that is linear between its wavelengths, ready to be inverted.
 struct Spectrum {
+    /// Wavelength, nm, and density; at least one.
     pairs: Vec<[f64; 2]>,
     /// Power up to each wavelength.
     sums: Vec<f64>,
+    /// Power of the whole table.
+    total: f64,
 }
 
 impl Spectrum {
-    fn new(table: &[[f32; 2]]) -> Self {
+    /// `None` for an empty table.
+    fn new(table: &[[f32; 2]]) -> Option<Self> {
         let mut pairs: Vec<[f64; 2]> = table.iter().map(|pair| pair.map(f64::from)).collect();
         pairs.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let mut sums = vec![0.0; pairs.len().min(1)];
-        for (k, pair) in pairs.windows(2).enumerate() {
-            sums.push(sums[k] + 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]));
+        let mut total = 0.0;
+        let mut sums = vec![total];
+        for pair in pairs.windows(2) {
+            total += 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]);
+            sums.push(total);
         }
-        Self { pairs, sums }
+        (!pairs.is_empty()).then_some(Self { pairs, sums, total })
     }
 
     /// The wavelength below which this share of the power lies, nm; a table of no power gives its first wavelength.
     fn wavelength(&self, share: f64) -> f64 {
-        let wanted = share * self.sums.last().copied().unwrap_or(0.0);
+        let wanted = share * self.total;
         let k = self.sums.partition_point(|s| *s <= wanted);
         if k == 0 || k >= self.pairs.len() {
-            return self.pairs.first().map_or(0.0, |p| p[0]);
+            return self.pairs[0][0];
         }
         let ([a, fa], [b, fb]) = (self.pairs[k - 1], self.pairs[k]);
         // The area below x is fa·x + (fb − fa)/(b − a)·x²/2; this form of the root has no cancellation.
@@ -234,7 +242,7 @@ mod tests {
         assert!((450.0..460.0).contains(&nm(0)) && (600.0..640.0).contains(&nm(1)));
         assert_eq!(set.notes.len(), 2, "{:?}", set.notes);
         // A triangle of wavelengths: the median is its peak, an eighth of the power lies below its lower quarter.
-        let spectrum = Spectrum::new(&[[600.0, 0.0], [620.0, 2.0], [640.0, 0.0]]);
+        let spectrum = Spectrum::new(&[[600.0, 0.0], [620.0, 2.0], [640.0, 0.0]]).unwrap();
         for (share, expected) in [(0.0, 600.0), (0.125, 610.0), (0.5, 620.0), (0.875, 630.0)] {
             assert!((spectrum.wavelength(share) - expected).abs() < 1e-9);
         }

@@ -78,6 +78,7 @@ impl Medium {
             return Err(("anisotropy", "`anisotropy` needs `scatter_per_mm`".into()));
         }
         if let Some(s) = self.scatter_per_mm.filter(|s| *s != 0.0) {
+            // Scattering without a stated preference has none: g = 0 is isotropic.
             let g = self.anisotropy.unwrap_or(0.0);
             if !(g > -1.0 && g < 1.0) {
                 return Err(("anisotropy", format!("an `anisotropy` of {g} is not above -1 and below 1")));

@@ -22,6 +22,7 @@ impl Material {
             SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
             SurfaceKind::Coating => match &self.coating {
                 Some(rows) => table(rows).map_err(|e| ("coating", e)),
+                // A coating passes only what it says that it passes; the rest is absorbed.
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
             },
         }?;

@@ -146,6 +146,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(match name {
             "AXIS2_PLACEMENT_2D" => Frame::from_axis(origin, Vector::Z, self.direction(args.id(first))),
             _ => {
+                // ISO 10303-42, `build_axes`: without an axis the placement's Z is that of the space.
                 let axis = self.direction(args.id(first)).unwrap_or(Vector::Z);
                 Frame::from_axis(origin, axis, self.direction(args.id(first + 1)))
             }
@@ -177,6 +178,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         };
         let axis1 = self.direction(args.id(0));
         let axis2 = self.direction(args.id(1));
+        // Without its third axis the operator takes what the other two leave; with fewer, the Z of the space.
         let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
         let mut frame = Frame::from_axis(origin, z, axis1);
         if axis2.is_some_and(|y| y.dot(frame.y) < 0.0) {

@@ -103,7 +103,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 a.read_shape_definition(args.entity(0), args.id(1));
             } else if let Some(args) = e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
                 if let (Some(parent), Some(child)) = (args.id(3), args.id(4)) {
-                    let name = args.text(1).filter(|n| !n.is_empty()).or_else(|| args.text(0)).unwrap_or_default();
+                    let name = args.text(1).filter(|n| !n.is_empty()).unwrap_or_else(|| args.name(0));
                     a.usages.entry(parent).or_default().push(Usage { child, name, id: e.id });
                 }
             } else if e.is_a("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
@@ -268,6 +268,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
+    /// Empty for a definition whose product cannot be found: what uses it names it then.
     fn product_name(&self, definition: u64) -> String {
         let product = || {
             let formation = self.file.entity(definition)?.attributes("PRODUCT_DEFINITION", 0)?.entity(2)?;
@@ -298,16 +299,18 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         path.push(definition);
         let product = self.product_name(definition);
-        for representation in self.shapes.get(&definition).cloned().unwrap_or_default() {
+        for representation in self.shapes.get(&definition).cloned().into_iter().flatten() {
             self.place_representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
         }
-        let usages = self.usages.remove(&definition).unwrap_or_default();
-        for usage in &usages {
-            let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
-            let at = placement.compose(&local);
-            self.place_product(usage.child, at, usage.name.clone(), path, &[owners, &[usage.id]].concat());
+        // Taken out while its children are placed: `path` keeps a product from coming back to itself before they are.
+        if let Some(usages) = self.usages.remove(&definition) {
+            for usage in &usages {
+                let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
+                let at = placement.compose(&local);
+                self.place_product(usage.child, at, usage.name.clone(), path, &[owners, &[usage.id]].concat());
+            }
+            self.usages.insert(definition, usages);
         }
-        self.usages.insert(definition, usages);
         path.pop();
     }
 
@@ -365,7 +368,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             let at = placement.compose(&target.compose(&origin.inverse()));
             self.place_representation(to, at, (name, product), path, &inner);
         }
-        for link in self.links.get(&id).cloned().unwrap_or_default() {
+        for link in self.links.get(&id).cloned().into_iter().flatten() {
             // A representation of another product is placed by its own usage.
             let elsewhere = self.owned.contains(&link.to) && link.placement.is_identity();
             if !path.contains(&link.to) && !elsewhere {

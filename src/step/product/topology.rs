@@ -180,7 +180,7 @@ impl ShapeItems {
             .or_else(|| Some(e.args()).filter(|_| e.keyword() != ""))
             .map(|a| if e.keyword().is_empty() { a.list(0) } else { e.args().list(1) });
         let mut faces = Vec::new();
-        for face in own.map(|l| l.ids()).unwrap_or_default() {
+        for face in own.iter().flat_map(|l| l.ids()) {
             let mut turned = flip;
             let mut face = face;
             for _ in 0..4 {
@@ -246,7 +246,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     };
     let Some(surface) = surface else { return Err(Refusal::new(e, "its surface is missing")) };
     let mut loops = Vec::new();
-    for bound in bounds.map(|b| b.ids()).unwrap_or_default() {
+    for bound in bounds.iter().flat_map(|b| b.ids()) {
         let Some(bound) = file.entity(bound) else { continue };
         let a = bound
             .attributes("FACE_BOUND", 1)

@@ -111,7 +111,12 @@ pub struct Row {
 impl Row {
     /// Seconds from the model to the answer.
     pub fn seconds(&self) -> f64 {
-        self.seconds_tessellate.unwrap_or(0.0) + self.seconds_build + self.seconds_trace_median
+        self.seconds_prepare() + self.seconds_trace_median
+    }
+
+    /// Before the first ray; the spline has no facets to make.
+    fn seconds_prepare(&self) -> f64 {
+        self.seconds_tessellate.unwrap_or(0.0) + self.seconds_build
     }
 }
 
@@ -163,7 +168,7 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
         let planes = all.iter().any(|r| r.direction_error_deg_p50 <= ROUNDING_DEG);
         let error = |r: &Row| if planes { r.direction_error_deg_p99 } else { r.direction_error_deg_p50 };
         let used: Vec<&Row> = all.into_iter().filter(|r| error(r) > ROUNDING_DEG).collect();
-        let sag: Vec<_> = used.iter().map(|r| (r.sag_mean_mm.unwrap_or(0.0), error(r))).collect();
+        let sag: Vec<_> = used.iter().filter_map(|r| Some((r.sag_mean_mm?, error(r)))).collect();
         let length: Vec<_> = used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), error(r))).collect();
         let theory_in_sag = match name {
             "flat" | "nearest" => Some(0.5),
@@ -202,8 +207,7 @@ const JOB: f64 = 1e6;
 impl Row {
     /// Seconds from the model to the answers of a job of a million rays, tracing in proportion to the rays.
     pub fn seconds_of_job(&self) -> f64 {
-        let prepare = self.seconds_tessellate.unwrap_or(0.0) + self.seconds_build;
-        prepare + self.seconds_trace_median * JOB / self.rays.max(1) as f64
+        self.seconds_prepare() + self.seconds_trace_median * JOB / self.rays.max(1) as f64
     }
 }
 
@@ -214,15 +218,16 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
         |facets: bool| rows.iter().filter(move |r| r.threads == threads && r.tolerance_mm.is_some() == facets);
     let good = timed(true).filter(|r| r.direction_error_deg_p99 <= target);
     let cheapest = good.min_by(|a, b| a.seconds_of_job().total_cmp(&b.seconds_of_job()));
+    let cheapest = cheapest.and_then(|r| Some((r, r.tolerance_mm?)));
     let exact = timed(false)
         .next()
         .map_or(String::new(), |e| format!("; the exact spline costs **{:.2} s**", e.seconds_of_job()));
     match cheapest {
-        Some(r) => format!(
+        Some((r, tolerance)) => format!(
             "For {target}° take {}{} mm with {} normals in the {}: **{:.2} s** for a million rays on {threads} threads{exact}. \
              99 % of the mirrored rays keep that direction error ({:.2e}° reached). Times are those of {} rays, tracing taken in proportion.",
             if r.adaptive { "adaptively from " } else { "" },
-            r.tolerance_mm.unwrap_or(0.0),
+            tolerance,
             r.normals,
             r.intersector,
             r.seconds_of_job(),
