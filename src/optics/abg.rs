@@ -25,6 +25,10 @@ const RADIUS_TOLERANCE: f64 = 1e-14;
 const REACH: f64 = 2.0;
 /// Rings of the tabulated share: their width grows by a factor of 1.06.
 const RINGS: usize = 256;
+/// The first ring, as a share of the radius at which the weight bends: within it the weight is constant to 1e-3^g.
+const FIRST_RING: f64 = 1e-3;
+/// The smallest first ring, a direction cosine: sharper peaks than a nanoradian are mirrors.
+const SHARPEST_RING: f64 = 1e-9;
 
 impl Abg {
     /// `a` and `b` positive, `g` from 0; refused when the whole disk of radius 2 would scatter more than there is.
@@ -109,8 +113,8 @@ impl Abg {
     }
 
     fn tabulate(&mut self) {
-        // The bend of the weight lies at r = b^(1/g); rings start a thousandth below it.
-        let start = (self.b.powf(1.0 / self.g.max(0.1)) * 1e-3).clamp(1e-9, 0.1);
+        // The bend of the weight lies at r = b^(1/g), and nothing changes far below it: rings start there.
+        let start = (self.b.powf(1.0 / self.g.max(0.1)) * FIRST_RING).clamp(SHARPEST_RING, 0.1);
         let factor = (REACH / start).powf(1.0 / (RINGS - 1) as f64);
         self.radii = std::iter::once(0.0).chain((0..RINGS).map(|i| start * factor.powi(i as i32))).collect();
         self.radii[RINGS] = REACH;

@@ -5,6 +5,12 @@ use super::fresnel::{self, Power};
 use super::refraction::cos_transmitted;
 use super::table::{bracket, check_increasing};
 
+/// By what two shares that were written as decimals may add up to more than one.
+const SUM_ROUNDING: f64 = 1e-12;
+
+/// The same for a table, whose shares were computed by another program and printed with nine digits or more.
+const TABLE_ROUNDING: f64 = 1e-9;
+
 /// What an interface does to the power that meets it.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -54,7 +60,7 @@ impl Coating {
         require("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
         require("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
         let sum = reflectance + transmittance;
-        require("reflectance plus transmittance", sum, sum <= 1.0 + 1e-12, "at most 1")?;
+        require("reflectance plus transmittance", sum, sum <= 1.0 + SUM_ROUNDING, "at most 1")?;
         Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
     }
 
@@ -141,7 +147,12 @@ impl CoatingTable {
             for (r, t) in [(c.reflected.rs, c.transmitted.rs), (c.reflected.rp, c.transmitted.rp)] {
                 require("a reflectance of the coating", r, (0.0..=1.0).contains(&r), "from 0 to 1")?;
                 require("a transmittance of the coating", t, (0.0..=1.0).contains(&t), "from 0 to 1")?;
-                require("reflectance plus transmittance of the coating", r + t, r + t <= 1.0 + 1e-9, "at most 1")?;
+                require(
+                    "reflectance plus transmittance of the coating",
+                    r + t,
+                    r + t <= 1.0 + TABLE_ROUNDING,
+                    "at most 1",
+                )?;
             }
         }
         Ok(Self { angles_deg, wavelengths_nm, cells })

@@ -4,6 +4,12 @@ use super::error::{Error, ErrorKind, require};
 use crate::formats::{PhotometricType, Photometry};
 use crate::math::{Vector, safe_newton};
 
+/// What an angle may lie beyond its range, radians or as a share of a cell, as the rounding of degrees in files puts it.
+const ROUNDING: f64 = 1e-9;
+
+/// How near an angle from the pole is found, radians: fifty ulps of 1.
+const QUANTILE_TOLERANCE: f64 = 1e-14;
+
 /// Draws directions in proportion to a measured intensity, bilinear in its two angles, exactly: every ray carries the same flux.
 ///
 /// Directions have the components of [`PhotometricType::direction`].
@@ -48,7 +54,7 @@ impl IntensitySampler {
                 (radians(&p.horizontal_deg, 90.0), radians(&p.vertical_deg, 0.0), turned)
             }
         };
-        let within = |x: f64| (-1e-9..=std::f64::consts::PI + 1e-9).contains(&x);
+        let within = |x: f64| (-ROUNDING..=std::f64::consts::PI + ROUNDING).contains(&x);
         for &x in &polar {
             require("an angle from the pole", x.to_degrees(), within(x), "from 0 to 180 degrees")?;
         }
@@ -94,7 +100,7 @@ impl IntensitySampler {
             },
             a,
             b,
-            1e-14,
+            QUANTILE_TOLERANCE,
         )
         .unwrap_or(b);
         let s = (x - a) / (b - a);
@@ -154,7 +160,7 @@ impl IntensitySampler {
 fn cell(nodes: &[f64], x: f64) -> Option<(usize, f64)> {
     let i = nodes.partition_point(|&a| a <= x).clamp(1, nodes.len() - 1) - 1;
     let s = (x - nodes[i]) / (nodes[i + 1] - nodes[i]);
-    (-1e-9..=1.0 + 1e-9).contains(&s).then_some((i, s))
+    (-ROUNDING..=1.0 + ROUNDING).contains(&s).then_some((i, s))
 }
 
 /// The fraction of an interval below which lies the share `u` of a density that runs linearly from `y0` to `y1`.

@@ -2,6 +2,10 @@
 
 use std::collections::BTreeMap;
 
+/// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
+/// any map and so leaves it.
+const LEAST_COSINE: f64 = 1e-3;
+
 /// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
 #[derive(Clone, Debug)]
 pub struct IntensityMap {
@@ -107,7 +111,7 @@ impl IntensityMap {
             // Degrees of azimuth are shorter towards the poles.
             let half =
                 if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
-            let half = half / v.to_radians().cos().max(1e-3);
+            let half = half / v.to_radians().cos().max(LEAST_COSINE);
             for (row, v_share) in overlaps(&self.v_edges, from, to, |v| v.to_radians().sin())? {
                 for (column, h_share) in overlaps(&self.h_edges, h - half, h + half, f64::to_radians)? {
                     let weight = v_share * h_share;

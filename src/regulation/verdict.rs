@@ -54,6 +54,9 @@ pub struct Assumptions {
 const REALIGN_DEG: [f64; 3] = [0.5, 0.75, 0.25];
 const REALIGN_STEP_DEG: f64 = 0.125;
 
+/// The rounding of edges that were written and read again, as a share of a cell.
+const ROUNDED_EDGES: f64 = 1e-9;
+
 /// Half the widest opening that UN R148 allows, degrees.
 const WIDEST_SIGNAL_SENSOR_DEG: f64 = 0.5;
 
@@ -73,8 +76,7 @@ pub fn assess(
     if regulation.id.starts_with("UN R148") {
         half = half.max(0.5 * map.coarsest_deg()).min(WIDEST_SIGNAL_SENSOR_DEG);
     }
-    // The rounding of edges that were written and read again.
-    if map.coarsest_deg() > 2.0 * half * (1.0 + 1e-9) {
+    if map.coarsest_deg() > 2.0 * half * (1.0 + ROUNDED_EDGES) {
         return Err(format!(
             "the cells of the far field are {:.3}° wide, the photometer of {} {:.3}°; trace with cells of at most that",
             map.coarsest_deg(),

@@ -7,6 +7,9 @@ use super::modeling::{Curve, Edge, Line, Point3, Rad, Shell, Solid, Vector3, Wir
 /// A full turn for truck, which wants more than one.
 const TURN: Rad<f64> = Rad(7.0);
 
+/// Thinnest rim of a lens, mm: truck takes points that are nearer to each other for one.
+const THINNEST_RIM: f64 = 1e-6;
+
 /// A lens about the z axis: front vertex at the origin, light along +z meets the front first.
 ///
 /// ```
@@ -46,7 +49,7 @@ impl Lens {
         checked(
             "the thickness at the rim",
             edge,
-            edge > 1e-6,
+            edge > THINNEST_RIM,
             "positive: make the lens thicker or the aperture smaller",
         )?;
         let at = |x: f64, z: f64| builder::vertex(Point3::new(x, 0.0, z));

@@ -9,6 +9,17 @@ use std::f64::consts::PI;
 /// Points of an edge at which its angle is taken.
 const SAMPLES: usize = 24;
 
+/// Distance from the axis below which a point is on it, as a share of a millimetre and of the part's size: above the rounding of
+/// truck's points, which carry two or three transforms, below any edge that truck accepts.
+const ON_AXIS: f64 = 1e-9;
+
+/// Distance from the meridian's half-plane that is the rounding of a profile which was drawn in it, in the same measure; truck's own
+/// tolerance of coincidence is 1e-6.
+const OFF_PLANE: f64 = 1e-7;
+
+/// Angles that differ by less are one, radians: 1 nm at a metre.
+const SAME_ANGLE: f64 = 1e-9;
+
 /// A surface of revolution before the angles of a face are known.
 pub(super) struct Revolved {
     meridian: Curve,
@@ -64,10 +75,10 @@ impl Revolved {
             middles.push(angles);
         }
         let [a, mut b] = range.ok_or("a face without edges on an endless surface of revolution")?;
-        if b - a > 2.0 * PI + 1e-9 {
+        if b - a > 2.0 * PI + SAME_ANGLE {
             return Err("a face that winds around its axis more than once".into());
         }
-        if b - a < 1e-9 {
+        if b - a < SAME_ANGLE {
             return Err("a face without width on a surface of revolution".into());
         }
         b = b.min(a + 2.0 * PI);
@@ -141,7 +152,7 @@ impl Revolved {
 
     fn on_axis(&self, p: Point) -> bool {
         let q = self.axis.local_point(self.local(p));
-        q.x.hypot(q.y) < 1e-9 * (1.0 + self.size)
+        q.x.hypot(q.y) < ON_AXIS * (1.0 + self.size)
     }
 
     fn angle(&self, p: Point) -> f64 {
@@ -160,12 +171,12 @@ fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
     let farther = |far: Point, p: Point| if radius(&p) >= radius(&far) { p } else { far };
     let farthest = samples.iter().copied().fold(samples[0], farther);
     let reach = radius(&farthest);
-    if reach < 1e-9 * (1.0 + size) {
+    if reach < ON_AXIS * (1.0 + size) {
         return Err("a curve on the axis it is turned about".into());
     }
     let (x, y) = (farthest.x / reach, farthest.y / reach);
-    let off =
-        |p: &Point| (p.y * x - p.x * y).abs() > 1e-7 * (1.0 + size) || p.x * x + p.y * y < -1e-7 * (1.0 + size);
+    let slack = OFF_PLANE * (1.0 + size);
+    let off = |p: &Point| (p.y * x - p.x * y).abs() > slack || p.x * x + p.y * y < -slack;
     if samples.iter().any(off) {
         return Err("a surface of revolution whose curve does not lie in a half-plane of the axis".into());
     }
@@ -185,7 +196,7 @@ fn wrapped(angle: f64) -> f64 {
 /// The angle brought to `(0, 2π]`.
 fn turned(angle: f64) -> f64 {
     let a = angle.rem_euclid(2.0 * PI);
-    if a < 1e-9 { 2.0 * PI } else { a }
+    if a < SAME_ANGLE { 2.0 * PI } else { a }
 }
 
 /// An affine placement; truck allows no other.

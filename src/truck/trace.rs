@@ -6,6 +6,18 @@ use crate::nurbs::{Curve, Surface, UvCurve};
 
 /// Wanted distance between the edge and its uv curve on the surface, mm, and the largest that is accepted.
 const WANTED: f64 = 1e-9;
+
+/// Length of a derivative, as a share of the surface's size, below which its parameter moves nothing: a pole.
+const POLE: f64 = 1e-9;
+
+/// The shortest share of a Newton step that is tried; what does not come nearer by then does not come nearer.
+const LEAST_STEP: f64 = 1e-3;
+
+/// A step of this share of the parameters' range is below their rounding.
+const STANDSTILL: f64 = 1e-15;
+
+/// Squared sine between two derivatives below which they count as parallel: the determinant is then rounding.
+const PARALLEL_SQUARED: f64 = 1e-20;
 pub(super) const ACCEPTED: f64 = 1e-5;
 /// Most Hermite pieces of a uv curve.
 const MAX_PIECES: usize = 512;
@@ -103,7 +115,7 @@ impl<'a> Tracer<'a> {
     fn pole(&self, uv: Uv) -> Option<usize> {
         let d = self.surface.derivatives(uv);
         let lengths = [d.du.length() * self.extent.x, d.dv.length() * self.extent.y];
-        (0..2).find(|&k| lengths[k] < 1e-9 * self.size.max(lengths[1 - k]))
+        (0..2).find(|&k| lengths[k] < POLE * self.size.max(lengths[1 - k]))
     }
 
     /// Parameter `k` and its slope at a pole, where it means nothing: continued from two points further in towards `inner`, so
@@ -147,7 +159,7 @@ impl<'a> Tracer<'a> {
             let (next, next_off) = loop {
                 let next = self.surface.clamp(uv + step * scale);
                 let next_off = (self.surface.evaluate(next) - p).length();
-                if next_off <= off || scale < 1e-3 {
+                if next_off <= off || scale < LEAST_STEP {
                     break (next, next_off);
                 }
                 scale *= 0.5;
@@ -157,7 +169,7 @@ impl<'a> Tracer<'a> {
                 break;
             }
             (uv, off) = (next, next_off);
-            if moved < 1e-15 {
+            if moved < STANDSTILL {
                 break;
             }
         }
@@ -175,7 +187,7 @@ impl<'a> Tracer<'a> {
 fn solve(du: Vector, dv: Vector, v: Vector) -> Uv {
     let (a, b, c) = (du.length_squared(), du.dot(dv), dv.length_squared());
     let determinant = a * c - b * b;
-    if determinant > 1e-20 * a * c {
+    if determinant > PARALLEL_SQUARED * a * c {
         let (p, q) = (du.dot(v), dv.dot(v));
         return Uv::new(c * p - b * q, a * q - b * p) / determinant;
     }
