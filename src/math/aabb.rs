@@ -88,6 +88,7 @@ impl Aabb {
         let (mut near, mut far) = (ray.t_min, ray.t_max);
         for axis in 0..3 {
             let (o, d) = (ray.origin[axis], ray.direction[axis]);
+            // 0/0 would be no number where the ray runs in a side.
             if d == 0.0 {
                 if o < self.min[axis] || o > self.max[axis] {
                     return None;

@@ -47,6 +47,7 @@ pub fn safe_newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, toler
         }
         let newton = x - value / slope;
         let (left, right) = (below.min(above), below.max(above));
+        // A step out of the bracket, or one that is no number where the slope vanishes, is replaced by a bisection.
         let next = if newton > left && newton < right { newton } else { 0.5 * (left + right) };
         if (next - x).abs() <= tolerance.max(f64::EPSILON * x.abs()) {
             return Some(next);

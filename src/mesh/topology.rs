@@ -31,6 +31,7 @@ impl FacetMesh {
             let p = self.corner_positions(f);
             for k in 0..4 {
                 let (a, b) = (p[k], p[(k + 1) % 4]);
+                // A triangle's last side has no length.
                 if a != b {
                     edges.entry([a.min(b), a.max(b)]).or_default()[(a > b) as usize] += 1;
                 }
@@ -40,6 +41,7 @@ impl FacetMesh {
         for [along, against] in edges.into_values() {
             match along + against {
                 1 => t.open_edges += 1,
+                // Neighbours that are turned alike use their edge in opposite directions.
                 2 if along != against => t.turned_edges += 1,
                 2 => {}
                 _ => t.nonmanifold_edges += 1,

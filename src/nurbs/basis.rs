@@ -43,6 +43,7 @@ pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span
     let mut value = [0.0; W];
     let (mut left, mut right) = ([0.0; W], [0.0; W]);
     value[0] = 1.0;
+    // Cox–de Boor (*The NURBS Book*, A2.2): all terms are positive inside the span, so that nothing cancels.
     for j in 1..=degree {
         left[j] = t - knots[span + 1 - j];
         right[j] = knots[span + j] - t;
@@ -79,6 +80,7 @@ pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t
         table[j][j] = saved;
     }
     let mut value = [[0.0; W]; 3];
+    // The last column holds the functions themselves; derivatives follow from the differences left in the lower triangle.
     for r in 0..=p {
         value[0][r] = table[r][p];
     }
@@ -111,6 +113,7 @@ pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t
             std::mem::swap(&mut s1, &mut s2);
         }
     }
+    // The k-th derivative has the factor p!/(p − k)!.
     let mut factor = p as f64;
     for k in 1..=order {
         for x in &mut value[k][..=p] {

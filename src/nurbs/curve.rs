@@ -202,6 +202,7 @@ impl<P: ControlPoint> Spline<P> {
                 if self.knots[k + 1 - p] == self.knots[k] && self.knots[k + p] == self.knots[k + 1] {
                     return self.points[k - p..=k].to_vec();
                 }
+                // The i-th Bézier point is the blossom at i times the right end and p − i times the left one.
                 let mut arguments = [self.knots[k]; MAX_DEGREE];
                 let mut piece = vec![self.blossom(k, &arguments[..p])];
                 for i in 1..=p {
@@ -224,6 +225,7 @@ impl<P: ControlPoint> Spline<P> {
     pub fn reparametrised(&self, [a, b]: [f64; 2]) -> Self {
         let [t0, t1] = self.domain();
         let map = |k: f64| {
+            // The ends are set, not computed: knots that were equal must stay so to the bit.
             if k <= t0 {
                 a
             } else if k >= t1 {

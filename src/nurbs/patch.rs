@@ -44,6 +44,7 @@ impl BezierPatch {
         };
         let (us, vs) = (breaks(0), breaks(1));
         let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
+        // First in u, then each row in v: knot insertion in one direction does not see the other.
         for a in 0..us.len() - 1 {
             let rows: Vec<Vec<Vec<Homogeneous>>> = (0..=p)
                 .map(|i| {
@@ -72,6 +73,7 @@ impl BezierPatch {
         let (bu, du) = bernstein_to_first::<W>(p, local.x);
         let (bv, dv) = bernstein_to_first::<W>(q, local.y);
         let mut sums = [Homogeneous::ZERO; 3];
+        // Sums over v first: p + 1 rows of q + 1 terms, each used for the point and both derivatives.
         for i in 0..=p {
             let (mut row, mut row_v) = (Homogeneous::ZERO, Homogeneous::ZERO);
             for j in 0..=q {
@@ -142,6 +144,7 @@ impl BezierPatch {
                 *sum += along[b] * bu[a][i];
             }
         }
+        // Chain rule: derivatives by local parameters are those by the domain times its width.
         let [hu, hv] = self.domain.map(|[a, b]| 1.0 / (b - a));
         let scale = [1.0, hu, hv, hu * hu, hu * hv, hv * hv];
         SecondDerivatives::projected(std::array::from_fn(|k| sums[k] * scale[k]))

@@ -41,6 +41,7 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
         for k in 0..SEEDS {
             let s = k as f64 / SEEDS as f64;
             work.copy_from_slice(piece);
+            // De Casteljau: `work[0]` ends as the point.
             for r in 1..work.len() {
                 for j in 0..work.len() - r {
                     work[j] = work[j] * (1.0 - s) + work[j + 1] * s;
@@ -76,12 +77,14 @@ fn descend_from(curve: &Curve, offset: &impl Fn(Point) -> Point, start: f64) -> 
         let slope = r.dot(first);
         let newton = first.length_squared() + r.dot(second);
         let gauss = first.length_squared();
+        // Far from the foot the second derivative may point uphill; Gauss–Newton's part of it never does.
         let curvature = if newton > 0.1 * gauss { newton } else { gauss };
         if !(curvature > 0.0) {
             break;
         }
         let mut step = -slope / curvature;
         let mut moved = false;
+        // A step that does not descend is halved; after twelve times the place is as good as stationary.
         for _ in 0..12 {
             let next = (t + step).clamp(t0, t1);
             let distance = offset(curve.evaluate(next)).length();

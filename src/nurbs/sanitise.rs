@@ -117,6 +117,7 @@ pub fn surface(
     let (ku, fixed_u) = check_knots(degree[0], ku, nu)?;
     let (kv, fixed_v) = check_knots(degree[1], kv, nv)?;
     let columns = (0..nv).map(|j| (0..nu).map(|i| points[i * nv + j]).collect()).collect();
+    // Columns are curves over the knots in u, rows over those in v: one repair serves both.
     let (columns, ku, repairs_u) = conform(degree[0], ku, columns, fixed_u)?;
     let nu = columns[0].len();
     let rows = (0..nu).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
@@ -134,6 +135,7 @@ fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogene
     if !(largest > 0.0 && largest.is_finite()) {
         return Err(Defect::Weights);
     }
+    // Weights of ordinary size stay as they are, to the bit.
     let scale = if largest.log2().abs() > 20.0 { 1.0 / largest } else { 1.0 };
     let weight = |i: usize| weights.map_or(1.0, |w| w[i] * scale);
     points
@@ -226,6 +228,8 @@ fn conform(
         return Err(Defect::Domain);
     }
     let first = Spline { degree, knots: knots.clone(), points: lines[0].clone() };
+    // Where the ends are not clamped, the domain begins inside the knots: cut there, the curve is the same and its ends are control
+    // points.
     if first.is_clamped() {
         return Ok((lines, knots, repairs));
     }

@@ -186,6 +186,8 @@ impl Surface {
         let inward_v = if uv.y > 0.5 * (v0 + v1) { -1.0 } else { 1.0 };
         // Comparable lengths: derivatives times the extent of the domain.
         let (lu, lv) = (d.du.length() * (u1 - u0), d.dv.length() * (v1 - v0));
+        // At a pole Su = 0 all along v; just inside Su ≈ h·Suv, so that Su × Sv tends to the direction of ±Suv × Sv. The other way round
+        // where Sv vanishes.
         let n = if lu < VANISHING * lv { d.duv.cross(d.dv) * inward_v } else { d.du.cross(d.duv) * inward_u };
         let reference = d.duv.length() * d.du.length().max(d.dv.length());
         if lu.min(lv) < VANISHING * lu.max(lv) && n.length() > VANISHING * reference {
@@ -237,6 +239,7 @@ impl Surface {
             .into_iter()
             .map(|points| change(Curve { degree, knots: knots.clone(), points }))
             .collect();
+        // A change of the knots is the same for every line: the first one tells degree and knots of all.
         let first = &lines[0];
         let mut s = self.clone();
         s.degree[direction] = first.degree;

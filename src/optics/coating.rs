@@ -83,6 +83,7 @@ impl Coating {
             }
             Self::Table(table) => table.shares(table.angle_deg(cos_i, eta), wavelength_nm),
         };
+        // A table or a pair of shares knows nothing of the angle of total reflection; energy is kept by reflecting what cannot go on.
         if cos_transmitted(cos_i, eta).is_some() {
             return split;
         }
@@ -167,6 +168,7 @@ impl CoatingTable {
         for (row, a) in [(i, 1.0 - s), (i + 1, s)] {
             for (column, b) in [(j, 1.0 - t), (j + 1, t)] {
                 let weight = a * b;
+                // At the table's ends the next cell does not exist, and its weight is zero.
                 if weight > 0.0 {
                     let cell = &self.cells[row * columns + column];
                     sum.reflected.add(cell.reflected, weight);

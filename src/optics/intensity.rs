@@ -42,6 +42,8 @@ impl IntensitySampler {
         }
         let radians = |angles: &[f64], offset: f64| angles.iter().map(|a| (a + offset).to_radians()).collect();
         let by_row = |h: usize, v: usize| p.candela[h * rows + v];
+        // Each type turns about an axis of its own: all become an angle from the pole and one about it. For type B the horizontal angle
+        // is the one from the pole.
         let (polar, turning, intensity): (Vec<f64>, Vec<f64>, Vec<f64>) = match p.kind {
             PhotometricType::C => {
                 (radians(&p.vertical_deg, 0.0), radians(&p.horizontal_deg, 0.0), p.candela.clone())
@@ -65,6 +67,7 @@ impl IntensitySampler {
             turn <= 6.2831854,
             "at most 360 degrees",
         )?;
+        // Flux up to each cell, by which cells are chosen.
         let mut sampler = Self { kind: p.kind, polar, turning, intensity, sums: vec![0.0] };
         let mut sum = 0.0;
         for t in 0..sampler.turning.len() - 1 {
@@ -93,6 +96,7 @@ impl IntensitySampler {
         let width = self.turning[t + 1] - self.turning[t];
         let missing = (wanted - self.sums[cell]) / width;
         let (a, b) = (self.polar[i], self.polar[i + 1]);
+        // First the angle from the pole, by inverting the flux of the cell's rings, which holds the sine of the sphere…
         let x = safe_newton(
             |x| {
                 let s = (x - a) / (b - a);
@@ -104,6 +108,7 @@ impl IntensitySampler {
         )
         .unwrap_or(b);
         let s = (x - a) / (b - a);
+        // …then the one about it, linear between the sides of the ring that was found.
         let along = |t: usize| {
             let (y0, y1) = (self.node(t, i), self.node(t, i + 1));
             y0 + s * (y1 - y0)

@@ -242,6 +242,7 @@ impl Wavelengths {
     pub fn photometric(&self) -> Result<Self, Error> {
         match &self.kind {
             Kind::Lines(nm) => {
+                // Powers of lines are kept as running sums, from which they are had back.
                 let before = std::iter::once(0.0).chain(self.sums.iter().copied());
                 let watts = self.sums.iter().zip(before).map(|(s, before)| s - before);
                 Self::lines(&nm.iter().zip(watts).map(|(&nm, w)| [nm, w * xyz_of_watt(nm)[1]]).collect::<Vec<_>>())
@@ -250,6 +251,7 @@ impl Wavelengths {
                 let [first, last] = cie::observer_range();
                 let [a, b] = self.range_nm().map(|nm| nm.clamp(first, last));
                 let steps = (0..=(b - a).ceil() as usize).map(|k| (a + k as f64).min(b));
+                // Between its own points the spectrum is linear: with these and every nanometre the product is followed closely.
                 let own = points.iter().map(|p| p[0]).filter(|nm| (a..=b).contains(nm));
                 let mut nm: Vec<f64> = steps.chain(own).collect();
                 nm.sort_by(f64::total_cmp);

@@ -83,6 +83,7 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
         let part = model.part(instance.part);
         for shell in &part.shells {
             let next = face + shell.faces.len() as u32;
+            // Facets lie in the order of their faces, and so of the shells.
             let start = facets.partition_point(|f| f.face.0 < face);
             let end = facets.partition_point(|f| f.face.0 < next);
             face = next;

@@ -92,6 +92,7 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<V
         let o = r[0].place;
         (0..r.len()).map(|k| (r[k].place - o).cross(r[(k + 1) % r.len()].place - o)).sum()
     };
+    // The vector area of a loop does not depend on what is spanned in it: its direction is the loop's mean normal.
     let mean: Vector = loops.iter().map(area).sum();
     let mean = if mean.dot(up) < 0.0 { -mean } else { mean };
     let z = mean.try_normalize()?;
@@ -106,18 +107,21 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<V
             c.at = Point2::new(clean((c.place - o).dot(x)), clean((c.place - o).dot(y)));
             let before = cdt.num_vertices();
             handles.push(cdt.insert(*c).ok()?);
+            // Two corners fall together in this plane.
             if cdt.num_vertices() == before {
                 return None;
             }
         }
         for k in 0..ring.len() {
             let (a, b) = (handles[k], handles[(k + 1) % ring.len()]);
+            // None: it would cross another side; several: it passes through a corner.
             if cdt.try_add_constraint(a, b).len() != 1 {
                 return None;
             }
             segments.push([ring[k].at, ring[(k + 1) % ring.len()].at]);
         }
     }
+    // The triangulation fills the convex hull: even–odd at the centroid tells what the loops hold.
     let inside = |t: &[BorderCorner; 3]| {
         let p = t.map(|c| [c.at.x, c.at.y]);
         let (px, py) = ((p[0][0] + p[1][0] + p[2][0]) / 3.0, (p[0][1] + p[1][1] + p[2][1]) / 3.0);

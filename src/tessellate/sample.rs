@@ -87,6 +87,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
         each.fold(f64::INFINITY, f64::min)
     };
     for t in triangles {
+        // From the surface to the facet…
         for i in 0..=GRID {
             for j in 0..=GRID - i {
                 let b = [(GRID - i - j) as f64, i as f64, j as f64].map(|x| x / GRID as f64);
@@ -101,6 +102,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             out.sag = out.sag.max((surface.evaluate(project(surface, x, at)) - x).length());
         }
     }
+    // …and from the facet to the surface, at the points of a quadrature, so that the mean is one by area.
     let (mut sum, mut area) = (0.0, 0.0);
     for t in triangles {
         let share = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).length().max(f64::MIN_POSITIVE);
@@ -201,6 +203,7 @@ pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
         }
         let (r, s) = (e.dot(d.du), e.dot(d.dv));
         let step = Uv::new(c * r - b * s, a * s - b * r) / det;
+        // A full step may overshoot where the surface bends; one that comes nearer is enough.
         let tries = [1.0, 0.5, 0.25, 0.1].map(|f| surface.clamp(best + step * f));
         let Some((next, nearer)) =
             tries.into_iter().map(|u| (u, (surface.evaluate(u) - x).length())).find(|n| n.1 < away)

@@ -64,6 +64,7 @@ impl SecondDerivativeBounds {
 /// Bounds of |Suu|, |Suv| and |Svv| over a patch.
 fn patch_bounds(patch: &BezierPatch) -> [f64; 3] {
     let [p, q] = patch.degree;
+    // About a point of its own: the terms with w below grow with the distance from the origin.
     let middle = patch.points[patch.points.len() / 2].project();
     let at = |i: usize, j: usize| -> Homogeneous {
         let x = patch.points[i * (q + 1) + j];
@@ -89,6 +90,8 @@ fn patch_bounds(patch: &BezierPatch) -> [f64; 3] {
     let uu = scaled(most(p.saturating_sub(1), q + 1, &uu), pf * (pf - 1.0));
     let vv = scaled(most(p + 1, q.saturating_sub(1), &vv), qf * (qf - 1.0));
     let uv = scaled(most(p, q, &uv), pf * qf);
+    // With A = w·S: w·Suu = Auu − 2·wu·Su − wuu·S, and likewise the others. Hulls bound each term, |S| by the radius, 1/w by the least
+    // weight.
     let w = patch.points.iter().map(|x| x.w).fold(f64::INFINITY, f64::min);
     let r = patch.points.iter().map(|x| (x.project() - middle).length()).fold(0.0, f64::max);
     let (su, sv) = ((u[0] + u[1] * r) / w, (v[0] + v[1] * r) / w);

@@ -149,12 +149,14 @@ impl Exact {
             }
         }
         let small = size(&node.rect).into_iter().fold(0.0, f64::max);
+        // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is.
         let touches =
             hull.across < TANGENT && (hull.far - hull.near < CONTACT_LENGTH * TANGENT || small < POINT_BOX);
         if touches || small < FINEST {
             return self.take_contact(query, clipping, &node);
         }
         let kept = keep.map(|[a, b]| b - a);
+        // A cut that keeps nearly everything costs what a halving costs and parts no two roots.
         if kept[0] < WORTH_CUTTING || kept[1] < WORTH_CUTTING {
             stack.push(cut(node, degree, keep, hull.near));
         } else {

@@ -106,6 +106,7 @@ impl Geometry {
 
     fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, (trim, grid): (u32, u32), solid: Option<[u32; 2]>) {
         let record = self.faces.len() as u32;
+        // Mirroring turns a normal over once more.
         let sign = if face.reversed != placed.placement.is_mirrored() { -1.0 } else { 1.0 };
         self.by_id.insert(placed.id, record);
         let first_patch = self.patches.len() as u32;
@@ -126,6 +127,7 @@ impl Geometry {
             solid,
         });
         for mut patch in face.surface.bezier_patches() {
+            // Knot insertion in double precision would lose what such a patch's small side has of digits.
             if is_ill_scaled(&patch) {
                 reference::extract(&face.surface, &mut patch);
             }

@@ -98,12 +98,15 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
             [a.x, a.y, a.z, p[3] / middle[3]]
         })
         .collect();
+    // A little more than the leaf is described: a root just beyond its border is then still proved to be the only one, whichever of two
+    // neighbours finds it.
     let mut enlarged = centred.clone();
     for d in 0..2 {
         net::restrict(&mut enlarged, degree, d, [-EXTENSION, 1.0 + EXTENSION]);
     }
     let mut slopes = net::slopes(&enlarged, degree);
     for four in [&mut slopes.u, &mut slopes.v, &mut slopes.ru, &mut slopes.rv] {
+        // Back to the leaf's own parameters.
         four.iter_mut().for_each(|x| *x /= 1.0 + 2.0 * EXTENSION);
     }
     let axes = tangent_frame(xyz(&slopes.u), xyz(&slopes.v));

@@ -93,6 +93,7 @@ impl ReferencePatch<'_> {
     #[inline(always)]
     fn newton(&self, [o, d]: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
         // The largest component of the direction, and the two others.
+        // Two planes through the ray, made of components: the largest of the direction is the one that both are divided by.
         let main = d.abs().max_position();
         let others = [(main + 1) % 3, (main + 2) % 3];
         let widths = [0, 1].map(|k| self.width(k));

@@ -73,6 +73,7 @@ impl RaySlabs {
         }
         self.start = near;
         self.misses = near > far;
+        // In single precision the point is rounded outwards in every axis: a box that the true ray meets is never missed.
         let slack = 4.0 * f64::EPSILON * (reach + near.abs());
         for k in 0..3 {
             let at = o[k] - tree.center[k] + d[k] * near;

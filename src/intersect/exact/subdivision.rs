@@ -134,6 +134,8 @@ impl Subdivision<'_> {
             let area = described.leaf.bounds().half_area();
             let deepest = depth >= self.flatness.depth;
             let flat = self.is_flat(&described, area, deepest);
+            // The box of a slanted leaf is mostly empty and met by many rays in vain: a large one is halved beyond what flatness asks,
+            // where that shrinks the boxes.
             let large = area > LARGE * self.scene_area && depth < self.flatness.depth + BOX_HALVINGS;
             let tighter = if large { tightening_direction(&piece, degree, TIGHTER * area) } else { None };
             let direction = match tighter {

@@ -131,6 +131,7 @@ fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
         (((centre(i)[axis] - lo[axis]) / (hi[axis] - lo[axis]) * BINS as f64) as usize).min(BINS - 1)
     };
     let wide = [0, 1, 2].map(|axis| hi[axis] > lo[axis]);
+    // Surface area heuristic over bins of centres (Wald 2007): a plane costs area × number on both of its sides.
     let mut all = [[(Aabb::EMPTY, 0usize); BINS]; 3];
     for &i in slice.iter() {
         for axis in (0..3).filter(|&axis| wide[axis]) {
@@ -156,6 +157,7 @@ fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
             }
         }
     }
+    // All centres lie in one bin: no plane parts them, and any half does.
     let Some((_, axis, at)) = best else { return slice.len() / 2 };
     let (mut i, mut j) = (0, slice.len());
     while i < j {

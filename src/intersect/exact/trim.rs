@@ -164,6 +164,7 @@ impl Trim {
             for i in 0..self.count[0] {
                 let cell = j * self.count[0] + i;
                 if self.cells[cell] != Region::Border {
+                    // Even–odd: what the half-line towards +u crosses an odd number of times is inside.
                     let right = crossings.len() - crossings.partition_point(|&u| u <= middle(i).x);
                     let inside = (right % 2 == 1) != self.outside_is_inside;
                     self.cells[cell] = if inside { Region::Inside } else { Region::Outside };

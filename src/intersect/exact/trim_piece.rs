@@ -189,6 +189,8 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, b
         let at = |k: usize| points[k].truncate() / points[k].z;
         let n = points.len() - 1;
         let rising = at(n).y >= at(0).y;
+        // A curve changes direction no more often than its control polygon does (variation diminishing), so a monotone polygon proves a
+        // monotone piece, of which parity needs the ends alone.
         let monotone = (0..n).all(|k| if rising { at(k + 1).y >= at(k).y } else { at(k + 1).y <= at(k).y });
         let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
         let size = hull.1 - hull.0;
@@ -202,6 +204,7 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, b
         }
         let (mut low, mut high) = (points.clone(), points.clone());
         let mut w = points;
+        // De Casteljau at one half.
         for r in 0..=n {
             low[r] = w[0];
             for k in 0..n - r {

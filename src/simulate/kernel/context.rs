@@ -54,10 +54,12 @@ impl<'a> Context<'a> {
         intersector: &'a dyn Intersector,
         settings: &'a RunSettings,
     ) -> Self {
+        // Receivers are sorted once by how a segment must ask them, so that the hot loop walks four short lists and tests no kind.
         let select = |wanted: &dyn Fn(&Receiver) -> bool| -> Vec<u32> {
             (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
         };
         let region = bound.region;
+        // A far field has no place, and faces that receive are found by the hit itself: only planes and spheres cut segments.
         let stands = |r: &Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
         Self {
             bound,
@@ -65,6 +67,7 @@ impl<'a> Context<'a> {
             settings,
             plan: Plan::new(bound, settings),
             paths: None,
+            // Most receivers stand around the scene: no segment from face to face can reach those, see `clip_outside`.
             blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
             outside: select(&|r| r.absorbs && stands(r) && !r.meets(&region)),
             passing: select(&|r| !r.absorbs && stands(r)),

@@ -23,25 +23,31 @@ pub(super) fn cross<C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Result<Crossing<C>, LostCause> {
+    // Two solids of one part have one medium: the boundary between them is drawn in the file and absent in the glass.
     let leaves_sibling = at.face.touches_sibling && payload.cross(at.face.body, false).is_some();
     if leaves_sibling && touches_sibling(context, ray, &at.face_hit()) {
         // From one solid of a part into the next.
         at.skip = context.glue_mm();
         return Ok(Crossing { here: payload, across: payload });
     }
+    // `payload.cross` refuses what cannot be, as leaving a body that the ray is not in.
     let mut here = payload;
     let mut across = payload.cross(at.face.body, at.entering);
+    // A ray may have slipped through a crack or a touching edge unseen. Before it is lost, its media are found anew from where it is; the
+    // crossing is tried once more with them.
     if across.is_none()
         && let Some(recovered) = recover_media(context, &payload, ray, at.hit.t, at.face.touches_body)
         && let Some(beyond) = recovered.cross(at.face.body, at.entering)
     {
         (here, across) = (recovered, Some(beyond));
     }
+    // Where another body touches, light leaves the one and enters the other at one point, and meets no gap of air between.
     if at.face.touches_body {
         cross_contact(context, ray, at, &mut here, &mut across);
     }
     match across {
         Some(across) => Ok(Crossing { here, across }),
+        // A full stack refuses every entry: that is a limit of ours and no flaw of the model, so it is counted apart.
         None if here.is_full() && at.entering => Err(LostCause::TooDeep),
         None => Err(LostCause::ImpossibleMedium),
     }

@@ -40,6 +40,7 @@ impl SourceQueue {
                 queue.enter(context, 0);
             }
             RaySelection::Ray(ray) => {
+                // A replayed ray is alone: no source follows, and the range is cut to its one index.
                 queue.last = 0;
                 if let Some((source, replicate)) = context.plan.locate(ray) {
                     queue.replicate = replicate;
@@ -83,6 +84,7 @@ impl SourceQueue {
             let emitter = &context.bound.emitters[self.source];
             let started = (self.next - self.range[0]) as u32;
             self.next += 1;
+            // A single ray draws its numbers alone; in order they are drawn in packets. Both give the same bits.
             let (index, emission) = if self.single {
                 sampler.single_ray(emitter, started, ray)
             } else {
@@ -102,16 +104,19 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     fn start(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
         let mut into_contact = None;
+        // Luminous faces emit from the spline; the ray starts from the intersector's own idea of that face.
         if let Some((face, normal)) = emission.from {
             self.tally.counts.corrected_normals += u64::from(start_on_face(context, face, normal, ray));
             into_contact = if C::MEDIA { emit_into_contact(context, face, normal, ray) } else { None };
         }
+        // Booked before anything can go wrong, so that a ray which cannot start is in both sums, emitted and lost.
         self.tally.counts.rays += 1;
         self.tally.ends.emitted += quanta_as_integer(path.quanta);
         let Some(mut payload) = self.payload_at_start(source, into_contact.as_ref(), ray) else {
             self.lose(path, ray, LostCause::TooDeep, None);
             return false;
         };
+        // In closures and behind a constant: kernels without colour or polarisation carry no trace of it.
         if C::COLOURED {
             payload.set_light(emission.wavelength, || match context.bound.emitters[source].polarised {
                 Some(field) => Stokes::linear(1.0, ray.direction, field),
@@ -140,6 +145,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                     C::inside(&emitter.inside)
                 }
             }
+            // Light that is emitted into a touching body starts behind the contact: its media are those there.
             StartingMedia::PerRay if C::MEDIA => C::inside(&media_at(context, into_contact.unwrap_or(ray))),
             StartingMedia::PerRay => Some(C::in_surroundings()),
         }

@@ -185,15 +185,19 @@ fn scatter_at<C: RayPayload>(
     let side = flat * specular.dot(flat).signum();
     let normal = normal * normal.dot(side).signum();
     let [u, v] = key.pair(Purpose::Scatter);
+    // `None`: the lobe's share was not drawn, this light stays specular.
     let Some(direction) = scatter.sample(specular, normal, [key.unit(Purpose::Lobe), u, v]) else {
         return specular;
     };
     if let Some(stokes) = payload.stokes_mut() {
+        // The model of a rough surface says nothing of phases: what it scatters counts as unpolarised.
         *stokes = Stokes::unpolarised(1.0, direction);
     }
     if direction.dot(side) > 0.0 {
         return direction;
     }
+    // The lobe stands about the shading normal and may dip below the surface itself. Mirrored back the power is kept, and the count says
+    // how often that was.
     at.corrected_normals += 1;
     reflect(direction, side)
 }

@@ -46,12 +46,14 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut certain = true;
     let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
     for _ in 0..MOST_FACES {
+        // Straight out of the scene: what is left without having been entered must have been around the start, whatever the shapes are.
         let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
         let point = segment.point_at(hit.t);
         let d = segment.direction;
         segment = Ray::new(point, d).with_departure(departure(&hit));
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
+        // Against the outward normal the ray goes in, along it out.
         crossings.cross(face.body, along < 0.0);
         if !(face.touches_body || face.medium_on_opaque || face.touches_sibling) {
             continue;

@@ -53,12 +53,14 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
     }
     let mut end = ray.t_max;
     if let Some(h) = hit {
+        // The box is convex: with both ends inside, all of the segment is.
         if context.region.contains(ray.origin) && context.region.contains(ray.point_at(h.t)) {
             return hit;
         }
         end = h.t;
     }
     let mut first = None;
+    // `end` shrinks with every receiver that is met, so that the nearest one is left.
     for &r in &context.outside {
         if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, end) {
             (end, first) = (t, Some(r));

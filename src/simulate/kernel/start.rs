@@ -20,6 +20,7 @@ const REACHES: [f64; 4] = [1.0, 0.1, 0.01, 1e-3];
 pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     for reach in REACHES {
         let probe = Ray::new(ray.origin + normal * reach, -normal).with_range(0.0, 2.0 * reach);
+        // Where another face is met within a long probe, a shorter one does not reach that far.
         let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let mut point = probe.point_at(hit.t);
         if hit.face != face {
@@ -30,6 +31,7 @@ pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector,
             (point, hit) = (behind.point_at(next.t), next);
         }
         if hit.face == face {
+            // Drawn about the spline's normal, a grazing ray may point below the tilted facet that it starts from.
             let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
             let direction = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
             *ray = Ray::new(point, direction).with_departure(departure(&hit));

@@ -47,6 +47,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
         let mut ray = Ray::new(Point::ZERO, Vector::Z);
         let index = ((to - from) * k / PROBED_RAYS) as u32;
         let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);
+        // One start on a face decides for all: the rays of such a source must each be asked.
         if emission.from.is_none() && start_clear_of_faces(context, &ray).is_some() {
             return StartingMedia::OnFace;
         }
@@ -60,10 +61,12 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
             }
         }
         let media = media_at(context, &ray);
+        // Sources that straddle a boundary have rays in several media.
         if first.get_or_insert_with(|| media.clone()) != &media {
             return StartingMedia::PerRay;
         }
     }
+    // All probes agree: the others are taken to, and no ray pays for the search.
     StartingMedia::Same(first.unwrap_or_else(|| emitter.inside.clone()))
 }
 

@@ -26,6 +26,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     pub(super) fn step(&mut self, path: &mut Path<C>, ray: &mut Ray, hit: Option<&Hit>) -> bool {
         let context = self.context;
         let hit = clip_outside(context, path, ray, hit);
+        // Receivers that let light through count it, and the medium takes its part, before the surface gets what is left.
         self.cover_segment(path, ray, hit.map_or(ray.t_max, |h| h.t));
         let Some(hit) = hit else {
             if C::MEDIA && path.receiver == SCATTERS {
@@ -36,6 +37,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         };
         let point = ray.point_at(hit.t);
         path.length += hit.t;
+        // An intersector that answers nonsense costs its ray, not the run.
         let face = context.bound.faces.get(hit.face.index());
         let Some(&face) = face.filter(|_| hit.t.is_finite() && hit.normal.is_finite()) else {
             self.lose(path, ray, LostCause::NotANumber, Some(hit.face));
@@ -54,6 +56,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             at.face = partner.face;
             at.point = partner.point;
         }
+        // From inside an opaque solid nothing can be seen: the ray got in by a gap.
         if at.face.opaque_solid && !at.entering {
             self.record(path, at.point, Event::Lost);
             self.lose(path, ray, LostCause::InsideSolid, Some(at.hit.face));
@@ -108,6 +111,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Books what a surface does to the light of a path, and starts what goes on; false when the path ends.
     #[inline(always)]
     fn apply(&mut self, path: &mut Path<C>, ray: &mut Ray, at: &mut SurfaceInteraction<'_>) -> bool {
+        // What the surface does was decided without touching a count; here alone it is booked, so that no power is booked twice or not at
+        // all.
         let direction = match interact(self.context, path, ray, at) {
             Interaction::Absorb => {
                 self.record(path, at.point, Event::Absorbed);
@@ -125,6 +130,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 path.payload = payload;
                 Some(direction)
             }
+            // Nothing is absorbed and the path is not released: light in a block without end must be seen going round.
             Interaction::ReflectTotally { direction, payload } => {
                 self.record(path, at.point, Event::Reflected);
                 path.payload = payload;
@@ -165,9 +171,11 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if division.releases {
             path.release();
         }
+        // What the coating absorbs goes first: the shares that follow are of what is left.
         if division.kept < path.quanta {
             self.absorb_in_face(path, at.hit.face, division.kept);
         }
+        // Both ways are followed while that is worth it; below the floor one is drawn, without which a path would double for ever.
         let splits =
             settings.interfaces == Interfaces::Split && path.quanta > settings.split_floor * path.first_quanta;
         let reflects = if splits {
@@ -193,13 +201,16 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         at: &mut SurfaceInteraction<'_>,
         division: &Division<'_, C>,
     ) -> bool {
+        // Power is counted in whole quanta: the child gets a whole number and the rest stays, so that the sum is kept to the last one.
         let reflected = round_quanta(path.quanta * division.share);
         if reflected >= 1.0 && reflected < path.quanta {
+            // The branch number keys the child's random numbers: its stream is its own, whichever thread traces it and when.
             let mut child = Path { quanta: reflected, branch: path.split_branch(), ..*path };
             let mut child_ray = *ray;
             self.record(&child, at.point, Event::Split);
             let direction = division.reflect(self.context, &mut child, ray.direction, at);
             if self.leave_face(&mut child, &mut child_ray, at, direction) {
+                // Last in, first out, and before new rays: what a ray splits into is finished first, so that little waits.
                 self.pending.push((child, child_ray));
             }
             path.quanta -= reflected;
@@ -281,6 +292,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let context = self.context;
         if path.receiver != NO_RECEIVER {
             let point = ray.point_at(ray.t_max);
+            // Light that reaches a receiver while its payload is still inside a body came out by a gap.
             if C::MEDIA && has_left_by_opening(context, &path.payload, ray, point) {
                 self.record(path, point, Event::Lost);
                 return self.lose(path, ray, LostCause::NoExit, None);
@@ -291,6 +303,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             return;
         }
         if C::MEDIA && path.payload.body() != AMBIENT {
+            // To leave the scene inside a medium is possible for an error of crossing alone: if that can be mended, the light escapes.
             match recover_media(context, &path.payload, ray, f64::INFINITY, false) {
                 Some(recovered) if recovered.body() == AMBIENT => path.payload = recovered,
                 _ => {

@@ -60,6 +60,7 @@ fn interface<'s, C: RayPayload>(
         Err(cause) => return Interaction::Lose(cause),
     };
     let (here, there) = (payload.body(), across.body());
+    // The innermost body stays the same: the face is that of a body which lies around it. Light goes on as if nothing were there.
     if here == there {
         at.overlap = overlapping_bodies(context, &payload, at);
         return Interaction::Pass { payload: across };
@@ -67,6 +68,7 @@ fn interface<'s, C: RayPayload>(
     let eta = context.index(here, &payload) / context.index(there, &payload);
     let d = ray.direction;
     let (normal, cos_i, transmitted) = refracted(d, eta, at);
+    // Total reflection: no light is on the other side, so `across` is dropped.
     let Some((transmitted, cos_t)) = transmitted else {
         if path.is_trapped_in(context, here) {
             return Interaction::Trap;
@@ -120,6 +122,7 @@ fn coating<'s, C: RayPayload>(
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
     let here = path.payload.body();
+    // What lets nothing through needs no medium behind it, so that mirrors may be open sheets.
     let transmits = C::MEDIA && at.face.body != AMBIENT && !coated.opaque;
     let crossing = if transmits {
         cross(context, path.payload, ray, at)
@@ -137,6 +140,7 @@ fn coating<'s, C: RayPayload>(
     let wavelength = payload.wavelength().unwrap_or(context.bound.light.wavelength);
     let split = coated.coating.split(cos_i, n1, n2, wavelength);
     let mut shares = [split.reflected.unpolarised(), split.transmitted.unpolarised()];
+    // For polarised light the shares depend on its state: Mueller matrices give them and the state after.
     let mut matrices = None;
     if payload.stokes_mut().is_some() {
         let m = mueller(&coated.coating, &split, cos_i, n1, n2);
@@ -145,10 +149,12 @@ fn coating<'s, C: RayPayload>(
     }
     // What is neither reflected nor transmitted is absorbed.
     let total = (shares[0] + shares[1]).min(1.0);
+    // In quanta, as below one nothing is left to go on.
     let kept = round_quanta(path.quanta * total);
     if kept == 0.0 {
         return Interaction::Absorb;
     }
+    // Beyond the critical angle no direction is left for what the coating would transmit: `split` has added it to what is reflected.
     let share = if transmitted.is_some() { shares[0] / (shares[0] + shares[1]) } else { 1.0 };
     let transmitted = transmitted.map_or(d, |(t, _)| t);
     let scatter = coated.scatter.as_ref();

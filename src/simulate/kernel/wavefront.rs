@@ -86,6 +86,7 @@ impl<C: RayPayload> Wavefront<C> {
             }
             taken += 1;
         }
+        // From the back: `swap_remove` fills a hole with the last path, which must not be one that goes too.
         for &i in self.ended[taken..].iter().rev() {
             self.paths.swap_remove(i as usize);
             self.rays.swap_remove(i as usize);

@@ -97,6 +97,7 @@ impl Piece {
         let own = |i: usize| tolerance(samples[i], p[(i + 1).min(steps)] - p[i.saturating_sub(1)]);
         let last = steps / TOLERANCE_EVERY;
         let tolerances: Vec<f64> = (0..=last).map(|k| own(TOLERANCE_EVERY * k)).collect();
+        // A chord of length h over curvature κ sags by κh²/8: at tolerance ξ there are √(κ/8ξ) chords to a millimetre.
         let density = |i: usize| {
             let (k, f) = (i / TOLERANCE_EVERY, (i % TOLERANCE_EVERY) as f64 / TOLERANCE_EVERY as f64);
             let xi = tolerances[k] + (tolerances[(k + 1).min(last)] - tolerances[k]) * f;
@@ -104,6 +105,7 @@ impl Piece {
         };
         let d: Vec<f64> = (0..=steps).map(density).collect();
         let mut chords = vec![0.0];
+        // Their number up to each sample, by the trapezoidal rule.
         for i in 0..steps {
             chords.push(chords[i] + 0.5 * (d[i] + d[i + 1]) * (p[i + 1] - p[i]).length());
         }

@@ -148,6 +148,7 @@ pub(in crate::tessellate) fn build(
         for v in &mut polygon {
             v.uv = surface.spline.clamp(v.uv);
         }
+        // Uses without length leave their vertex twice.
         polygon.dedup_by(|b, a| a.uv == b.uv && a.position == b.position);
         if polygon.len() > 1 && polygon[0].uv == polygon[polygon.len() - 1].uv {
             polygon.pop();

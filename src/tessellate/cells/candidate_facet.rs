@@ -23,6 +23,7 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
     let mut worst = 0f64;
     let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
     for [i, j, k] in [[0, 1, 2], [0, 2, 3]] {
+        // First the quick look, which decides most; inside and sides one by one only where it does not.
         match prover.facet_bound([c[i].0, c[j].0, c[k].0], [c[i].1, c[j].1, c[k].1], true, limit) {
             Some(bound) if bound > limit => return bound,
             Some(bound) => worst = worst.max(bound),

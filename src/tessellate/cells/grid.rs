@@ -86,6 +86,7 @@ pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivis
             *count += 1;
         }
     }
+    // A side that two facets share is inside; what is used once must be met by the transition.
     grid.outline = order.into_iter().filter(|name| uses[name] % 2 == 1).collect();
     grid
 }
@@ -316,6 +317,7 @@ impl CellFacets<'_, '_, '_, '_> {
     /// The triangulation of a polygon with the least sum of squared distances of its diagonals from the surface, in places of the
     /// polygon; by dynamic programming over its parts.
     fn best_triangulation(&self, polygon: &[u32]) -> Option<Vec<[usize; 3]>> {
+        // Triangulation of least weight by dynamic programming (Klincsek 1980): O(n³) for n corners, hence the limit.
         let n = polygon.len();
         if n > MAX_CORNERS {
             return None;
@@ -331,6 +333,7 @@ impl CellFacets<'_, '_, '_, '_> {
         for gap in 2..n {
             for i in 0..n - gap {
                 let j = i + gap;
+                // The side that closes the polygon is no diagonal.
                 let chord = if i == 0 && j == n - 1 { 0.0 } else { off(i, j).powi(2) };
                 cost[i][j] = f64::INFINITY;
                 for k in i + 1..j {

@@ -135,6 +135,7 @@ fn density(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
             let sag_across = c.abs() * width * width / (8.0 * xi);
             let left = if k * c > 0.0 { 1.0 - sag_across.min(MAX_SHARE_ACROSS) } else { 1.0 };
             let speed = if d == 0 { der.du } else { der.dv }.length();
+            // Sag κh²/8 with h = speed × step, solved for steps to a unit of the parameter.
             *slot = slot.max((k.abs() / (8.0 * xi * left)).sqrt() * speed);
         }
     }

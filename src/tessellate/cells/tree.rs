@@ -165,6 +165,7 @@ impl Tree<'_, '_> {
             self.visit(branch, half(high));
             return;
         }
+        // Shared out beforehand: what a branch may use must not depend on which thread comes first.
         let budget = branch.budget / 2;
         let apart = |cell: Cell| {
             let mut branch = Branch::new(self, budget);

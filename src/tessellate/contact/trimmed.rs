@@ -58,6 +58,7 @@ impl<'m> TrimmedFace<'m> {
         };
         let border = out.vertices().map(|v| out.place_of(v, mesh));
         let (lo, hi) = out.polygons.bounds();
+        // Middles of a grid's cells: none lies on the border, whose vertices are samples already.
         let step = |k: usize| (k as f64 + 0.5) / GRID as f64;
         let grid = (0..GRID * GRID).map(|k| lo + Uv::new(step(k / GRID), step(k % GRID)) * (hi - lo));
         let inside = grid.filter(|&uv| out.contains(uv)).map(|uv| out.surface.point(uv));

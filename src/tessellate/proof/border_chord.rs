@@ -107,6 +107,7 @@ impl BorderChord {
 /// clearly small.
 fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
     let mut piece = curve.restricted_points(a, b);
+    // Distance to a segment is a convex function: over the hull it is largest at a control point.
     let away =
         |points: &[Homogeneous]| points.iter().map(|p| distance_to_chord(p.project(), chord)).fold(0.0, f64::max);
     let n = curve.degree;

@@ -8,6 +8,7 @@ type Polygon = SmallVec<[Uv; 8]>;
 /// The part of a segment or convex polygon inside a rectangle.
 pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
     let mut now: Polygon = uv.into();
+    // Sutherland & Hodgman 1974: one side of the rectangle after the other.
     let closed = uv.len() > 2;
     for d in 0..2 {
         for (bound, sign) in [(rectangle[d][0], 1.0), (rectangle[d][1], -1.0)] {
@@ -25,6 +26,7 @@ pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygo
                 let q = now[(i + 1) % n];
                 if inside(p) != inside(q) {
                     let mut x = p.lerp(q, (bound - p[d]) / (q[d] - p[d]));
+                    // Exactly on the side, where interpolation would round beside it.
                     x[d] = bound;
                     next.push(x);
                 }

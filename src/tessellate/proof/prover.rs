@@ -207,6 +207,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         let limit = limit - off;
         let n = patch.degree[0] + patch.degree[1];
         let low = patch.degree.iter().all(|d| (1..=MAX_HALVED).contains(d));
+        // Half of a rectangle, as most facets are, has coefficients with fixed weights; any other triangle is expanded.
         let (net, xyz) = match right_angle(&at).filter(|_| low) {
             Some((r, corner)) => {
                 let turned = [0, 1, 2].map(|k| xyz[(k + r) % 3]);
@@ -226,6 +227,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         for k in 0..3 {
             let chord = [xyz[k], xyz[(k + 1) % 3]];
             // Places in the net's order of the coefficients along a side.
+            // Coefficients stand in rows of a triangle, row m from m(m+1)/2 on: its sides are the first and the last of each row, and the
+            // last row.
             let row = (0..=n).map(|m| match k {
                 0 => m * (m + 1) / 2,
                 1 => n * (n + 1) / 2 + m,

@@ -53,6 +53,7 @@ pub(super) fn refine<const N: usize>(
     if let Some(bound) = scalar.bound_within::<N>(limit) {
         return bound;
     }
+    // What could not be shown is given back as it is: above the limit, and so not proved.
     if levels == 0 {
         return bound;
     }
@@ -65,6 +66,7 @@ pub(super) fn refine<const N: usize>(
         let m = 0.5 * (at[0] + at[1]);
         let _ = take([at[0], m].as_slice().try_into().expect("two"))
             || take([m, at[1]].as_slice().try_into().expect("two"));
+    // Four triangles by the middles of the sides; one above the limit is enough to give up.
     } else {
         let (a, b, c) = (0.5 * (at[0] + at[1]), 0.5 * (at[1] + at[2]), 0.5 * (at[2] + at[0]));
         let subs = [[a, b, c], [at[0], a, c], [a, at[1], b], [c, b, at[2]]];

@@ -68,12 +68,14 @@ impl ScalarBezier {
         let mut most = f64::NEG_INFINITY;
         while let Some(depth) = depths.pop() {
             let start = self.stack.len() - size;
+            // A polynomial in Bernstein form is at most its largest coefficient.
             let worst = self.stack[start..].iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
             if worst <= 0.0 {
                 most = most.max(worst);
                 self.stack.truncate(start);
                 continue;
             }
+            // Coefficients at corners are values: a positive one shows that the limit is passed, and no halving helps.
             if depth == 0 || self.largest_value_taken::<N>(start) > 0.0 {
                 return None;
             }
@@ -84,6 +86,7 @@ impl ScalarBezier {
             }
             depths.extend([depth - 1, depth - 1]);
         }
+        // From W·(d − limit) ≤ most < 0 follows d ≤ limit + most/W, and W is at most its largest coefficient.
         Some(limit + most / heaviest)
     }
 

@@ -40,6 +40,7 @@ impl ScalarPatch {
                 return None;
             }
             *left = left.checked_sub(1)?;
+            // Halving helps most across the direction in which the coefficients bend most.
             let bend = |i: usize, step: usize| (net[i + 2 * step] - 2.0 * net[i + step] + net[i]).abs();
             let along_u = (0..size.saturating_sub(2 * (q + 1))).map(|i| bend(i, q + 1)).fold(0.0, f64::max);
             let rows = (0..=p).flat_map(|i| (0..q.saturating_sub(1)).map(move |j| i * (q + 1) + j));
@@ -48,6 +49,7 @@ impl ScalarPatch {
             let (low, high) = self.stack[start..].split_at_mut(size);
             halve_net(low, high, [p, q], if along_u >= along_v { 0 } else { 1 });
         }
+        // As in `ScalarBezier::bound_within`: dividing by the largest weight is on the safe side, for `most` is not positive.
         Some(limit + most / heaviest)
     }
 }

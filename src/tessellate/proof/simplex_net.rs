@@ -126,6 +126,7 @@ impl SimplexNets {
             }
         }
         self.columns.clear();
+        // The blossom in u alone, column by column: each becomes a net over the corners.
         for j in 0..=q {
             for i in 0..=p {
                 self.work[0][i * one] = patch.points[i * (q + 1) + j];
@@ -133,6 +134,7 @@ impl SimplexNets {
             let last = de_casteljau::<N>(&mut self.work, p, 0, u, one);
             self.columns.extend_from_slice(&self.work[last][..one]);
         }
+        // Then in v, on top of it: the columns are the coefficients of a polynomial in v, and the degrees add up.
         for (column, to) in self.columns.chunks_exact(one).zip(self.work[0].chunks_exact_mut(all)) {
             to[..one].copy_from_slice(column);
         }

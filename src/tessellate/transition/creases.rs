@@ -21,6 +21,7 @@ pub(in crate::tessellate) fn crease_lines(
     used.sort_unstable();
     used.dedup();
     let uv = |n: u32| nodes[n].uv;
+    // Even–odd over what bounds the transition.
     let is_inside = |p: Uv| segments.iter().filter(|s| crosses_ray_from(p, s.map(uv))).count() % 2 == 1;
     for d in 0..2 {
         for &crease in &surface.sharp[d] {

@@ -71,6 +71,7 @@ pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usiz
             matching.fixed[t] = candidates[c].cosine.is_none();
         }
     }
+    // By Berge's theorem a matching is largest when no path leads from one free triangle to another by turns over free and chosen pairs.
     for start in 0..triangles {
         if matching.pair[start].is_none()
             && let Some((triangle, last)) = matching.path_from(start)
@@ -99,6 +100,7 @@ impl Matching<'_> {
             let open: Vec<usize> = self.of.of(t).collect();
             for c in open {
                 let a = self.other(c, t);
+                // Marked by the start, so that nothing has to be cleared between searches.
                 if self.fixed[a] || self.reached[a] == Some(start) {
                     continue;
                 }

@@ -48,6 +48,7 @@ pub(in crate::tessellate) fn pair_triangles(
     for c in augment(&candidates, t.len(), &chosen) {
         let Candidate { cosine, triangles: [i, j], corners } = candidates[c];
         (taken[i], taken[j]) = (true, true);
+        // A quad is traced as its two triangles: what is proved of both holds for it.
         let bound = t[i].bound.max(t[j].bound);
         let tolerance = t[i].tolerance.min(t[j].tolerance);
         if cosine.is_some() {

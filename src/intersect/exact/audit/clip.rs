@@ -104,6 +104,8 @@ impl<'a> PatchClipping<'a> {
             if piece.net.misses(self.rounding) {
                 continue;
             }
+            // Out of work: what is left lies no nearer than its nearest control point, and the caller learns from where on nothing is
+            // known.
             if steps > STEPS {
                 exhausted = exhausted.min(piece.net.nearest());
                 continue;

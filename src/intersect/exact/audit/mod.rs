@@ -240,20 +240,24 @@ fn above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
     let at = |p: &DVec3| p.truncate() / p.z;
     let (first, last) = (at(&points[0]), at(&points[points.len() - 1]));
     let (lo, hi) = hull_corners(points);
+    // A half-line upward misses what lies to one side of it or below its start.
     if q.x < lo.x || q.x >= hi.x || q.y > hi.y {
         return 0;
     }
+    // Half open in u, so that the joint of two pieces counts for one of them alone.
     let spans = u32::from((first.x <= q.x) != (last.x <= q.x));
     if q.y < lo.y {
         // All of it lies above: only the ends count.
         return spans;
     }
+    // So short that its chord stands for it.
     if depth > DEEPEST_TRIM || points.len() == 2 {
         let v = first.y + (last.y - first.y) * (q.x - first.x) / (last.x - first.x);
         return if v > q.y { spans } else { 0 };
     }
     let n = points.len() - 1;
     let (mut low, mut w) = (Vec::with_capacity(n + 1), points.to_vec());
+    // De Casteljau at one half: the first entry of every row is the lower half's net, what remains in `w` the upper one's.
     for r in 0..=n {
         low.push(w[0]);
         for k in 0..n - r {

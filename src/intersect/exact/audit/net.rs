@@ -70,6 +70,8 @@ impl Net {
             flat(p, 0) - flat(0, 0) + flat(p, q) - flat(0, q)
         };
         let Some(normal) = along.perp().try_normalize() else { return Some([0.0, 1.0]) };
+        // Bézier clipping (Nishita, Sederberg & Kakimoto 1990): a distance is a polynomial in Bernstein form, whose graph lies in the
+        // hull of its control points at k/n. Weights are positive, so that they change no sign and need no division.
         let n = self.degree[direction];
         // Lowest and highest distance at each station.
         let stations: SmallVec<[DVec3; 8]> = (0..=n)
@@ -88,6 +90,7 @@ impl Net {
             if s.y <= 0.0 && s.z >= 0.0 {
                 (first, last) = (first.min(s.x), last.max(s.x));
             }
+            // The hull's edges are among the lines between two of its points, and the other lines lie within it.
             for r in &stations[k + 1..] {
                 for (a, b) in [(s.y, r.y), (s.y, r.z), (s.z, r.y), (s.z, r.z)] {
                     if (a < 0.0) != (b < 0.0) {

@@ -43,6 +43,8 @@ pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
         (det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs()))
             .then(|| [[d / det, -b / det], [-c / det, a / det]])
     };
+    // With Y the inverse of the middle Jacobian, ‖I − Y·J‖ < 1 all over the box makes p ↦ Y·f(p) one-to-one on it: no second root can be
+    // there (the test of Krawczyk and Moore).
     let y = inverse(middle)?;
     let deviates =
         |r: usize| (0..2).map(|c| y[r][0].abs() * radius[0][c] + y[r][1].abs() * radius[1][c]).sum::<f64>();
@@ -52,6 +54,7 @@ pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let unit = [[0.0, 1.0]; 2];
     let patch = BezierPatch { degree: patch.degree, points: patch.points.to_vec(), domain: unit };
     let mut at = Uv::splat(0.5);
+    // On its way Newton's method may leave the box a little; its root counts only inside.
     for _ in 0..20 {
         let [s, su, sv] = patch.homogeneous(at);
         let j = inverse([[su.x, sv.x], [su.y, sv.y]])?;
