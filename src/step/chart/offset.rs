@@ -28,6 +28,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         }
         Kind::Cone { frame, radius, half_angle } => {
             let (frame, half_angle) = (*frame, *half_angle);
+            // Seen across the axis a step along the tilted normal is longer by 1/cos.
             let radius = radius + distance / half_angle.cos();
             if !(radius > 0.0) {
                 return None;
@@ -258,6 +259,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
         let mut error = 0f64;
         for u in lines[0].at.windows(2) {
             for v in lines[1].at.windows(2) {
+                // The error of Hermite interpolation goes with t²(1 − t)²: it is largest in the middle of a cell.
                 let uv = Uv::new(0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]));
                 let (p, ..) = first_order(basis, distance, uv)?;
                 error = error.max((surface.evaluate(uv) - p).length());

@@ -195,6 +195,7 @@ impl SplineChart {
         let middle = Uv::new(0.5 * (domain[0][0] + domain[0][1]), 0.5 * (domain[1][0] + domain[1][1]));
         let mut best = known.unwrap_or((middle, f64::INFINITY));
         for (tried, (bound, i)) in order.into_iter().enumerate() {
+            // What lies in a farther box is farther.
             if bound >= best.1 || best.1 < EXACT_FOOT_MM || tried > MAX_PATCHES_SEARCHED {
                 break;
             }

@@ -95,6 +95,7 @@ impl Chart {
                 self.period[0] = Some(TURN);
                 self.size = radius.abs().max(1.0);
                 if *half_angle != 0.0 {
+                    // The apex, where the radius has shrunk to nothing.
                     let at = -radius / half_angle.tan();
                     self.poles.push(Pole { fixed: 1, at, point: frame.point(Point::new(0.0, 0.0, at)) });
                 }

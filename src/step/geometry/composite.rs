@@ -43,6 +43,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         let sense = args.flag(3) != Some(false);
         let by_point = args.word(4) == Some("CARTESIAN");
+        // Conics are parametrised by angles, which files give in a unit of their own.
         let scale = match &shape {
             CurveShape::Ellipse { .. } => self.units.angle,
             _ => 1.0,
@@ -50,12 +51,14 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let limit = |list: Args<'f, 'a>| -> Option<f64> {
             let point = || (0..list.len()).find_map(|i| self.point(list.id(i)?).ok()).map(|p| shape.parameter(p));
             let number = || (0..list.len()).find_map(|i| list.real(i)).map(|x| x * scale);
+            // The file says which of its two trimming values it means; writers that give only the other are understood too.
             if by_point { point().or_else(number) } else { number().or_else(point) }
         };
         let (Some(t1), Some(t2)) = (limit(args.list(1)), limit(args.list(2))) else {
             return Err(Refusal::new(e, "a trimming value is missing"));
         };
         let (from, mut to) = if sense { (t1, t2) } else { (t2, t1) };
+        // On a closed curve the second end lies ahead of the first; both in one place mean once around.
         if let Some(period) = shape.period() {
             to = from + (to - from).rem_euclid(period);
             if to - from <= SEAM_SHARE * period {
@@ -138,6 +141,7 @@ fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
         while piece.len() <= degree {
             let n = piece.len();
             let mut up = vec![piece[0]];
+            // Degree elevation: the new points divide the legs of the polygon at i/n.
             up.extend(
                 (1..n).map(|i| piece[i - 1] * (i as f64 / n as f64) + piece[i] * (1.0 - i as f64 / n as f64)),
             );

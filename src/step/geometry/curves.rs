@@ -74,6 +74,7 @@ impl CurveShape {
                 Curve::line(*origin + t0 * *direction, *origin + t1 * *direction, [t0, t1])
             }
             Self::Ellipse { frame, a, b } => {
+                // A rational spline goes along with an affine map: the ellipse is the image of a circle's arc.
                 let unit = conic::arc(&Frame::IDENTITY, 1.0, [t0, t1]);
                 map_points(unit, |q| frame.point(Point::new(a * q.x, b * q.y, 0.0)))
             }
@@ -323,6 +324,7 @@ impl KnotForm {
         }
         let inner = points - degree;
         Some(match self {
+            // ( => From −degree on, so that the domain begins at zero (ISO 10303-42, uniform_curve).
             Self::Uniform => (0..points + degree + 1).map(|i| i as f64 - degree as f64).collect(),
             Self::QuasiUniform => {
                 let ends = |x: f64| std::iter::repeat_n(x, degree);

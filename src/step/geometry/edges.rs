@@ -71,6 +71,7 @@ pub(crate) fn trim_to_vertices(
     sense: bool,
 ) -> Option<TrimmedEdge> {
     let shape = &directed.shape;
+    // The edge's sense is told against the curve as the file names it, which may be used backwards itself.
     let forward = sense != directed.reversed;
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));

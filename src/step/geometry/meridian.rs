@@ -40,6 +40,7 @@ fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     let sample = |i: i32| a + (b - a) * f64::from(i) / f64::from(SAMPLES);
     let far = (0..=SAMPLES).map(|i| at(sample(i)));
     let Some(far) = far.max_by(|p, q| p.x.hypot(p.y).total_cmp(&q.x.hypot(q.y))) else { return Vec::new() };
+    // Positive on the side of the farthest point, negative beyond the axis.
     let side = |t: f64| {
         let p = at(t);
         far.x * p.x + far.y * p.y

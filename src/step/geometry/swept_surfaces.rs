@@ -27,6 +27,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return Ok((curve, None));
         }
         let directed = self.curve(id, depth + 1)?;
+        // A line has no ends: as much of it is taken as the face can reach, with room, since more would only make the surface larger.
         let around = |t: f64, speed: f64| {
             let reach = REACH_MARGIN * radius.max(SMALLEST_REACH_MM) / speed;
             directed.shape.segment(t - reach, t + reach)
@@ -40,6 +41,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             CurveShape::Ellipse { .. } => directed.shape.segment(0.0, 2.0 * PI),
             CurveShape::Hyperbola { a, b, .. } => {
                 let t = directed.shape.parameter(center);
+                // Both ends out of reach: distance grows with sinh t along a hyperbola, with t² along a parabola.
                 let reach = (1.0 + 2.0 * radius / a.min(*b)).asinh() + t.abs();
                 directed.shape.segment(-reach, reach)
             }

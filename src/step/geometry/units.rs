@@ -53,6 +53,7 @@ pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
     if let Some(args) = context.attributes("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", 2) {
         let list = args.list(0);
         let values = (0..list.len()).filter_map(|i| list.entity(i));
+        // The smallest of several is the one that all shapes keep.
         let lengths = values.filter_map(|m| m.all_args().find_map(|a| a.real(0))).filter(|&x| x > 0.0);
         assigned.units.accuracy = lengths.reduce(f64::min).map(|x| x * assigned.units.length);
     }
@@ -82,6 +83,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
     } else {
         None
     };
+    // The file's own definition counts; a name is asked only where it has none.
     let by_measure = || {
         let with_unit = conversion.entity(1)?;
         let args = with_unit

@@ -42,6 +42,7 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
     if digits == 0 {
         return None;
     }
+    // FORTRAN's `D`, which Part 21 does not know, is read too.
     if matches!(source.get(i), Some(b'E' | b'e' | b'D' | b'd')) {
         let mut j = i + 1;
         let minus = source.get(j) == Some(&b'-');
@@ -66,6 +67,8 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
     {
         return Some((Value::Integer(if negative { -x } else { x }), i));
     }
+    // Both are exact in double precision below 2⁵³ and 10²², so that one rounding is left: the nearest number (Clinger 1990). Else the
+    // standard library reads it.
     let magnitude = if exact && mantissa < 1 << 53 && exponent.unsigned_abs() <= 22 {
         let power = POWERS[exponent.unsigned_abs() as usize];
         if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power }

@@ -14,6 +14,7 @@ const MAX_FAULTS: usize = 100;
 
 /// Parses a whole file. Fails only when the bytes are no Part 21 file at all.
 pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
+    // Places are kept as 32 bits, which halves the size of the tables.
     if u32::try_from(source.len()).is_err() {
         return Err(Error::new(ErrorKind::TooLarge { file: name.into() }));
     }
@@ -58,6 +59,8 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
 fn index(instances: &[Instance]) -> (Index, Vec<usize>) {
     let largest = instances.iter().map(|i| i.id).fold(0, u64::max);
     let mut repeated = Vec::new();
+    // Writers number nearly without gaps: a table is smaller and quicker than a map then. One number of 10¹⁸ must not make a table of
+    // that size.
     if largest <= 4 * instances.len() as u64 + 1024 {
         let mut table = vec![0; largest as usize + 1];
         for (k, i) in instances.iter().enumerate() {
@@ -115,6 +118,7 @@ impl Parser<'_> {
                     let (values, records, typed) = (self.values.len(), self.records.len(), self.typed.len());
                     let mut id = None;
                     if let Err(what) = self.instance(&mut id) {
+                        // Of a damaged instance nothing stays; reading goes on behind it.
                         self.values.truncate(values);
                         self.records.truncate(records);
                         self.typed.truncate(typed);
@@ -124,6 +128,7 @@ impl Parser<'_> {
                 c if c.is_ascii_alphabetic() => {
                     let keyword = self.identifier();
                     marked |= &self.source[keyword.range()] == b"ISO-10303-21";
+                    // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
                     }
@@ -300,6 +305,7 @@ impl Parser<'_> {
             return Err("lists are nested too deeply");
         }
         self.at += 1;
+        // Values wait on a stack until their list is whole, so that lists inside it do not tear it apart.
         let base = self.stack.len();
         loop {
             match self.peek() {
@@ -335,6 +341,7 @@ impl Parser<'_> {
                 self.at += 1;
                 Value::Derived
             }
+            // `.5` is a number, `.T.` an enumeration.
             b'.' if !self.source.get(self.at + 1).is_some_and(u8::is_ascii_digit) => {
                 self.at += 1;
                 let name = self.identifier();

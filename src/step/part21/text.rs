@@ -43,6 +43,7 @@ fn escape(rest: &[u8]) -> Option<(String, usize)> {
     if rest.starts_with(b"\\S\\") {
         return rest.get(3).map(|&b| (char::from(b | 0x80).to_string(), 4));
     }
+    // The choice of a page of ISO 8859: `\S\` is read by the first of them, Latin-1, whatever it says.
     if rest.starts_with(b"\\P") && rest.get(3) == Some(&b'\\') {
         return Some((String::new(), 4));
     }

@@ -96,6 +96,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             aspects: FxHashMap::default(),
             by_products: FxHashSet::default(),
         };
+        // Read last: both kinds of relations point to shapes and usages that may stand anywhere in the file.
         let mut contextual = Vec::new();
         let mut relations = Vec::new();
         for e in file.entities() {
@@ -302,7 +303,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         for representation in self.shapes.get(&definition).cloned().into_iter().flatten() {
             self.place_representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
         }
-        // Taken out while its children are placed: `path` keeps a product from coming back to itself before they are.
+        // Taken out while its children are placed; nothing asks for it meanwhile, for `path` stops a product inside itself.
         if let Some(usages) = self.usages.remove(&definition) {
             for usage in &usages {
                 let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
@@ -323,6 +324,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         owners: &[u64],
     ) {
         self.visited += 1;
+        // A few lines can name a million instances: the limit is on visits, not on depth alone.
         let exhausted = self.visited > self.limit || path.len() >= MAX_DEPTH;
         if exhausted || path.contains(&id) || self.by_products.contains(&id) {
             return;
@@ -365,6 +367,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 continue;
             };
             let inner = [owners, &[item]].concat();
+            // The origin of the mapped representation comes to lie on the target.
             let at = placement.compose(&target.compose(&origin.inverse()));
             self.place_representation(to, at, (name, product), path, &inner);
         }

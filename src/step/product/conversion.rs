@@ -61,6 +61,7 @@ pub(crate) fn convert(
     let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
     let (keys, index) = number_edges(in_order);
 
+    // Each edge once: faces that share one must get the same bits, or they would not join.
     let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
     let convert_one = |id: &u64| {
         let plan = plans[id].as_ref().map_err(Refusal::clone);
@@ -267,6 +268,7 @@ fn face_edges<'e>(
             kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
         }
         let lengths = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
+        // Shorter than the loop's shortest edge, so that no edge can be taken for a gap.
         let tolerance = (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(ACCURACY_MM[0]);
         found.repairs.extend(put_in_order(&mut kept, tolerance));
         if !kept.is_empty() {
@@ -292,6 +294,7 @@ fn convert_face(
     settings: &Settings,
 ) -> Outcome<BuiltFace> {
     let entity = geometry.entity(id)?;
+    // What is refused is the face; what is wrong may be an edge far below it.
     let blame = |r: &Refusal| Refusal {
         id,
         entity: entity.name(),

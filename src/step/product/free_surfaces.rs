@@ -100,6 +100,7 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
             let range = trim_rectangle(geometry, e, &chart)?;
             for d in 0..2 {
                 let [a, b] = range[d];
+                // A rectangle of less than a period is open there, and poles count where it ends at them.
                 if chart.period[d].is_none_or(|p| b - a < p * (1.0 - PERIOD_SLACK)) {
                     chart.period[d] = None;
                     chart.poles.retain(|pole| pole.fixed != d || pole.at == a || pole.at == b);

@@ -40,6 +40,7 @@ pub(crate) fn add_face(
     known.sort();
     known.dedup();
     let near = SEAM_END_MM + GAPS * built.gap.min(LARGEST_GAP_MM);
+    // A seam ends at vertices of the face, or shells would have a crack there.
     let seams: Vec<EdgeId> = built
         .seams
         .into_iter()

@@ -34,6 +34,7 @@ pub(super) fn convert_recipes(
                 let numbers = add_edges(edges, part);
                 let faces: Vec<Face> = built
                     .into_iter()
+                    // The file names the solid; its faces have no entities.
                     .map(|b| Face { entity: None, ..add_face(b, id, name.clone(), part, &numbers, styles) })
                     .collect();
                 part.shells.push(Shell {

@@ -85,6 +85,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             size.ok_or_else(|| Refusal::new(e, "a size is not positive"))
         };
         let frame = |a: Args<'f, 'a>| self.placement(self.resolve(e, a.id(0), "position")?.id);
+        // Closed surfaces need no edges: no loop means all of it.
         let whole = |kind: Kind, analytic: Analytic| SolidRecipe {
             edges: Vec::new(),
             faces: vec![RecipeFace { chart: Chart::new(kind, analytic), same_sense: true, loops: Vec::new() }],
@@ -118,6 +119,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let top =
                 self.length(a, 4).filter(|t| *t >= 0.0).ok_or_else(|| Refusal::new(e, "its ltx is negative"))?;
             let corners = [[0.0, 0.0], [x, 0.0], [top, y], [0.0, y]];
+            // With ltx zero the wedge is a prism over a triangle; an edge without length would be refused.
             let corners = if top > 0.0 { &corners[..] } else { &[[0.0, 0.0], [x, 0.0], [0.0, y]] };
             return swept(polygon(&frame, corners), frame.z * z);
         }
@@ -143,6 +145,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let corners = [place(0.0, 0.0), place(radius, 0.0), place(wide, height), place(0.0, height)];
             let sides = (0..4).map(|k| (corners[k], corners[(k + 1) % 4])).filter(|(p, q)| p != q);
             let sides = sides.map(|(p, q)| Curve::line(p, q, [0.0, 1.0])).collect();
+            // The half profile in the plane of x and z, turned about z; with a tip at one end its edge there has no length and is left
+            // out.
             let profile = Profile { normal: -frame.y, loops: vec![sides] };
             return revolve(profile, &frame, TAU).ok_or_else(|| unsupported(e));
         }
@@ -248,6 +252,7 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
         let bottom: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
         let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(moved(c, |p| p + by))).collect();
         let start = |c: &Curve| c.evaluate(c.domain()[0]);
+        // The edges from the corners of the profile up: each is shared by two sides.
         let posts: Vec<usize> =
             curves.iter().map(|c| solid.add_edge(Curve::line(start(c), start(c) + by, [0.0, 1.0]))).collect();
         for (k, curve) in curves.iter().enumerate() {

@@ -88,6 +88,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let [Some(a), Some(b), Some(c)] = found else {
                 return Err(Refusal::new(e, "a triangle refers to a point that is not in the list"));
             };
+            // A triangle without an area shades nothing and has no normal to give.
             let Some(flat) = (b.1 - a.1).cross(c.1 - a.1).try_normalize() else { continue };
             let first = mesh.vertices.len() as u32;
             for ((row, p), local) in [a, b, c].into_iter().zip(triangle) {

@@ -254,6 +254,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
             .unwrap_or_else(|| bound.args());
         let Some(edges) = a.entity(0).map(|l| edge_loop(l)).transpose()? else { continue };
         let mut edges = edges;
+        // A bound against its loop is run backwards: order and senses turn both.
         if a.flag(1) == Some(false) {
             edges.reverse();
             edges.iter_mut().for_each(|x| x.1 = !x.1);

@@ -26,6 +26,7 @@ pub(crate) fn bound_region(
 ) -> Result<Boundary, &'static str> {
     chains.retain(|c| !c.pieces.is_empty());
     let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
+    // In the unwrapped plane a loop around a closed surface ends whole periods from its start: alone it bounds no region.
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // Loops without extent: a vertex, or an edge run forth and back.
     let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
@@ -53,6 +54,7 @@ pub(crate) fn bound_region(
         }
         _ => return Err("more than two loops wind around the surface"),
     };
+    // Material lies on the left, so an outer loop runs counter-clockwise.
     if signed_area(&outer.polygon()) < 0.0 {
         outer.reverse();
         out.repairs.push("the loops ran against the face's orientation");
@@ -168,6 +170,7 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
     };
     let bottom = side(1, v0, corner[0], corner[1]);
     let right = side(0, u1, corner[1], corner[2]);
+    // Where the surface is closed, opposite sides are one seam run both ways.
     let top = if chart.period[1].is_some() { bottom } else { side(1, v1, corner[3], corner[2]) };
     let left = if chart.period[0].is_some() { right } else { side(0, u0, corner[0], corner[3]) };
     let piece = |source: Source, a: Uv, b: Uv, reversed: bool| Piece {
@@ -196,6 +199,7 @@ fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64
         spans.push((start, start + (hi - lo)));
     }
     spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // What reaches over the end of the period lies at its start too.
     let mut end = spans.iter().map(|s| s.1 - period).fold(f64::NEG_INFINITY, f64::max);
     let mut best = (0.0, 0.0);
     for &(a, b) in &spans {

@@ -90,6 +90,7 @@ impl Target<'_> {
             let (t1, t2) = (t + step, t + 2.0 * step);
             let second = (self.locate)(t2, piece.evaluate(t2), hint);
             let first = (self.locate)(t1, piece.evaluate(t1), Some(second));
+            // At the pole itself one parameter means nothing: it goes on from two places inside.
             let slope = (second - first) / step;
             let mut uv = first * 2.0 - second;
             for d in 0..2 {
@@ -104,9 +105,11 @@ impl Target<'_> {
         let miss = (s.point - d.point).length();
         let det = e * g - f * f;
         if det > PARALLEL_DERIVATIVES * e * g && det.is_normal() {
+            // The curve's tangent in terms of Su and Sv, by least squares: what it is across the surface is the file's own gap.
             let (x, y) = (s.du.dot(d.first), s.dv.dot(d.first));
             return Ok(Node { t, uv, slope: Uv::new((x * g - y * f) / det, (y * e - x * f) / det), miss });
         }
+        // Parallel derivatives give no slope; neighbouring feet do.
         let step = DIFFERENCE_STEP * (b - a) * inward;
         let beside = (self.locate)(t + step, piece.evaluate(t + step), Some(uv));
         Ok(Node { t, uv, slope: (beside - uv) / step, miss })
@@ -270,6 +273,7 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
     let mut knots = vec![first.t; 4];
     let mut points = vec![UvCurve::line(first.uv, last.uv, [0.0, 1.0]).points[0]];
     for (i, (a, b)) in pieces.iter().enumerate() {
+        // From Hermite to Bézier: inner control points lie a third of the step along the slopes.
         let third = (b.t - a.t) / 3.0;
         points.push((a.uv + a.slope * third).extend(1.0));
         points.push((b.uv - b.slope * third).extend(1.0));
@@ -285,6 +289,7 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
                 if !smooth {
                     points.push(b.uv.extend(1.0));
                 }
+                // A double knot keeps a cubic C¹, and its joint is no control point; a triple one allows a corner.
                 knots.extend(std::iter::repeat_n(b.t, if smooth { 2 } else { 3 }));
             }
         }

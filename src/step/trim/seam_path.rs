@@ -72,6 +72,7 @@ impl Obstacles<'_> {
         let mut nodes: Vec<Node> = starts.iter().map(|p| node(*p, 0.0)).collect();
         nodes.extend(corners.into_iter().map(|p| node(p, f64::INFINITY)));
         // Shortest complete way so far: its length, last node, goal and end.
+        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
         let mut best: Option<(f64, usize, usize, Uv)> = None;
         loop {
             let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
@@ -181,6 +182,7 @@ fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bo
             }
             let p = p + by;
             let q = q + by;
+            // Segments cross where each has the ends of the other on opposite sides.
             let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
             let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
             let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;

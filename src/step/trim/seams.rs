@@ -71,6 +71,7 @@ fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
     let p = region.parameters(a);
     let q = region.parameters(b);
     let extent = [0, 1].map(|d| (domain[d][1] - domain[d][0]).abs());
+    // Along a parameter line the seam is a curve of the spline itself, and so exact.
     for fixed in 0..2 {
         if (p[fixed] - q[fixed]).abs() > ISOLINE_SLACK * extent[fixed] {
             continue;

@@ -87,6 +87,7 @@ impl FaceTask<'_> {
 
     /// Turns the poles of a sphere away from the edges, unless the file cut it open itself.
     pub(super) fn turn_sphere(&mut self) {
+        // A sphere is a torus without a large radius.
         let Kind::Torus { frame, major: 0.0, .. } = self.chart.kind else { return };
         let mut count: FxHashMap<usize, usize> = FxHashMap::default();
         for &(edge, _) in self.loops.iter().flatten() {
