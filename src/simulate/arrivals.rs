@@ -16,11 +16,13 @@ const ROUNDING: f64 = 1e-9;
 pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {
     let Some(receiver) = bound.receivers.get(receiver) else { return Vec::new() };
     let emitted: f64 = results.paths.iter().filter(|v| v.event == Event::Emitted).map(|v| v.power).sum();
+    // The sample stands for all: what its paths emitted, scaled to what the run did.
     let share = results.power.emitted / emitted.max(f64::MIN_POSITIVE);
     let mut rays = Vec::new();
     for path in results.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
         for pair in path.windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
+            // Vertices may coincide, as where a path splits.
             let Some(direction) = (b.point - a.point).try_normalize() else { continue };
             if receiver.interactions.is_some_and(|n| n != b.bounce)
                 || receiver.absorbs && b.event != Event::Received

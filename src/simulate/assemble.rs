@@ -35,6 +35,7 @@ impl Scene {
             };
             let alike = self.models[..i].iter().position(same).map(|k| firsts[k]);
             let like = |(a, b): (&Part, &Part)| (&a.name, a.face_count()) == (&b.name, b.face_count());
+            // A caller may hand in another model for the same file: parts must agree, not names of files alone.
             let known = |first: &u32| {
                 let there = &whole.parts[*first as usize..];
                 there.len() >= model.parts.len() && there.iter().zip(&model.parts).all(like)

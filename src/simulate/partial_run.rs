@@ -108,6 +108,7 @@ impl PartialRun {
         let paths: Vec<_> = t.paths.iter().map(|v| (bare(v), bits(&[v.point]), v.power.to_bits())).collect();
         block(&mut out, &serde_json::to_vec(&paths)?);
         to.write_all(&out)?;
+        // The hash over all that stands before: a file that was cut or damaged on its way is refused, not added up.
         to.write_all(&Fnv::hash(&[&out]).to_le_bytes())
     }
 
@@ -129,6 +130,7 @@ impl PartialRun {
             return Err("it has more replicates than its run".into());
         }
         p.done = (0..done).map(|_| r.u32()).collect::<Result<_, _>>()?;
+        // In order and each once, or `merge` would count a replicate twice.
         if p.done.windows(2).any(|w| w[0] >= w[1]) || p.done.last().is_some_and(|&r| r >= p.replicates) {
             return Err("its replicates are out of order".into());
         }

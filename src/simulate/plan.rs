@@ -73,6 +73,7 @@ impl Plan {
                 share
             })
             .collect();
+        // Errors come from the spread of replicates, each of which needs rays enough to be a sample of the whole.
         let replicates = if grows {
             settings.rays.div_ceil(GROWING_REPLICATE) as u32
         } else {
@@ -81,6 +82,7 @@ impl Plan {
         };
         let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
         let rays = if grows { divided * u64::from(replicates) } else { divided };
+        // A power of two, so that whether a ray is recorded is one `and` of its index.
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
         let quantum = emitted / (rays as f64 * QUANTA);

@@ -201,6 +201,7 @@ impl Receiver {
         match &self.shape {
             Shape::Plane { frame, half, one_sided } => {
                 let along = ray.direction.dot(frame.z);
+                // A one-sided plane counts what comes against its normal.
                 if along == 0.0 || *one_sided && along > 0.0 {
                     return None;
                 }

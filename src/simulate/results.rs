@@ -308,6 +308,7 @@ impl ReceiverResult {
             }
             Shape::Absorbed { .. } => ("absorbed", if lumen { "lm" } else { "W" }, 1.0, ([1.0; 2], [0.0; 2]), None),
         };
+        // Quanta of a cell to its mean density: per area, or per solid angle for a far field.
         let per = |k: usize| quantum * scale / r.measure(k % grid[0], k / grid[0]);
         let n = r.cell_count();
         let (sums, further) = tallies.cells[i].split_at(n);

@@ -80,6 +80,7 @@ pub fn trace(
         for _ in 1..threads.min(work.todo.len()) {
             scope.spawn(|| work.run(&gathering));
         }
+        // This thread works too, so that one thread needs no other.
         work.run(&gathering);
     });
     let (partial, cost) = gathering.into_partial_run();
@@ -117,6 +118,7 @@ impl Work<'_, '_> {
         let mut tally = ReplicateTally::new(bound);
         let mut sums = ThreadSums::new(gathering, bound, self.context.plan.replicates);
         let mut recorder = self.recording.map(|context| Recorder::new(context, self.kind));
+        // Whole replicates alone: which thread has which then changes no sum.
         while !self.stop.load(Ordering::Relaxed) {
             let Some(&replicate) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else { break };
             let cost = dispatch::trace(self.kind, self.context, RaySelection::Replicate(replicate), &mut tally);

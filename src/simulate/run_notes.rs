@@ -30,6 +30,7 @@ impl BoundScene {
             let at = l.face.and_then(|f| self.instance(f));
             *places.entry((l.body, at, l.cause)).or_default() += 1;
         }
+        // From the back, since the last of equals is taken: the first in order is named, whatever threads did.
         let ((body, at, cause), number) = places.into_iter().rev().max_by_key(|(_, number)| *number)?;
         let why = match cause {
             LostCause::NoExit => {

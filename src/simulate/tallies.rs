@@ -191,6 +191,7 @@ impl Tallies {
             instances[bound.instance_of_face[face] as usize] += quanta;
         });
         let filled = self.instances.iter_mut().zip(instances).filter(|(_, quanta)| *quanta > 0);
+        // Only what got something: a replicate that adds nothing changes neither sum nor square.
         filled.for_each(|(sum, quanta)| sum.add_replicate(quanta));
         replicate.absorbed.flush(&mut self.faces);
         replicate.bulk.flush(&mut self.bulk);

@@ -56,6 +56,7 @@ pub(super) fn find_bodies(
         let message = format!("{} bodies with media; at most 65534 are possible", bodies.len());
         return Err(scene.error(ErrorKind::Model, &[Key::Name("material")], message));
     }
+    // Sweep along x: behind the first box that begins beyond this one, none meets it.
     let mut order: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
     order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
     let meets = |(i, a): (usize, &Aabb)| {
@@ -68,6 +69,7 @@ pub(super) fn find_bodies(
 /// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
 /// body to light, and as long as the box around them all.
 pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
+    // Union–find with halved paths (Tarjan & van Leeuwen 1984); the lowest number stands for its group.
     let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
     fn first(united: &mut [u16], mut body: u16) -> u16 {
         while united[body as usize] != body {
@@ -83,6 +85,7 @@ pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[
             united[a.max(b) as usize] = a.min(b);
         }
     }
+    // A path cannot tell where one body of its index ends and the next begins: what counts is the way through all of them.
     let mut whole = vec![(Aabb::EMPTY, false); bodies.len()];
     let of_body: Vec<usize> = (0..bodies.len() as u16).map(|k| first(&mut united, k) as usize).collect();
     for (body, &k) in bodies.iter().zip(&of_body).skip(1) {

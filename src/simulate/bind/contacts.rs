@@ -40,6 +40,7 @@ pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u16]) -
         body.sort_by(|a, b| a.2.min.x.total_cmp(&b.2.min.x));
         for (i, (a, shell, box_a)) in body.iter().enumerate() {
             for (b, other, box_b) in body[i + 1..].iter().take_while(|(.., b)| b.min.x <= box_a.max.x) {
+                // By boxes alone: whether the shells really touch at a point is asked where light crosses there.
                 if shell != other && !box_a.intersection(*box_b).is_empty() {
                     (siblings[*a], siblings[*b]) = (true, true);
                 }
@@ -62,6 +63,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u16], opa
     }
     let placed: Vec<PlacedFace<'_>> = model.placed_faces().collect();
     let glue = scene.run.glue_mm;
+    // Half the glue on either side makes it whole between two boxes.
     let box_of = |f: &PlacedFace<'_>| face_bounds(f).grown(0.5 * glue);
     let mut faces: Vec<(usize, Aabb)> = (placed.iter())
         .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
@@ -78,11 +80,13 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u16], opa
                 continue;
             }
             let mut touch = false;
+            // Both ways: the points of a large face may all miss a small one that lies on it.
             for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
                 let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
                 let near = around.grown(glue);
                 for p in points.iter().filter(|p| near.contains(**p)) {
                     distances += 1;
+                    // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
                     touch |= distances > MOST_DISTANCES || nearest.distance(other, *p) <= glue;
                     if touch {
                         break;

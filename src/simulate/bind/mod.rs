@@ -125,6 +125,7 @@ fn bind_faces(
             None => materials::surface(scene, &default)?,
         };
         let closed = f.shell.is_some_and(|s| model.part(f.part).shells[s].closed);
+        // Opaque from outside: what a body with a medium does behind its face is the medium's affair.
         let opaque = body == AMBIENT && surface.is_opaque();
         opaque_outside.push(opaque);
         faces.push(FaceOptics {

@@ -94,6 +94,7 @@ fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
     let s = &face.surface;
     let [[u0, u1], [v0, v1]] = s.domain();
     let away = |uv: Uv| s.evaluate(uv).distance(p);
+    // The nearest point is a foot inside the trims or lies on them.
     let border = loops.iter().flatten().map(|&uv| away(uv)).fold(f64::INFINITY, f64::min);
     let grid = (0..SAMPLES * SAMPLES).map(|i| {
         let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
@@ -105,6 +106,7 @@ fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .or_else(|| loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)));
     let Some((mut best, mut uv)) = start else { return border };
+    // Gauss–Newton towards the foot; only what lies inside counts on the way.
     for _ in 0..MOST_STEPS {
         let d = s.derivatives(uv);
         let r = p - d.point;

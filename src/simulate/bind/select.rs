@@ -141,6 +141,7 @@ fn each_name_means_something(
         ("kind", &rule.kind, SurfaceKind::ALL.map(SurfaceKind::word).to_vec()),
     ];
     for (key, patterns, names) in lists {
+        // A rule of several names must not lose one of them to a slip of the pen while the others match.
         for pattern in patterns.iter().flat_map(|p| p.as_slice()) {
             if names.iter().any(|n| fits(pattern, n)) {
                 continue;

@@ -24,6 +24,7 @@ pub(super) fn scene_light(scene: &Scene, loaded: &[Option<Loaded>]) -> SceneLigh
     });
     let lines: Vec<Option<f64>> = lines.collect();
     let first = lines.first().copied().flatten();
+    // One line for all sources needs no wavelength on the ray: media are evaluated once, and the kernel carries none.
     let coloured = first.is_none() || lines.iter().any(|l| *l != first);
     SceneLight { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
 }

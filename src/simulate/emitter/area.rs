@@ -61,6 +61,8 @@ impl Area {
             for k in 0..CELLS * CELLS {
                 let [low, size] = luminous.cell(k);
                 let samples = (0..9).map(|i| Uv::new((i / 3) as f64, (i % 3) as f64) * 0.5);
+                // Area per parameter, the rejection's bound: sampled on a grid of three by three, and raised by a margin for what lies
+                // between.
                 let largest = samples.map(|s| luminous.element(low + size * s)).fold(0.0, f64::max);
                 luminous.bounds.push(BOUND_MARGIN * largest);
                 sum += BOUND_MARGIN * largest * size.x * size.y;
@@ -76,17 +78,21 @@ impl Area {
         let whole = self.sums[self.sums.len() - 1];
         let mut last = None;
         for attempt in 0..MOST_ATTEMPTS {
+            // The first try takes the pair of the low-discrepancy sequence, which then covers the area evenly; further ones are
+            // independent.
             let [u, v] = if attempt == 0 { stream.pair(index, 0) } else { stream.random(index, 2 * attempt + 10) };
             let at = u * whole;
             let cell = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);
             let low = if cell == 0 { 0.0 } else { self.sums[cell - 1] };
             let luminous = &self.faces[cell / (CELLS * CELLS)];
             let [corner, size] = luminous.cell(cell % (CELLS * CELLS));
+            // What is left of u within its cell is uniform again and serves as the coordinate.
             let s = ((at - low) / (self.sums[cell] - low)).clamp(0.0, 1.0);
             let uv = corner + size * Uv::new(s, v);
             last = Some((luminous, uv));
             let [keep, _] = stream.random(index, 2 * attempt + 11);
             let bound = luminous.bounds[cell % (CELLS * CELLS)];
+            // Rejection makes uniform in parameters into uniform in area.
             if is_inside(&luminous.loops, uv) && keep * bound <= luminous.element(uv) {
                 break;
             }

@@ -113,6 +113,7 @@ impl Emitter {
         }
         let collimated = matches!(self.lobe, Lobe::Collimated)
             && matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
+        // Parallel light is the same wherever on its way it starts.
         if collimated && size <= far {
             // The whole source moves along its direction, to before the scene, unless it shines away from it.
             let foot = foot_on_line(self.frame.origin, direction, centre);
@@ -121,6 +122,7 @@ impl Emitter {
             }
             return Ok(());
         }
+        // A direction is known to its last bit alone: over this distance that moves the ray aside.
         let shift = distance * DIRECTION_ROUNDING;
         if shift > LARGEST_SHIFT * diagonal {
             return Err(format!(

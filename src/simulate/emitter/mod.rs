@@ -111,6 +111,7 @@ impl Emitter {
             }
             None => {}
         }
+        // In a scene of one line rays carry no wavelength; a list that has its own keeps them.
         let wavelengths = match (&s.spectrum, light.coloured) {
             (_, false) => None,
             (None, true) if coloured_list => None,
@@ -220,6 +221,7 @@ impl Emitter {
                 emission.from = Some((face, normal));
                 axes = [x, y, normal];
             }
+            // { => Systematic sampling: shares evenly spaced over the list take from every part what it has.
             Shape::List(list) => {
                 let r = list.ray_at_share(stream.systematic(index));
                 *ray = Ray::new(f.point(r.origin), f.direction(r.direction));
@@ -235,6 +237,7 @@ impl Emitter {
             }
             Lobe::Cosine(exponent) => {
                 let [u, v] = stream.pair(index, 1);
+                // From (0, 1], as the power of zero would be grazing light; for a Lambertian source cos θ is √u (Malley).
                 let u = 1.0 - u;
                 direction_about_axis(axes, if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) }, v)
             }

@@ -116,6 +116,7 @@ impl Emitter {
         let mut cos_theta = u;
         match self.lobe {
             Lobe::Cone(limit) => {
+                // Plain loops over whole arrays: the compiler makes vectors of them under the caller's instruction set.
                 for k in 0..PACKET {
                     cos_theta[k] = cosine_in_cone(limit, u[k]);
                 }

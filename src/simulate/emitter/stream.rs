@@ -148,6 +148,8 @@ impl Stream {
         let along = if self.pairs[1] { 2 } else { 0 };
         let mut cells = [0u16; CHUNK];
         for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
+            // Morton order of the directions (or places): rays that start one after another go through the same part of the scene, whose
+            // nodes are still in the cache.
             *cell = (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16;
         }
         // Counting sort: most cells hold one ray of a chunk.
@@ -161,6 +163,7 @@ impl Stream {
             *end = sum;
         }
         self.order.resize(CHUNK, 0);
+        // From the back, so that rays of one cell keep their order: the sort is stable and its result the same everywhere.
         for (k, cell) in cells[..n].iter().enumerate().rev() {
             let end = &mut ends[usize::from(*cell) % CHUNK];
             *end -= 1;

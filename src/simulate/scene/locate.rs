@@ -152,8 +152,10 @@ pub(super) fn lengths(text: &str, understood: &serde_json::Value) -> Option<(Ran
 pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
     let message = e.message();
     let mut words = message.split('`').skip(1).step_by(2);
+    // The reader's errors are texts: known keys stand in backquotes, the unknown one first.
     let error = if message.starts_with("unknown field") {
         let word = words.next().unwrap_or("");
+        // A key of another program for an effect that is not simulated must not be taken for a slip.
         if let Some(effect) = refused(word) {
             let message = format!("`{word}`: {effect} is not simulated");
             Error::new(ErrorKind::Unsupported, message)

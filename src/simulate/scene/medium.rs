@@ -60,6 +60,7 @@ impl Medium {
         if let Some(t) = &self.index_table {
             ways.push(Index::Table(Table::new("index", points(t)).map_err(|e| ("index_table", e.to_string()))?));
         }
+        // Two indices would leave open which one counts.
         if ways.len() != 1 {
             let given = if ways.is_empty() { "has no index".into() } else { format!("has {} indices", ways.len()) };
             return Err(("name", format!("'{}' {given}; give exactly one", self.name)));
