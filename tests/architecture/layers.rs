@@ -227,7 +227,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "cell",
             "node",
             "pack",
-            "build",
+            "subdivision",
             "flatten",
             "frame",
             "tree",

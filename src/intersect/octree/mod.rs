@@ -21,7 +21,6 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
-mod build;
 mod cell;
 mod clip;
 mod facet_pair;
@@ -39,6 +38,7 @@ mod ray;
 mod ray_state;
 mod settings;
 mod statistics;
+mod subdivision;
 mod tree;
 mod walk;
 

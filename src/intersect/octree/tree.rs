@@ -2,7 +2,8 @@
 
 use super::frame::Frame;
 use super::node::{Block, Link, Node, Target};
-use super::{Settings, Statistics, build, flatten, huge_pages};
+use super::subdivision::subdivide;
+use super::{Settings, Statistics, flatten, huge_pages};
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
 use crate::math::{Aabb, Point, Ray};
@@ -33,7 +34,7 @@ impl<'m> Tree<'m> {
         let surroundings = Surroundings::new(mesh);
         let finite = surroundings.bounds;
         let center = if finite.is_empty() { Point::ZERO } else { finite.center() };
-        let cell = build::subdivide(mesh, center, settings, statistics);
+        let cell = subdivide(mesh, center, settings, statistics);
         let flat = cell.map(|cell| flatten::flatten(mesh, center, cell, settings, statistics));
         let (nodes, blocks, root) = match flat {
             Some(flat) => (flat.nodes, flat.blocks, Some(flat.root)),
