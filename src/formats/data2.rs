@@ -60,6 +60,7 @@ pub fn read_data2(path: &Path) -> Result<Vec<Data2Facet>, Error> {
             index_ratio: numbers[15],
         });
     }
+    // A file that was cut at the end of a line shows by its count alone.
     if facets.len() != count {
         let message = format!("the first line promises {count} facets, the file holds {}", facets.len());
         return Err(Error::at_line(path, first + 1, message));

@@ -39,7 +39,9 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     }
     let first = ldt.lamp_sets.first();
     let lumens = first.map(|s| s.total_luminous_flux).filter(|f| *f > 0.0);
+    // A negative number of lamps marks absolute photometry, whose flux is that of the luminaire.
     let absolute = first.is_some_and(|s| s.num_lamps < 0);
+    // Intensities are in candela per kilolumen of the lamps.
     let to_candela =
         lumens.unwrap_or(1000.0) / 1000.0 * if ldt.conversion_factor > 0.0 { ldt.conversion_factor } else { 1.0 };
     let mut planes: Vec<(f64, &[f64])> =
@@ -102,6 +104,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     let planes = if rotational { 1 } else { all.horizontal_deg.len() - 1 };
     let lumens = p.lamp_lumens.unwrap_or_else(|| p.flux());
     let per_klm = if lumens > 0.0 { 1000.0 / lumens } else { 1.0 };
+    // The format has a field for the step of the angles, zero where they are uneven.
     let even = |a: &[f64]| {
         let step = a[1] - a[0];
         if a.windows(2).all(|p| (p[1] - p[0] - step).abs() < SAME_ANGLE_DEG) { step } else { 0.0 }

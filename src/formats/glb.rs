@@ -86,6 +86,7 @@ fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Poin
 
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let bounds = facets.mesh.bounds();
+    // About the model's middle, where single precision has most to give; the node's translation puts it back.
     let middle = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
     let mut buffer = Buffer::default();
     let (mut meshes, mut nodes, mut materials) = (Vec::new(), Vec::new(), Vec::new());
@@ -105,6 +106,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         let mut segments = Vec::new();
         let mut start = 0;
         for &end in &paths.ends {
+            // Mode 1 draws separate lines, a pair of points each.
             segments.extend((start + 1..end).flat_map(|k| [k as u32 - 1, k as u32]));
             start = end;
         }

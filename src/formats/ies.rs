@@ -49,6 +49,7 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
             }
         }
     };
+    // Behind TILT line breaks mean nothing: numbers follow each other as they come.
     let rest: Vec<(usize, &str)> = lines
         .flat_map(|(n, l)| l.split([' ', '\t', ',', '\r']).filter(|w| !w.is_empty()).map(move |w| (n + 1, w)))
         .collect();
@@ -178,6 +179,7 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
     let mut out = Lines::default();
     out.line("IESNA:LM-63-2002");
     for (name, value) in &p.keywords {
+        // A keyword is one line; what follows stands under MORE.
         for (i, part) in value.lines().enumerate() {
             let clean: String = part.chars().filter(|c| !c.is_control()).collect();
             out.line(&format!("[{}] {clean}", if i == 0 { name } else { "MORE" }));
@@ -189,6 +191,7 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
         PhotometricType::B => 2,
         PhotometricType::A => 3,
     };
+    // −1 lumens stand for absolute photometry.
     let lumens = p.lamp_lumens.map_or("-1".to_owned(), |l| l.to_string());
     let [width, length, height] = p.opening_mm.map(|x| x / 1000.0);
     out.line(&format!("1 {lumens} 1 {rows} {planes} {kind} 2 {width} {length} {height}"));

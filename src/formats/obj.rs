@@ -26,6 +26,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
                 let corners = if facet.is_triangle() { 3 } else { 4 };
                 write!(w, "f")?;
                 for &v in &facet.vertices[..corners] {
+                    // Counted from one; the empty place between the slashes is for textures.
                     write!(w, " {}//{}", mesh.vertices[v as usize].position + 1, v + 1)?;
                 }
                 writeln!(w)?;

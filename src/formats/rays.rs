@@ -142,6 +142,7 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
         } else {
             line.split_whitespace().collect()
         };
+        // Spreadsheets end lines by empty cells.
         while cells.last().is_some_and(|c| c.is_empty()) {
             cells.pop();
         }
@@ -204,6 +205,7 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
     let file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let size = file.metadata().map_err(|e| Error::new(path, ErrorKind::Read(e)))?.len();
+    // A few kilobytes may unpack to gigabytes: what all arrays take together is bounded by the size of the file.
     let mut budget = LEAST_BUDGET.max(MOST_INFLATION.saturating_mul(size));
     let mut zip = zip::ZipArchive::new(file).map_err(|e| malformed(format!("not an NPZ file: {e}")))?;
     let mut array = |name: &str, width: usize| -> Result<Option<Vec<f64>>, Error> {

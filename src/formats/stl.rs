@@ -27,6 +27,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
             for x in [normal, *a, *b, *c].iter().flat_map(|p| p.to_array()) {
                 w.write_all(&(x as f32).to_le_bytes())?;
             }
+            // No attributes.
             w.write_all(&[0, 0])?;
         }
         Ok(())

@@ -125,6 +125,7 @@ impl Tm25Reader {
                     let table = table.ok_or_else(|| format!("spectral table {number}, of {}", tables.len()))?;
                     let spectrum = tables[table].as_ref();
                     let spectrum = spectrum.ok_or_else(|| format!("spectral table {number}, which is empty"))?;
+                    // Multiples of the golden ratio are spread evenly over [0, 1), however many of them there will be.
                     drawn[table] += 1;
                     Some(spectrum.wavelength((drawn[table] as f64 * GOLDEN).fract()))
                 }
