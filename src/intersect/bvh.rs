@@ -127,6 +127,7 @@ impl<'m> Bvh<'m> {
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
         let size = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
         let scale = if settings.cured { unit_scale(size) } else { 1.0 };
+        // A code is a facet and which of its triangles it is: obvhs knows triangles alone.
         let codes: Vec<u32> = (0..mesh.facets.len())
             .filter(|&f| mesh.corners(f).iter().all(|&p| is_usable(p)))
             .flat_map(|f| {
@@ -211,6 +212,7 @@ impl<'m> Bvh<'m> {
         if !(origin.is_finite() && direction.is_finite()) {
             return None;
         }
+        // In the tree's units and a little farther, so that single precision does not end before the hit.
         let far = |t: f64| {
             let t = ((t - begin) * self.scale * (1.0 + LIMIT_ROOM)) as f32;
             if t.is_finite() { t } else { f32::MAX }

@@ -36,6 +36,7 @@ pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mod
         if facet.is_triangle() { [hit.b[0], hit.b[1], hit.b[2], 0.0] } else { bilinear_weights(parameters) };
     let [v0, v1, v2, v3] = vertices;
     let [w0, w1, w2, w3] = weights;
+    // Opposed normals may cancel; the facet's own is left then.
     let smooth = || {
         let sum = v0.normal * w0 + v1.normal * w1 + v2.normal * w2 + v3.normal * w3;
         sum.try_normalize().unwrap_or(flat)

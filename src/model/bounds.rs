@@ -70,6 +70,7 @@ impl Model {
                     reaches.push((side.reach(&placed(whole, &instance.placement)), i));
                 }
             }
+            // The farthest first: once a hull reaches no farther than the box, none behind it does.
             reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (reach, i) in reaches {
                 if reach <= side.reach(&bounds) {
@@ -139,6 +140,7 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     if covers(&bounds, &hull) {
         return bounds;
     }
+    // The hull holds the face: only where the box does not hold the hull can the face grow it.
     let outline = Outline::new(face);
     let border = outline.polygons.iter().flatten().map(|uv| position(*uv));
     bounds = bounds.union(Aabb::from_points(border));
@@ -180,6 +182,7 @@ fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> 
     let mut stride = 0.5 * cell;
     for _ in 0..ROUNDS {
         let mut moved = false;
+        // Compass search asks for no derivatives, so that kinks do not stop it.
         for direction in [Uv::X, -Uv::X, Uv::Y, -Uv::Y] {
             let next = uv + stride * direction;
             let reached = height(next);

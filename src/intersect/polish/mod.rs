@@ -127,6 +127,7 @@ impl<'a> Polished<'a> {
     fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Polishing {
         let sag = self.sag_of(facet_hit.primitive).max(NO_SAG);
         let sine = facet_hit.geometric_normal.dot(ray.direction).abs();
+        // A facet lies up to its sag off the spline: along a slanting ray that is sag over sine.
         let window = (WINDOW_OF_SAGS * sag / sine.max(LEAST_WINDOW_SINE)).max(LEAST_WINDOW);
         let found = self.exact.converge(ray, facet_hit.face, facet_hit.uv, STEPS);
         let nearby = found.filter(|p| (p.t - facet_hit.t).abs() <= window);

@@ -107,6 +107,7 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
                 *uses.entry(edge).or_insert(0) += 1;
             }
         }
+        // An edge that the face uses twice is a seam.
         let is_border = |edge| uses.get(&edge) == Some(&1);
         let all = face.loops.iter().flat_map(|l| &l.uses);
         return all.filter(|u| u.edge.is_some_and(is_border)).map(|u| u.uv.clone()).collect();
@@ -124,6 +125,7 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
         (0..=SAMPLES).map(|i| surface.evaluate(c.evaluate(i as f64 / SAMPLES as f64))).collect()
     };
     let traced: Vec<Vec<Point>> = sides.iter().map(points).collect();
+    // Opposite sides that coincide are a seam, a side that is one point is a pole.
     let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < COINCIDENT * size);
     let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < COINCIDENT * size);
     (0..4).filter(|&i| !close(&traced[i], &traced[i ^ 1]) && !pole(&traced[i])).map(|i| sides[i].clone()).collect()

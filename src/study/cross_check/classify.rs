@@ -142,6 +142,7 @@ impl<'a> Classifier<'a> {
         };
         let [begin, end] = stretch.range;
         let same_crossing = other.is_some_and(|o| o.face == first.face && (begin..=end).contains(&o.t));
+        // A side of 0: the ray begins or ends while it is near the surface.
         if same_crossing || stretch.sides.contains(&0) {
             return Cause::WithinSag;
         }
@@ -151,6 +152,7 @@ impl<'a> Classifier<'a> {
         if !stretch.complete {
             return Cause::Unexplained(Defect::Inconclusive);
         }
+        // The ray comes near and leaves on the side it came from: it grazes the surface.
         if stretch.sides[0] == stretch.sides[1] {
             return Cause::Silhouette;
         }

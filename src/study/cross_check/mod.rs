@@ -89,6 +89,7 @@ pub fn cross_check(
         })
         .collect();
     let mut all = Tally::default();
+    // In the order of the rays: what is kept as an example does not hang on threads.
     for tally in tallies {
         all.absorb(tally, settings.keep);
     }

@@ -132,12 +132,14 @@ impl PlacedSurface {
             let d = self.surface.second_derivatives(uv);
             let r = d.point - p;
             let g = [r.dot(d.du), r.dot(d.dv)];
+            // Where the nearest place would lie beyond a side of the domain, its parameter is held.
             let fixed = [
                 (uv.x <= u0 && g[0] > 0.0) || (uv.x >= u1 && g[0] < 0.0),
                 (uv.y <= v0 && g[1] > 0.0) || (uv.y >= v1 && g[1] < 0.0),
             ];
             let (e, f, k) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
             let (mut a, mut b, mut c) = (e + r.dot(d.duu), f + r.dot(d.duv), k + r.dot(d.dvv));
+            // Far from the foot the Hessian may point uphill; Gauss–Newton's part of it never does.
             if !(a > 0.0 && c > 0.0 && a * c - b * b > CONVEX * a * c) {
                 (a, b, c) = (e * (1.0 + CONVEX) + VANISHING, f, k * (1.0 + CONVEX) + VANISHING);
             }

@@ -182,6 +182,7 @@ impl<'r> CellPairs<'r> {
             if rays == 0.0 {
                 continue;
             }
+            // Where rays are many a block is parted in four; where they are few its cells stay pooled, so that their noise averages.
             if rays > POOLED_RAYS && block.side > 1 {
                 let side = block.side / 2;
                 let quarters = [(0, 0), (side, 0), (0, side), (side, side)];

@@ -212,6 +212,7 @@ fn collapsed() -> Case {
         let d = random.hemisphere(-Vector::Z);
         let d = if d.z > -0.2 { -Vector::Z } else { d };
         let target = Point::new(x, y, 0.0);
+        // The distance from the slanted sides, y = ±0.4 (50 − x).
         let inside = (half - y.abs()) / 0.4f64.hypot(1.0);
         let truth = if inside > 0.0 { Truth::hit(100.0, d.z, inside) } else { Truth::miss(-inside * d.z.abs()) };
         Question::First { ray: Ray::new(target - d * 100.0, d), truth }

@@ -252,6 +252,7 @@ impl Grader<'_> {
         let local = Ray::new(origin, direction);
         let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
         let second = Ray::new(first.point_at(h.t), frame.direction(direction).normalize()).with_departure(from);
+        // From a point o of a sphere around the origin the chord along d is −2 o·d long.
         let true_t = -2.0 * origin.dot(direction);
         let cos = (origin.dot(direction) / radius).abs();
         let truth = Truth::hit(true_t, cos, radius * cos * cos * 0.5);

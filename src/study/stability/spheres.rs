@@ -258,6 +258,7 @@ fn facet_features() -> Case {
         let o = target - d * 150.0;
         let (b, c) = (o.dot(d), o.length_squared() - R * R);
         let root = (b * b - c).sqrt();
+        // The nearer root in the form without cancellation.
         let truth = Truth::hit(c / (-b + root), root / R, R);
         questions.push(Question::First { ray: Ray::new(o, d), truth });
     }
