@@ -257,6 +257,7 @@ pub(super) fn local(patch: &BezierPatch, uv: Uv) -> Uv {
 /// Whether all control points lie on one affine image of their Greville points, with equal weights.
 fn is_affine(s: &Surface, size: f64) -> bool {
     let [nu, nv] = s.counts();
+    // A spline whose control points lie on an affine map at their Greville abscissas is that map.
     let greville =
         |d: usize, i: usize| s.knots[d][i + 1..=i + s.degree[d]].iter().sum::<f64>() / s.degree[d] as f64;
     let (g0, g1) = ([greville(0, 0), greville(1, 0)], [greville(0, nu - 1), greville(1, nv - 1)]);
@@ -279,6 +280,7 @@ fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64
     let knots = &s.knots[d];
     let inner = b[1..b.len() - 1].iter().enumerate();
     inner
+        // Below the degree's multiplicity the surface has one tangent across the knot.
         .filter(|(_, k)| knots.iter().filter(|x| x == k).count() >= s.degree[d])
         .filter(|&(i, &k)| {
             let step = CREASE_STEP * (b[i + 2] - k).min(k - b[i]);

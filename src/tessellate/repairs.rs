@@ -20,6 +20,7 @@ pub(super) fn repaired_faces(
         let facets = &made.mesh.facets;
         let range = facets.partition_point(|f| f.face < id)..facets.partition_point(|f| f.face <= id);
         let (proved, open): (Vec<usize>, Vec<usize>) = range.partition(|&f| made.quality[f].certified);
+        // What is proved needs no samples.
         let proved = proved.into_iter().map(|f| made.quality[f].bound).fold(0.0, f64::max);
         sample::sample_facets(&made.mesh, model, &open).iter().map(|s| s.sag).fold(proved, f64::max)
     };

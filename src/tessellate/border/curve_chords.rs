@@ -38,6 +38,7 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     let n = b.len();
     let is_kink = |i: usize| {
         let k = b[i];
+        // A knot of lower multiplicity leaves the curve smooth.
         if curve.knots.iter().filter(|&&x| x == k).count() < curve.degree {
             return false;
         }
@@ -182,6 +183,7 @@ pub(super) fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
         while let Some((a, b, depth)) = stack.pop() {
             let m = 0.5 * (a + b);
             if depth < MAX_HALVINGS && a < m && m < b && out.len() < MAX_CHORDS && coarse(a, b) {
+                // The first half on top: parameters come out in order.
                 stack.push((m, b, depth + 1));
                 stack.push((a, m, depth + 1));
             } else {

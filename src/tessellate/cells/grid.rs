@@ -199,6 +199,7 @@ impl CellFacets<'_, '_, '_, '_> {
         }
         let middle = self.prover.surface.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
         let off = |i: usize, j: usize| distance_to_chord(middle, &[n[i].place, n[j].place]);
+        // The diagonal that passes nearer to the surface's middle is tried first.
         let better = if off(1, 3) < off(0, 2) * (1.0 - NEARER) { 1 } else { 0 };
         [better, better + 1].into_iter().find_map(|r| {
             let q: [u32; 4] = std::array::from_fn(|k| corners[(k + r) % 4]);

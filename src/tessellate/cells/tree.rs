@@ -254,6 +254,7 @@ impl Tree<'_, '_> {
         }
         if let Some(max) = self.max_angle.filter(|_| slack == 1.0) {
             let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.surface.normal(c)).collect();
+            // Normals within the angle of one facet differ by twice as much at most.
             let turned = n.iter().any(|a| n.iter().any(|b| a.angle_between(*b) > 2.0 * max));
             if turned {
                 return None;

@@ -88,6 +88,7 @@ pub(super) fn crossing(
     let [a, b] = carrier.surface.spline.domain()[d];
     let share = |t: f64| (at(t)[d] - a) / (b - a);
     let (from, to) = (share(lo), share(hi));
+    // Across a seam the share of the period jumps by nearly one; a point on it may count on either side.
     let on_seam = |x: f64| x.min(1.0 - x) <= ON_SEAM;
     if on_seam(from) || on_seam(to) || (from - to).abs() <= 0.5 {
         return None;

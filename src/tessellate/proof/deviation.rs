@@ -232,6 +232,7 @@ impl DeviationBounds {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
         let (pi, qi) = (1.0 / (p + 1) as f64, 1.0 / (q + 1) as f64);
+        // L is bilinear: its product with W has degrees (p + 1, q + 1), to which A is raised on the way.
         for i in 0..=p {
             let (before, after) = ((p + 1 - i) as f64 * pi, (i + 1) as f64 * pi);
             for j in 0..=q {
@@ -294,6 +295,8 @@ fn second_derivative_bounds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
             }
         }
     }
+    // The second derivatives are polynomials whose control points are these differences times p(p − 1), pq and q(q − 1): none is longer
+    // than the longest of them.
     let (p, q) = (p as f64, q as f64);
     [most[0].sqrt() * p * (p - 1.0), most[1].sqrt() * p * q, most[2].sqrt() * q * (q - 1.0)]
 }

@@ -46,6 +46,7 @@ impl FlatQuad {
     /// The quad under corners in their order, with the traced diagonal from corner `first`; `None` unless it is convex and nearly flat.
     fn new(c: &[Point; 4], first: usize) -> Option<Self> {
         let normal = (c[2] - c[0]).cross(c[3] - c[1]).try_normalize()?;
+        // A plane across both diagonals has the corners equally far above and below it, in turn.
         let height = 0.5 * (c[1] - c[0]).dot(normal);
         let corners = [0, 1, 2, 3].map(|k| c[k] + normal * if k % 2 == 0 { height } else { -height });
         let side = |k: usize| corners[(k + 1) % 4] - corners[k];

@@ -46,6 +46,7 @@ impl LinearMap {
         if det.abs() < THINNEST || det.is_nan() {
             return None;
         }
+        // L(x, y) = l00 + ls·x + lt·y, solved from the corners, zero at the first.
         let (e1, e2) = (at[1] - at[0], at[2] - at[0]);
         let ls = (e1 * d2.y - e2 * d1.y) / det;
         let lt = (e2 * d1.x - e1 * d2.x) / det;

@@ -83,6 +83,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         {
             return quick;
         }
+        // One sample beyond the limit ends the search for a proof before it costs anything.
         let sampled = self.probe(&uv, &flat, limit, &PROBES);
         if sampled > limit {
             return sampled;
@@ -110,6 +111,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         self.max_over_patches(&uv, |this, a, b, polygon| {
             let patch = this.surface.patch(a, b);
             let mut worst = 0f64;
+            // Over a whole patch its own net is the hull, without any cutting.
             if is_rectangle(polygon, patch.domain) {
                 let hull = patch.points.iter().map(|p| flat.distance(p.project())).fold(0.0, f64::max);
                 if hull <= limit {
@@ -312,6 +314,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             a..=b
         };
         let (ra, rb) = (range(0, lo.x, hi.x), range(1, lo.y, hi.y));
+        // More patches than are worth a look: not proved.
         if ra.clone().count() * rb.clone().count() > MAX_PIECES {
             return f64::INFINITY;
         }

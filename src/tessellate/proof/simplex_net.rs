@@ -91,6 +91,7 @@ impl SimplexNets {
         let mut step = if d == 0 { [width, 1] } else { [1, width] };
         let mut first = 0;
         for (step, (n, upper)) in step.iter_mut().zip([p, q].into_iter().zip(corner.upper)) {
+            // Backwards from the other end: one table serves all four corners.
             if upper {
                 first += n as isize * *step;
                 *step = -*step;
