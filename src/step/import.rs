@@ -81,11 +81,13 @@ fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (F
     };
     for (id, mut assigned) in contexts(file) {
         if let Some(length) = settings.length_unit_mm {
+            // The stated uncertainty is in the file's unit of length, and goes with it.
             let accuracy = assigned.units.accuracy.map(|a| a / assigned.units.length * length);
             assigned.units = Units { length, accuracy, ..assigned.units };
         }
         units.insert(id, assigned.units);
         if assigned.length_name.is_some() {
+            // A shape without a context of its own is taken to be in the unit that the file names first.
             fallback.get_or_insert(assigned.units);
         }
         add(&mut names.length, assigned.length_name);

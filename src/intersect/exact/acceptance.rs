@@ -37,6 +37,7 @@ impl Exact {
             let (inside, near) = self.trim_side(query, leaf, local);
             near_trim = near;
             if !inside {
+                // Beside a trim and outside: another face should have taken it. Remembered, for where faces gape none does.
                 if near {
                     query.reject_at_trim(t);
                 }

@@ -105,11 +105,13 @@ impl Exact {
         cost.nodes += u64::from(query.nodes);
         cost.tests += u64::from(query.leaves_tested);
         let Some(root) = &query.best else {
+            // A miss is proved only where nothing was left undecided.
             let undecided = query.undecided_from < f64::INFINITY;
             let certainty = if undecided { Certainty::Uncertified } else { Certainty::Certified };
             cost.fallbacks += u64::from(certainty == Certainty::Uncertified);
             return Answer { hit: None, certainty, near_trim: query.nearest_rejected < f64::INFINITY };
         };
+        // What was left undecided behind the hit does not touch it.
         let certainty = if query.undecided_from <= root.t { Certainty::Uncertified } else { root.certainty };
         cost.fallbacks += u64::from(certainty == Certainty::Uncertified);
         let near_trim = root.near_trim || query.nearest_rejected <= root.t;

@@ -261,6 +261,7 @@ fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
 /// Puts the halves of a node on the stack, across its longer side, the nearer one on top.
 #[inline(always)]
 fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
+    // The first derivative is as long as its middle and its radius allow: a side is at most that.
     let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
     let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
     let [size_u, size_v] = size(&node.rect);
@@ -274,6 +275,7 @@ fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     children[0].rect[direction][1] = middle;
     children[1].rect[direction][0] = middle;
     let [a, b] = children;
+    // Taken first, the nearer half may find a root that ends the search of the other.
     if a.near <= b.near {
         stack.extend([b, a]);
     } else {

@@ -56,6 +56,7 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
         }
         least_weight = least_weight.min(p[3]);
     }
+    // Weights are positive: homogeneous coordinates have the signs of the places.
     if (0..2).any(|k| lo[k] > margin[k] || hi[k] < -margin[k]) {
         return None;
     }
@@ -109,6 +110,8 @@ fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [
             let x = &net[i * (q + 1) + j];
             let at = [i as f64 / p as f64, j as f64 / q as f64];
             for k in 0..2 {
+                // x − Y·f(x) has control points i/n − Y·fᵢⱼ, for x itself has them at i/n: a root lies where it is its own image, and so
+                // within their range.
                 let g = at[k] - (y[k][0] * x[0] + y[k][1] * x[1]);
                 range[k] = [range[k][0].min(g), range[k][1].max(g)];
             }
@@ -133,6 +136,7 @@ pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> O
             return Some([u, v]);
         }
         last = step;
+        // Out of the box by half of it: whatever it finds is not this box's.
         if !(u > -0.5 && u < 1.5 && v > -0.5 && v < 1.5) {
             return None;
         }

@@ -49,6 +49,7 @@ pub(super) struct HitLabel {
 
 impl Linearization {
     pub(super) fn new(leaf: &Leaf, slopes: &Slopes, middle: &V4, ill_scaled: bool) -> Self {
+        // Rounded up: in single precision it must not end before the leaf does.
         let half = leaf.reach.map(|[lo, hi]| ((0.5 - lo).max(hi - 0.5) as f32).next_up());
         Self {
             rows: std::array::from_fn(|c| [slopes.u[c], slopes.v[c], middle[c], slopes.ru[c] + slopes.rv[c]]),

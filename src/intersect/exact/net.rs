@@ -89,6 +89,7 @@ pub(super) fn evaluate_inlined(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> J
 fn bernstein_fixed<const N: usize>(t: f64) -> ([f64; N], [f64; N]) {
     let s = 1.0 - t;
     let (mut b, mut d) = ([0.0; N], [0.0; N]);
+    // Written out for the degrees of nearly all surfaces: the recurrence would wait for itself.
     match N {
         2 => {
             (b[0], b[1]) = (s, t);
@@ -147,6 +148,7 @@ fn bernstein(n: usize, t: f64) -> ([f64; MAX_DEGREE + 1], [f64; MAX_DEGREE + 1])
     let (mut b, mut d) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
     b[0] = 1.0;
     for k in 1..=n {
+        // Derivatives are n times the differences of the values one degree lower, which stand in `b` just now.
         if k == n {
             for i in 0..=n {
                 let before = if i > 0 { b[i - 1] } else { 0.0 };
@@ -239,6 +241,7 @@ fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f6
             for r in 1..=n {
                 for k in (r..=n).rev() {
                     let i = point_index(direction, q, k, line);
+                    // De Casteljau at b keeps the lower part in place…
                     net[i] = lerp(net[point_index(direction, q, k - 1, line)], net[i], b);
                 }
             }
@@ -247,6 +250,7 @@ fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f6
             for r in 1..=n {
                 for k in 0..=n - r {
                     let i = point_index(direction, q, k, line);
+                    // …and at a/b, which is a within what is left, the upper one.
                     net[i] = lerp(net[i], net[point_index(direction, q, k + 1, line)], a / b);
                 }
             }

@@ -195,6 +195,7 @@ impl DeparturePoint {
         let grid = &geometry.grids[geometry.faces[self.face as usize].grid as usize];
         let patch = &geometry.patches[leaf.patch as usize];
         let uv = patch.uv(leaf.patch_parameters(local));
+        // Across a seam or at a pole one point has several parameters, all of them on the border.
         let on_border = |p: Uv| {
             (0..2).any(|d| {
                 let b = &grid.breaks[d];

@@ -166,6 +166,7 @@ impl ReferencePatch<'_> {
 fn de_boor(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Point4; 8]>, t: Number) -> [Point4; 2] {
     let mut slope = [Number::ZERO; 4];
     for r in 1..=degree {
+        // Before the last step two points are left, whose difference is the derivative.
         if r == degree {
             let width = Number::from(knots[span + 1]) - knots[span].into();
             let scale = Number::from(degree as f64) / width;

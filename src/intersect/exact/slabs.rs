@@ -98,6 +98,7 @@ impl RaySlabs {
             for i in 0..WIDTH {
                 let a = (first[i] - self.enter[k]) * self.inverse[k];
                 let b = (last[i] - self.leave[k]) * self.inverse[k];
+                // By comparison, as the vector instructions do it, so that both give the same bits.
                 near[i] = if a > near[i] { a } else { near[i] };
                 far[i] = if b < far[i] { b } else { far[i] };
             }

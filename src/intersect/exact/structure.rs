@@ -90,6 +90,7 @@ impl Exact {
         let mut linearizations = Vec::new();
         let mut pool = Vec::new();
         for patch in patches {
+            // Patches were cut apart from each other, in parallel; here their nets come to stand in one pool, in their order.
             let offset = pool.len() as u32;
             leaves.extend(patch.leaves.into_iter().map(|l| Leaf { net: l.net + offset, ..l }));
             linearizations.extend(patch.linearizations.into_iter().map(|l| l.moved_in_pool(offset)));

@@ -173,6 +173,7 @@ impl Subdivision<'_> {
         leaf.patch = self.index;
         leaf.face = self.patch.face;
         let face = &self.geometry.faces[self.patch.face as usize];
+        // Only a leaf that a trim passes asks the shared edge which side a root lies on.
         if !self.trim.whole && !leaf.whole {
             let border = border_sides(&self.geometry.grids[face.grid as usize], self.patch, rect);
             widen(&mut leaf, &slopes, border, face.band);

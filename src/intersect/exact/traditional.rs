@@ -89,6 +89,7 @@ impl<'a> Traditional<'a> {
                 let here = distances[i * nv + j];
                 let is = i.saturating_sub(1)..=(i + 1).min(nu - 1);
                 let js = j.saturating_sub(1)..=(j + 1).min(nv - 1);
+                // Newton's method starts where a sample is nearer to the ray than its neighbours.
                 if is.flat_map(|a| js.clone().map(move |b| a * nv + b)).any(|k| distances[k] < here) {
                     continue;
                 }

@@ -247,6 +247,7 @@ pub(super) fn extend_periodically(curve: &Curve, [a, b]: [f64; 2], period: Optio
     let first = ((a - t0) / period + PERIOD_SLACK).floor() as i64;
     let last = (((b - t0) / period - PERIOD_SLACK).ceil() as i64 - 1).clamp(first, first + MAX_COPIES);
     let start = t0 + first as f64 * period;
+    // From the period in which the range begins; further copies are joined to its end.
     let copy = curve.reparametrised([start, start + period]);
     let mut whole = copy.clone();
     for _ in first..last {

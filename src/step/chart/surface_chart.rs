@@ -219,6 +219,7 @@ impl Chart {
             let [a, b] = self.range[d];
             match self.period[d] {
                 Some(p) if a.is_finite() => {
+                    // Both ends of the base period stay, so that a point on the seam keeps the side it was given.
                     if uv[d] >= a && uv[d] <= b {
                         uv[d]
                     } else {

@@ -137,6 +137,7 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
     let mut t = (q.y / b).atan2(q.x / a);
     for _ in 0..20 {
         let (s, c) = t.sin_cos();
+        // Half the derivative of the squared distance, and its derivative in turn.
         let slope = (a * c - q.x) * (-a * s) + (b * s - q.y) * (b * c);
         let bend = a * a * s * s + b * b * c * c + (a * c - q.x) * (-a * c) + (b * s - q.y) * (-b * s);
         if !(bend > 0.0) {
@@ -286,6 +287,7 @@ pub(crate) fn polyline(points: &[Point]) -> Option<Curve> {
             }
             Some(&q) => {
                 let length = (p - q).length();
+                // Parameters must ascend: a piece without length would repeat its knot.
                 if length > MERGED_POINTS_MM {
                     kept.push(p);
                     lengths.push(lengths[lengths.len() - 1] + length);

@@ -117,6 +117,7 @@ fn add_edges(
         let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| first_of(&joined, id)));
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             *vertices.entry(id).or_insert_with(|| {
+                // The file's own vertex, where it has one: edges that meet there end at the same bits.
                 let given = id.and_then(|id| geometry.vertex(id).ok());
                 part.vertices.push(given.unwrap_or_else(|| curve.evaluate(t)));
                 VertexId(part.vertices.len() as u32 - 1)

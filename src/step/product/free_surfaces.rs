@@ -157,6 +157,7 @@ fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart)
             return Err(Refusal::new(e, "a trimming parameter is missing"));
         };
         let (mut lo, mut hi) = (lo * scale[d], hi * scale[d]);
+        // Against the parameter's sense the first value is the end.
         if a.flag(5 + d) == Some(false) {
             (lo, hi) = (hi, lo);
         }

@@ -87,6 +87,7 @@ pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
         return false;
     }
     let ([coarse, _], [fine, whole]) = (flux(GRIDS[1]), flux(GRIDS[2]));
+    // Negative by more than what a finer grid changed, and by more than a sliver of the whole: a flat or a twisted shell stays as it is.
     fine < 0.0 && -fine > 4.0 * (fine - coarse).abs() && -fine > 0.02 * whole
 }
 
@@ -133,6 +134,7 @@ fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] 
             continue;
         }
         let d = face.surface.derivatives(uv);
+        // By Gauss's theorem the flow of p/3 out of a closed surface is its volume.
         let flow = (d.point - center).dot(d.du.cross(d.dv)) / 3.0;
         sum += if face.reversed { -flow } else { flow };
         whole += flow.abs();

@@ -40,6 +40,7 @@ impl Counter<'_, '_, '_> {
         if let Some(known) = self.products.get(&id) {
             return *known;
         }
+        // While it is being counted it counts for nothing: what contains itself must come to an end.
         self.products.insert(id, 0);
         let mut count = 1u64;
         if depth < MAX_DEPTH {
@@ -59,6 +60,7 @@ impl Counter<'_, '_, '_> {
         if let Some(known) = self.shapes.get(&id) {
             return *known;
         }
+        // As for products.
         self.shapes.insert(id, 0);
         let mut count = 1u64;
         if depth < MAX_DEPTH {

@@ -91,6 +91,7 @@ fn add_edges(edges: Vec<Curve>, part: &mut Part) -> Vec<Option<EdgeId>> {
     for curve in edges {
         let vertices = curve.domain().map(|t| {
             let p: Point = curve.evaluate(t);
+            // Only among the vertices of this solid: another one that touches it keeps its own.
             let near = part.vertices[first..].iter().position(|v| (*v - p).length() <= SAME_VERTEX_MM);
             let number = near.unwrap_or_else(|| {
                 part.vertices.push(p);

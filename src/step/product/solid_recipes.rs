@@ -198,6 +198,7 @@ impl Profile {
             self.normal = -self.normal;
         }
         let areas: Vec<f64> = self.loops.iter().map(|l| signed_area(l, self.normal)).collect();
+        // Of loops in a plane the largest holds the others.
         let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()))?;
         for (k, curves) in self.loops.iter_mut().enumerate() {
             if (areas[k] > 0.0) != (k == outer) {

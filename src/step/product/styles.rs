@@ -39,6 +39,7 @@ impl Styles {
                 table.insert(item, colour);
             }
         }
+        // Last, for an overriding style stands above the plain one wherever the file has it.
         plain.extend(over);
         Self { colours: plain, layers }
     }

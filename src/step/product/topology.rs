@@ -278,6 +278,7 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
         return Ok((0..n)
             .map(|i| (points[i], points[(i + 1) % n]))
             .filter(|(a, b)| a != b)
+            // Named by its ends in order, so that both faces beside it find the same edge.
             .map(|(a, b)| (EdgeKey::Straight(a.min(b), a.max(b)), a > b))
             .collect());
     }
@@ -287,6 +288,7 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
     for i in 0..list.len() {
         let Some(mut edge) = list.entity(i) else { return Err(Refusal::new(e, "an edge of the loop is missing")) };
         let mut reversed = false;
+        // Oriented edges may be oriented again; a chain of them must end.
         for _ in 0..4 {
             let Some(a) = edge.attributes("ORIENTED_EDGE", 3) else { break };
             reversed ^= a.flag(1) == Some(false);

@@ -117,6 +117,7 @@ fn chains(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bool, t
     let mut chains = Vec::with_capacity(task.loops.len());
     for uses in &task.loops {
         let mut pieces: Vec<Piece> = uses.iter().map(piece).collect();
+        // Against the surface's normal, what was on the left is on the right.
         if !same_sense {
             pieces.reverse();
             pieces.iter_mut().for_each(|p| p.reversed = !p.reversed);

@@ -41,6 +41,7 @@ impl Boxes {
         let me = self.nodes.len();
         self.nodes.push(Node {
             bounds: bounds.grown(GROWN * (1.0 + bounds.diagonal())),
+            // Until it is known to be an inner node.
             content: Content::Box(order[0]),
         });
         if order.len() == 1 {

@@ -80,6 +80,7 @@ impl<'a> PatchClipping<'a> {
         domain: [[f64; 2]; 2],
     ) -> Self {
         let see = |p: &Homogeneous| {
+            // The homogeneous point less w times the origin: seen from there without dividing by its weight.
             let r = p.truncate() - ray.origin * p.w;
             Homogeneous::new(r.dot(view.a), r.dot(view.b), r.dot(ray.direction), p.w)
         };
