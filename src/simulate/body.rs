@@ -35,6 +35,7 @@ pub(crate) struct Body {
 impl Body {
     pub(crate) fn new(m: optics::Medium, name: String, light: &SceneLight) -> Self {
         Self {
+            // In light of one line an index is a number; the formula is kept only where rays have wavelengths of their own.
             index: m.index.value(light.wavelength),
             dispersive: (light.coloured && m.index.is_dispersive()).then_some(m.index),
             absorption: m.absorption.coefficient(light.wavelength),

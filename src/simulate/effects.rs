@@ -49,6 +49,7 @@ impl KernelKind {
     pub(crate) fn for_effects(effects: Effects) -> Self {
         let media = [Effect::Refraction, Effect::Fresnel, Effect::BulkAbsorption, Effect::BulkScatter];
         let faces = [Effect::SurfaceScatter, Effect::Coating];
+        // Every kernel can do what the ones below can: the first that is asked for decides.
         if effects.contains(Effect::Polarisation) {
             Self::Full
         } else if effects.contains(Effect::Dispersion) {

@@ -115,6 +115,7 @@ impl Plan {
             }
             None => {
                 let n = u128::from(self.replicates);
+                // Without a rest: where part k ends, part k + 1 begins.
                 let at = |k: u32| share.first + (u128::from(share.rays) * u128::from(k) / n) as u64;
                 [at(replicate), at(replicate + 1)]
             }

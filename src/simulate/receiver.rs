@@ -187,6 +187,7 @@ impl Receiver {
                 !(self.bounds().intersection(*region).is_empty() || apart(region.corners()))
             }
             Shape::Sphere { frame, radius } => {
+                // A box meets the shell of a ball where it reaches out of it and into it.
                 let far = region.corners().map(|c| (c - frame.origin).length()).into_iter().fold(0.0, f64::max);
                 let nearest = frame.origin.clamp(region.min, region.max);
                 far >= *radius && (nearest - frame.origin).length() <= *radius
@@ -235,6 +236,7 @@ impl Receiver {
             Shape::Plane { frame, half, .. } => {
                 let local = p - frame.origin;
                 let (x, y) = (local.dot(frame.x), local.dot(frame.y));
+                // A point on the very border may be rounded over it.
                 let at = [(x / half[0]).clamp(-1.0, 1.0), (y / half[1]).clamp(-1.0, 1.0)];
                 let largest = half[0].max(half[1]);
                 Some(self.counted(at, (x * x + y * y) / (largest * largest)))

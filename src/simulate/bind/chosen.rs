@@ -16,6 +16,7 @@ pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, 
     for (i, rule) in scene.materials.iter().enumerate() {
         let base = [Key::Name("material"), Key::Index(i)];
         for face in select::faces(scene, &base, &rule.faces(), model, &mut nearest)? {
+            // A later rule stands above an earlier one, for surfaces and media apart.
             if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);
             }

@@ -48,6 +48,7 @@ impl<'a> Nearest<'a> {
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best: Option<(f64, usize)> = None;
         for (low, c) in order {
+            // Boxes come in order: what lies in a farther one is farther.
             if best.is_some_and(|(d, _)| low * (1.0 - BOX_ROUNDING) > d) {
                 break;
             }

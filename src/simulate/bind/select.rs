@@ -22,6 +22,7 @@ fn fits(pattern: &str, name: &str) -> bool {
     let Some(mut rest) = name.strip_prefix(pieces.next().unwrap_or("")) else { return false };
     let mut last = None;
     for piece in pieces {
+        // All pieces but the last are taken where they first stand, which leaves most for the others; the last must end the name.
         if let Some(middle) = last.replace(piece) {
             match rest.find(middle) {
                 Some(i) => rest = &rest[i + middle.len()..],

@@ -262,6 +262,7 @@ fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVe
             };
             return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
         };
+        // Body 0 are the surroundings.
         media.push(body as u16 + 1);
     }
     Ok(media)

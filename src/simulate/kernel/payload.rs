@@ -186,6 +186,7 @@ impl RayPayload for Nested {
             *next.bodies.get_mut(n)? = body;
             next.depth += 1;
         } else {
+            // Not always the innermost: where bodies overlap, light may leave the outer one first.
             let at = self.bodies[..n].iter().rposition(|b| *b == body)?;
             next.bodies.copy_within(at + 1..n, at);
             next.bodies[n - 1] = AMBIENT;

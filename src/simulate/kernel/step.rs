@@ -230,6 +230,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     ) -> bool {
         path.bounce += 1;
         let mut next = Ray::new(at.point, direction).with_departure(at.departure());
+        // Both faces of a contact were crossed at once: the ray goes on behind the second, which it would meet from the wrong side.
         if C::MEDIA && at.skip > 0.0 {
             let reach = way_through_glue(at.skip, direction.dot(at.hit.geometric_normal));
             next.t_min = end_of_contact(self.context, &next, at.hit.geometric_normal, reach);
@@ -263,6 +264,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let point = ray.point_at(ray.t_max);
         let numbers = path.key(context).pair(Purpose::BulkDirection);
         path.length += ray.t_max;
+        // Light that was held by total reflection has another direction now, and may get out.
         path.release();
         path.bounce += 1;
         self.record(path, point, Event::Scattered);

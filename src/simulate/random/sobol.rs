@@ -25,6 +25,8 @@ fn directions(dimension: usize) -> [u32; 32] {
     let s = s as usize;
     for i in 0..32 {
         v[i] = if i < s {
+            // The first numbers are given; the others follow from the primitive polynomial whose inner coefficients are the bits of `a`
+            // (Joe & Kuo 2008).
             m[i] << (31 - i)
         } else {
             (1..s).fold(v[i - s] ^ (v[i - s] >> s), |x, k| x ^ (((a >> (s - 1 - k)) & 1) * v[i - k]))
