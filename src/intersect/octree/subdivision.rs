@@ -70,7 +70,7 @@ impl Subdivision<'_> {
         let middle: [f32; 3] = std::array::from_fn(|a| 0.5 * (cell.low[a] + cell.high[a]));
         let octants = self.split(&facets, &middle);
         let total: usize = octants.iter().map(Vec::len).sum();
-        let largest = octants.iter().map(Vec::len).max().unwrap_or(0);
+        let largest = octants.iter().map(Vec::len).fold(0, usize::max);
         // No progress: one octant still meets all while others meet some too, or all meet nearly everything.
         if (largest == n && total > n) || total >= 4 * n || (n < 64 && total >= 3 * n) {
             return pack(facets);

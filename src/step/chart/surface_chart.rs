@@ -220,11 +220,7 @@ impl Chart {
             match self.period[d] {
                 Some(p) if a.is_finite() => {
                     // Both ends of the base period stay, so that a point on the seam keeps the side it was given.
-                    if uv[d] >= a && uv[d] <= b {
-                        uv[d]
-                    } else {
-                        a + (uv[d] - a).rem_euclid(p)
-                    }
+                    if uv[d] >= a && uv[d] <= b { uv[d] } else { a + (uv[d] - a).rem_euclid(p) }
                 }
                 Some(_) => uv[d],
                 None => uv[d].clamp(a, b),

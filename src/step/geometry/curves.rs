@@ -326,7 +326,7 @@ impl KnotForm {
         }
         let inner = points - degree;
         Some(match self {
-            // ( => From −degree on, so that the domain begins at zero (ISO 10303-42, uniform_curve).
+            // From −degree on, so that the domain begins at zero (ISO 10303-42, uniform_curve).
             Self::Uniform => (0..points + degree + 1).map(|i| i as f64 - degree as f64).collect(),
             Self::QuasiUniform => {
                 let ends = |x: f64| std::iter::repeat_n(x, degree);
