@@ -1,0 +1,53 @@
+"""Writes ``api.md`` from the docstrings: ``python docs/generate_api.py``; with ``--check`` it only compares."""
+
+from __future__ import annotations
+
+import inspect
+import pathlib
+import sys
+from typing import Any
+
+import lampyris
+import lampyris.distributed
+
+PAGE = pathlib.Path(__file__).with_name("api.md")
+
+
+def signature(thing: Any) -> str:
+    try:
+        return str(inspect.signature(thing)).replace("lampyris.", "")
+    except (TypeError, ValueError):
+        return ""
+
+
+def entry(name: str, thing: Any, level: str) -> list[str]:
+    text = inspect.getdoc(thing) or ""
+    is_callable = callable(thing) and not isinstance(thing, type)
+    return [f"{level} `{name}{signature(thing) if is_callable else ''}`", "", text, ""]
+
+
+def members(thing: type) -> list[tuple[str, Any]]:
+    public = [(n, m) for n, m in inspect.getmembers(thing) if not n.startswith("_")]
+    own = {n for base in thing.__mro__ if base.__module__.startswith("lampyris") for n in vars(base)}
+    return [(n, m) for n, m in public if n in own]
+
+
+def page() -> str:
+    lines = ["# Every name", "", "Written by `docs/generate_api.py` from the docstrings.", ""]
+    things = [(f"lampyris.{n}", getattr(lampyris, n)) for n in sorted(lampyris.__all__)]
+    things = [(n, t) for n, t in things if not isinstance(t, str) and not inspect.ismodule(t)]
+    studies = [(f"lampyris.study.{n}", getattr(lampyris.study, n)) for n in ("Study", "accuracy", "check", "interpolation")]
+    shared = [("lampyris.distributed.trace", lampyris.distributed.trace)]
+    for name, thing in things + studies + shared:
+        lines += entry(name, thing, "##")
+        if isinstance(thing, type) and thing.__module__.startswith("lampyris"):
+            for member, value in members(thing):
+                lines += entry(f"{name}.{member}", value, "###")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    made = page()
+    if "--check" in sys.argv:
+        sys.exit(0 if PAGE.exists() and PAGE.read_text(encoding="utf-8") == made else f"{PAGE} is not current: run {sys.argv[0]}")
+    PAGE.write_text(made, encoding="utf-8")

@@ -1,0 +1,82 @@
+"""What faces are made of, and which faces are meant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ._types import Table, Vector, plain
+
+
+@dataclass(frozen=True)
+class Selector:
+    """Faces of a model: all selectors that are given must hold; ``*`` in a name stands for anything."""
+
+    table: Table = field(default_factory=dict)
+
+
+def select(
+    *,
+    part: str | Sequence[str] | None = None,
+    instance: str | Sequence[str] | None = None,
+    face: str | Sequence[str] | None = None,
+    colour: str | Vector | None = None,
+    entity: int | Sequence[int] | None = None,
+    at: Vector | Sequence[Vector] | None = None,
+) -> Selector:
+    """Faces by part, instance, name, colour, ``#id`` in the file, or the face nearest to points (mm)."""
+    given = {"part": part, "instance": instance, "face": face, "colour": colour, "entity": entity, "at": at}
+    return Selector(plain(given))
+
+
+@dataclass(frozen=True)
+class Material:
+    """Keys of a rule ``[[material]]``, and the medium that it brings along."""
+
+    table: Table
+    medium: Table | None = None
+
+
+def mirror(reflectance: float | Sequence[Sequence[float]] = 1.0, scatter: Table | None = None) -> Material:
+    """A mirror of this share, or of a table ``[[angle_deg, share], …]``."""
+    return Material(plain({"surface": "mirror", "reflectance": reflectance, "scatter": scatter}))
+
+
+def diffuse(reflectance: float = 1.0) -> Material:
+    """Reflects this share by Lambert's law."""
+    return Material({"surface": "diffuse", "reflectance": reflectance})
+
+
+def absorber() -> Material:
+    """Light ends here."""
+    return Material({"surface": "absorber"})
+
+
+def interface() -> Material:
+    """The bare boundary of a medium."""
+    return Material({"surface": "interface"})
+
+
+def metal(n: float, k: float) -> Material:
+    """A polished metal of the index n + ik."""
+    return Material({"surface": "metal", "metal": [n, k]})
+
+
+def coating(
+    reflectance: float | None = None,
+    transmittance: float | None = None,
+    rows: Sequence[Sequence[float]] | None = None,
+) -> Material:
+    """A coated boundary: shares, or rows ``[angle_deg, nm, R, T]`` over a full grid."""
+    keys = {"surface": "coating", "reflectance": reflectance, "transmittance": transmittance, "coating": rows}
+    return Material(plain(keys))
+
+
+def glass(medium: str | float, **keys: Any) -> Material:
+    """A body of a transparent medium: a name of the catalogue (see :func:`media`) or an index; ``keys`` are those of ``[[medium]]``."""
+    if isinstance(medium, str) and not keys:
+        return Material({"medium": medium})
+    name = medium if isinstance(medium, str) else f"n={medium:g}"
+    table = {"name": name, **keys} if isinstance(medium, str) else {"name": name, "index": float(medium), **keys}
+    return Material({"medium": name}, plain(table))

@@ -1,0 +1,101 @@
+"""Models from STEP files."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from . import _html, _lampyris
+from ._types import Path, Tolerance, Tolerances, tolerance_list, tolerance_range
+from .mesh import Mesh
+
+
+class Account(dict[str, Any]):
+    """What a file holds and what was refused: the object of ``lampyris info --json``."""
+
+    def _repr_html_(self) -> str:
+        faces = self["faces"]
+        rows = [
+            ("parts", self["parts"]),
+            ("instances", self["instances"]),
+            ("faces found", faces["found"]),
+            ("converted", faces["converted"]),
+            ("repaired", faces["repaired"]),
+            ("refused", faces["refused"]),
+            ("unit of length", ", ".join(self["units"]["length"])),
+        ]
+        rows += [(f"refused #{r['id']} {r['entity']}", r["reason"]) for r in self["refusals"]]
+        return _html.table((self["file"], ""), rows)
+
+
+class Model:
+    """Trimmed splines as a STEP file holds them, placed, in mm; made by :func:`read_step`."""
+
+    def __init__(self, core: _lampyris.Model) -> None:
+        self._core = core
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._core.name
+
+    @property
+    def path(self) -> str:
+        """Where it was read from."""
+        return str(self._core.path)
+
+    @property
+    def unit_mm(self) -> float | None:
+        """Millimetres per length unit, where the file's own was overruled."""
+        return self._core.unit_mm
+
+    @property
+    def parts(self) -> list[str]:
+        """Names of its parts."""
+        return self._core.parts
+
+    def account(self) -> Account:
+        """Faces read, units, what was refused and why."""
+        return Account(json.loads(self._core.account_json()))
+
+    def faces(self) -> list[dict[str, Any]]:
+        """Every face with what a selector can tell it by: part, solid, id, name, colour, kind, radius, area, box, a point on it."""
+        parts = json.loads(self._core.faces_json())
+        return [
+            {"part": part["name"], "solid": solid["index"], **face}
+            for part in parts
+            for solid in part["solids"]
+            for face in solid["faces"]
+        ]
+
+    def tessellate(
+        self,
+        tolerance: Tolerance | None = None,
+        *,
+        angle_deg: float | None = None,
+        parts: Tolerances | None = None,
+        faces: Tolerances | None = None,
+        measure: bool = False,
+    ) -> Mesh:
+        """Quad facets within a proved distance of the splines.
+
+        ``tolerance`` is one length or two in mm, tight where curved and loose where flat, (0.05, 0.2) unless said otherwise; ``parts``
+        and ``faces`` overrule it by name. ``measure`` samples the distance too.
+        """
+        asked = None if tolerance is None else tolerance_range(tolerance)
+        made = self._core.tessellate(asked, angle_deg, tolerance_list(parts), tolerance_list(faces), measure)
+        return Mesh(made)
+
+    def __repr__(self) -> str:
+        return repr(self._core)
+
+    def _repr_html_(self) -> str:
+        return self.account()._repr_html_()
+
+
+def read_step(path: Path, unit_mm: float | None = None) -> Model:
+    """Reads a STEP file; a face that cannot be converted is refused with a reason and stops nothing.
+
+    ``unit_mm`` overrules the file's unit of length. Raises :class:`InputError` when the file cannot be read or is not STEP.
+    """
+    return Model(_lampyris.read_step(path, unit_mm))

@@ -1,0 +1,63 @@
+"""How far work is: tqdm's bar where tqdm is there, else a line of text on a terminal."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+#: Called with the stage, what is done, the total (0 where it is not known) and messages; it stops the work by raising.
+ProgressCallback = Callable[[str, int, int, list[str]], None]
+
+
+class Progress:
+    """Shows the stages of a job one after another."""
+
+    def __init__(self, messages: bool = True) -> None:
+        self._bar: Any = None
+        self._stage = ""
+        self._messages = messages
+        self._shown = 0
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            self._tqdm: Any = None
+        else:
+            self._tqdm = tqdm
+
+    def __call__(self, stage: str, done: int, total: int, messages: list[str]) -> None:
+        if self._messages:
+            for message in messages:
+                print(message, file=sys.stderr)
+        if stage != self._stage:
+            self.close()
+            self._stage = stage
+            if self._tqdm is not None and total > 0:
+                self._bar = self._tqdm(total=total, desc=stage, unit=" rays", unit_scale=True, leave=False)
+        if self._bar is not None:
+            self._bar.total = total
+            self._bar.update(max(0, done - self._bar.n))
+        elif self._tqdm is None and total > 0 and sys.stderr.isatty():
+            percent = 100 * done // total
+            if percent != self._shown:
+                self._shown = percent
+                print(f"\r{stage} {percent:3d} %", end="", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Takes the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+        if self._shown:
+            print("\r", end="", file=sys.stderr)
+            self._shown = 0
+
+
+def callback(progress: bool | ProgressCallback) -> tuple[ProgressCallback | None, Callable[[], None]]:
+    """What is told of the work, and what ends it: ``True`` for a bar, ``False`` for silence, or a function."""
+    if progress is True:
+        shown = Progress()
+        return shown, shown.close
+    if progress is False:
+        return None, lambda: None
+    return progress, lambda: None

@@ -1,0 +1,58 @@
+"""Where light is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ._types import Table, Vector, plain
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """Keys of a ``[[receiver]]``."""
+
+    table: Table
+
+
+def _receiver(kind: str, name: str, keys: dict[str, Any], **own: Any) -> Receiver:
+    return Receiver(plain({"name": name, "kind": kind, **own, **keys}))
+
+
+def plane(
+    name: str,
+    at: Vector,
+    normal: Vector = (0.0, 0.0, 1.0),
+    size: Vector = (100.0, 100.0),
+    cells: Sequence[int] = (100, 100),
+    **keys: Any,
+) -> Receiver:
+    """A rectangle in space, power per area; light ends there unless ``absorbs=False``."""
+    return _receiver("plane", name, keys, at=at, normal=normal, size=size, cells=cells)
+
+
+def far_field(
+    name: str,
+    h_deg: Vector = (-90.0, 90.0),
+    v_deg: Vector = (-90.0, 90.0),
+    cells: Sequence[int] | None = None,
+    step_deg: float | None = None,
+    **keys: Any,
+) -> Receiver:
+    """All light that leaves the scene by direction, power per solid angle; ``cells``, or cells of ``step_deg``."""
+    if cells is None and step_deg is not None:
+        if not step_deg > 0.0:
+            raise ValueError(f"step_deg = {step_deg}: it must be positive")
+        cells = [max(1, round((high - low) / step_deg)) for low, high in (h_deg, v_deg)]
+    return _receiver("far_field", name, keys, h_deg=h_deg, v_deg=v_deg, cells=cells)
+
+
+def sphere(name: str, at: Vector, radius: float, cells: Sequence[int] = (180, 90), **keys: Any) -> Receiver:
+    """A sphere in space by direction from its centre, power per area."""
+    return _receiver("sphere", name, keys, at=at, radius=radius, cells=cells)
+
+
+def absorbed(name: str, part: str | Sequence[str] | None = None, **keys: Any) -> Receiver:
+    """What the faces of a part absorb."""
+    return _receiver("absorbed", name, keys, part=part, cells=[1, 1])

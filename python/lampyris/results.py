@@ -1,0 +1,262 @@
+"""What a run counted: arrays with unit and both errors."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from . import _html, _lampyris
+from ._types import FloatArray, Path
+from .verdicts import Assessment
+
+#: Pixels across a picture of a receiver, at least.
+PICTURE_WIDTH = 200
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with both its errors, one standard error each."""
+
+    value: float
+    unit: str
+    #: From the number of rays.
+    statistical: float
+    #: From the facets; 0 on the spline, none where it was not measured.
+    geometric: float | None
+    #: ``statistics`` or ``geometry``: the larger of the two.
+    limited_by: str
+
+    def __str__(self) -> str:
+        geometric = "not measured" if self.geometric is None else f"{self.geometric:.2g}"
+        return f"{self.value:.6g} ± {self.statistical:.2g} (rays) ± {geometric} (facets) {self.unit}".strip()
+
+    def __float__(self) -> float:
+        return self.value
+
+
+class Receiver:
+    """What one receiver counted. Maps have the shape (cells[1], cells[0]): the second axis runs down the rows."""
+
+    def __init__(self, results: _lampyris.Results, index: int, document: dict[str, Any]) -> None:
+        self._results = results
+        self._index = index
+        #: The object of the receiver in ``results.json``.
+        self.document = document
+        self.name: str = document["name"]
+        #: ``plane``, ``far_field``, ``sphere`` or ``absorbed``.
+        self.kind: str = document["kind"]
+        #: Unit of the cells.
+        self.unit: str = document["unit"]
+        #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``.
+        self.figures: dict[str, Figure] = {
+            name: Figure(f["value"], f["unit"], f["statistical"], f["geometric"], f["limited_by"])
+            for name, f in document["figures"].items()
+            if f is not None
+        }
+
+    @cached_property
+    def _layers(self) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        return self._results.layers(self._index)
+
+    @property
+    def values(self) -> FloatArray:
+        """The cells, in :attr:`unit`."""
+        return self._layers[0]
+
+    @property
+    def statistical(self) -> FloatArray:
+        """Standard error of every cell from the number of rays."""
+        return self._layers[1]
+
+    @property
+    def geometric(self) -> FloatArray | None:
+        """Error of every cell from the facets; zero on the spline, none where it was not measured."""
+        return self._layers[2]
+
+    @cached_property
+    def edges(self) -> tuple[FloatArray, FloatArray]:
+        """Edges of the cells along both axes: mm of planes, degrees of angles."""
+        return self._results.edges(self._index)
+
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """Centres of the cells along both axes."""
+        first, second = self.edges
+        return 0.5 * (first[1:] + first[:-1]), 0.5 * (second[1:] + second[:-1])
+
+    @property
+    def axis_names(self) -> tuple[str, str]:
+        """What runs along the axes, as dimensions of ``to_xarray``."""
+        if self.kind == "plane":
+            return "x", "y"
+        return ("C", "gamma") if self.document.get("angles") == "C" else ("H", "V")
+
+    def _in(self, unit: str) -> FloatArray:
+        if self.unit != unit:
+            raise ValueError(f"{self.name} is in {self.unit}, not {unit}; ``values`` has it in its own unit")
+        return self.values
+
+    @property
+    def candela(self) -> FloatArray:
+        """Luminous intensity, of a far field in a run that counts lm."""
+        return self._in("cd")
+
+    @property
+    def lux(self) -> FloatArray:
+        """Illuminance, of a plane or sphere in a run that counts lm."""
+        return self._in("lx")
+
+    @property
+    def power(self) -> Figure:
+        """Power that arrived."""
+        return self.figures["power"]
+
+    @property
+    def channels(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Further channels by name: cells and their standard errors."""
+        names = [c["name"] for c in self.document["channels"]]
+        return {name: self._results.channel(self._index, k) for k, name in enumerate(names)}
+
+    def to_xarray(self) -> Any:
+        """An ``xarray.Dataset`` of value, statistical and geometric over the axes."""
+        import xarray
+
+        first, second = self.axis_names
+        along, across = self.axes
+        layers = {"value": self.values, "statistical": self.statistical}
+        if self.geometric is not None:
+            layers["geometric"] = self.geometric
+        unit = "mm" if self.kind == "plane" else "deg"
+        data = {name: ((second, first), layer, {"units": self.unit}) for name, layer in layers.items()}
+        coordinates = {first: (first, along, {"units": unit}), second: (second, across, {"units": unit})}
+        return xarray.Dataset(data, coordinates, {"receiver": self.name, "kind": self.kind})
+
+    def to_png(self, exponent: float = 0.5) -> bytes:
+        """The map as a picture; an exponent below 1 lifts what is dark."""
+        zoom = max(1, -(-PICTURE_WIDTH // self.values.shape[1]))
+        return _lampyris.value_map(self.values, zoom, exponent)
+
+    def __repr__(self) -> str:
+        return f"<lampyris receiver {self.name!r} ({self.kind}): {self.power}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(n, f.value, f.statistical, f.geometric, f.unit) for n, f in self.figures.items()]
+        text = _html.table((self.name, "value", "± rays", "± facets", "unit"), rows)
+        if self.values.size > 1:
+            text += _html.picture(self.to_png(), f"{self.name}, 0 to {self.values.max():.4g} {self.unit}")
+        return text
+
+
+class Run(Mapping[str, Receiver]):
+    """The results of a traced scene; a mapping of receivers by name."""
+
+    def __init__(self, results: _lampyris.Results, until: dict[str, Any] | None = None) -> None:
+        self._results = results
+        #: What came of an error that was asked for.
+        self.until = until
+
+    @cached_property
+    def document(self) -> dict[str, Any]:
+        """The document of ``results.json``."""
+        return dict(json.loads(self._results.document_json()))
+
+    @cached_property
+    def _receivers(self) -> dict[str, Receiver]:
+        documents = self.document["receivers"]
+        return {d["name"]: Receiver(self._results, k, d) for k, d in enumerate(documents)}
+
+    @property
+    def digest(self) -> str:
+        """Hash of all tallies: equal if and only if all of them are, bit by bit; that of ``lampyris trace --json``."""
+        return self._results.digest
+
+    @property
+    def rays(self) -> int:
+        """Rays that left the sources."""
+        return int(self.document["rays"])
+
+    @property
+    def power(self) -> dict[str, float]:
+        """Where the power went: emitted, received, absorbed, escaped, cut_off, lost."""
+        return dict(self.document["power"])
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds of reading, meshing, building and tracing."""
+        return dict(self.document["seconds"])
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader must know."""
+        return list(self.document["notes"])
+
+    @property
+    def chosen(self) -> dict[str, Any] | None:
+        """How the run is traced and why, where nobody asked for it."""
+        return self.document.get("chosen")
+
+    @property
+    def check(self) -> dict[str, Any] | None:
+        """Some of the rays asked again of BVH and spline."""
+        return self.document.get("check")
+
+    @property
+    def paths(self) -> dict[str, Any]:
+        """Recorded paths vertex by vertex: arrays ``ray``, ``branch``, ``bounce``, ``point`` (n, 3) in mm and ``power``."""
+        return dict(zip(("ray", "branch", "bounce", "point", "power"), self._results.paths()))
+
+    def assess(
+        self, regulation: str, receiver: str | None = None, *, left_hand: bool = False, as_placed: bool = False
+    ) -> Assessment:
+        """The verdict of a lamp regulation (see :func:`lampyris.regulations`) about a far field in candela."""
+        names = list(self._receivers)
+        if receiver is None:
+            fits = [n for n, r in self._receivers.items() if r.kind == "far_field" and r.unit == "cd"]
+            if len(fits) != 1:
+                raise ValueError(f"assess: name the far field in candela, one of {fits or names}")
+            receiver = fits[0]
+        elif receiver not in self._receivers:
+            raise KeyError(f"no receiver {receiver!r}; there are {', '.join(names)}")
+        text = _lampyris.assess(self._results, names.index(receiver), regulation, left_hand, as_placed)
+        return Assessment(json.loads(text))
+
+    def to_json(self, path: Path | None = None) -> str:
+        """The document as text, written to a file where one is named."""
+        text = json.dumps(self.document, indent=2)
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text + "\n")
+        return text
+
+    def to_frame(self) -> Any:
+        """A ``pandas.DataFrame`` of all figures: receiver, figure, value, statistical, geometric, unit."""
+        import pandas
+
+        rows = [
+            {"receiver": name, "figure": figure, "value": f.value, "statistical": f.statistical, "geometric": f.geometric, "unit": f.unit}
+            for name, receiver in self._receivers.items()
+            for figure, f in receiver.figures.items()
+        ]
+        return pandas.DataFrame(rows)
+
+    def __getitem__(self, name: str) -> Receiver:
+        try:
+            return self._receivers[name]
+        except KeyError:
+            raise KeyError(f"no receiver {name!r}; there are {', '.join(self._receivers)}") from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._receivers)
+
+    def __len__(self) -> int:
+        return len(self._receivers)
+
+    def __repr__(self) -> str:
+        return f"<lampyris.Run: {self.rays} rays, receivers {', '.join(self)}, digest {self.digest}>"
+
+    def _repr_html_(self) -> str:
+        power = _html.table(("power", ""), self.power.items())
+        return power + "".join(receiver._repr_html_() for receiver in self.values())

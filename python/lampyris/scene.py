@@ -1,0 +1,337 @@
+"""Scenes: read from TOML or built here, traced to figures with both errors."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import os
+import pathlib
+import tempfile
+from collections.abc import Iterable
+from typing import Any
+
+from . import _lampyris
+from ._types import Path, Table, Tolerance, Tolerances, plain, tolerance_list, tolerance_range
+from .materials import Material, Selector
+from .mesh import Mesh
+from .model import Model
+from .progress import ProgressCallback, callback
+from .receivers import Receiver
+from .results import Run
+from .sources import Source
+
+#: Settings of a trace that are none of the scene's own.
+Settings = dict[str, Any]
+
+
+class Part:
+    """What was traced of a run: to be kept, sent, added to other parts, and gone on from with ``trace(resume=part)``."""
+
+    def __init__(self, core: _lampyris.Part) -> None:
+        self._core = core
+
+    @property
+    def rays(self) -> int:
+        """Rays that are done."""
+        return self._core.rays
+
+    @property
+    def done(self) -> int:
+        """Replicates that are done."""
+        return self._core.done
+
+    @property
+    def replicates(self) -> int:
+        """Replicates of the whole run."""
+        return self._core.replicates
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is left to trace."""
+        return self._core.is_whole
+
+    def merged(self, other: Part) -> Part:
+        """The sum with another part of the same run."""
+        return Part(self._core.merged(other._core))
+
+    def to_bytes(self) -> bytes:
+        """For a file or another machine; :meth:`Scene.read_part` reads them."""
+        return self._core.to_bytes()
+
+    def save(self, path: Path) -> None:
+        """Writes the bytes into a file."""
+        pathlib.Path(path).write_bytes(self.to_bytes())
+
+    def __repr__(self) -> str:
+        return repr(self._core)
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C stopped a trace; ``part`` is what was done, and the scene keeps it as ``interrupted``."""
+
+    def __init__(self, part: Part) -> None:
+        share = f"{part.done} of {part.replicates} replicates ({part.rays} rays)"
+        super().__init__(f"{share} are kept: scene.trace(..., resume=True) goes on from there")
+        self.part = part
+
+
+class Scene:
+    """A scene: models, materials, sources, receivers, as the tables of a scene file.
+
+    ``models`` are STEP files or models that were read; ``unit`` is ``"W"`` or ``"lm"``; further keywords are those of ``[run]``.
+    """
+
+    def __init__(
+        self,
+        models: Path | Model | Iterable[Path | Model] = (),
+        *,
+        title: str = "",
+        unit: str = "W",
+        **run: Any,
+    ) -> None:
+        self._tables: Table = {"run": plain({"unit": unit, **run})}
+        if title:
+            self._tables["title"] = title
+        self._text: str | None = None
+        self._name = "scene"
+        self._folder = os.getcwd()
+        self._models: list[Model] = []
+        self._ray_folder: tempfile.TemporaryDirectory[str] | None = None
+        self._prepared: tuple[str, _lampyris.Prepared] | None = None
+        #: What an interrupted trace left.
+        self.interrupted: Part | None = None
+        given = [models] if isinstance(models, (str, os.PathLike, Model)) else list(models)
+        for model in given:
+            self.add_model(model)
+
+    @classmethod
+    def from_toml(cls, path: Path) -> Scene:
+        """Reads a scene file; what it names is relative to its folder."""
+        file = pathlib.Path(path)
+        if file.suffix.lower() in (".stp", ".step", ".p21"):
+            raise _lampyris.SceneError(f"{file}: a STEP file, where a scene (.toml) is needed; lampyris.Scene({str(file)!r}) makes one")
+        try:
+            text = file.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as e:
+            raise _lampyris.InputError(f"{file}: cannot read the scene file: {e}; check the path") from e
+        return cls.parse(text, folder=file.absolute().parent, name=str(path))
+
+    @classmethod
+    def parse(cls, text: str, folder: Path = ".", name: str = "scene") -> Scene:
+        """From the text of a scene file."""
+        scene = cls()
+        scene._folder = os.path.abspath(folder)
+        scene._tables = json.loads(_lampyris.scene_to_json(text, name, scene._folder))
+        scene._text = text
+        scene._name = name
+        return scene
+
+    @property
+    def tables(self) -> Table:
+        """The tables of the scene file; changes count."""
+        self._text = None
+        return self._tables
+
+    def add_model(self, model: Path | Model, **keys: Any) -> Scene:
+        """Puts a STEP file, or a model that was read, into the scene; ``keys`` are those of ``[[model]]``, such as ``placement``."""
+        if isinstance(model, Model):
+            self._models.append(model)
+            keys = {"unit_mm": model.unit_mm, **keys}
+            model = model.path
+        self.tables.setdefault("model", []).append(plain({"file": os.path.abspath(model), **keys}))
+        return self
+
+    def medium(self, name: str, **keys: Any) -> Scene:
+        """Describes a medium: ``index=1.49``, ``sellmeier=…``, ``absorption_per_mm=…``."""
+        self.tables.setdefault("medium", []).append(plain({"name": name, **keys}))
+        return self
+
+    def __setitem__(self, where: str | Selector, material: Material) -> None:
+        """``scene["housing"] = mirror(0.95)``: what the faces of a part, or of a selector, are made of; later rules win."""
+        if not isinstance(material, Material):
+            raise TypeError(f"a material is needed, as lampyris.mirror(0.9), not {type(material).__name__}")
+        selector = where.table if isinstance(where, Selector) else {"part": where}
+        if material.medium is not None:
+            media = self.tables.setdefault("medium", [])
+            if material.medium not in media:
+                media.append(dict(material.medium))
+        self.tables.setdefault("material", []).append({**selector, **material.table})
+
+    def add(self, *things: Source | Receiver) -> Scene:
+        """Adds sources and receivers."""
+        for thing in things:
+            if isinstance(thing, Source):
+                self._add_source(thing)
+            elif isinstance(thing, Receiver):
+                self.tables.setdefault("receiver", []).append(dict(thing.table))
+            else:
+                raise TypeError(f"a source or a receiver is needed, as lampyris.led(…), not {type(thing).__name__}")
+        return self
+
+    def _add_source(self, source: Source) -> None:
+        table = dict(source.table)
+        if "file" in table:
+            table["file"] = os.path.abspath(table["file"])
+        if source.rays is not None:
+            if self._ray_folder is None:
+                self._ray_folder = tempfile.TemporaryDirectory(prefix="lampyris-rays-")
+            # By content, so that the same rays make the same scene.
+            name = hashlib.sha256(source.rays.tobytes()).hexdigest()[:16] + ".npz"
+            table["file"] = os.path.join(self._ray_folder.name, name)
+            _lampyris.write_ray_file(table["file"], source.rays)
+        self.tables.setdefault("source", []).append(table)
+
+    def to_toml(self) -> str:
+        """The scene file: the very text that was read, or the tables."""
+        if self._text is None:
+            self._text = _lampyris.toml_from_json(json.dumps(self._tables))
+        return self._text
+
+    def save(self, path: Path) -> None:
+        """Writes the scene file; models are named by their absolute paths."""
+        tables = copy.deepcopy(self._tables)
+        for entry in tables.get("model", []) + [s for s in tables.get("source", []) if "file" in s]:
+            entry["file"] = os.path.abspath(os.path.join(self._folder, entry["file"]))
+        pathlib.Path(path).write_text(_lampyris.toml_from_json(json.dumps(tables)), encoding="utf-8")
+
+    def prepare(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Settings:
+        """Reads, binds and facets the scene, and chooses how to trace it; says how. ``settings`` are those of :meth:`trace`."""
+        prepared = self._prepare(_settings(**settings), progress)
+        return dict(json.loads(prepared.summary_json()))
+
+    def facets(self, **settings: Any) -> Mesh:
+        """The facets that a trace with these settings is about; on the spline those that it is drawn and checked with."""
+        return Mesh(self._prepare(_settings(**settings), False).mesh)
+
+    def _prepare(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
+        text = self.to_toml()
+        key = hashlib.sha256(json.dumps([text, self._folder, settings], default=str).encode()).hexdigest()
+        if self._prepared is None or self._prepared[0] != key:
+            tell, close = callback(progress)
+            try:
+                cores = [model._core for model in self._models]
+                prepared = _lampyris.Prepared(text, self._name, self._folder, cores, settings, tell)
+            finally:
+                close()
+            self._prepared = (key, prepared)
+        return self._prepared[1]
+
+    def trace(
+        self,
+        rays: int | None = None,
+        *,
+        until: str | None = None,
+        seed: int | None = None,
+        threads: int | None = None,
+        tolerance: Tolerance | None = None,
+        angle_deg: float | None = None,
+        accuracy_deg: float | None = None,
+        parts: Tolerances | None = None,
+        faces: Tolerances | None = None,
+        roles: Tolerances | None = None,
+        normals: str | None = None,
+        intersector: str | None = None,
+        resume: bool | Part = False,
+        progress: bool | ProgressCallback = True,
+    ) -> Run:
+        """Traces the scene: so many ``rays``, or as many as an error asks for, as ``until="1%@far"``.
+
+        What is not said the scene says; without tolerance, normals and intersector a pilot of the run's own rays chooses them. The bits
+        are those of ``lampyris trace`` with the same settings, for any number of threads. Ctrl-C raises :class:`Interrupted`;
+        ``resume=True`` then goes on, ``resume=part`` from any part of the run. The GIL is free meanwhile.
+        """
+        settings = _settings(
+            rays=rays, seed=seed, threads=threads, tolerance=tolerance, angle_deg=angle_deg, accuracy_deg=accuracy_deg,
+            parts=parts, faces=faces, roles=roles, normals=normals, intersector=intersector,
+        )
+        prepared = self._prepare(settings, progress)
+        part = self.interrupted if resume is True else (resume or None)
+        if resume is True and part is None:
+            raise ValueError("resume=True: no trace of this scene was interrupted; leave it out, or give a part")
+        tell, close = callback(progress)
+        words = None
+        try:
+            if until is not None and part is None:
+                found, rest, stopped, words = prepared.trace_until(until, tell)
+            else:
+                found, rest, stopped = prepared.trace(None if part is None else part._core, None, tell)
+        finally:
+            close()
+        if rest is not None:
+            self.interrupted = Part(rest)
+            if isinstance(stopped, KeyboardInterrupt):
+                raise Interrupted(self.interrupted) from None
+        if stopped is not None:
+            raise stopped
+        if found is None:
+            raise _lampyris.Defect("a trace ended without results; please report it")
+        self.interrupted = None
+        return Run(found, None if words is None else json.loads(words))
+
+    def trace_part(
+        self, index: int, count: int, *, progress: bool | ProgressCallback = False, **settings: Any
+    ) -> Part:
+        """Traces part ``index`` (from 0) of ``count`` of the run; ``settings`` are those of :meth:`trace`."""
+        prepared = self._prepare(_settings(**settings), progress)
+        tell, close = callback(progress)
+        try:
+            _, part, stopped = prepared.trace(None, (index, count), tell)
+        finally:
+            close()
+        if stopped is not None:
+            raise stopped
+        if part is None:
+            raise _lampyris.Defect("a part was traced without sums; please report it")
+        return Part(part)
+
+    def read_part(self, data: bytes, **settings: Any) -> Part:
+        """A part from its bytes; it must be of this scene with the same settings."""
+        return Part(self._prepare(_settings(**settings), False).read_part(data))
+
+    def __repr__(self) -> str:
+        tables = self._tables
+        counts = ", ".join(f"{len(tables.get(k, []))} {k}s" for k in ("model", "material", "source", "receiver"))
+        return f"<lampyris.Scene {tables.get('title', '')!r}: {counts}>"
+
+
+def _settings(
+    *,
+    rays: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    tolerance: Tolerance | None = None,
+    angle_deg: float | None = None,
+    accuracy_deg: float | None = None,
+    parts: Tolerances | None = None,
+    faces: Tolerances | None = None,
+    roles: Tolerances | None = None,
+    normals: str | None = None,
+    intersector: str | None = None,
+) -> Settings:
+    """What is asked beside the scene, as the extension takes it."""
+    if rays is not None and (isinstance(rays, bool) or rays != int(rays) or rays < 1):
+        raise ValueError(f"rays = {rays!r}: a number of rays is whole and at least 1")
+    return {
+        "tolerance": None if tolerance is None else tolerance_range(tolerance),
+        "angle_deg": angle_deg,
+        "accuracy_deg": accuracy_deg,
+        "part": tolerance_list(parts),
+        "face": tolerance_list(faces),
+        "role": tolerance_list(roles),
+        "rays": None if rays is None else (None, int(rays)),
+        "seed": seed,
+        "threads": threads,
+        "intersector": intersector,
+        "normals": normals,
+    }
+
+
+def media() -> list[str]:
+    """Names of the media that need no table."""
+    return _lampyris.media()
+
+
+def scene_schema() -> dict[str, Any]:
+    """The JSON Schema of scene files."""
+    return dict(json.loads(_lampyris.scene_schema()))

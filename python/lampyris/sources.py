@@ -1,0 +1,88 @@
+"""Where light comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._types import FloatArray, Path, Table, Vector, plain
+
+
+@dataclass(frozen=True)
+class Source:
+    """Keys of a ``[[source]]``, and its rays where they came as an array."""
+
+    table: Table
+    rays: FloatArray | None = None
+
+
+def _source(kind: str, keys: dict[str, Any], **own: Any) -> Source:
+    return Source(plain({"kind": kind, **own, **keys}))
+
+
+def point(at: Vector, power: float = 1.0, **keys: Any) -> Source:
+    """The same in every direction."""
+    return _source("point", keys, at=at, power=power)
+
+
+def cone(at: Vector, direction: Vector, half_angle_deg: float, power: float = 1.0, **keys: Any) -> Source:
+    """The same in every direction within an angle of ``direction``."""
+    return _source("cone", keys, at=at, direction=direction, half_angle_deg=half_angle_deg, power=power)
+
+
+def collimated(at: Vector, direction: Vector, radius: float | None = None, power: float = 1.0, **keys: Any) -> Source:
+    """A beam from a disc of ``radius`` or a rectangle of ``size``, mm."""
+    return _source("collimated", keys, at=at, direction=direction, radius=radius, power=power)
+
+
+def lambertian(at: Vector, direction: Vector, power: float = 1.0, **keys: Any) -> Source:
+    """Intensity proportional to the cosine to ``direction``, from a point, a disc (``radius``) or a rectangle (``size``)."""
+    return _source("lambertian", keys, at=at, direction=direction, power=power)
+
+
+def cosine(at: Vector, direction: Vector, exponent: float, power: float = 1.0, **keys: Any) -> Source:
+    """Intensity proportional to a power of the cosine to ``direction``."""
+    return _source("cosine", keys, at=at, direction=direction, exponent=exponent, power=power)
+
+
+def led(
+    at: Vector = (0.0, 0.0, 0.0),
+    direction: Vector = (0.0, 0.0, 1.0),
+    size: Vector = (1.0, 1.0),
+    power: float = 1.0,
+    **keys: Any,
+) -> Source:
+    """The die of an LED: a rectangle that shines by Lambert's law."""
+    return _source("lambertian", keys, at=at, direction=direction, size=size, power=power)
+
+
+def ies(file: Path, at: Vector = (0.0, 0.0, 0.0), direction: Vector = (0.0, 0.0, 1.0), **keys: Any) -> Source:
+    """The intensity of an IES LM-63 file, in lumens unless ``power`` is given."""
+    return _source("ies", keys, file=file, at=at, direction=direction)
+
+
+def eulumdat(file: Path, at: Vector = (0.0, 0.0, 0.0), direction: Vector = (0.0, 0.0, 1.0), **keys: Any) -> Source:
+    """The intensity of a EULUMDAT file, in lumens unless ``power`` is given."""
+    return _source("eulumdat", keys, file=file, at=at, direction=direction)
+
+
+def ray_file(file: Path, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
+    """The rays of a file: TM-25, Zemax, LightTools, CSV or NPZ."""
+    return _source("rays", keys, file=file, at=at)
+
+
+def rays(array: npt.ArrayLike, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
+    """Rays of an array: (n, 7) of origin (mm), direction and power, or (n, 8) with the wavelength in nm too."""
+    given = np.asarray(array)
+    if given.dtype.kind not in "fiu":
+        raise TypeError(f"rays: an array of numbers with shape (n, 7) or (n, 8) is needed, not of {given.dtype}")
+    if given.ndim != 2 or given.shape[1] not in (7, 8):
+        raise ValueError(f"rays: the shape must be (n, 7) or (n, 8), not {given.shape}; the columns are x, y, z, dx, dy, dz, power, nm")
+    if not np.isfinite(given).all():
+        row = int(np.argwhere(~np.isfinite(given))[0, 0])
+        raise ValueError(f"rays[{row}] holds a number that is not finite; leave such rows out")
+    table = plain({"kind": "rays", "at": at, **keys})
+    return Source(table, np.ascontiguousarray(given, dtype=np.float64))

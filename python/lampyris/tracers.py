@@ -1,0 +1,92 @@
+"""Octree, BVH and spline, asked about arrays of rays."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _lampyris
+from ._lampyris import Hits
+from .mesh import Mesh
+from .model import Model
+
+
+class _Tracer:
+    def __init__(self, core: _lampyris.Tracer) -> None:
+        self._core = core
+
+    def intersect(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        *,
+        t_min: float = 0.0,
+        t_max: float = math.inf,
+        threads: int | None = None,
+    ) -> Hits:
+        """Nearest hits of rays from ``origins`` (n, 3) along ``directions`` (n, 3), in mm.
+
+        Arrays of float64 in one piece are read where they lie, read-only ones too; other numbers are converted first. Directions are
+        brought to unit length. ``ValueError`` names the first ray with a number that is not finite.
+        """
+        return self._core.intersect(np.asarray(origins), np.asarray(directions), t_min, t_max, threads)
+
+    @property
+    def bytes(self) -> int:
+        """Bytes held, without mesh and model."""
+        return self._core.bytes
+
+    @property
+    def primitives(self) -> int:
+        """Facets or patches."""
+        return self._core.primitives
+
+    @property
+    def build_seconds(self) -> float:
+        """Seconds that building took."""
+        return self._core.build_seconds
+
+    def __repr__(self) -> str:
+        return repr(self._core)
+
+
+class Octree(_Tracer):
+    """The octree over the facets of a mesh.
+
+    ``normals`` is how the normal at a hit is got: flat, nearest, bilinear or cubic; with ``exact`` every hit is moved to the spline of
+    ``model``.
+    """
+
+    def __init__(self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None) -> None:
+        core = None if model is None else model._core
+        super().__init__(_lampyris.Tracer.of_mesh(_mesh(mesh, "Octree"), "octree", normals, core))
+
+
+class Bvh(_Tracer):
+    """A hierarchy of boxes over the facets of a mesh: eight-wide, or binary with ``wide=False``."""
+
+    def __init__(
+        self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None, *, wide: bool = True
+    ) -> None:
+        core = None if model is None else model._core
+        kind = "cwbvh" if wide else "bvh2"
+        super().__init__(_lampyris.Tracer.of_mesh(_mesh(mesh, "Bvh"), kind, normals, core))
+
+
+class Exact(_Tracer):
+    """The splines of a model themselves; every hit says whether it is proved to be the first."""
+
+    def __init__(self, model: Model) -> None:
+        if not isinstance(model, Model):
+            raise TypeError(f"Exact takes a Model, not {type(model).__name__}; read one with lampyris.read_step")
+        super().__init__(_lampyris.Tracer.of_model(model._core))
+
+
+def _mesh(mesh: Any, what: str) -> _lampyris.Mesh:
+    if not isinstance(mesh, Mesh):
+        advice = "make one with model.tessellate(), Mesh.from_arrays, from_trimesh or from_pyvista"
+        raise TypeError(f"{what} takes a Mesh, not {type(mesh).__name__}; {advice}")
+    return mesh._core

@@ -1,0 +1,92 @@
+//! NumPy arrays in and out: what is wrong with an array is said before any work.
+
+use crate::errors::Defect;
+use lampyris::math::{Point, Uv, Vector};
+use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// A float64 array of so many columns as it lies in memory; other numbers are converted by NumPy, which copies.
+///
+/// # Errors
+/// `TypeError` for what is no array of real numbers, `ValueError` for another shape.
+pub(crate) fn columns<'py>(
+    given: &Bound<'py, PyAny>,
+    name: &str,
+    width: usize,
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    let py = given.py();
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (given,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
+    if !matches!(kind.as_str(), "f" | "i" | "u") {
+        let dtype = array.getattr("dtype")?;
+        return Err(PyTypeError::new_err(format!(
+            "{name}: an array of float64 with shape (n, {width}) is needed, not of {dtype}; convert it with numpy.asarray({name}, dtype=float)"
+        )));
+    }
+    if shape.len() != 2 || shape[1] != width {
+        return Err(PyValueError::new_err(format!(
+            "{name}: the shape must be (n, {width}), not {}; a single row is {name}[None, :]",
+            array.getattr("shape")?
+        )));
+    }
+    let array = numpy.call_method1("ascontiguousarray", (array, numpy.getattr("float64")?))?;
+    let array = array.cast_into::<PyArray2<f64>>().map_err(|_| {
+        PyTypeError::new_err(format!("{name}: an array of float64 with shape (n, {width}) is needed"))
+    })?;
+    array.try_readonly().map_err(|_| {
+        PyValueError::new_err(format!("{name}: the array is being written by another thread; wait, or pass a copy"))
+    })
+}
+
+/// The rows of a contiguous array.
+pub(crate) fn rows<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
+    array.as_slice().map_err(|_| Defect::new_err("an array that was made contiguous is not; please report it"))
+}
+
+/// A vector as an array of this shape, without a copy.
+pub(crate) fn shaped<'py, T: Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    shape: &[usize],
+) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+    PyArray1::from_vec(py, values).reshape(shape.to_vec())
+}
+
+/// Coordinates of points in a row.
+pub(crate) fn flat(points: impl Iterator<Item = Point>) -> Vec<f64> {
+    points.flat_map(|p| p.to_array()).collect()
+}
+
+/// Coordinates of parameters in a row.
+pub(crate) fn flat_uv(points: impl Iterator<Item = Uv>) -> Vec<f64> {
+    points.flat_map(|p| p.to_array()).collect()
+}
+
+/// The vector at the beginning of a row.
+pub(crate) fn vector(row: &[f64]) -> Vector {
+    Vector::new(row[0], row[1], row[2])
+}
+
+/// Whether an array is empty or all of its rows are finite.
+///
+/// # Errors
+/// `ValueError` that names the first row that is not.
+pub(crate) fn require_finite(rows: &[f64], width: usize, name: &str) -> PyResult<()> {
+    match rows.iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(k) => Err(PyValueError::new_err(format!(
+            "{name}[{}, {}] is {}: every number must be finite; leave such rows out with {name}[numpy.isfinite({name}).all(axis=1)]",
+            k / width,
+            k % width,
+            rows[k]
+        ))),
+    }
+}
+
+/// Number of rows of an array.
+pub(crate) fn length(array: &PyReadonlyArray2<'_, f64>) -> usize {
+    array.shape()[0]
+}

@@ -1,0 +1,162 @@
+//! Work that runs without the GIL on a thread of its own, while this one tells how far it is and listens for Ctrl-C.
+
+use crate::errors::Defect;
+use lampyris::pipeline::{Monitor, Stage};
+use lampyris::study;
+use lampyris::study::default_accuracy::Chosen;
+use pyo3::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+/// How often to look for signals and to tell how far the work is: below what a person notices.
+const LOOK_EVERY: Duration = Duration::from_millis(40);
+
+/// How far the work is, written by its threads and read by the one that waits.
+#[derive(Default)]
+pub(crate) struct SharedProgress {
+    stage: Mutex<&'static str>,
+    messages: Mutex<Vec<String>>,
+    done: AtomicU64,
+    total: AtomicU64,
+    stops: AtomicBool,
+    /// Whether what runs is tracing, which stops when asked and keeps what it has done.
+    is_tracing: AtomicBool,
+}
+
+impl SharedProgress {
+    fn say(&self, message: String) {
+        locked(&self.messages).push(message);
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+impl Monitor for SharedProgress {
+    fn begin(&self, stage: Stage<'_>) {
+        let (name, total) = match stage {
+            Stage::Reading(_) => ("reading", 0),
+            Stage::Tessellating => ("making facets", 0),
+            Stage::Choosing => ("choosing facets or spline", 0),
+            Stage::Aiming => ("aiming", 0),
+            Stage::Building(_) => ("building", 0),
+            Stage::BuildingCheck(_) => ("building the cross-check", 0),
+            Stage::Tracing(rays) => ("tracing", rays),
+            Stage::Checking(rays) => ("checking", rays),
+            _ => ("working", 0),
+        };
+        *locked(&self.stage) = name;
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+        self.is_tracing.store(matches!(stage, Stage::Tracing(_)), Ordering::SeqCst);
+    }
+
+    fn advance(&self, done: u64, total: u64) -> bool {
+        self.done.fetch_max(done, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+        !self.stops.load(Ordering::SeqCst)
+    }
+
+    fn study_progress(&self, progress: &study::Progress) {
+        const SHARES: f64 = 1000.0;
+        self.total.store(SHARES as u64, Ordering::Relaxed);
+        self.done.store((SHARES * progress.done.clamp(0.0, 1.0)) as u64, Ordering::Relaxed);
+    }
+
+    fn end(&self) {
+        self.is_tracing.store(false, Ordering::SeqCst);
+    }
+
+    fn chosen(&self, chosen: &Chosen) {
+        let how = match chosen.intersector {
+            "exact" => "on the spline".to_owned(),
+            _ => format!("on facets of {}..{} mm", chosen.tolerance_mm[0], chosen.tolerance_mm[1]),
+        };
+        self.say(format!("tracing {how}: {}", chosen.because));
+    }
+
+    fn aimed(&self, answer: &str) {
+        self.say(answer.to_owned());
+    }
+
+    fn grows(&self, found_percent: Option<f64>, rays: u64) {
+        let found = found_percent.map_or("nothing arrives".to_owned(), |e| format!("{e:.2} %"));
+        self.say(format!("{found}: going on with {rays} rays"));
+    }
+}
+
+/// What came of the work, and the exception that asked it to stop.
+pub(crate) struct Outcome<T> {
+    pub(crate) made: T,
+    pub(crate) stopped: Option<PyErr>,
+}
+
+/// Does the work; `progress(stage, done, total, messages)` is called now and then, and stops the work by raising.
+///
+/// # Errors
+/// The exception of a signal or of `progress` where the work cannot be stopped: it is left to end by itself. [`Defect`] where it panics.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Py<PyAny>>,
+    threads: Option<usize>,
+    work: impl FnOnce(&SharedProgress) -> T + Send + 'static,
+) -> PyResult<Outcome<T>> {
+    let shared = Arc::new(SharedProgress::default());
+    let (sender, receiver) = mpsc::channel();
+    let for_work = shared.clone();
+    std::thread::spawn(move || {
+        let made = catch_unwind(AssertUnwindSafe(|| on_threads(threads, || work(&for_work))));
+        // Nobody waits any more where the work was left to itself.
+        let _ = sender.send(made);
+    });
+    let receiver = Mutex::new(receiver);
+    let mut stopped = None;
+    loop {
+        let received = py.detach(|| locked(&receiver).recv_timeout(LOOK_EVERY));
+        match received {
+            Ok(Ok(made)) => {
+                // What was said at the end is said too.
+                let last = if stopped.is_none() { tell(py, &shared, progress).err() } else { None };
+                return Ok(Outcome { made, stopped: stopped.or(last) });
+            }
+            Ok(Err(panic)) => return Err(defect(panic.as_ref())),
+            Err(RecvTimeoutError::Disconnected) => return Err(Defect::new_err("the work ended without a result")),
+            Err(RecvTimeoutError::Timeout) if stopped.is_some() => {}
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(e) = py.check_signals().and_then(|()| tell(py, &shared, progress)) {
+                    shared.stops.store(true, Ordering::SeqCst);
+                    if !shared.is_tracing.load(Ordering::SeqCst) {
+                        return Err(e);
+                    }
+                    stopped = Some(e);
+                }
+            }
+        }
+    }
+}
+
+/// In a pool of so many threads, or in the one that all share.
+fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
+    match threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build()) {
+        Some(Ok(pool)) => pool.install(work),
+        _ => work(),
+    }
+}
+
+fn tell(py: Python<'_>, shared: &SharedProgress, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+    let Some(progress) = progress else { return Ok(()) };
+    let stage = *locked(&shared.stage);
+    let messages = std::mem::take(&mut *locked(&shared.messages));
+    let [done, total] = [&shared.done, &shared.total].map(|n| n.load(Ordering::Relaxed));
+    progress.call1(py, (stage, done, total, messages)).map(|_| ())
+}
+
+fn defect(panic: &(dyn std::any::Any + Send)) -> PyErr {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+    Defect::new_err(format!("a defect of lampyris: {text}; please report it with the file and the scene"))
+}

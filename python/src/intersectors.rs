@@ -1,0 +1,420 @@
+//! Octree, BVH and spline, asked about arrays of rays.
+
+use crate::arrays::{columns, length, rows, shaped, vector};
+use crate::background::interruptible;
+use crate::errors::SceneError;
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::names::normal_mode;
+use lampyris::intersect::NormalMode;
+use lampyris::intersect::bvh::{self, Bvh};
+use lampyris::intersect::exact::{self, Exact};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::intersect::{Certainty, Cost, Footprint};
+use lampyris::{FacetMesh, Hit, Intersector, Ray};
+use numpy::PyArrayDyn;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use self_cell::self_cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Rays that are turned into the crate's own at a time: they and their hits stay in the second cache.
+const CHUNK: usize = 2048;
+/// How far from 1 the length of a direction may be and keep its bits.
+const UNIT_ROUNDING: f64 = 1e-15;
+
+type Tree<'a> = Box<dyn Intersector + Send + 'a>;
+
+/// What facets are looked up in.
+struct Facets {
+    mesh: Arc<FacetMesh>,
+    /// Of hits that are moved to the spline.
+    exact: Option<Arc<Exact>>,
+}
+
+self_cell! {
+    struct FacetTree {
+        owner: Facets,
+        #[covariant]
+        dependent: Tree,
+    }
+}
+
+self_cell! {
+    /// A tree whose hits are moved to the spline.
+    struct PolishedTree {
+        owner: FacetTree,
+        #[covariant]
+        dependent: Tree,
+    }
+}
+
+/// What answers.
+enum Structure {
+    Facets(FacetTree),
+    Polished(PolishedTree),
+    Spline(Arc<Exact>),
+}
+
+impl Structure {
+    fn intersector(&self) -> &dyn Intersector {
+        match self {
+            Self::Facets(tree) => &**tree.borrow_dependent(),
+            Self::Polished(tree) => &**tree.borrow_dependent(),
+            Self::Spline(exact) => &**exact,
+        }
+    }
+}
+
+/// Finds the nearest hits of rays; made by `Octree`, `Bvh` and `Exact`.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Tracer {
+    structure: Arc<Structure>,
+    footprint: Footprint,
+    name: &'static str,
+}
+
+/// Nearest hits, an array each.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Hits {
+    /// Distance along the ray, mm; infinite for a miss, (n,).
+    #[pyo3(get)]
+    t: Py<PyArrayDyn<f64>>,
+    /// Outward unit normal to shade with, NaN for a miss, (n, 3).
+    #[pyo3(get)]
+    normal: Py<PyArrayDyn<f64>>,
+    /// Outward unit normal of the flat facet, or of the spline, NaN for a miss, (n, 3).
+    #[pyo3(get)]
+    geometric_normal: Py<PyArrayDyn<f64>>,
+    /// Placed face, −1 for a miss, (n,).
+    #[pyo3(get)]
+    face: Py<PyArrayDyn<i32>>,
+    /// Facet, or patch of the spline, −1 for a miss, (n,).
+    #[pyo3(get)]
+    primitive: Py<PyArrayDyn<i32>>,
+    /// Parameters on the face's surface, NaN for a miss, (n, 2).
+    #[pyo3(get)]
+    uv: Py<PyArrayDyn<f64>>,
+    /// How sure it is: 0 a miss, 1 a facet, 2 polished, 3 certified, 4 tangent, 5 not certified, (n,).
+    #[pyo3(get)]
+    certainty: Py<PyArrayDyn<u8>>,
+    /// Nodes visited, over all rays.
+    #[pyo3(get)]
+    nodes: u64,
+    /// Facets or patches tested, over all rays.
+    #[pyo3(get)]
+    tests: u64,
+}
+
+/// Arrays of hits in the making.
+struct HitArrays {
+    t: Vec<f64>,
+    normal: Vec<f64>,
+    geometric_normal: Vec<f64>,
+    face: Vec<i32>,
+    primitive: Vec<i32>,
+    uv: Vec<f64>,
+    certainty: Vec<u8>,
+}
+
+impl HitArrays {
+    /// Pages that the system hands out as zeros when they are first written.
+    fn new(n: usize) -> Self {
+        Self {
+            t: vec![0.0; n],
+            normal: vec![0.0; 3 * n],
+            geometric_normal: vec![0.0; 3 * n],
+            face: vec![0; n],
+            primitive: vec![0; n],
+            uv: vec![0.0; 2 * n],
+            certainty: vec![0; n],
+        }
+    }
+}
+
+/// The rows of the arrays that one task writes.
+struct HitRows<'a> {
+    t: &'a mut [f64],
+    normal: &'a mut [f64],
+    geometric_normal: &'a mut [f64],
+    face: &'a mut [i32],
+    primitive: &'a mut [i32],
+    uv: &'a mut [f64],
+    certainty: &'a mut [u8],
+}
+
+impl HitRows<'_> {
+    fn write(&mut self, k: usize, hit: Option<&Hit>) {
+        let Some(hit) = hit else {
+            self.t[k] = f64::INFINITY;
+            self.normal[3 * k..3 * k + 3].fill(f64::NAN);
+            self.geometric_normal[3 * k..3 * k + 3].fill(f64::NAN);
+            self.face[k] = -1;
+            self.primitive[k] = -1;
+            self.uv[2 * k..2 * k + 2].fill(f64::NAN);
+            return;
+        };
+        self.t[k] = hit.t;
+        self.normal[3 * k..3 * k + 3].copy_from_slice(&hit.normal.to_array());
+        self.geometric_normal[3 * k..3 * k + 3].copy_from_slice(&hit.geometric_normal.to_array());
+        self.face[k] = hit.face.0 as i32;
+        self.primitive[k] = hit.primitive as i32;
+        self.uv[2 * k..2 * k + 2].copy_from_slice(&hit.uv.to_array());
+        self.certainty[k] = match hit.certainty {
+            Certainty::Facet => 1,
+            Certainty::Polished => 2,
+            Certainty::Certified => 3,
+            Certainty::Tangent => 4,
+            _ => 5,
+        };
+    }
+}
+
+/// The ray of two rows; `None` where a number is not finite or the direction has no length.
+fn ray(origin: &[f64], direction: &[f64], range: [f64; 2]) -> Option<Ray> {
+    let (origin, given) = (vector(origin), vector(direction));
+    let length = given.length();
+    let direction = if (length - 1.0).abs() <= UNIT_ROUNDING { given } else { given / length };
+    let is_good = origin.is_finite() && direction.is_finite() && length > 0.0;
+    is_good.then(|| Ray::new(origin, direction).with_range(range[0], range[1]))
+}
+
+/// Asks about all rays, on the current pool; gives the first ray that is none, where there is one.
+fn ask(
+    who: &dyn Intersector,
+    origins: &[f64],
+    directions: &[f64],
+    range: [f64; 2],
+    into: &mut HitArrays,
+) -> (Cost, Option<usize>) {
+    let bad = AtomicUsize::new(usize::MAX);
+    let rows = (into.t.par_chunks_mut(CHUNK))
+        .zip(into.normal.par_chunks_mut(3 * CHUNK))
+        .zip(into.geometric_normal.par_chunks_mut(3 * CHUNK))
+        .zip(into.face.par_chunks_mut(CHUNK))
+        .zip(into.primitive.par_chunks_mut(CHUNK))
+        .zip(into.uv.par_chunks_mut(2 * CHUNK))
+        .zip(into.certainty.par_chunks_mut(CHUNK))
+        .map(|((((((t, normal), geometric_normal), face), primitive), uv), certainty)| HitRows {
+            t,
+            normal,
+            geometric_normal,
+            face,
+            primitive,
+            uv,
+            certainty,
+        });
+    let buffers = || (Vec::with_capacity(CHUNK), vec![None; CHUNK]);
+    let cost = rows
+        .enumerate()
+        .map_init(buffers, |(rays, hits): &mut (Vec<Ray>, Vec<Option<Hit>>), (chunk, mut rows)| {
+            let first = chunk * CHUNK;
+            let count = rows.t.len();
+            rays.clear();
+            for k in first..first + count {
+                match ray(&origins[3 * k..3 * k + 3], &directions[3 * k..3 * k + 3], range) {
+                    Some(ray) => rays.push(ray),
+                    None => {
+                        bad.fetch_min(k, Ordering::Relaxed);
+                        return Cost::default();
+                    }
+                }
+            }
+            let mut cost = Cost::default();
+            hits[..count].fill(None);
+            who.intersect_batch(rays, &mut hits[..count], &mut cost);
+            for (k, hit) in hits[..count].iter().enumerate() {
+                rows.write(k, hit.as_ref());
+            }
+            cost
+        })
+        .reduce(Cost::default, |mut a, b| {
+            a += b;
+            a
+        });
+    let bad = bad.into_inner();
+    (cost, (bad != usize::MAX).then_some(bad))
+}
+
+#[pymethods]
+impl Tracer {
+    /// A structure over facets: `octree`, `bvh2` or `cwbvh`; `normals="exact"` moves every hit to the spline of the model.
+    #[staticmethod]
+    #[pyo3(signature = (mesh, kind, normals = "bilinear", model = None))]
+    fn of_mesh(py: Python<'_>, mesh: &Mesh, kind: &str, normals: &str, model: Option<&Model>) -> PyResult<Self> {
+        let normals = normal_mode(normals)?;
+        let name = match kind {
+            "octree" => "octree",
+            "bvh2" => "bvh2",
+            "cwbvh" => "cwbvh",
+            _ => return Err(SceneError::new_err(format!("kind {kind}: use octree, bvh2 or cwbvh"))),
+        };
+        let model = match (normals, model) {
+            (NormalMode::Exact, None) => {
+                let message = "normals exact: the spline is needed to move hits to; give model=";
+                return Err(SceneError::new_err(message));
+            }
+            (NormalMode::Exact, Some(model)) => Some(model.import.clone()),
+            _ => None,
+        };
+        let mesh = mesh.mesh.clone();
+        let build = move || {
+            let exact = model.map(|import| Arc::new(Exact::build(&import.model, &exact::Settings::default())));
+            let on_facets = normals.on_facets();
+            let tree = FacetTree::new(Facets { mesh, exact }, |facets| -> Tree<'_> {
+                let mesh = &facets.mesh;
+                match name {
+                    "octree" => Box::new(Octree::build(
+                        mesh,
+                        &octree::Settings { normals: on_facets, ..Default::default() },
+                    )),
+                    "bvh2" => {
+                        let kind = bvh::Kind::Bvh2;
+                        Box::new(Bvh::build(
+                            mesh,
+                            &bvh::Settings { kind, normals: on_facets, ..Default::default() },
+                        ))
+                    }
+                    _ => Box::new(Bvh::build(mesh, &bvh::Settings { normals: on_facets, ..Default::default() })),
+                }
+            });
+            if tree.borrow_owner().exact.is_none() {
+                return Structure::Facets(tree);
+            }
+            Structure::Polished(PolishedTree::new(tree, |tree| -> Tree<'_> {
+                let Facets { mesh, exact } = tree.borrow_owner();
+                match exact {
+                    Some(exact) => Box::new(Polished::new(&**tree.borrow_dependent(), mesh, exact)),
+                    None => unreachable!("checked above"),
+                }
+            }))
+        };
+        let structure = interruptible(py, None, None, move |_| build())?.made;
+        let footprint = structure.intersector().footprint();
+        Ok(Self { structure: Arc::new(structure), footprint, name })
+    }
+
+    /// The spline of a model itself, certified.
+    #[staticmethod]
+    fn of_model(py: Python<'_>, model: &Model) -> PyResult<Self> {
+        let import = model.import.clone();
+        let build = move |_: &_| Exact::build(&import.model, &exact::Settings::default());
+        let exact = interruptible(py, None, None, build)?.made;
+        let footprint = exact.footprint();
+        Ok(Self { structure: Arc::new(Structure::Spline(Arc::new(exact))), footprint, name: "exact" })
+    }
+
+    /// Nearest hits of rays from `origins` (n, 3) along `directions` (n, 3), between `t_min` and `t_max` mm.
+    ///
+    /// Arrays of float64 that lie in one piece are read where they are, and the answers are the arrays that were written: nothing is
+    /// copied. Directions are brought to unit length.
+    #[pyo3(signature = (origins, directions, t_min = 0.0, t_max = f64::INFINITY, threads = None))]
+    fn intersect(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+        t_min: f64,
+        t_max: f64,
+        threads: Option<usize>,
+    ) -> PyResult<Hits> {
+        let (origins, directions) = (columns(origins, "origins", 3)?, columns(directions, "directions", 3)?);
+        let n = length(&origins);
+        if n != length(&directions) {
+            return Err(PyValueError::new_err(format!(
+                "origins and directions must have as many rows, not {n} and {}; numpy.broadcast_to repeats one row",
+                length(&directions)
+            )));
+        }
+        if t_min.is_nan() || t_max.is_nan() || t_min > t_max {
+            return Err(PyValueError::new_err(format!("t_min = {t_min} must be at most t_max = {t_max}")));
+        }
+        if threads == Some(0) {
+            return Err(PyValueError::new_err("threads: at least one is needed; leave it out for all"));
+        }
+        let (from, along) = (rows(&origins)?, rows(&directions)?);
+        let who = self.structure.intersector();
+        let (arrays, cost, bad) = py.detach(|| {
+            let mut arrays = HitArrays::new(n);
+            let mut work = || ask(who, from, along, [t_min, t_max], &mut arrays);
+            let (cost, bad) = match threads.map(|t| rayon::ThreadPoolBuilder::new().num_threads(t).build()) {
+                Some(Ok(pool)) => pool.install(&mut work),
+                _ => work(),
+            };
+            (arrays, cost, bad)
+        });
+        if let Some(k) = bad {
+            return Err(PyValueError::new_err(format!(
+                "ray {k} is none: from {:?} along {:?}; numbers must be finite, and directions must have a length",
+                &from[3 * k..3 * k + 3],
+                &along[3 * k..3 * k + 3]
+            )));
+        }
+        Ok(Hits {
+            t: shaped(py, arrays.t, &[n])?.unbind(),
+            normal: shaped(py, arrays.normal, &[n, 3])?.unbind(),
+            geometric_normal: shaped(py, arrays.geometric_normal, &[n, 3])?.unbind(),
+            face: shaped(py, arrays.face, &[n])?.unbind(),
+            primitive: shaped(py, arrays.primitive, &[n])?.unbind(),
+            uv: shaped(py, arrays.uv, &[n, 2])?.unbind(),
+            certainty: shaped(py, arrays.certainty, &[n])?.unbind(),
+            nodes: cost.nodes,
+            tests: cost.tests,
+        })
+    }
+
+    /// Seconds of the crate's own call on the same rays, which are its own already, and the number of hits: what `intersect` is measured
+    /// against.
+    fn seconds_of_rust_call(
+        &self,
+        py: Python<'_>,
+        origins: &Bound<'_, PyAny>,
+        directions: &Bound<'_, PyAny>,
+    ) -> PyResult<(f64, usize)> {
+        let (origins, directions) = (columns(origins, "origins", 3)?, columns(directions, "directions", 3)?);
+        let (from, along) = (rows(&origins)?, rows(&directions)?);
+        let who = self.structure.intersector();
+        Ok(py.detach(|| {
+            let pairs = from.chunks(3).zip(along.chunks(3));
+            let rays: Vec<Ray> = pairs.filter_map(|(o, d)| ray(o, d, [0.0, f64::INFINITY])).collect();
+            let start = Instant::now();
+            let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+            rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| {
+                who.intersect_batch(rays, hits, &mut Cost::default());
+            });
+            (start.elapsed().as_secs_f64(), hits.iter().flatten().count())
+        }))
+    }
+
+    /// Bytes held, without the mesh or model.
+    #[getter]
+    fn bytes(&self) -> usize {
+        self.footprint.bytes
+    }
+
+    /// Facets or patches.
+    #[getter]
+    fn primitives(&self) -> usize {
+        self.footprint.primitives
+    }
+
+    /// Seconds that building took.
+    #[getter]
+    fn build_seconds(&self) -> f64 {
+        self.footprint.build_seconds
+    }
+
+    /// `octree`, `bvh2`, `cwbvh` or `exact`.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.name
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<lampyris {} over {} primitives>", self.name, self.footprint.primitives)
+    }
+}

@@ -1,0 +1,23 @@
+//! Words and numbers that several functions take.
+
+use crate::errors::SceneError;
+use lampyris::intersect::NormalMode;
+use pyo3::prelude::*;
+
+/// The kind of normals of this name.
+pub(crate) fn normal_mode(name: &str) -> PyResult<NormalMode> {
+    NormalMode::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| {
+        let known = NormalMode::ALL.map(NormalMode::name).join(", ");
+        SceneError::new_err(format!("normals {name:?}: they are not known; use one of {known}"))
+    })
+}
+
+/// Refuses what is no range of tolerances.
+pub(crate) fn require_tolerance(low: f64, high: f64) -> PyResult<()> {
+    if low > 0.0 && low <= high && high.is_finite() {
+        return Ok(());
+    }
+    Err(SceneError::new_err(format!(
+        "tolerance ({low}, {high}): it must be two positive lengths in mm, the tighter one first, as in (0.05, 0.2)"
+    )))
+}

@@ -1,0 +1,385 @@
+//! Scenes that are bound, faceted and ready to be traced, and the parts of their runs.
+
+use crate::background::{Outcome, interruptible};
+use crate::errors::{Defect, SceneError, of_pipeline, of_scene};
+use crate::mesh::Mesh;
+use crate::model::Model;
+use crate::names::{normal_mode, require_tolerance};
+use crate::results::Results;
+use lampyris::pipeline::{
+    self, AccurateSettings, ErrorTarget, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
+    TraceRequest, TracingSettings, fingerprint, read_models, settings_for_accuracy,
+};
+use lampyris::simulate::{PartialRun, Scene};
+use lampyris::step::{self, Import};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What stands at the head of the bytes of a part.
+#[derive(Deserialize, Serialize)]
+struct PartHeader {
+    fingerprint: String,
+    /// What wrote it, for messages.
+    command: String,
+}
+
+/// A scene whose facets are made and whose intersector is chosen.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Prepared {
+    scene: Arc<PreparedScene>,
+    fingerprint: String,
+    threads: Option<usize>,
+}
+
+/// The replicates of a run that are done, and their sums.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Part {
+    run: PartialRun,
+    fingerprint: String,
+    /// That of what it was asked of: another one where the number of rays was found by tracing.
+    asked_of: String,
+    /// The scene that it is of, with its number of rays.
+    of: Arc<PreparedScene>,
+}
+
+/// What is asked beside the scene; the Python side gives every key.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Settings {
+    tolerance: Option<[f64; 2]>,
+    angle_deg: Option<f64>,
+    accuracy_deg: Option<f64>,
+    part: Vec<(String, [f64; 2])>,
+    face: Vec<(String, [f64; 2])>,
+    role: Vec<(String, [f64; 2])>,
+    rays: Option<(Option<u64>, u64)>,
+    seed: Option<u64>,
+    threads: Option<usize>,
+    intersector: Option<String>,
+    normals: Option<String>,
+}
+
+/// Most rays of a run: doubles count singly up to it.
+const MOST_RAYS: u64 = 1 << 47;
+
+impl Settings {
+    fn meshing(&self) -> PyResult<MeshingSettings> {
+        let ranges =
+            self.tolerance.iter().chain([&self.part, &self.face, &self.role].into_iter().flatten().map(|(_, t)| t));
+        for [low, high] in ranges {
+            require_tolerance(*low, *high)?;
+        }
+        for (name, angle) in [("angle_deg", self.angle_deg), ("accuracy_deg", self.accuracy_deg)] {
+            if let Some(angle) = angle.filter(|a| !(*a > 0.0 && *a < 90.0)) {
+                return Err(SceneError::new_err(format!(
+                    "{name} = {angle}: it must be above 0 and below 90 degrees"
+                )));
+            }
+        }
+        Ok(MeshingSettings {
+            tolerance: self.tolerance,
+            angle_deg: self.angle_deg,
+            part: self.part.clone(),
+            face: self.face.clone(),
+            role: self.role.clone(),
+            plan: None,
+        })
+    }
+
+    fn tracing(&self) -> PyResult<TracingSettings> {
+        if let Some((first, end)) = self.rays
+            && !(first.unwrap_or(0)..MOST_RAYS).contains(&end.wrapping_sub(1))
+        {
+            return Err(SceneError::new_err(format!(
+                "rays = {end}: a number of rays is whole, at least 1 and at most 1e14"
+            )));
+        }
+        let intersector = self.intersector.as_ref().map(|name| name.parse().map_err(of_pipeline)).transpose()?;
+        Ok(TracingSettings {
+            ray_range: self.rays.map(|(first, end)| RayRange { first, end }),
+            seed: self.seed,
+            threads: self.threads,
+            intersector,
+            normals: self.normals.as_deref().map(normal_mode).transpose()?,
+        })
+    }
+}
+
+#[pymethods]
+impl Prepared {
+    /// Reads the models of a scene, binds it, makes facets, and chooses how to trace where nobody asks.
+    #[new]
+    #[pyo3(signature = (text, name, folder, models, settings, progress = None))]
+    fn new(
+        py: Python<'_>,
+        text: &str,
+        name: &str,
+        folder: PathBuf,
+        models: Vec<Py<Model>>,
+        settings: Settings,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Self> {
+        let scene = Scene::parse(text, name, &folder).map_err(of_scene)?;
+        let (meshing, tracing) = (settings.meshing()?, settings.tracing()?);
+        let accuracy_deg = settings.accuracy_deg;
+        let threads = tracing.threads;
+        let read: Vec<ReadModel> = models.iter().map(|m| ReadModel::new(m.get())).collect();
+        let prepare = move |monitor: &dyn pipeline::Monitor| {
+            let loaded = load(&scene, &read, monitor)?;
+            let requested = (meshing, tracing);
+            let AccurateSettings { meshing, tracing, plan } =
+                settings_for_accuracy(accuracy_deg, requested, Some(&scene), &loaded.model, monitor)?;
+            let job = SceneJob { meshing, tracing, accuracy: plan, ..SceneJob::new(scene, loaded) };
+            let prepared = PreparedScene::new(job, monitor)?;
+            let hash = fingerprint(&prepared)?.0;
+            Ok((prepared, hash))
+        };
+        let outcome = interruptible(py, progress.as_ref(), threads, move |shared| prepare(shared))?;
+        if let Some(e) = outcome.stopped {
+            return Err(e);
+        }
+        let (scene, fingerprint) = outcome.made.map_err(of_pipeline)?;
+        Ok(Self { scene: Arc::new(scene), fingerprint, threads })
+    }
+
+    /// Traces; gives results, or the part that was done when it was stopped or is one of several, and the exception that stopped it.
+    #[pyo3(signature = (resume = None, shard = None, progress = None, verify = false))]
+    fn trace(
+        &self,
+        py: Python<'_>,
+        resume: Option<&Part>,
+        shard: Option<[u32; 2]>,
+        progress: Option<Py<PyAny>>,
+        verify: bool,
+    ) -> PyResult<(Option<Results>, Option<Part>, Option<PyErr>)> {
+        if let Some(part) = resume.filter(|p| p.asked_of != self.fingerprint) {
+            return Err(PyValueError::new_err(format!(
+                "resume: this part is of another run ({}); trace it with the same scene, files, settings and version",
+                part.fingerprint
+            )));
+        }
+        if let Some([index, count]) = shard.filter(|[index, count]| index >= count) {
+            return Err(PyValueError::new_err(format!(
+                "shard: ({index}, {count}) counts from 0: write (0, {count}) and so on"
+            )));
+        }
+        let scene = resume.map_or(&self.scene, |part| &part.of).clone();
+        let from = resume.map(|p| p.run.clone());
+        let for_work = scene.clone();
+        let work = move |monitor: &dyn pipeline::Monitor| {
+            let request = TraceRequest { verify_pruning: verify, from, shard, ..TraceRequest::default() };
+            if shard.is_some() {
+                return Err(Box::new(for_work.trace_part(request, monitor)));
+            }
+            for_work.trace(request, monitor)
+        };
+        let Outcome { made, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
+        Ok(match made {
+            Ok(found) => (Some(Results::new(scene, found)), None, stopped),
+            Err(run) => (None, Some(self.part(*run, scene)), stopped),
+        })
+    }
+
+    /// Traces as many rays as the error asks for; gives what was found of it as JSON too.
+    #[pyo3(signature = (until, progress = None))]
+    fn trace_until(
+        &self,
+        py: Python<'_>,
+        until: &str,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Option<Results>, Option<Part>, Option<PyErr>, String)> {
+        let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
+        let mut scene = PreparedScene::clone(&self.scene);
+        let work = move |monitor: &dyn pipeline::Monitor| {
+            let (run, result) = target.trace(&mut scene, monitor);
+            if !run.is_whole() {
+                return (Err(Box::new(run)), scene, result);
+            }
+            let request = TraceRequest { from: Some(run), ..TraceRequest::default() };
+            (scene.trace(request, monitor), scene, result)
+        };
+        let Outcome { made, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
+        let (found, scene, result) = made;
+        let (scene, words) = (Arc::new(scene), serde_json::to_string(&result).map_err(crate::errors::of_json)?);
+        Ok(match found {
+            Ok(found) => (Some(Results::new(scene, found)), None, stopped, words),
+            Err(run) => {
+                let fingerprint = hash_of(&scene)?;
+                (
+                    None,
+                    Some(Part { run: *run, fingerprint, asked_of: self.fingerprint.clone(), of: scene }),
+                    stopped,
+                    words,
+                )
+            }
+        })
+    }
+
+    /// A part from its bytes.
+    ///
+    /// Raises `ValueError` when they are damaged or of another run.
+    fn read_part(&self, bytes: &[u8]) -> PyResult<Part> {
+        let check = |header: &PartHeader| {
+            if header.fingerprint == self.fingerprint {
+                return Ok(());
+            }
+            Err(format!(
+                "it is a part of another run (of {}); the scene, its files, the settings and the version must be the same",
+                header.command
+            ))
+        };
+        let run = PartialRun::read(bytes, check, &self.scene.bound)
+            .map_err(|e| PyValueError::new_err(format!("the part cannot be used: {e}")))?;
+        Ok(self.part(run, self.scene.clone()))
+    }
+
+    /// A hash of all that decides the bits of the run.
+    #[getter]
+    fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+
+    /// The number of rays.
+    #[getter]
+    fn rays(&self) -> u64 {
+        self.scene.run_settings().rays
+    }
+
+    /// The facets.
+    #[getter]
+    fn mesh(&self) -> Mesh {
+        Mesh::of_scene(self.scene.tessellation.mesh.clone())
+    }
+
+    /// How it is traced and why, what is in the scene, as JSON.
+    fn summary_json(&self) -> PyResult<String> {
+        let scene = &self.scene;
+        let [finest, loosest] = scene.mesh_settings.tolerance;
+        let settings = scene.run_settings();
+        let summary = json!({
+            "rays": settings.rays, "seed": settings.seed, "threads": scene.threads,
+            "tolerance_mm": [finest, loosest], "facets": scene.tessellation.mesh.facets.len(),
+            "intersector": scene.choice.intersector.name(), "normals": scene.choice.normals.name(),
+            "unit": scene.power_unit(), "chosen": scene.chosen, "notes": scene.bound.notes(),
+            "accounts": scene.job.loaded.reports,
+        });
+        serde_json::to_string(&summary).map_err(crate::errors::of_json)
+    }
+}
+
+impl Prepared {
+    fn part(&self, run: PartialRun, of: Arc<PreparedScene>) -> Part {
+        Part { run, fingerprint: self.fingerprint.clone(), asked_of: self.fingerprint.clone(), of }
+    }
+}
+
+fn hash_of(scene: &PreparedScene) -> PyResult<String> {
+    Ok(fingerprint(scene).map_err(of_pipeline)?.0)
+}
+
+#[pymethods]
+impl Part {
+    /// Adds another part of the same run, and gives the sum.
+    fn merged(&self, other: &Self) -> PyResult<Self> {
+        if self.fingerprint != other.fingerprint {
+            return Err(PyValueError::new_err(
+                "the parts are of different runs; trace them with the same scene and settings",
+            ));
+        }
+        let mut run = self.run.clone();
+        run.merge(&other.run).map_err(PyValueError::new_err)?;
+        Ok(Self {
+            run,
+            fingerprint: self.fingerprint.clone(),
+            asked_of: self.asked_of.clone(),
+            of: self.of.clone(),
+        })
+    }
+
+    /// The part as bytes, for a file or another machine.
+    fn to_bytes(&self, py: Python<'_>) -> PyResult<Py<PyBytes>> {
+        let command = format!("lampyris {} in Python", env!("CARGO_PKG_VERSION"));
+        let header = PartHeader { fingerprint: self.fingerprint.clone(), command };
+        let mut bytes = Vec::new();
+        self.run.write(&header, &mut bytes).map_err(|e| Defect::new_err(e.to_string()))?;
+        Ok(PyBytes::new(py, &bytes).unbind())
+    }
+
+    /// Replicates that are done.
+    #[getter]
+    fn done(&self) -> usize {
+        self.run.done.len()
+    }
+
+    /// Replicates of the whole run.
+    #[getter]
+    fn replicates(&self) -> u32 {
+        self.run.replicates
+    }
+
+    /// Rays that are done.
+    #[getter]
+    fn rays(&self) -> u64 {
+        self.run.tallies.counts.rays
+    }
+
+    /// Whether every replicate is done.
+    #[getter]
+    fn is_whole(&self) -> bool {
+        self.run.is_whole()
+    }
+
+    /// A hash of all that decides the bits of the run.
+    #[getter]
+    fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<lampyris.Part: {} of {} replicates, {} rays>",
+            self.run.done.len(),
+            self.run.replicates,
+            self.rays()
+        )
+    }
+}
+
+/// A model that was read already.
+struct ReadModel {
+    path: PathBuf,
+    unit_mm: Option<f64>,
+    import: Arc<Import>,
+}
+
+impl ReadModel {
+    fn new(model: &Model) -> Self {
+        let (path, unit_mm) = model.source();
+        Self { path, unit_mm, import: model.import.clone() }
+    }
+}
+
+/// The models of a scene: those that were read already, and the others from their files.
+fn load(
+    scene: &Scene,
+    read: &[ReadModel],
+    monitor: &dyn pipeline::Monitor,
+) -> Result<LoadedModel, pipeline::Error> {
+    read_models(scene, |entry| {
+        let path = scene.resolve(&entry.file);
+        let same = |m: &&ReadModel| m.path == path && m.unit_mm == entry.unit_mm;
+        if let Some(known) = read.iter().find(same) {
+            return Ok(Import { model: known.import.model.clone(), report: known.import.report.clone() });
+        }
+        let settings = step::Settings { length_unit_mm: entry.unit_mm, ..step::Settings::default() };
+        monitor.begin(pipeline::Stage::Reading(&path));
+        let import = step::read(Path::new(&path), &settings);
+        monitor.end();
+        Ok(import?)
+    })
+}

@@ -1,0 +1,214 @@
+//! Results as arrays, and their verdicts.
+
+use crate::arrays::{columns, flat, rows, shaped};
+use crate::errors::{SceneError, of_json};
+use lampyris::formats::{Axis, ColourMap, Grid, Picture};
+use lampyris::pipeline::{PreparedScene, SceneResults};
+use lampyris::regulation::{self, Assumptions, IntensityMap, Regulation, Traffic};
+use numpy::PyArrayDyn;
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+/// What a run counted, with both errors.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Results {
+    scene: Arc<PreparedScene>,
+    found: SceneResults,
+}
+
+/// A layer of a receiver: values, and their statistical and geometric errors where these are known.
+type Layers<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Option<Bound<'py, PyArrayDyn<f64>>>);
+
+impl Results {
+    pub(crate) fn new(scene: Arc<PreparedScene>, found: SceneResults) -> Self {
+        Self { scene, found }
+    }
+
+    fn receiver(&self, receiver: usize) -> PyResult<&lampyris::simulate::ReceiverResult> {
+        self.found.results.receivers.get(receiver).ok_or_else(|| {
+            PyIndexError::new_err(format!("receiver {receiver}: there are {}", self.found.results.receivers.len()))
+        })
+    }
+}
+
+#[pymethods]
+impl Results {
+    /// Hash of all tallies: equal if and only if all of them are, bit by bit.
+    #[getter]
+    fn digest(&self) -> &str {
+        &self.found.results.digest
+    }
+
+    /// The document of `results.json`.
+    fn document_json(&self) -> PyResult<String> {
+        let document = self.found.document(&self.scene).map_err(of_json)?;
+        serde_json::to_string(&document).map_err(of_json)
+    }
+
+    /// The cells of a receiver, the second axis slow, with both errors.
+    fn layers<'py>(&self, py: Python<'py>, receiver: usize) -> PyResult<Layers<'py>> {
+        let r = self.receiver(receiver)?;
+        let shape = [r.grid[1], r.grid[0]];
+        let geometric = self.found.geometric_cells(&self.scene, receiver);
+        Ok((
+            shaped(py, r.cells.clone(), &shape)?,
+            shaped(py, r.errors.clone(), &shape)?,
+            geometric.filter(|g| g.len() == r.cells.len()).map(|g| shaped(py, g, &shape)).transpose()?,
+        ))
+    }
+
+    /// The cells of a further channel of a receiver and their statistical errors.
+    fn channel<'py>(
+        &self,
+        py: Python<'py>,
+        receiver: usize,
+        channel: usize,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let r = self.receiver(receiver)?;
+        let c = r
+            .channels
+            .get(channel)
+            .ok_or_else(|| PyIndexError::new_err(format!("channel {channel}: there are {}", r.channels.len())))?;
+        let shape = [r.grid[1], r.grid[0]];
+        Ok((shaped(py, c.cells.clone(), &shape)?, shaped(py, c.errors.clone(), &shape)?))
+    }
+
+    /// The edges of the cells along both axes: mm of planes, degrees of angles.
+    fn edges<'py>(
+        &self,
+        py: Python<'py>,
+        receiver: usize,
+    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+        let r = self.receiver(receiver)?;
+        let along = |axis: usize| -> Vec<f64> {
+            let (n, low) = (r.grid[axis], r.middle[axis] - r.half[axis]);
+            (0..=n).map(|k| low + 2.0 * r.half[axis] * k as f64 / n as f64).collect()
+        };
+        let (first, second) = (along(0), along(1));
+        let lengths = [first.len(), second.len()];
+        Ok((shaped(py, first, &lengths[..1])?, shaped(py, second, &lengths[1..])?))
+    }
+
+    /// Recorded paths vertex by vertex: ray, branch, bounce, point (n, 3), power.
+    #[allow(clippy::type_complexity)]
+    fn paths<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyArrayDyn<u64>>,
+        Bound<'py, PyArrayDyn<u32>>,
+        Bound<'py, PyArrayDyn<u32>>,
+        Bound<'py, PyArrayDyn<f64>>,
+        Bound<'py, PyArrayDyn<f64>>,
+    )> {
+        let paths = &self.found.results.paths;
+        let n = paths.len();
+        Ok((
+            shaped(py, paths.iter().map(|v| v.ray).collect(), &[n])?,
+            shaped(py, paths.iter().map(|v| v.branch).collect(), &[n])?,
+            shaped(py, paths.iter().map(|v| v.bounce).collect(), &[n])?,
+            shaped(py, flat(paths.iter().map(|v| v.point)), &[n, 3])?,
+            shaped(py, paths.iter().map(|v| v.power).collect(), &[n])?,
+        ))
+    }
+}
+
+/// A map of values (rows from below) as the bytes of a PNG file.
+#[pyfunction]
+#[pyo3(signature = (values, zoom = 1, exponent = 1.0))]
+pub(crate) fn value_map(
+    py: Python<'_>,
+    values: &Bound<'_, PyAny>,
+    zoom: u32,
+    exponent: f64,
+) -> PyResult<Py<PyBytes>> {
+    let width = values.getattr("shape")?.extract::<Vec<usize>>()?.get(1).copied().unwrap_or(1);
+    let array = columns(values, "values", width)?;
+    let numbers = rows(&array)?.to_vec();
+    let axis =
+        |label: &str, cells: usize| Axis { label: label.into(), unit: String::new(), range: [0.0, 1.0], cells };
+    let grid = Grid {
+        name: String::new(),
+        quantity: String::new(),
+        unit: String::new(),
+        axes: [axis("x", width), axis("y", numbers.len() / width.max(1))],
+        values: numbers,
+        error: None,
+        geometric: None,
+        layers: Vec::new(),
+    };
+    let png = Picture::of_grid(&grid, ColourMap::Inferno, zoom, exponent).to_png();
+    Ok(PyBytes::new(py, &png.map_err(|e| SceneError::new_err(e.to_string()))?).unbind())
+}
+
+/// The lamp regulations that there are tables of: id, name, number of rows, how well checked.
+#[pyfunction]
+pub(crate) fn regulations() -> Vec<(String, String, usize, String)> {
+    let all = Regulation::all().into_iter();
+    all.map(|r| (r.id.to_string(), r.function.name.to_string(), r.function.rows.len(), r.checked())).collect()
+}
+
+/// A far field over H and V in candela judged by a regulation, as JSON.
+#[pyfunction]
+#[pyo3(signature = (results, receiver, regulation, left_hand = false, as_placed = false))]
+pub(crate) fn assess(
+    py: Python<'_>,
+    results: &Results,
+    receiver: usize,
+    regulation: &str,
+    left_hand: bool,
+    as_placed: bool,
+) -> PyResult<String> {
+    let regulation = Regulation::find(regulation).map_err(SceneError::new_err)?;
+    let r = results.receiver(receiver)?;
+    if r.kind != "far_field" || r.unit != "cd" {
+        return Err(SceneError::new_err(format!(
+            "{}: a verdict needs a far field with angles \"A\" in a run that counts lm, not a {} in {}",
+            r.name, r.kind, r.unit
+        )));
+    }
+    let geometric = results.found.geometric_cells(&results.scene, receiver);
+    let mut csv = String::from("H_deg,V_deg,intensity_cd,statistical,geometric\n");
+    let center =
+        |axis: usize, k: usize| r.middle[axis] + r.half[axis] * ((2 * k + 1) as f64 / r.grid[axis] as f64 - 1.0);
+    for j in 0..r.grid[1] {
+        for i in 0..r.grid[0] {
+            let k = j * r.grid[0] + i;
+            let error = geometric.as_ref().and_then(|g| g.get(k)).copied().unwrap_or(0.0);
+            let _ = writeln!(csv, "{},{},{},{},{error}", center(0, i), center(1, j), r.cells[k], r.errors[k]);
+        }
+    }
+    let found = &results.found.results;
+    let ray_flux = (found.rays > 0).then(|| found.power.emitted / found.rays as f64);
+    let map = IntensityMap::from_csv(&csv, ray_flux).map_err(SceneError::new_err)?;
+    let assumptions = Assumptions {
+        traffic: if left_hand { Traffic::Left } else { Traffic::Right },
+        as_placed,
+        rays: found.rays,
+        tolerance_mm: results.scene.chosen.as_ref().map(|c| c.tolerance_mm[1]),
+    };
+    let a = py.detach(|| regulation::assess(&map, &regulation, &assumptions)).map_err(|e| {
+        SceneError::new_err(format!("{e}; set cells, h_deg and v_deg of the far field and trace again"))
+    })?;
+    let rows: Vec<_> = (a.rows.iter())
+        .map(|r| {
+            json!({
+                "id": r.row.id, "kind": r.row.kind,
+                "h_deg": r.direction.map(|d| d[0]), "v_deg": r.direction.map(|d| d[1]),
+                "min": r.row.min, "max": r.row.max, "value": r.reading.map(|x| x.value),
+                "statistical": r.reading.map(|x| x.statistical), "geometric": r.reading.map(|x| x.geometric),
+                "verdict": r.verdict.map(|v| v.to_string()),
+            })
+        })
+        .collect();
+    let document = json!({
+        "regulation": a.regulation.id, "title": a.regulation.title, "checked": a.regulation.checked(),
+        "aim": {"h_deg": a.aim.h_deg, "v_deg": a.aim.v_deg, "how": a.aim.how},
+        "sensor_deg": a.sensor_deg, "rows": rows, "verdict": a.verdict.to_string(),
+    });
+    serde_json::to_string(&document).map_err(of_json)
+}

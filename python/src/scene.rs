@@ -1,0 +1,65 @@
+//! Scenes as text and as plain data, and the files that go with them.
+
+use crate::arrays::{columns, require_finite, rows};
+use crate::errors::{SceneError, of_format, of_json, of_scene};
+use lampyris::formats::{LightRay, write_rays};
+use lampyris::math::Vector;
+use lampyris::optics::catalogue;
+use lampyris::simulate::Scene;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Checks the text of a scene and gives its tables as JSON, as they were written.
+#[pyfunction]
+pub(crate) fn scene_to_json(text: &str, name: &str, folder: PathBuf) -> PyResult<String> {
+    Scene::parse(text, name, &folder).map_err(of_scene)?;
+    let tables: Value = toml::from_str(text).map_err(|e| SceneError::new_err(e.to_string()))?;
+    serde_json::to_string(&tables).map_err(of_json)
+}
+
+/// Tables given as JSON, as TOML.
+#[pyfunction]
+pub(crate) fn toml_from_json(tables: &str) -> PyResult<String> {
+    let tables: Value = serde_json::from_str(tables).map_err(|e| SceneError::new_err(e.to_string()))?;
+    toml::to_string(&tables)
+        .map_err(|e| SceneError::new_err(format!("a scene holds what TOML has no word for: {e}; leave None out")))
+}
+
+/// The JSON Schema of scenes.
+#[pyfunction]
+pub(crate) fn scene_schema() -> String {
+    Scene::schema().to_string()
+}
+
+/// The names of the media that need no table.
+#[pyfunction]
+pub(crate) fn media() -> Vec<String> {
+    catalogue::names().map(str::to_owned).collect()
+}
+
+/// Writes rays (n, 7: origin, direction, power) or (n, 8: and wavelength, nm) as the NPZ file that a scene reads.
+#[pyfunction]
+pub(crate) fn write_ray_file(path: PathBuf, rays: &Bound<'_, PyAny>) -> PyResult<()> {
+    let width = rays.getattr("shape").and_then(|s| s.extract::<Vec<usize>>()).ok();
+    let width = if width.is_some_and(|s| s.get(1) == Some(&8)) { 8 } else { 7 };
+    let array = columns(rays, "rays", width)?;
+    let numbers = rows(&array)?;
+    require_finite(numbers, width, "rays")?;
+    if numbers.is_empty() {
+        return Err(PyValueError::new_err("rays: there must be at least one"));
+    }
+    let ray = |(k, row): (usize, &[f64])| {
+        let direction = Vector::new(row[3], row[4], row[5]);
+        if direction == Vector::ZERO || row[6] < 0.0 || row.get(7).is_some_and(|nm| *nm <= 0.0) {
+            return Err(PyValueError::new_err(format!(
+                "rays[{k}] is none: the direction must have a length, the power be zero or more, the wavelength positive"
+            )));
+        }
+        let origin = Vector::new(row[0], row[1], row[2]);
+        Ok(LightRay { origin, direction, power: row[6], wavelength_nm: row.get(7).copied() })
+    };
+    let rays: Vec<LightRay> = numbers.chunks(width).enumerate().map(ray).collect::<PyResult<_>>()?;
+    write_rays(&path, &rays).map_err(of_format)
+}

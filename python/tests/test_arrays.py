@@ -1,0 +1,135 @@
+"""Intersectors on arrays: closed forms, and what a wrong array is told."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lampyris as lp
+
+CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+
+
+def cube() -> lp.Mesh:
+    return lp.Mesh.from_arrays(CUBE, SIDES)
+
+
+def rays(n: int, seed: int = 1) -> tuple[Any, Any]:
+    random = np.random.default_rng(seed)
+    origins = random.normal(size=(n, 3))
+    origins *= 5.0 / np.linalg.norm(origins, axis=1)[:, None]
+    targets = random.uniform(-1.5, 1.5, size=(n, 3))
+    directions = targets - origins
+    return origins, directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+def slab(origins: Any, directions: Any) -> Any:
+    """Distance to the cube by the slab method."""
+    near, far = ((side - origins) / directions for side in (-1.0, 1.0))
+    enter, leave = np.minimum(near, far).max(axis=1), np.maximum(near, far).min(axis=1)
+    return np.where(enter <= leave, enter, np.inf)
+
+
+@pytest.mark.parametrize("build", [lp.Octree, lp.Bvh, lambda m: lp.Bvh(m, wide=False)])
+def test_a_cube_is_met_where_its_slabs_say(build: Any) -> None:
+    origins, directions = rays(20_000)
+    hits = build(cube()).intersect(origins, directions)
+    expected = slab(origins, directions)
+    assert np.array_equal(np.isfinite(hits.t), np.isfinite(expected))
+    met = np.isfinite(expected)
+    assert np.abs(hits.t[met] - expected[met]).max() < 1e-12
+    points = origins[met] + expected[met][:, None] * directions[met]
+    side = np.abs(points).argmax(axis=1)
+    normals = np.zeros_like(points)
+    normals[np.arange(len(points)), side] = np.sign(points[np.arange(len(points)), side])
+    assert np.abs(hits.normal[met] - normals).max() < 1e-12
+    assert (hits.face[~met] == -1).all() and np.isnan(hits.normal[~met]).all() and (hits.certainty[~met] == 0).all()
+    assert hits.t.dtype == np.float64 and hits.normal.shape == (20_000, 3) and hits.uv.shape == (20_000, 2)
+
+
+def test_arrays_in_one_piece_are_read_where_they_lie_and_no_other_is_changed() -> None:
+    origins, directions = rays(1000)
+    tree = lp.Octree(cube())
+    expected = tree.intersect(origins, directions).t
+    origins.flags.writeable = False
+    directions.flags.writeable = False
+    assert np.array_equal(tree.intersect(origins, directions).t, expected)
+    strided = np.zeros((1000, 6))
+    strided[:, ::2] = origins
+    assert np.array_equal(tree.intersect(strided[:, ::2], directions).t, expected)
+    assert np.array_equal(tree.intersect(origins.tolist(), directions).t, expected)
+    assert np.allclose(tree.intersect(origins.astype(np.float32), directions).t, expected, atol=1e-5, equal_nan=True)
+    assert np.allclose(tree.intersect(origins, 3.0 * directions).t, expected, atol=1e-12, equal_nan=True)
+    for threads in (1, 3):
+        assert np.array_equal(tree.intersect(origins, directions, threads=threads).t, expected)
+    assert tree.intersect(np.empty((0, 3)), np.empty((0, 3))).t.shape == (0,)
+    near = tree.intersect(origins, directions, t_max=1.0)
+    assert not np.isfinite(near.t).any()
+
+
+@pytest.mark.parametrize(
+    ("origins", "directions", "kind", "says"),
+    [
+        (np.zeros((3, 2)), np.ones((3, 3)), ValueError, r"origins: the shape must be \(n, 3\)"),
+        (np.zeros(3), np.ones((1, 3)), ValueError, r"a single row is origins\[None, :\]"),
+        (np.zeros((2, 3)), np.ones((3, 3)), ValueError, "as many rows"),
+        (np.array([["a", "b", "c"]]), np.ones((1, 3)), TypeError, "float64"),
+        (np.zeros((1, 3), dtype=complex), np.ones((1, 3)), TypeError, "float64"),
+        (np.array([[object()] * 3]), np.ones((1, 3)), TypeError, "float64"),
+        (np.array([[0, 0, 0], [0, np.nan, 0]]), np.ones((2, 3)), ValueError, "ray 1 is none"),
+        (np.zeros((1, 3)), np.array([[0, 0, np.inf]]), ValueError, "ray 0 is none"),
+        (np.zeros((1, 3)), np.zeros((1, 3)), ValueError, "a length"),
+    ],
+)
+def test_wrong_rays_are_told_what_to_do(origins: Any, directions: Any, kind: type[Exception], says: str) -> None:
+    with pytest.raises(kind, match=says):
+        lp.Octree(cube()).intersect(origins, directions)
+
+
+def test_wrong_meshes_are_told_what_to_do() -> None:
+    with pytest.raises(ValueError, match="number of one of the 8 positions"):
+        lp.Mesh.from_arrays(CUBE, [[0, 1, 8]])
+    with pytest.raises(ValueError, match=r"positions\[1, 2\] is NaN"):
+        lp.Mesh.from_arrays(np.array([[0, 0, 0], [0, 0, np.nan]]), np.array([[0, 1, 1]]))
+    with pytest.raises(TypeError, match="takes a Mesh"):
+        lp.Octree(CUBE)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match='normals "round"'):
+        lp.Octree(cube(), normals="round")
+    with pytest.raises(ValueError, match="give model="):
+        lp.Octree(cube(), normals="exact")
+
+
+def test_hits_that_are_moved_to_the_spline_are_those_of_the_spline(lens: pathlib.Path) -> None:
+    model = lp.read_step(lens)
+    mesh = model.tessellate(0.05)
+    random = np.random.default_rng(3)
+    origins = np.column_stack([random.uniform(-8, 8, (500, 2)), np.full(500, -50.0)])
+    directions = np.tile([0.0, 0.0, 1.0], (500, 1))
+    exact = lp.Exact(model).intersect(origins, directions)
+    polished = lp.Octree(mesh, normals="exact", model=model).intersect(origins, directions)
+    assert np.isfinite(exact.t).all() and (exact.certainty == 3).all()
+    assert np.abs(polished.t - exact.t).max() < 1e-9
+    facets = lp.Octree(mesh).intersect(origins, directions)
+    assert np.abs(facets.t - exact.t).max() < 0.05 + 1e-9
+
+
+def test_meshes_go_to_trimesh_and_pyvista_and_back(lens: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    pyvista = pytest.importorskip("pyvista")
+    mesh = lp.read_step(lens).tessellate((0.05, 0.2))
+    as_trimesh = mesh.to_trimesh()
+    assert as_trimesh.is_watertight and abs(as_trimesh.volume - mesh.volume) < 1e-6 * mesh.volume
+    assert abs(mesh.to_pyvista().area - mesh.area) < 1e-3 * mesh.area
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=2.0)
+    other = pyvista.Sphere(radius=2.0)
+    for made in (lp.Mesh.from_trimesh(ball), lp.Mesh.from_pyvista(other)):
+        hits = lp.Octree(made).intersect([[0.1, 0.2, -9.0]], [[0.0, 0.0, 1.0]])
+        assert abs(hits.t[0] - (9.0 - np.sqrt(4.0 - 0.05))) < 0.05
+    mesh.save(tmp_path / "lens.stl")
+    assert (tmp_path / "lens.stl").stat().st_size > 84
+    with pytest.raises(OSError, match="lens.xyz"):
+        mesh.save(tmp_path / "lens.xyz")

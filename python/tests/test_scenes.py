@@ -1,0 +1,236 @@
+"""Scenes built in Python, results, and mishaps."""
+
+from __future__ import annotations
+
+import pathlib
+import signal
+import subprocess
+import sys
+import textwrap
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import ROOT, SCENES
+
+import lampyris as lp
+
+LAMP = ROOT / "fixtures" / "step" / "lamp_multicavity.stp"
+
+
+def lamp(rays: int = 20_000) -> lp.Scene:
+    """The demo's lamp, built call by call."""
+    scene = lp.Scene(lp.read_step(LAMP), unit="lm", rays=rays, seed=1)
+    scene["cover_PMMA"] = lp.glass("PMMA")
+    points = [[-95, 30, 12.5], [0, 30, 9.375], [95, 30, 7.5]]
+    scene[lp.select(part="housing", at=points)] = lp.mirror(0.95)
+    scene.add(lp.led(at=(-95, 0, 17.69), direction=(0, 0, -1), power=100))
+    scene.add(lp.far_field("far", h_deg=(-40, 40), v_deg=(-20, 20), step_deg=1.0))
+    return scene
+
+
+def test_ten_lines_from_a_step_file_to_candela(tmp_path: pathlib.Path) -> None:
+    scene = lamp()
+    assert scene.facets().sag.max() <= 0.2
+    run = scene.trace(progress=False)
+    far = run["far"]
+    assert far.candela.shape == far.statistical.shape == (40, 80) and far.unit == "cd"
+    assert far.geometric is not None and far.geometric.shape == (40, 80)
+    power = run.power
+    assert power["emitted"] == pytest.approx(100.0, rel=1e-12)
+    parts = sum(power[k] for k in ("received", "absorbed", "escaped", "cut_off", "lost"))
+    assert parts == pytest.approx(power["emitted"], rel=1e-12)
+    assert far.power.statistical > 0 and far.power.unit == "lm" and "±" in str(far.power)
+    with pytest.raises(ValueError, match="cd, not lx"):
+        _ = far.lux
+    with pytest.raises(KeyError, match="there are far"):
+        _ = run["near"]
+    # The light of the cells is the light that arrived: candela times solid angle.
+    (h, v) = far.edges
+    solid = np.outer(np.diff(np.sin(np.radians(v))), np.diff(np.radians(h)))
+    assert (far.candela * solid).sum() == pytest.approx(far.power.value, rel=1e-9)
+    html = run._repr_html_()
+    assert "data:image/png;base64," in html and "<script" not in html
+    assert run.to_json(tmp_path / "results.json").startswith("{") and (tmp_path / "results.json").exists()
+    assert set(run.paths) == {"ray", "branch", "bounce", "point", "power"} and run.paths["point"].shape[1] == 3
+
+
+def test_the_scene_that_was_saved_is_the_scene(tmp_path: pathlib.Path) -> None:
+    scene = lamp(4000)
+    scene.save(tmp_path / "lamp.toml")
+    again = lp.Scene.from_toml(tmp_path / "lamp.toml")
+    runs = [s.trace(intersector="octree", progress=False) for s in (scene, again)]
+    assert runs[0].digest == runs[1].digest
+    frame = pytest.importorskip("pandas") and runs[0].to_frame()
+    assert set(frame.columns) >= {"receiver", "figure", "value", "statistical", "geometric", "unit"}
+    xarray = pytest.importorskip("xarray")
+    dataset = runs[0]["far"].to_xarray()
+    assert isinstance(dataset, xarray.Dataset) and dataset["value"].dims == ("V", "H")
+    assert dataset["value"].attrs["units"] == "cd" and dataset["H"].attrs["units"] == "deg"
+
+
+def test_rays_of_an_array_are_a_source() -> None:
+    n = 5000
+    random = np.random.default_rng(5)
+    array = np.zeros((n, 7))
+    array[:, :2] = random.uniform(-1, 1, (n, 2))
+    array[:, 5] = 1.0
+    array[:, 6] = 2.0 / n
+    scene = lp.Scene(rays=4000)
+    scene.add(lp.rays(array), lp.plane("wall", at=(0, 0, 10), size=(4, 4), cells=(4, 4)))
+    run = scene.trace(progress=False)
+    assert run.power["emitted"] == pytest.approx(2.0, rel=1e-9)
+    assert run["wall"].power.value == pytest.approx(2.0, rel=1e-9)
+    assert run["wall"].figures["rms_1"].value == pytest.approx(1 / np.sqrt(3), rel=0.05)
+    for wrong, kind, says in [
+        (np.zeros((3, 6)), ValueError, r"\(n, 7\)"),
+        (np.array([["a"] * 7]), TypeError, "numbers"),
+        (np.full((2, 7), np.nan), ValueError, "not finite"),
+    ]:
+        with pytest.raises(kind, match=says):
+            lp.rays(wrong)
+    with pytest.raises(ValueError, match="a length"):
+        scene.add(lp.rays(np.zeros((1, 7))))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "says"),
+    [
+        (lambda s: s.trace(rays=0), ValueError, "at least 1"),
+        (lambda s: s.trace(tolerance=-1), ValueError, "positive lengths"),
+        (lambda s: s.trace(tolerance=(1, 2, 3)), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(normals="round"), ValueError, "normals"),
+        (lambda s: s.trace(intersector="quadtree"), ValueError, "octree, bvh2, cwbvh, exact"),
+        (lambda s: s.trace(threads=0), ValueError, "at least one thread"),
+        (lambda s: s.trace(threads="two"), TypeError, "threads"),
+        (lambda s: s.trace(seed=-1), (OverflowError, TypeError, ValueError), "seed"),
+        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, 'did you mean "housing"'),
+        (lambda s: s.trace(until="1%@fra"), ValueError, 'did you mean "far"'),
+        (lambda s: s.trace(resume=True), ValueError, "no trace of this scene was interrupted"),
+        (lambda s: s.__setitem__("housing", 0.9), TypeError, r"lampyris.mirror\(0.9\)"),
+        (lambda s: s.add("light"), TypeError, "source or a receiver"),
+        (lambda s: s.trace(accuracy_deg=0.1, tolerance=0.1), ValueError, "both say how fine"),
+    ],
+)
+def test_wrong_settings_are_told_what_to_do(change: Any, kind: Any, says: str) -> None:
+    scene = lamp(2000)
+    with pytest.raises(kind, match=says):
+        change(scene)
+
+
+def test_wrong_files_are_told_what_to_do(tmp_path: pathlib.Path) -> None:
+    with pytest.raises(OSError, match="check the path"):
+        lp.read_step(tmp_path / "absent.stp")
+    (tmp_path / "no.stp").write_text("solid x")
+    with pytest.raises(lp.InputError, match="not a STEP file"):
+        lp.read_step(tmp_path / "no.stp")
+    with pytest.raises(lp.SceneError, match="a STEP file, where a scene"):
+        lp.Scene.from_toml(LAMP)
+    with pytest.raises(OSError, match="cannot read the scene"):
+        lp.Scene.from_toml(tmp_path / "absent.toml")
+    with pytest.raises(lp.SceneError, match=r"slip:2:1.*rays"):
+        lp.Scene.parse("[run]\nray = 5\n", name="slip")
+    scene = lamp(2000)
+    scene["cover"] = lp.mirror(0.9)
+    with pytest.raises(lp.SceneError, match="cover"):
+        scene.trace(progress=False)
+
+
+def test_progress_is_told_and_can_stop_a_run() -> None:
+    scene = lamp(2000)
+    told: list[tuple[str, int, int]] = []
+    scene.trace(progress=lambda stage, done, total, messages: told.append((stage, done, total)))
+    assert told
+
+    class Enough(Exception):
+        pass
+
+    def stop(stage: str, done: int, total: int, messages: list[str]) -> None:
+        if stage == "tracing" and done > 0:
+            raise Enough
+
+    long = lamp(50_000_000)
+    with pytest.raises(Enough):
+        long.trace(intersector="octree", progress=stop)
+    assert long.interrupted is not None and 0 < long.interrupted.rays < 50_000_000
+
+
+def test_an_error_that_was_asked_for_is_reached() -> None:
+    run = lamp().trace(until="1%@far", intersector="octree", progress=False)
+    assert run.until is not None and run.until["reached"] and run.until["found_percent"] <= 1.0
+    assert run["far"].power.statistical <= 0.01 * run["far"].power.value
+
+
+INTERRUPTED = """
+    import sys, lampyris as lp
+    scene = lp.Scene.from_toml(sys.argv[1])
+    settings = dict(rays=int(sys.argv[2]), intersector="octree")
+    def tell(stage, done, total, messages):
+        if stage == "tracing" and done > 0:
+            print("tracing", flush=True)
+    try:
+        scene.trace(progress=tell, **settings)
+    except lp.Interrupted as e:
+        assert 0 < e.part.done < e.part.replicates, e.part
+        print("kept", e, flush=True)
+        print("digest", scene.trace(resume=True, progress=False, **settings).digest, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of a console are not sent to one process there")
+def test_ctrl_c_leaves_what_is_done_and_it_goes_on_to_the_same_bits() -> None:
+    scene = next(s for s in SCENES if s.stem == "s3_reflector")
+    rays = 4_000_000
+    line = [sys.executable, "-c", textwrap.dedent(INTERRUPTED), str(scene), str(rays)]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "tracing\n"
+        child.send_signal(signal.SIGINT)
+        rest = [text for text in child.stdout.read().splitlines() if text != "tracing"]
+    assert child.returncode == 0 and rest[0].startswith("kept"), rest
+    whole = lp.Scene.from_toml(scene).trace(rays=rays, intersector="octree", progress=False)
+    assert rest[-1] == f"digest {whole.digest}"
+
+
+def test_a_model_accounts_for_itself() -> None:
+    model = lp.read_step(LAMP)
+    account = model.account()
+    assert account["faces"]["refused"] == 0 and account["units"]["length"]
+    assert len(model.faces()) == account["faces"]["found"] and {"part", "kind", "area_mm2", "at"} <= set(model.faces()[0])
+    assert "housing" in model.parts and "refused" in model._repr_html_()
+    mesh = model.tessellate((0.05, 0.2), measure=True)
+    assert mesh.report is not None and mesh.report["over_tolerance"] == 0
+    assert mesh.sag.max() <= 0.2 and mesh.facets.shape == (len(mesh), 4) and mesh.normals.shape == (len(mesh), 4, 3)
+    with pytest.raises(ValueError, match='did you mean "housing"'):
+        model.tessellate(parts={"hosing": 0.1})
+    with pytest.raises(ValueError, match="unit_mm"):
+        lp.read_step(LAMP, unit_mm=-1)
+
+
+def test_a_lamp_gets_its_verdict() -> None:
+    scene = lamp(50_000)
+    scene.add(lp.far_field("fine", h_deg=(-50, 50), v_deg=(-20, 20), step_deg=0.125))
+    run = scene.trace(intersector="octree", progress=False)
+    name = next(iter(lp.regulations()))
+    verdict = run.assess(name, "fine")
+    assert verdict.verdict in ("pass", "fail", "unsure") and verdict["rows"]
+    assert verdict.verdict in verdict._repr_html_()
+    with pytest.raises(ValueError, match="name the far field"):
+        run.assess(name)
+    with pytest.raises(ValueError):
+        run.assess("UN R0", "fine")
+
+
+def test_studies_give_arrays() -> None:
+    lens = lp.read_step(ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp")
+    study = lp.study.accuracy(lens, [0.2, 0.05], rays=2000, repetitions=1, normals=["flat", "bilinear"], progress=False)
+    facets = study["intersector"] == "octree"
+    assert study["direction_error_deg_rms"].dtype == float and facets.sum() >= 4 and study.answer
+    bilinear = facets & (study["normals"] == "bilinear") & (study["threads"] == 1)
+    errors = study["direction_error_deg_rms"][bilinear][np.argsort(study["tolerance_mm"][bilinear])]
+    assert errors[0] < errors[-1]
+    check = lp.study.check(lens, rays=3000, progress=False)
+    assert check["rays"] == 3000 and check["octree_vs_bvh"]["disagree"] == 0
+    assert check["facets_vs_exact"]["unexplained"] == 0
+    with pytest.raises(TypeError, match="takes a Model"):
+        lp.study.check("lens.stp")  # type: ignore[arg-type]
