@@ -36,6 +36,7 @@ impl Intersector for Sphere {
             geometric_normal: normal,
             face: FaceId(0),
             primitive: 0,
+            triangle: None,
             uv: Uv::ZERO,
             certainty: Certainty::Certified,
         })

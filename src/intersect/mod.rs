@@ -11,8 +11,9 @@ pub mod octree;
 pub mod polish;
 mod prefetch;
 mod slopes;
+mod start_triangle;
 
-use crate::math::{FaceId, Point, Ray, Uv, Vector};
+use crate::math::{Departure, FaceId, Point, Ray, Triangle, Uv, Vector};
 pub(crate) use prefetch::prefetch;
 
 /// Finds the nearest hit of a ray.
@@ -78,10 +79,20 @@ pub struct Hit {
     pub face: FaceId,
     /// The intersector's primitive: a facet of the mesh, or a patch of the spline model.
     pub primitive: u32,
+    /// The triangle of the facet; `None` on the spline.
+    pub triangle: Option<Triangle>,
     /// Parameters on the face's surface.
     pub uv: Uv,
     /// How sure it is.
     pub certainty: Certainty,
+}
+
+impl Hit {
+    /// The point as one that a ray leaves.
+    #[inline(always)]
+    pub fn departure(&self) -> Departure {
+        Departure { face: self.face, primitive: self.primitive, uv: self.uv, triangle: self.triangle }
+    }
 }
 
 /// How sure a hit is.

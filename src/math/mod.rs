@@ -14,7 +14,7 @@ pub mod units;
 pub use aabb::Aabb;
 pub use frame::Frame;
 pub use interval::Interval;
-pub use ray::{Departure, Ray};
+pub use ray::{Departure, Ray, Triangle};
 pub use roots::{quadratic_roots, safe_newton};
 
 /// A position, mm.

@@ -219,7 +219,16 @@ mod tests {
     fn hit(t: f64) -> Hit {
         let normal = Vector::Z;
         let (face, primitive, uv) = (FaceId(0), 0, Uv::ZERO);
-        Hit { t, normal, geometric_normal: normal, face, primitive, uv, certainty: Certainty::Facet }
+        Hit {
+            t,
+            normal,
+            geometric_normal: normal,
+            face,
+            primitive,
+            triangle: None,
+            uv,
+            certainty: Certainty::Facet,
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::Random;
 use super::rays::RaySource;
 use crate::intersect::{Cost, Intersector};
-use crate::math::{Departure, Ray, Uv, Vector};
+use crate::math::{Departure, Ray, Triangle, Uv, Vector};
 use crate::mesh::FacetMesh;
 use std::ops::Range;
 
@@ -48,9 +48,8 @@ impl<'a> SurfacePaths<'a> {
             ray = match self.guide.intersect(&ray, &mut Cost::default()) {
                 Some(hit) => {
                     let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
-                    let departure = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
                     let direction = cosine_direction(&mut random, hit.geometric_normal * side);
-                    Ray::new(ray.point_at(hit.t), direction).with_departure(departure)
+                    Ray::new(ray.point_at(hit.t), direction).with_departure(hit.departure())
                 }
                 None => self.first(&mut random),
             };
@@ -72,8 +71,8 @@ impl<'a> SurfacePaths<'a> {
             let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
             // The first triangle of a facet may be a line where the second has all its area.
             if let Some(normal) = (b - a).cross(c - a).try_normalize() {
-                let departure =
-                    Departure { face: self.mesh.facets[facet].face, primitive: facet as u32, uv: Uv::ZERO };
+                let (face, triangle) = (self.mesh.facets[facet].face, Some(Triangle::First));
+                let departure = Departure { face, primitive: facet as u32, uv: Uv::ZERO, triangle };
                 let direction = cosine_direction(random, normal * side);
                 return Ray::new(a + (b - a) * u + (c - a) * v, direction).with_departure(departure);
             }

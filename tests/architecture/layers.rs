@@ -181,7 +181,19 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ("math", &["mod", "simd", "ray", "aabb", "frame", "interval", "roots", "units"]),
     (
         "intersect",
-        &["mod", "prefetch", "exact", "polish", "slopes", "facet_hit", "facet", "normals", "bvh", "octree"],
+        &[
+            "mod",
+            "prefetch",
+            "exact",
+            "polish",
+            "slopes",
+            "start_triangle",
+            "facet_hit",
+            "facet",
+            "normals",
+            "bvh",
+            "octree",
+        ],
     ),
     (
         "intersect/exact",

@@ -3,7 +3,7 @@
 use crate::support::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost, Intersector};
-use lampyris::math::{Departure, Homogeneous, Point, Ray, Uv, Vector};
+use lampyris::math::{Homogeneous, Point, Ray, Uv, Vector};
 use lampyris::model::{EdgeUse, Face, Model, Part, Shell, TrimLoop};
 use lampyris::nurbs::{Surface, UvCurve};
 
@@ -75,7 +75,7 @@ fn a_ray_that_leaves_a_sphere_finds_the_other_side() {
     for k in 0..n {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
         let first = exact.intersect(&ray, &mut Cost::default()).expect("aimed well inside");
-        let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
+        let from = first.departure();
         let mut o = ray.point_at(first.t);
         let inward = -o.normalize();
         // Every third leaves almost along the surface: a chord of 2e-4 to 6 mm.
@@ -107,7 +107,7 @@ fn a_ray_that_leaves_a_sphere_outward_meets_nothing() {
     for _ in 0..20_000 {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
         let first = exact.intersect(&ray, &mut Cost::default()).expect("aimed well inside");
-        let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
+        let from = first.departure();
         let o = ray.point_at(first.t) + s.direction() * 1e-14;
         let mut d = s.direction();
         if d.dot(o) < 0.0 {

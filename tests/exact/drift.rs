@@ -5,7 +5,7 @@ use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Cost, Intersector};
-use lampyris::math::{Departure, Point, Ray, Vector};
+use lampyris::math::{Point, Ray, Vector};
 use lampyris::tessellate;
 
 const BOUNCES: usize = 100_000;
@@ -18,7 +18,7 @@ fn drift(mirror: &dyn Intersector, radius: f64) -> f64 {
         let hit = mirror.intersect(&ray, &mut Cost::default()).unwrap_or_else(|| panic!("bounce {k}: {ray:?}"));
         let d = ray.direction;
         let mirrored = (d - hit.normal * (2.0 * d.dot(hit.normal))).normalize();
-        let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+        let from = hit.departure();
         ray = Ray::new(ray.point_at(hit.t), mirrored).with_departure(from);
     }
     (ray.origin.cross(ray.direction) - before).length() / before.length()

@@ -10,6 +10,7 @@ mod files;
 mod grazing;
 mod hostile;
 mod models;
+mod paths;
 mod polish;
 mod referee;
 mod support;

@@ -43,6 +43,7 @@ impl Intersector for EveryFacet<'_> {
                     geometric_normal: normal,
                     face: facet.face,
                     primitive: k as u32,
+                    triangle: None,
                     uv,
                     certainty: Certainty::Facet,
                 });
@@ -118,7 +119,7 @@ fn a_departure_from_the_spline_is_never_lost() {
             if first.certainty != Certainty::Polished {
                 continue;
             }
-            let from = Departure { face: first.face, primitive: first.primitive, uv: first.uv };
+            let from = first.departure();
             let o: Point = ray.point_at(first.t);
             let along: Vector = first.normal.cross(s.direction()).normalize();
             let side = if s.next() < 0.5 { -1.0 } else { 1.0 };
@@ -167,7 +168,7 @@ fn short_flat_rays_meet_the_sphere() {
     let facets = EveryFacet(&mesh);
     let polished = Polished::new(&facets, &mesh, &exact);
     let other = mesh.facets.iter().position(|f| f.face == FaceId(1)).unwrap() as u32;
-    let from = Departure { face: FaceId(1), primitive: other, uv: Uv::new(45.0, 0.0) };
+    let from = Departure { face: FaceId(1), primitive: other, uv: Uv::new(45.0, 0.0), triangle: None };
     let mut random = Stream(11);
     for _ in 0..300 {
         let out = random.direction();
@@ -209,7 +210,7 @@ fn a_batch_gives_the_bits_of_rays_asked_alone() {
         polished.intersect_batch(&rays, &mut hits, &mut Cost::default());
         for k in 0..rays.len() {
             if let Some(h) = hits[k] {
-                let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+                let from = h.departure();
                 rays.push(Ray::new(rays[k].point_at(h.t), s.direction()).with_departure(from));
             }
         }

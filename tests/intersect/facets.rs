@@ -1,14 +1,15 @@
 //! The contract of intersectors on facets, asked of every one of them.
 
+use crate::departures::leave;
 use crate::support::*;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
 use lampyris::intersect::octree::{self, InstructionSet, Octree};
 use lampyris::intersect::{Cost, Hit, Intersector};
-use lampyris::math::{Departure, Point, Ray, Vector};
+use lampyris::math::{Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
 
 /// Names and structures under test: all must give the same bits.
-fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
+pub(crate) fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
     let octree = octree::Settings::default();
     let portable = octree::Settings { instruction_set: InstructionSet::Portable, ..octree };
     let bvh = bvh::Settings::default();
@@ -29,7 +30,7 @@ fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
 }
 
 /// Asks all structures one by one and in a batch; all answers must be the same bits.
-fn ask(mesh: &FacetMesh, rays: &[Ray]) -> Vec<Option<Hit>> {
+pub(crate) fn ask(mesh: &FacetMesh, rays: &[Ray]) -> Vec<Option<Hit>> {
     let mut first: Option<Vec<Option<Hit>>> = None;
     for (name, structure) in all(mesh) {
         let mut batch = vec![None; rays.len()];
@@ -81,7 +82,7 @@ fn nearest_hit_is_that_of_trying_all_facets() {
 }
 
 /// A ray from inside a closed mesh at a vertex, a point of an edge or of a diagonal, or along an axis.
-fn at_a_seam(mesh: &FacetMesh, middle: Point, size: f64, k: usize, r: &mut Random) -> Ray {
+pub(crate) fn at_a_seam(mesh: &FacetMesh, middle: Point, size: f64, k: usize, r: &mut Random) -> Ray {
     let corners = mesh.corners(r.below(mesh.facets.len()));
     let (a, b) = (corners[0], corners[[1, 2, 3][k % 3]]);
     let target = match k % 4 {
@@ -148,126 +149,6 @@ fn nothing_slips_through_a_mesh_smaller_than_a_wavelength() {
             .collect();
         // From far away the target itself is rounded; all structures agree all the same.
         ask(&mesh, &rays);
-    }
-}
-
-#[test]
-fn grazing_rays_that_start_on_edges_stay_inside() {
-    for (size, shift) in [(50.0, 0.0), (50.0, 1e6), (5e-5, 0.0)] {
-        let middle = Point::new(shift, -shift, shift);
-        for mesh in [globe(24, 13, |v| v * size + middle), globe(64, 33, |v| v * size + middle)] {
-            let mut r = Random(77);
-            let mut rays = Vec::new();
-            let octree = Octree::build(&mesh, &octree::Settings::default());
-            for k in 0..4000 {
-                let first = at_a_seam(&mesh, middle, size, k, &mut r);
-                let Some(hit) = octree.intersect(&first, &mut Cost::default()) else {
-                    panic!("slipped through: {first:?}")
-                };
-                let inward = -hit.geometric_normal;
-                let sideways = r.direction();
-                let sideways = (sideways - inward * inward.dot(sideways)).normalize();
-                let sine = 10f64.powi(-((k % 10) as i32)) * r.within(0.1, 0.999);
-                let direction = (sideways * (1.0 - sine * sine).sqrt() + inward * sine).normalize();
-                rays.push(leave(first, &hit, direction));
-            }
-            let lost = ask(&mesh, &rays).iter().filter(|hit| hit.is_none()).count();
-            assert_eq!(lost, 0, "of {} rays in a mesh of {size} mm at {middle}", rays.len());
-        }
-    }
-}
-
-#[test]
-fn a_facet_is_not_met_by_what_leaves_it_wherever_its_start_was_rounded_to() {
-    // Starts of a ten-millionth of a millimetre above a facet in an axis plane, running down onto it.
-    let mut mesh = FacetMesh::default();
-    add_grid(&mut mesh, 4, 4, 0, |u, v| Point::new(100.0 * u, 100.0 * v, 30.0));
-    add_grid(&mut mesh, 4, 4, 1, |u, v| Point::new(100.0 * u, 100.0 * v, -30.0));
-    let mut r = Random(3);
-    let mut rays = Vec::new();
-    for k in 0..2000 {
-        let facet = r.below(16);
-        let [a, _, c, _] = mesh.corners(facet);
-        let start = a.lerp(c, r.within(0.3, 0.7)) + Vector::new(r.within(-5.0, 5.0), r.within(-5.0, 5.0), 1.2e-7);
-        let down = 10f64.powi(-(k % 9));
-        let direction = Vector::new(r.within(-1.0, 1.0), r.within(-1.0, 1.0), -down).normalize();
-        let departure =
-            Departure { face: mesh.facets[facet].face, primitive: facet as u32, uv: Default::default() };
-        rays.push(Ray::new(start, direction).with_departure(departure));
-    }
-    for (ray, hit) in rays.iter().zip(ask(&mesh, &rays)) {
-        let own = ray.departure.map(|d| d.primitive);
-        assert!(hit.is_none_or(|hit| Some(hit.primitive) != own), "{hit:?} by {ray:?}");
-    }
-}
-
-fn leave(ray: Ray, hit: &Hit, direction: Vector) -> Ray {
-    Ray::new(ray.point_at(hit.t), direction).with_departure(Departure {
-        face: hit.face,
-        primitive: hit.primitive,
-        uv: hit.uv,
-    })
-}
-
-#[test]
-fn a_ray_reflected_inside_a_closed_mesh_stays_inside() {
-    for mesh in [ball(10, |v| v * 50.0), globe(40, 20, |v| v * 50.0 + Vector::splat(1e3))] {
-        let middle = mesh.bounds().center();
-        let mut r = Random(5);
-        for (name, structure) in all(&mesh) {
-            let mut bounces = 0;
-            for _ in 0..300 {
-                let mut ray = Ray::new(middle, r.direction());
-                for _ in 0..30 {
-                    let hit = structure.intersect(&ray, &mut Cost::default());
-                    let Some(hit) = hit else { panic!("{name}: left through {ray:?}") };
-                    bounces += 1;
-                    assert!(
-                        ray.direction.dot(hit.geometric_normal) > 0.0,
-                        "{name}: met from outside, {ray:?} {hit:?}"
-                    );
-                    let n = hit.geometric_normal;
-                    let direction = if bounces % 3 == 0 {
-                        // Anywhere inward, often at grazing angles.
-                        let d = r.direction() - n * r.unit();
-                        let lift = d.dot(n);
-                        (d - n * (lift + lift.abs().max(1e-5))).normalize()
-                    } else {
-                        (ray.direction - n * (2.0 * ray.direction.dot(n))).normalize()
-                    };
-                    ray = leave(ray, &hit, direction);
-                }
-            }
-            assert_eq!(bounces, 9000);
-        }
-    }
-}
-
-#[test]
-fn a_ray_leaving_a_convex_body_meets_nothing() {
-    let mesh = ball(10, |v| v * 50.0);
-    let mut r = Random(17);
-    let mut rays = Vec::new();
-    for f in 0..mesh.facets.len() {
-        let [a, b, c, d] = mesh.corners(f);
-        for k in 0..40 {
-            // On both triangles, on their edges and corners.
-            let (s, t) = ([0.0, 0.5, 1.0, r.unit()][k % 4], [0.0, 1.0, 0.5, r.unit()][k / 4 % 4]);
-            let second = k % 2 == 1;
-            let [p, q, w] = if second { [a, c, d] } else { [a, b, c] };
-            let start = p + ((q - p) * s + (w - q) * (s * t));
-            let normal = (q - p).cross(w - p).normalize();
-            let direction = (r.direction() * 0.99 + normal).normalize();
-            let from = Departure { face: mesh.facets[f].face, primitive: f as u32, uv: Default::default() };
-            // The blown-up cube has quads folded inward or outward by up to this much: start directions above.
-            if direction.dot(normal) > 0.1 {
-                rays.push(Ray::new(start, direction).with_departure(from));
-            }
-        }
-    }
-    let hits = ask(&mesh, &rays);
-    for (ray, hit) in rays.iter().zip(hits) {
-        assert!(hit.is_none(), "{ray:?} met {hit:?}");
     }
 }
 

@@ -28,7 +28,7 @@ fn leaving(mesh: &FacetMesh, dice: &mut Random) -> Ray {
     if dice.unit() < 0.5 {
         direction = (direction - normal * (direction.dot(normal) * (1.0 - 0.1 * dice.unit()))).normalize();
     }
-    let from = Departure { face: FaceId(0), primitive: facet as u32, uv: Uv::ZERO };
+    let from = Departure { face: FaceId(0), primitive: facet as u32, uv: Uv::ZERO, triangle: None };
     Ray::new(origin, direction).with_departure(from)
 }
 
@@ -131,7 +131,7 @@ fn a_folded_facet_is_met_by_what_leaves_its_other_half() {
         if height < 1e-6 {
             continue;
         }
-        let departure = Departure { face: FaceId(0), primitive: 0, uv: Uv::ZERO };
+        let departure = Departure { face: FaceId(0), primitive: 0, uv: Uv::ZERO, triangle: None };
         let ray = Ray::new(from, (to - from).normalize()).with_departure(departure);
         let tree = Octree::build(&mesh, &octree::Settings::default());
         let judge = Bvh::build(&mesh, &bvh::Settings::default());

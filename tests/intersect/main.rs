@@ -1,5 +1,6 @@
 //! The contract of intersectors on facets, and the shortcuts of the octree that must change no answer.
 
+mod departures;
 mod facets;
 mod horizon;
 mod light;

@@ -1,7 +1,7 @@
 //! Meshes, rays and a reference for the contract of intersectors.
 
 use lampyris::intersect::{Cost, Intersector};
-use lampyris::math::{Departure, FaceId, Point, Ray, Uv, Vector};
+use lampyris::math::{FaceId, Point, Ray, Uv, Vector};
 use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -241,7 +241,7 @@ pub(crate) fn paths(tree: &dyn Intersector, sources: &[Point], count: usize) -> 
             let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
             let n = hit.geometric_normal * if r.unit() < 0.6 { side } else { -side };
             let direction = (n + r.direction() * 0.999).normalize();
-            let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+            let from = hit.departure();
             ray = Ray::new(ray.point_at(hit.t), direction).with_departure(from);
         }
     }

@@ -1,147 +1,188 @@
 #!/usr/bin/env python3
-"""Puts one deliberate fault at a time into a copy of the source and asks whether the default tests notice.
+"""Puts deliberate faults into a copy of the source and asks of each whether the default tests notice.
 
-    tests/mutants/run.py [--list] [--check] [--only TEXT] [--work FOLDER] [--jobs N]
+    tests/mutants/run.py [--list] [--check] [--only TEXT] [--work FOLDER] [--jobs N] [--all-areas] [--table FILE]
 
-Each mutant is a file, a text that stands there exactly once, what takes its place, and the tests that ought to notice it. `--check` only looks whether
-every text still stands where it should. A mutant is *killed* when a test fails or the program no longer compiles by a lint of the
-compiler; *survivors* are listed at the end, and the exit code is their number. Nothing but Python 3.9 and the Rust toolchain is needed."""
+`faults.py` lists them: a file, a text that stands there exactly once with the expression or statement between `«` and `»`, what takes its place, and the
+areas of tests that ought to notice, each with an optional filter of names (`exact:certificates`). All of them are compiled into one program, each behind
+a question for `LAMPYRIS_FAULT`, so that the trial of a fault costs no build.
+
+A fault is *killed* when a test fails, and *survived* when all pass; `--all-areas` asks every area about the survivors before it says so. A list whose
+texts no longer stand in the source, that no compiler takes, or whose areas fail without any fault, is an error and kills nothing. The exit code is the
+number of survivors. The copy lies outside of the source; compiled dependencies are taken over from `target`. Nothing but Python 3.9, git and the Rust
+toolchain is needed."""
 import argparse
+import json
+import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
+from faults import EQUIVALENT, FAULTS
+
 ROOT = Path(__file__).resolve().parents[2]
-EXACT, OCTREE, PROOF, KERNEL = "src/intersect/exact/", "src/intersect/octree/", "src/tessellate/proof/", "src/simulate/kernel/"
-
-# (name, file, text, replacement, tests)
-MUTANTS = [
-    # The certified core: what a certificate promises.
-    ("own point found again", EXACT + "acceptance.rs", "if query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {",
-     "if false && query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {", "exact simulate"),
-    ("own point accepted within 1e-3 mm", EXACT + "acceptance.rs", "if query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {",
-     "if query.departure.is_some_and(|own| t.abs() < 1e-3 || own.is_same_point(leaf, local, t, &self.geometry)) {", "exact simulate"),
-    ("trims forgotten at the border", EXACT + "acceptance.rs", "            if !inside {", "            if false && !inside {", "exact"),
-    ("trims forgotten in cells", EXACT + "acceptance.rs", "return (decided == Region::Inside, false)", "return (true, false)", "exact"),
-    ("rejections at trims not told", EXACT + "acceptance.rs", "query.reject_at_trim(t);", "let _ = t;", "exact"),
-    ("edges do not decide", EXACT + "acceptance.rs", "Some(inside) => inside,", "Some(_) => place.inside,", "exact"),
-    ("two roots taken for one", EXACT + "leaf_test.rs", "const UNIQUE: f64 = 0.95;", "const UNIQUE: f64 = 3.0;", "exact study"),
-    ("rounding margin dropped", EXACT + "leaf_test.rs", "let margin = PARAMETER_ROUNDING + noise *", "let margin = 0.0 * noise *", "exact study"),
-    ("Krawczyk radius forgotten", EXACT + "leaf_test.rs", "(1.0 + row_u + INVERSE_ROUNDING) + margin", "(1.0 + INVERSE_ROUNDING) + margin", "exact study"),
-    ("Krawczyk reach a third", EXACT + "leaf_test.rs", "let reach_v = f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin;",
-     "let reach_v = (f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin) / 3.0;", "exact study"),
-    ("singular Jacobians inverted", EXACT + "tolerances.rs", "pub(super) const SINGULAR: f64 = 1e-8;", "pub(super) const SINGULAR: f64 = 0.0;", "exact study"),
-    ("roots counted far beside the leaf", EXACT + "leaf_test.rs", "let e = margin + 2.0 * NEWTON_STEP;", "let e = margin + 0.05;", "exact study"),
-    ("range not asked at the only root", EXACT + "acceptance.rs", "if !query.is_in_range(t) {", "if false && !query.is_in_range(t) {", "exact"),
-    ("oriented box without rounding", EXACT + "leaf_test.rs", "(leaf.olo[k] - noise - o) * inv, (leaf.ohi[k] + noise - o) * inv", "(leaf.olo[k] + 1e-3 - o) * inv, (leaf.ohi[k] - 1e-3 - o) * inv", "exact study"),
-    ("doubt forgotten at a hit", EXACT + "answer.rs", "let certainty = if query.undecided_from <= root.t {", "let certainty = if false {", "exact study"),
-    ("doubt forgotten at a miss", EXACT + "answer.rs", "let undecided = query.undecided_from < f64::INFINITY;", "let undecided = false;", "exact study"),
-    ("doubt forgotten in a passage", EXACT + "answer.rs", "if hit.t >= query.undecided_from {", "if false {", "exact study"),
-    ("doubt forgotten when the budget ends", EXACT + "clip.rs", "query.undecided_from = query.undecided_from.min(node.near);", "", "exact study"),
-    ("normal swapped", EXACT + "answer.rs", "let normal = label.sign * regular", "let normal = -label.sign * regular", "exact"),
-    ("clipping takes two roots for one", EXACT + "clip.rs", "const UNIQUE: f64 = 0.9;", "const UNIQUE: f64 = 3.0;", "exact study"),
-    ("clipping drops its slack", EXACT + "clip.rs", "keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];", "keep[k] = [keep[k][0] + 1e-6, keep[k][1] - 1e-6];", "exact study"),
-    ("clipping drops boxes before the start", EXACT + "clip.rs", "hull.far < query.t_min - TANGENT", "hull.far < query.t_min + 1.0", "exact study"),
-    ("clipping prefers the later box", EXACT + "clip.rs", "if node.near >= query.t_max && query.best.is_some() {", "if node.near >= query.t_max * 0.5 && query.best.is_some() {", "exact study"),
-    # Polishing.
-    ("polish accepts a point off the ray", EXACT + "newton.rs", "if residual > near + rounding {", "if residual > 1e-2 {", "exact"),
-    ("polish swaps normals of reversed faces", EXACT + "newton.rs", "let normal = record.sign * patch::normal", "let normal = patch::normal", "exact simulate"),
-    ("polish forgets seams", EXACT + "newton.rs", "uv[k] = if grid.closed[k] && uv[k]", "uv[k] = if false && uv[k]", "exact"),
-    # The octree: rounding, boxes, sieve.
-    ("box not rounded down", OCTREE + "clip.rs", "if f64::from(y) > x { y.next_down() } else { y }", "y", "intersect study --lib"),
-    ("box not rounded up", OCTREE + "clip.rs", "if f64::from(y) < x { y.next_up() } else { y }", "y", "intersect study --lib"),
-    ("boxes unpadded and shrunk", OCTREE + "clip.rs", "round_down(low[a] - pad)", "round_down(low[a] + 0.01 * (high[a] - low[a]))", "intersect study"),
-    ("second triangle of a facet left out", OCTREE + "clip.rs", "if c == d { 1 } else { 2 }", "1", "intersect study"),
-    ("node bound to nearest below", OCTREE + "node.rs", "/ step).floor();", "/ step).round();", "intersect study"),
-    ("node bound to nearest above", OCTREE + "node.rs", "/ step).ceil();", "/ step).round();", "intersect study"),
-    ("steps too short", OCTREE + "node.rs", "const STEP_ROOM: f64 = 1.0 + 1e-6;", "const STEP_ROOM: f64 = 1.0 - 1e-3;", "intersect study"),
-    ("box slack dropped", OCTREE + "ray_state.rs", "b.slack[a] = ((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs();", "b.slack[a] = 0.0 * (o.abs() + frame.reach[a] + ROUNDING + moved) * inverse.abs();", "intersect study"),
-    ("sieve slack dropped", OCTREE + "ray_state.rs", "self.sieve.slack = moved;", "self.sieve.slack = 0.0 * moved;", "intersect study"),
-    # The proof of facets.
-    ("Taylor bound a third", PROOF + "deviation.rs", "/ (8.0 * lightest))", "/ (24.0 * lightest))", "tessellate --lib"),
-    ("mixed derivative forgotten", PROOF + "deviation.rs", "(most[0] + 2.0 * most[1] + most[2])", "(most[0] + most[2])", "tessellate --lib"),
-    ("weight forgotten", PROOF + "deviation.rs", "lightest = lightest.min(w_min);", "lightest = lightest.min(w_max);", "tessellate --lib"),
-    ("height of the quad forgotten", PROOF + "flat_quad.rs", "let flat = sides - quad.height;", "let flat = sides;", "tessellate --lib"),
-    ("slope of the quad forgotten", PROOF + "flat_quad.rs", "let sides = limit * quad.cosine - self.margin;", "let sides = 3.0 * limit - self.margin;", "tessellate --lib"),
-    # Tallies.
-    ("squares of other replicates forgotten", "src/simulate/tally.rs", "self.squares = self.squares.saturating_add(o.squares);", "", "simulate cli --lib"),
-    ("rounding of quanta downward", "src/simulate/tally.rs", "(x + SHIFT) - SHIFT } else", "x.floor() } else", "simulate --lib"),
-    ("a waiting cell is lost", "src/simulate/tally.rs", "    pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        self.add_pending();", "    pub(crate) fn flush(&mut self, sums: &mut [Sum]) {", "simulate --lib"),
-    ("error without its correction", "src/simulate/tally.rs", "(squares - total * total / k).max(0.0) * k / (k - 1.0)", "(squares - total * total / k).max(0.0) / (k - 1.0)", "simulate --lib"),
-    # Contacts.
-    ("partner looks the same way", KERNEL + "contact.rs", "let against = found.geometric_normal.dot(at.hit.geometric_normal) < -ALIGNED;\n        other.touches_body", "let against = found.geometric_normal.dot(at.hit.geometric_normal) > ALIGNED;\n        other.touches_body", "simulate"),
-    ("coating of the wrong face", KERNEL + "contact.rs", "[false, false] if entering => ContactSurface::Partner(partner),", "[false, false] if !entering => ContactSurface::Partner(partner),", "simulate"),
-    ("coating of a partner forgotten", KERNEL + "contact.rs", "[true, false] => ContactSurface::Partner(partner),", "[true, false] => ContactSurface::Bare,", "simulate"),
-    ("rounding of places a thousandth", KERNEL + "tolerances.rs", "const ROUNDING_MM: f64 = 1e-9;", "const ROUNDING_MM: f64 = 1e-14;", "simulate"),
-    # Optics.
-    ("mirror image of the wrong length", "src/optics/refraction.rs", "unit(d - n * (2.0 * d.dot(n)))", "unit(d - n * (1.999 * d.dot(n)))", "simulate --lib"),
-    ("total reflection misjudged", "src/optics/refraction.rs", "(sin2_t < 1.0).then(", "(sin2_t < 0.999).then(", "simulate --lib"),
-]
+AREAS = ["lib", "exact", "intersect", "study", "simulate", "tessellate", "step", "formats", "cli", "hostile", "truck"]
+# An area that takes longer than this hangs, s: the slowest takes two minutes on a busy machine.
+LIMIT = 1800
+# What the faults ask: with no number, none is in.
+CHOICE = """
+/// Whether this deliberate fault is in.
+#[doc(hidden)]
+#[allow(missing_docs)]
+pub fn has_fault(number: u32) -> bool {
+    static CHOSEN: std::sync::LazyLock<Option<u32>> =
+        std::sync::LazyLock::new(|| std::env::var("LAMPYRIS_FAULT").ok()?.parse().ok());
+    *CHOSEN == Some(number)
+}
+"""
 
 
-def source(mutant):
-    return (ROOT / mutant[1]).read_text(encoding="utf8")
+def parts(text):
+    """What stands before, within and after the marks of a text."""
+    before, rest = text.split("«")
+    inside, after = rest.split("»")
+    return before, inside, after
 
 
-def check(mutants):
-    """Names of mutants whose text does not stand exactly once in its file."""
-    bad = []
-    for mutant in mutants:
-        path = ROOT / mutant[1]
-        count = path.read_text(encoding="utf8").count(mutant[2]) if path.is_file() else -1
+def stale():
+    """Names and faults of entries whose text does not stand exactly once in its file."""
+    bad = {}
+    for name, file, text, *_ in FAULTS:
+        path = ROOT / file
+        count = path.read_text(encoding="utf8").count("".join(parts(text))) if path.is_file() else 0
         if count != 1:
-            bad.append(f"{mutant[0]}: {mutant[1]} holds its text {count} times" if count >= 0 else f"{mutant[0]}: {mutant[1]} is gone")
+            bad[name] = f"{file} holds its text {count} times"
     return bad
 
 
-def targets(tests):
-    return [part for name in tests.split() for part in (["--lib"] if name == "--lib" else ["--test", name])]
+def with_faults(file, source):
+    """The source of a file with every fault of it behind its question."""
+    edits = []
+    for number, (_, where, text, replacement, _) in enumerate(FAULTS):
+        if where == file:
+            before, inside, after = parts(text)
+            start = source.index(before + inside + after) + len(before)
+            edits.append((start, start + len(inside), number, replacement))
+    # Several faults of one place are asked one after another.
+    for start, end in sorted({edit[:2] for edit in edits}, reverse=True):
+        inside = source[start:end]
+        for other_start, other_end, number, replacement in edits:
+            if (other_start, other_end) == (start, end):
+                inside = f"if crate::has_fault({number}) {{ {replacement} }} else {{ {inside} }}"
+        is_statement = source[start:end].rstrip().endswith((";", "}"))
+        source = source[:start] + (inside if is_statement else f"({inside})") + source[end:]
+    return source
 
 
-def run(mutant, copy, jobs):
-    """Whether the tests notice, the seconds it took and the first line that says so."""
-    path = copy / mutant[1]
-    original = path.read_text(encoding="utf8")
-    start = time.time()
-    try:
-        path.write_text(original.replace(mutant[2], mutant[3]), encoding="utf8")
-        command = ["cargo", "test", "--offline", "--quiet", "-j", str(jobs), *targets(mutant[4])]
-        done = subprocess.run(command, cwd=copy, capture_output=True, text=True)
-    finally:
-        path.write_text(original, encoding="utf8")
-    lines = (done.stdout + done.stderr).splitlines()
-    why = next((line for line in lines if "FAILED" in line or line.startswith("error") or "panicked at" in line), "")
-    return done.returncode != 0, time.time() - start, why.strip()
+def write_copy(copy):
+    """Brings the copy up to the source; what is unchanged keeps its time, so that it is not built again."""
+    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    for file in filter(None, listed.split("\n")):
+        source, target = ROOT / file, copy / file
+        if not source.is_file():
+            continue
+        content = source.read_bytes()
+        if any(fault[1] == file for fault in FAULTS):
+            content = with_faults(file, content.decode("utf8")).encode("utf8")
+        if file == "src/lib.rs":
+            content += CHOICE.encode("utf8")
+        if not (target.is_file() and target.read_bytes() == content):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+    for part in [".fingerprint", "build", "deps"]:
+        source, target = ROOT / "target/debug" / part, copy / "target/debug" / part
+        if source.is_dir() and not target.exists():
+            # Of dependencies alone: this crate's own files belong to another folder.
+            shutil.copytree(source, target, ignore=shutil.ignore_patterns("*lampyris*"), copy_function=shutil.copy2)
+
+
+def build(copy, jobs, areas):
+    """The test programs of the areas."""
+    chosen = [word for area in areas for word in (["--lib"] if area == "lib" else ["--test", area])]
+    command = ["cargo", "test", "--offline", "--no-run", "--message-format", "json-render-diagnostics", "-j", str(jobs), *chosen]
+    env = {**os.environ, "CARGO_TARGET_DIR": str(copy / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
+    done = subprocess.run(command, cwd=copy, stdout=subprocess.PIPE, text=True, env=env)
+    if done.returncode != 0:
+        sys.exit("the list is in error: its faults do not compile")
+    programs = {}
+    for line in done.stdout.splitlines():
+        message = json.loads(line)
+        if message.get("executable") and message["profile"]["test"]:
+            target = message["target"]
+            programs["lib" if "lib" in target["kind"] else target["name"]] = message["executable"]
+    return programs
+
+
+def failures(output):
+    """Names of the tests that failed, else the last line that says something."""
+    names = [line.removeprefix("test ").split(" ... ")[0] for line in output.splitlines() if line.startswith("test ") and line.endswith("FAILED")]
+    last = next((line for line in reversed(output.splitlines()) if line.strip()), "no output")
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "") if names else last.strip()
+
+
+def ask(programs, copy, number, areas):
+    """What the tests of the areas say, one after another, until one fails: whether they notice, and how."""
+    env = {**os.environ, "PROPTEST_RNG_SEED": "20261121", "CARGO_MANIFEST_DIR": str(copy)}
+    env.pop("LAMPYRIS_FAULT", None)
+    if number is not None:
+        env["LAMPYRIS_FAULT"] = str(number)
+    for area in areas:
+        area, _, names = area.partition(":")
+        try:
+            command = [programs[area], *filter(None, names.split("+"))]
+            done = subprocess.run(command, cwd=copy, capture_output=True, text=True, errors="replace", timeout=LIMIT, env=env)
+        except subprocess.TimeoutExpired:
+            return True, f"{area}: no end within {LIMIT} s"
+        if done.returncode != 0:
+            return True, f"{area}: {failures(done.stdout)}"
+    return False, ""
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--list", action="store_true", help="names alone")
     parser.add_argument("--check", action="store_true", help="does every text still stand where it should?")
-    parser.add_argument("--only", default="", help="mutants whose name or file contains this")
-    parser.add_argument("--work", type=Path, default=ROOT / "target" / "mutants", help="where the copy is kept")
-    parser.add_argument("--jobs", type=int, default=4)
+    parser.add_argument("--only", default="", help="faults whose name or file contains this; several, with commas between")
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "lampyris-faults", help="where the copy is kept")
+    parser.add_argument("--jobs", type=int, default=4, help="of the build")
+    parser.add_argument("--all-areas", action="store_true", help="ask every area about survivors")
+    parser.add_argument("--no-base", action="store_true", help="skip the run without any fault")
+    parser.add_argument("--table", type=Path, help="append a row of a Markdown table for each")
     options = parser.parse_args()
-    chosen = [m for m in MUTANTS if options.only in m[0] or options.only in m[1]]
+    chosen = [(n, f) for n, f in enumerate(FAULTS) if any(only in f[0] or only in f[1] for only in options.only.split(","))]
     if options.list:
-        print("\n".join(f"{m[0]:45} {m[1]}" for m in chosen))
+        print("\n".join(f"{f[0]:45} {f[1]}" for _, f in chosen))
         return 0
-    stale = check(chosen)
-    print("\n".join(stale) or f"{len(chosen)} mutants stand where they should")
+    if bad := stale():
+        sys.exit("\n".join(f"{name}: {why}" for name, why in bad.items()))
+    print(f"{len(chosen)} faults stand where they should", flush=True)
     if options.check:
-        return len(stale)
-    names = [line.split(":")[0] for line in stale]
-    copy = options.work
-    skipped = shutil.ignore_patterns("target", ".git", "lampyris-*")
-    shutil.copytree(ROOT, copy, ignore=skipped, dirs_exist_ok=True)
+        return 0
+    write_copy(options.work)
+    wanted = dict.fromkeys(area for _, f in chosen for area in f[4].split())
+    areas = AREAS if options.all_areas else list(dict.fromkeys(area.partition(":")[0] for area in wanted))
+    programs = build(options.work, options.jobs, areas)
+    if not options.no_base:
+        failed, why = ask(programs, options.work, None, areas)
+        if failed:
+            sys.exit(f"fails without any fault: {why}")
     survivors = []
-    for mutant in (m for m in chosen if m[0] not in names):
-        killed, seconds, why = run(mutant, copy, options.jobs)
-        print(f"{'killed ' if killed else 'SURVIVED'} {seconds:5.0f} s  {mutant[0]}  {why}", flush=True)
-        if not killed:
-            survivors.append(mutant[0])
+    for number, (name, file, _, _, tests) in chosen:
+        start = time.time()
+        killed, why = ask(programs, options.work, number, tests.split())
+        if not killed and options.all_areas and name not in EQUIVALENT:
+            killed, why = ask(programs, options.work, number, AREAS)
+        verdict = "killed" if killed else "equivalent" if name in EQUIVALENT else "survived"
+        why = why or EQUIVALENT.get(name, "")
+        print(f"{verdict:10} {time.time() - start:5.0f} s  {name}: {why}", flush=True)
+        if options.table:
+            with options.table.open("a", encoding="utf8") as table:
+                table.write(f"| {name} | {file.removeprefix('src/')} | {verdict} | {why} |\n")
+        if verdict == "survived":
+            survivors.append(name)
     print(f"{len(survivors)} survivors: {', '.join(survivors) or 'none'}")
     return len(survivors)
 

@@ -3,7 +3,7 @@
 
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
-use lampyris::math::{Departure, Frame, Homogeneous, Point, Ray, Uv, Vector};
+use lampyris::math::{Frame, Homogeneous, Point, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::{ControlPoint, Curve, Surface, sweep};
@@ -33,7 +33,7 @@ fn follow(scene: &dyn Intersector, start: Ray, acts: &[Act]) -> Option<(Ray, f64
             Act::Refract(eta) => refract(ray.direction, hit.normal, *eta)?,
         };
         way += hit.t;
-        let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+        let from = hit.departure();
         ray = Ray::new(ray.point_at(hit.t), direction).with_departure(from);
     }
     Some((ray, way, certain))
@@ -288,6 +288,7 @@ impl Intersector for Facets<'_> {
                     geometric_normal: flat,
                     face: facet.face,
                     primitive: i as u32,
+                    triangle: None,
                     uv: Uv::ZERO,
                     certainty: Certainty::Facet,
                 });

@@ -132,6 +132,7 @@ impl Intersector for World {
                 geometric_normal: normal,
                 face: FaceId(i as u32),
                 primitive: i as u32,
+                triangle: None,
                 uv: Uv::ZERO,
                 certainty: Certainty::Certified,
             })

@@ -56,6 +56,7 @@ fn facet_hit(mesh: &FacetMesh, i: usize, ray: &Ray, normals: NormalMode, best: &
             geometric_normal: flat,
             face: facet.face,
             primitive: i as u32,
+            triangle: None,
             uv: (0..4).map(|k| vertex[k].uv * weight[k]).sum(),
             certainty: Certainty::Facet,
         });
@@ -104,6 +105,7 @@ impl Intersector for Balls {
                     geometric_normal: n,
                     face: FaceId(i as u32),
                     primitive: i as u32,
+                    triangle: None,
                     uv: sphere_uv(n),
                     certainty: Certainty::Certified,
                 });
@@ -246,6 +248,7 @@ impl Intersector for Bowl {
             geometric_normal: n,
             face: FaceId(0),
             primitive: 0,
+            triangle: None,
             uv,
             certainty: Certainty::Certified,
         })

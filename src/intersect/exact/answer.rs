@@ -151,8 +151,8 @@ impl Exact {
         let uv = root.settled.unwrap_or_else(|| label.uv(inside));
         let regular = if label.ill_scaled { None } else { patch::regular_normal(&jet, label.rounding) };
         let normal = label.sign * regular.unwrap_or_else(|| self.delicate_normal(root.leaf, uv, inside));
-        let certainty = root.certainty;
-        Hit { t, normal, geometric_normal: normal, face: label.face, primitive: label.patch, uv, certainty }
+        let (face, primitive, certainty) = (label.face, label.patch, root.certainty);
+        Hit { t, normal, geometric_normal: normal, face, primitive, triangle: None, uv, certainty }
     }
 
     /// The unit normal along `Su × Sv` where `f64` leaves too little of it: of the surface as given, and its limit at singular

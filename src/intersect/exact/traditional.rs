@@ -133,6 +133,7 @@ impl Intersector for Traditional<'_> {
             geometric_normal: p.normal,
             face,
             primitive: p.patch,
+            triangle: None,
             uv: p.uv,
             certainty: Certainty::Uncertified,
         })

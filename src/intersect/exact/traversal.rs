@@ -217,14 +217,15 @@ mod tests {
         for k in 0..rays.len() {
             let hit = exact.intersect(&rays[k], &mut Cost::default());
             if let (Some(hit), 0) = (hit, k % 3) {
-                let from = Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv };
+                let from = hit.departure();
                 rays[k] = Ray::new(rays[k].point_at(hit.t), rays[k].direction).with_departure(from);
             } else if k % 3 == 1 {
                 rays[k] = rays[k].with_range(20.0, 120.0);
             }
         }
         rays[7].direction = Vector::ZERO;
-        rays[8].departure = Some(Departure { face: crate::math::FaceId(99), primitive: 0, uv: Uv::ZERO });
+        rays[8].departure =
+            Some(Departure { face: crate::math::FaceId(99), primitive: 0, uv: Uv::ZERO, triangle: None });
         let mut hits = vec![None; rays.len()];
         let mut together = Cost::default();
         let mut single = Cost::default();

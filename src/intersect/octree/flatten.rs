@@ -124,7 +124,11 @@ impl Draft {
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
         self.blocks.extend(draft.blocks);
         self.nodes.extend(draft.nodes.into_iter().map(|mut node| {
-            node.children = node.children.map(|c| Link(c).moved(nodes, blocks).0);
+            // An unused child stays zero, by which vector instructions tell it: where slacks are wider than the node they meet its empty
+            // box too, and a moved zero led them back up the tree for ever.
+            for slot in (0..8).filter(|slot| node.used >> slot & 1 == 1) {
+                node.children[slot] = Link(node.children[slot]).moved(nodes, blocks).0;
+            }
             node
         }));
         self.stats.add(&draft.stats);

@@ -158,7 +158,8 @@ impl<'a> Polished<'a> {
         let answer = self.exact.first(&around, &mut Cost::default());
         match answer.hit {
             Some(hit) => {
-                Polishing::Hit(Hit { primitive: facet_hit.primitive, certainty: Certainty::Polished, ..hit })
+                let Hit { primitive, triangle, .. } = *facet_hit;
+                Polishing::Hit(Hit { primitive, triangle, certainty: Certainty::Polished, ..hit })
             }
             // A silhouette of the facets that the spline does not have. Where the surface goes on beyond its trims, faces gape.
             None if answer.certainty == Certainty::Certified

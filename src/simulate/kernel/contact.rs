@@ -18,14 +18,8 @@ pub(super) struct FaceHit {
 impl FaceHit {
     /// The place as one that a ray leaves.
     pub(super) fn departure(&self) -> Departure {
-        departure(&self.hit)
+        self.hit.departure()
     }
-}
-
-/// A hit as the place that a ray leaves.
-#[inline(always)]
-pub(super) fn departure(hit: &Hit) -> Departure {
-    Departure { face: hit.face, primitive: hit.primitive, uv: hit.uv }
 }
 
 /// The body on the other side of a face that lies on a face of another body within the glue distance.

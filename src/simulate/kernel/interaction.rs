@@ -1,6 +1,6 @@
 //! What happens to light at a face, in words that the tracer books.
 
-use super::contact::{FaceHit, departure};
+use super::contact::FaceHit;
 use super::context::Context;
 use super::path::Path;
 use super::payload::RayPayload;
@@ -95,7 +95,7 @@ impl SurfaceInteraction<'_> {
     /// The place as one that a ray leaves.
     #[inline(always)]
     pub(super) fn departure(&self) -> Departure {
-        departure(self.hit)
+        self.hit.departure()
     }
 
     /// The hit with a copy of its own, for what looks for faces at the same place.

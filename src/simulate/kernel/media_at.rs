@@ -1,6 +1,5 @@
 //! The bodies around a point, from geometry: for sources that do not say what they lie in, and for light that has passed an edge unseen.
 
-use super::contact::departure;
 use super::context::{Bodies, Context};
 use super::payload::RayPayload;
 use super::tolerances::{ALIGNED, way_through_glue};
@@ -50,7 +49,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
         let point = segment.point_at(hit.t);
         let d = segment.direction;
-        segment = Ray::new(point, d).with_departure(departure(&hit));
+        segment = Ray::new(point, d).with_departure(hit.departure());
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         // Against the outward normal the ray goes in, along it out.
@@ -60,7 +59,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         }
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
         let reach = way_through_glue(context.glue_mm(), along);
-        let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(departure(&hit));
+        let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(hit.departure());
         let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let entering = d.dot(second.geometric_normal) < 0.0;
         let may_touch = |other: &&FaceOptics| {

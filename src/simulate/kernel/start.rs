@@ -1,6 +1,5 @@
 //! The first segment of a ray that leaves a face.
 
-use super::contact::departure;
 use super::context::Context;
 use crate::intersect::Cost;
 use crate::math::{FaceId, Ray, Vector};
@@ -26,7 +25,7 @@ pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector,
         if hit.face != face {
             // A face of a body that lies on it may come first.
             let behind =
-                Ray::new(point, -normal).with_range(0.0, context.glue_mm()).with_departure(departure(&hit));
+                Ray::new(point, -normal).with_range(0.0, context.glue_mm()).with_departure(hit.departure());
             let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };
             (point, hit) = (behind.point_at(next.t), next);
         }
@@ -34,7 +33,7 @@ pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector,
             // Drawn about the spline's normal, a grazing ray may point below the tilted facet that it starts from.
             let below = ray.direction.dot(hit.geometric_normal) <= 0.0;
             let direction = if below { reflect(ray.direction, hit.geometric_normal) } else { ray.direction };
-            *ray = Ray::new(point, direction).with_departure(departure(&hit));
+            *ray = Ray::new(point, direction).with_departure(hit.departure());
             return below;
         }
     }

@@ -1,6 +1,6 @@
 //! What the rays of each source start in.
 
-use super::contact::{departure, emit_into_contact};
+use super::contact::emit_into_contact;
 use super::context::{Bodies, Context, StartingMedia};
 use super::media_at::media_at;
 use super::start::start_on_face;
@@ -102,7 +102,7 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<R
         let rounding = rounding_at(ray.origin);
         probe = Ray::new(probe.point_at(hit.t), d)
             .with_range(-rounding, probe.t_max - hit.t)
-            .with_departure(departure(&hit));
+            .with_departure(hit.departure());
     }
     // Over an edge a ray goes in and out at once.
     let into_opaque = enters_opaque && !leaves_opaque;

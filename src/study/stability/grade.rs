@@ -2,7 +2,7 @@
 
 use super::case::{Geometry, Question, Scene, Truth};
 use crate::intersect::{Certainty, Cost, Hit, Intersector};
-use crate::math::{Departure, Point, Ray, Vector};
+use crate::math::{Point, Ray, Vector};
 use serde::Serialize;
 
 /// Error of a normal that no facet reaches, rad.
@@ -213,11 +213,7 @@ impl Grader<'_> {
             let Some(h) = self.ask(&next) else { break };
             let p = next.point_at(h.t);
             hits.push(Hit { t: (p - origin).dot(next.direction), ..h });
-            next = Ray::new(p, next.direction).with_departure(Departure {
-                face: h.face,
-                primitive: h.primitive,
-                uv: h.uv,
-            });
+            next = Ray::new(p, next.direction).with_departure(h.departure());
         }
         let resolution = self.scene.resolution(ray, truths.last().map_or(0.0, Truth::distance));
         let right = match self.geometry {
@@ -250,7 +246,7 @@ impl Grader<'_> {
         let Some(h) = self.ask(&first) else { return Grade::Wrong };
         let origin = frame.local_point(first.point_at(h.t));
         let local = Ray::new(origin, direction);
-        let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+        let from = h.departure();
         let second = Ray::new(first.point_at(h.t), frame.direction(direction).normalize()).with_departure(from);
         // From a point o of a sphere around the origin the chord along d is −2 o·d long.
         let true_t = -2.0 * origin.dot(direction);
@@ -291,7 +287,7 @@ impl Grader<'_> {
             path += h.t / frame.scale;
             let d = ray_here.direction;
             let turned = (d - h.geometric_normal * (2.0 * d.dot(h.geometric_normal))).normalize();
-            let from = Departure { face: h.face, primitive: h.primitive, uv: h.uv };
+            let from = h.departure();
             ray_here = Ray::new(ray_here.point_at(h.t), turned).with_departure(from);
         }
         // Unfolded, the path is straight; folding each coordinate back gives the true end.
