@@ -255,6 +255,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "walk",
             "avx2",
             "avx512",
+            "kernels",
         ],
     ),
     (

@@ -1,56 +1,14 @@
-//! The walk with AVX2 and FMA.
+//! What the walk does in lanes, with AVX2 and FMA.
 //!
-//! Sound because [`walk`] is entered only after [`available`] found both at run time, because loads stay inside the
+//! Sound because [`super::kernels`] takes it only where kernels may use them, because loads stay inside the
 //! fixed-size arrays of [`Node`], [`Block`] and [`BoxRay`], whose row indices are below six.
 #![allow(unsafe_code)]
 
 use super::lanes::Lanes;
-use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
 use super::quad_edges::{QuadEdges, QuadRay};
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
-use super::tree::Tree;
-use super::walk;
-use crate::intersect::Cost;
-use crate::intersect::facet::FacetHit;
-use crate::math::Ray;
 use std::arch::x86_64::*;
-
-/// Whether this processor can run [`walk`].
-pub(super) fn available() -> bool {
-    is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("fma")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt")
-}
-
-/// Finds the nearest hit of each ray.
-///
-/// # Panics
-/// Where [`available`] is false.
-pub(super) fn walk(
-    tree: &Tree,
-    light_buffers: &[LightBuffer],
-    rays: &[Ray],
-    hits: &mut [Option<FacetHit>],
-    cost: &mut Cost,
-) {
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-    fn run(
-        tree: &Tree,
-        light_buffers: &[LightBuffer],
-        rays: &[Ray],
-        hits: &mut [Option<FacetHit>],
-        cost: &mut Cost,
-    ) {
-        walk::walk::<Avx2>(tree, light_buffers, rays, hits, cost);
-    }
-    assert!(available());
-    // SAFETY: the features were just found.
-    unsafe { run(tree, light_buffers, rays, hits, cost) }
-}
 
 /// Eight lanes of f32.
 pub(super) struct Avx2;

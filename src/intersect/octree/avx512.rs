@@ -1,61 +1,21 @@
-//! The walk with AVX-512: what enters and what leaves a box, or both halves of the corners of a block, in one register.
+//! What the walk does in lanes, with AVX-512: what enters and what leaves a box, or both halves of the corners of a block, in one
+//! register.
 //!
-//! Sound because [`walk`] is entered only after [`available`] found the features at run time, because loads stay inside the
-//! fixed-size arrays of [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and
+//! Sound because [`super::kernels`] takes it only where kernels may use the features, because loads stay inside the fixed-size arrays of [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and
 //! because octants are below eight and axes below three.
 #![allow(unsafe_code)]
 
-use super::avx2::{self, Avx2, ORDERS};
+use super::avx2::{Avx2, ORDERS};
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
-use super::light_buffer::LightBuffer;
 use super::node::{Block, Node};
 use super::quad_edges::{QuadEdges, QuadRay};
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
-use super::tree::Tree;
-use super::walk;
-use crate::intersect::Cost;
-use crate::intersect::facet::{FacetHit, Line};
-use crate::math::Ray;
+use crate::intersect::facet::Line;
 use std::arch::x86_64::*;
 
-/// Whether this processor can run [`walk`].
-pub(super) fn available() -> bool {
-    avx2::available()
-        && is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512vbmi")
-}
-
-/// Finds the nearest hit of each ray.
-///
-/// # Panics
-/// Where [`available`] is false.
-pub(super) fn walk(
-    tree: &Tree,
-    light_buffers: &[LightBuffer],
-    rays: &[Ray],
-    hits: &mut [Option<FacetHit>],
-    cost: &mut Cost,
-) {
-    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl,avx512bw,avx512vbmi")]
-    fn run(
-        tree: &Tree,
-        light_buffers: &[LightBuffer],
-        rays: &[Ray],
-        hits: &mut [Option<FacetHit>],
-        cost: &mut Cost,
-    ) {
-        walk::walk::<Avx512>(tree, light_buffers, rays, hits, cost);
-    }
-    assert!(available());
-    // SAFETY: the features were just found.
-    unsafe { run(tree, light_buffers, rays, hits, cost) }
-}
-
-struct Avx512;
+/// Sixteen lanes of f32.
+pub(super) struct Avx512;
 
 /// By octant: the bytes of a node's bounds along x, then y, then z; of each axis first where a ray enters the children, the farthest
 /// first, then where it leaves them.

@@ -28,6 +28,7 @@ mod flatten;
 mod frame;
 mod horizon;
 mod huge_pages;
+mod kernels;
 mod lanes;
 mod light_buffer;
 mod node;
@@ -45,6 +46,7 @@ mod walk;
 use super::facet::FacetHit;
 use super::{Cost, ExpectedRays, Footprint, Hit, Intersector, normals};
 use crate::intersect::prefetch::prefetch;
+use crate::math::simd::Level;
 use crate::math::{Aabb, Ray};
 use crate::mesh::FacetMesh;
 use horizon::Horizons;
@@ -76,6 +78,8 @@ use walk::BATCH;
 pub struct Octree<'m> {
     tree: Tree<'m>,
     settings: Settings,
+    /// What [`Settings::instruction_set`] allows and the processor has.
+    level: Level,
     /// Of the facets that many rays leave, once a run pays for it.
     horizons: OnceLock<Horizons>,
     /// Of the sources whose rays are expected.
@@ -94,6 +98,7 @@ impl<'m> Octree<'m> {
         Self {
             tree,
             settings: *settings,
+            level: settings.instruction_set.level(),
             horizons: OnceLock::new(),
             light_buffers: RwLock::default(),
             statistics,
@@ -106,6 +111,7 @@ impl<'m> Octree<'m> {
         Self {
             tree: self.tree.clone(),
             settings: self.settings,
+            level: self.level,
             horizons: OnceLock::new(),
             light_buffers: RwLock::default(),
             statistics: self.statistics.clone(),
@@ -153,17 +159,7 @@ impl<'m> Octree<'m> {
 
     /// Finds the nearest hit of each ray with the instructions that were chosen; `light_buffers` may answer some of them.
     fn walk(&self, light_buffers: &[LightBuffer], rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
-        #[cfg(target_arch = "x86_64")]
-        {
-            let set = self.settings.instruction_set;
-            if set == InstructionSet::Fastest && avx512::available() {
-                return avx512::walk(&self.tree, light_buffers, rays, hits, cost);
-            }
-            if set != InstructionSet::Portable && avx2::available() {
-                return avx2::walk(&self.tree, light_buffers, rays, hits, cost);
-            }
-        }
-        walk::walk::<portable::Portable>(&self.tree, light_buffers, rays, hits, cost);
+        self.level.run(kernels::Walk { tree: &self.tree, light_buffers, rays, hits, cost });
     }
 }
 

@@ -170,6 +170,29 @@ impl RayState {
         Link(children.nearest)
     }
 
+    /// Keeps all children that were just written.
+    #[inline(always)]
+    pub(super) fn keep_all(&mut self, children: Children) {
+        self.top = (self.top + children.count).min(STACK - 9);
+    }
+
+    /// The topmost entry.
+    #[inline(always)]
+    pub(super) fn peek(&self) -> Link {
+        Link(self.links[(self.top - 1) % STACK])
+    }
+
+    /// Takes the topmost entry if it is a node that is not beyond `t_max`.
+    #[inline(always)]
+    pub(super) fn take_open_node(&mut self) -> Option<usize> {
+        let (top, link) = ((self.top - 1) % STACK, self.peek());
+        let is_open = (link.kind() == 0) & (self.enters[top] <= self.boxes.t_max);
+        if is_open {
+            self.top = top;
+        }
+        is_open.then(|| link.as_node())
+    }
+
     /// Goes on with the topmost entry that is not beyond `t_max`.
     #[inline(always)]
     pub(super) fn pop(&mut self, t_max: f32) -> Link {
@@ -188,11 +211,11 @@ impl RayState {
     pub(super) fn advance<L: Lanes>(&mut self, children: Children) -> Link {
         let mut top = self.top.clamp(GROUND, STACK - 8);
         let mut open = self.open_below::<L>(top);
-        while (open == 0) & (top != GROUND) & (children.count == 0) {
+        // The ground is open to all. One test of both: whether there are children cannot be foretold, that there is anything can.
+        while open | children.count as u32 == 0 {
             top = (top - GROUND).max(GROUND);
             open = self.open_below::<L>(top);
         }
-        // The ground is open to all.
         let below = top - 1 - ((open | 1) << 16).leading_zeros() as usize;
         let above = top + children.count - 1;
         let older = self.links[below % STACK];

@@ -1,6 +1,7 @@
 //! How an octree is built and walked.
 
 use crate::intersect::NormalMode;
+use crate::math::simd::Level;
 
 /// How the tree is built and walked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,4 +65,15 @@ pub enum InstructionSet {
     Avx2,
     /// Plain Rust.
     Portable,
+}
+
+impl InstructionSet {
+    /// The widest of them that the processor has.
+    pub(super) fn level(self) -> Level {
+        match self {
+            Self::Fastest => Level::widest(),
+            Self::Avx2 => Level::avx2(),
+            Self::Portable => Level::PORTABLE,
+        }
+    }
 }

@@ -6,7 +6,7 @@
 
 use super::lanes::Lanes;
 use super::light_buffer::{self, LightBuffer};
-use super::node::{Block, Link, Target};
+use super::node::{Block, Link, Node, Target};
 use super::ray_state::{Children, RayState};
 use super::tree::Tree;
 use crate::intersect::Cost;
@@ -117,23 +117,47 @@ pub(super) fn walk<L: Lanes>(
     STATES.set(Some(states));
 }
 
+/// The arrays of a tree. Read once for many rays: that writing the state of a ray leaves where they lie as it was is more than a
+/// compiler can tell.
+#[derive(Clone, Copy)]
+struct Arrays<'t> {
+    nodes: &'t [Node],
+    blocks: &'t [Block],
+    positions: &'t [Point],
+}
+
+impl<'t> Arrays<'t> {
+    #[inline(always)]
+    fn new(tree: &'t Tree) -> Self {
+        Self { nodes: &tree.nodes, blocks: &tree.blocks, positions: &tree.surroundings.mesh.positions }
+    }
+}
+
 /// One ray from its start to its end.
 #[inline(always)]
 fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
+    let arrays = Arrays::new(tree);
     loop {
         match s.next.target() {
             Target::Node(index) => {
                 cost.nodes += 1;
-                let t_max = s.boxes.t_max;
-                let children = s.enter::<L>(&tree.nodes[index]);
-                s.next = if children.count > 0 { s.take_nearest(children) } else { s.pop(t_max) };
+                // Two at a time: one waits for its memory and its own arithmetic most of the time, and the second is mostly needed.
+                if let Some(second) = s.take_open_node() {
+                    cost.nodes += 1;
+                    let children = s.enter::<L>(&arrays.nodes[second]);
+                    s.keep_all(children);
+                }
+                let children = s.enter::<L>(&arrays.nodes[index]);
+                s.next = if children.count > 0 { s.take_nearest(children) } else { s.pop(s.boxes.t_max) };
+                prefetch_step(arrays, s.next);
+                prefetch_step(arrays, s.peek());
             }
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
-                s.candidates = sift::<L>(&tree.blocks[index], s) & used_lanes(count);
+                s.candidates = sift::<L>(&arrays.blocks[index], s) & used_lanes(count);
                 if s.candidates != 0 {
-                    test::<L>(tree, s);
+                    test::<L>(tree, arrays, s);
                 }
                 s.next = s.pop(s.boxes.t_max);
             }
@@ -152,6 +176,7 @@ fn walk_batch<L: Lanes>(
     hits: &mut [Option<FacetHit>],
     cost: &mut Cost,
 ) {
+    let arrays = Arrays::new(tree);
     let mut queues = StepQueues::default();
     let mut live = order.len().min(WIDTH);
     let mut next = live;
@@ -165,9 +190,9 @@ fn walk_batch<L: Lanes>(
         cost.nodes += queue.count as u64;
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
-            let children = s.enter::<L>(&tree.nodes[s.next.as_node()]);
+            let children = s.enter::<L>(&arrays.nodes[s.next.as_node()]);
             s.next = s.advance::<L>(children);
-            prefetch_step(tree, s.next);
+            prefetch_step(arrays, s.next);
             queues.put(s.next.kind(), ray);
         }
         let queue = queues.take(BLOCK);
@@ -176,24 +201,24 @@ fn walk_batch<L: Lanes>(
             let (index, count) = s.next.as_block();
             cost.tests += count as u64;
             s.block = index as u32;
-            s.candidates = sift::<L>(&tree.blocks[index], s) & used_lanes(count);
+            s.candidates = sift::<L>(&arrays.blocks[index], s) & used_lanes(count);
             s.next = s.advance::<L>(Children::NONE);
-            prefetch_step(tree, s.next);
+            prefetch_step(arrays, s.next);
             queues.put(select_unpredictable(s.candidates != 0, CORNERS, s.next.kind()), ray);
         }
         let queue = queues.take(EXACT);
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
-            test::<L>(tree, s);
+            test::<L>(tree, arrays, s);
             // What was next may lie beyond the new hit.
             s.recheck_next::<L>();
-            prefetch_step(tree, s.next);
+            prefetch_step(arrays, s.next);
             queues.put(s.next.kind(), ray);
         }
         let queue = queues.take(CORNERS);
         for &ray in queue.rays() {
             let s = &states[usize::from(ray) % WIDTH];
-            prefetch_corners(tree, s);
+            prefetch_corners(arrays, s);
             queues.put(EXACT, ray);
         }
         let queue = queues.take(END);
@@ -233,21 +258,21 @@ fn used_lanes(count: usize) -> u32 {
 
 /// Asks for the memory of a node or block; at the end for the first block.
 #[inline(always)]
-fn prefetch_step(tree: &Tree, link: Link) {
+fn prefetch_step(arrays: Arrays, link: Link) {
     let block = select_unpredictable(link == Link::END, 0, link.as_block().0);
-    prefetch_either(link.kind() != NODE, (&tree.blocks, block), (&tree.nodes, link.as_node()));
+    prefetch_either(link.kind() != NODE, (arrays.blocks, block), (arrays.nodes, link.as_node()));
 }
 
 /// Asks for the corners of the facets that the sieve left; nearly always it is one.
 #[inline(always)]
-fn prefetch_corners(tree: &Tree, s: &RayState) {
-    let block = &tree.blocks[s.block as usize];
+fn prefetch_corners(arrays: Arrays, s: &RayState) {
+    let block = &arrays.blocks[s.block as usize];
     let mut mask = (s.candidates | s.candidates >> 4) & 15;
     loop {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask.wrapping_sub(1);
         for p in block.positions[k] {
-            prefetch(&tree.surroundings.mesh.positions, p as usize);
+            prefetch(arrays.positions, p as usize);
         }
         if mask == 0 {
             return;
@@ -257,15 +282,14 @@ fn prefetch_corners(tree: &Tree, s: &RayState) {
 
 /// Tests the facets that the sieve left.
 #[inline(always)]
-fn test<L: Lanes>(tree: &Tree, s: &mut RayState) {
-    let positions = &tree.surroundings.mesh.positions;
-    let block = &tree.blocks[s.block as usize];
+fn test<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
+    let block = &arrays.blocks[s.block as usize];
     let candidates = s.candidates;
     let mut mask = (candidates | candidates >> 4) & 15;
     loop {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask.wrapping_sub(1);
-        let corners = block.positions[k].map(|p| &positions[p as usize]);
+        let corners = block.positions[k].map(|p| &arrays.positions[p as usize]);
         // The second triangle of a triangle is a line: it is never hit, but to see that takes exact arithmetic.
         let is_quad = u32::from(block.positions[k][2] != block.positions[k][3]);
         let triangles = candidates >> k & 1 | candidates >> (k + 3) & (is_quad << 1);

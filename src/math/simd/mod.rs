@@ -17,6 +17,8 @@ pub(crate) trait Instructions {
     const AVX2: bool;
     /// Whether AVX-512 F, DQ and VL may be used as well.
     const AVX512: bool;
+    /// Whether AVX-512 BW and VBMI may be used as well.
+    const AVX512_VBMI: bool;
 }
 
 /// What every processor of the target has.
@@ -25,20 +27,31 @@ pub(crate) struct Portable;
 pub(crate) struct Avx2;
 /// What [`has_avx512`] asks for.
 pub(crate) struct Avx512;
+/// What [`has_avx512_vbmi`] asks for.
+pub(crate) struct Avx512Vbmi;
 
 impl Instructions for Portable {
     const AVX2: bool = false;
     const AVX512: bool = false;
+    const AVX512_VBMI: bool = false;
 }
 
 impl Instructions for Avx2 {
     const AVX2: bool = true;
     const AVX512: bool = false;
+    const AVX512_VBMI: bool = false;
 }
 
 impl Instructions for Avx512 {
     const AVX2: bool = true;
     const AVX512: bool = true;
+    const AVX512_VBMI: bool = false;
+}
+
+impl Instructions for Avx512Vbmi {
+    const AVX2: bool = true;
+    const AVX512: bool = true;
+    const AVX512_VBMI: bool = true;
 }
 
 /// A loop to be compiled for several instruction sets; what it works on is in the fields.
@@ -81,6 +94,57 @@ pub(crate) fn has_avx512() -> bool {
     false
 }
 
+/// Whether this processor has AVX-512 BW and VBMI beside what [`has_avx512`] asks for.
+#[inline(always)]
+pub(crate) fn has_avx512_vbmi() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    {
+        has_avx512() && is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512vbmi")
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// An instruction set that this processor was found to have: for kernels so short that asking takes time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level(Width);
+
+#[derive(Clone, Copy, Debug)]
+enum Width {
+    Portable,
+    Avx2,
+    Avx512Vbmi,
+}
+
+impl Level {
+    /// What every processor has.
+    pub(crate) const PORTABLE: Self = Self(Width::Portable);
+
+    /// AVX2 where the processor has it.
+    pub(crate) fn avx2() -> Self {
+        Self(if has_avx2() { Width::Avx2 } else { Width::Portable })
+    }
+
+    /// AVX-512 with VBMI, else AVX2, where the processor has it.
+    pub(crate) fn widest() -> Self {
+        if has_avx512_vbmi() { Self(Width::Avx512Vbmi) } else { Self::avx2() }
+    }
+
+    /// Runs a kernel.
+    #[inline(always)]
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            // SAFETY: such a level is made only where the features were found.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512Vbmi => unsafe { run_avx512_vbmi(kernel) },
+            // SAFETY: the same.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => unsafe { run_avx2(kernel) },
+            _ => kernel.run::<Portable>(),
+        }
+    }
+}
+
 /// Runs a kernel with AVX2 where the processor has it.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
@@ -115,6 +179,12 @@ fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
 }
 
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl,avx512bw,avx512vbmi")]
+fn run_avx512_vbmi<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx512Vbmi>()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,5 +214,8 @@ mod tests {
         let portable = Horner(&coefficients, x).run::<Portable>();
         assert_eq!(dispatch(Horner(&coefficients, x)), portable);
         assert_eq!(dispatch_widest(Horner(&coefficients, x)), portable);
+        for level in [Level::PORTABLE, Level::avx2(), Level::widest()] {
+            assert_eq!(level.run(Horner(&coefficients, x)), portable, "{level:?}");
+        }
     }
 }

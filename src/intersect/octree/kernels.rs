@@ -1,0 +1,43 @@
+//! The walk compiled for each instruction set, with its lanes.
+
+#[cfg(target_arch = "x86_64")]
+use super::avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+use super::avx512::Avx512;
+use super::light_buffer::LightBuffer;
+use super::portable;
+use super::tree::Tree;
+use super::walk;
+use crate::intersect::Cost;
+use crate::intersect::facet::FacetHit;
+use crate::math::Ray;
+use crate::math::simd::{Instructions, Kernel};
+
+/// Finds the nearest hit of each ray; `light_buffers` may answer some of them.
+///
+/// Hits are described by the caller: compiled into this for wider registers the batch took a tenth longer.
+pub(super) struct Walk<'a, 'm> {
+    pub(super) tree: &'a Tree<'m>,
+    pub(super) light_buffers: &'a [LightBuffer],
+    pub(super) rays: &'a [Ray],
+    pub(super) hits: &'a mut [Option<FacetHit>],
+    pub(super) cost: &'a mut Cost,
+}
+
+impl Kernel for Walk<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if I::AVX512_VBMI {
+                return walk::walk::<Avx512>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
+            }
+            if I::AVX2 {
+                return walk::walk::<Avx2>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
+            }
+        }
+        walk::walk::<portable::Portable>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
+    }
+}
