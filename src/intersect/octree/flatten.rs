@@ -38,13 +38,7 @@ pub(super) fn flatten(
     assert!(draft.blocks.len() <= Link::MOST_BLOCKS, "more blocks than links can name");
     let mut blocks = huge_pages::with_capacity(draft.blocks.len());
     (draft.blocks.par_iter())
-        .map(|(count, facets)| {
-            let corners = facets.map(|f| {
-                let f = f.min(mesh.facets.len() as u32 - 1) as usize;
-                (f as u32, mesh.corner_positions(f), mesh.corners(f).map(|p| p - center))
-            });
-            Block::new(&corners[..usize::from(*count)])
-        })
+        .map(|(count, facets)| Block::new(mesh, center, &facets[..usize::from(*count)]))
         .collect_into_vec(&mut blocks);
     let mut nodes = huge_pages::with_capacity(draft.nodes.len());
     nodes.extend_from_slice(&draft.nodes);

@@ -2,6 +2,7 @@
 
 use super::clip::{Box32, round_down};
 use crate::math::{Aabb, Point};
+use crate::mesh::FacetMesh;
 
 /// By how much steps are made larger, so that the last bound reaches the far side whatever their rounding to f32: sixteen roundings.
 const STEP_ROOM: f64 = 1.0 + 1e-6;
@@ -118,11 +119,12 @@ impl Node {
     pub(super) fn set(&mut self, slot: usize, bounds: &Box32, link: Link) {
         for a in 0..3 {
             let (origin, step) = (f64::from(self.origin[a]), f64::from(self.step[a]));
-            let low = ((f64::from(bounds.low[a]) - origin) / step).floor();
-            let high = ((f64::from(bounds.high[a]) - origin) / step).ceil();
-            // Casts saturate.
+            let low = (f64::from(bounds.low[a]) - origin) / step;
+            let high = (f64::from(bounds.high[a]) - origin) / step;
+            // Casts cut off and saturate; `floor` and `ceil` are calls on processors without SSE4.1.
+            let whole = high as u8;
             self.bounds[2 * a][slot] = low as u8;
-            self.bounds[2 * a + 1][slot] = high as u8;
+            self.bounds[2 * a + 1][slot] = whole.saturating_add(u8::from(f64::from(whole) < high));
         }
         self.children[slot] = link.0;
         self.used |= 1 << slot;
@@ -155,22 +157,31 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Corners are relative to the middle of the mesh.
-    pub(super) fn new(facets: &[(u32, [u32; 4], [Point; 4])]) -> Self {
-        let points = facets.iter().flat_map(|f| f.2);
-        let low = points.clone().fold(Point::INFINITY, Point::min);
-        let high = points.fold(Point::NEG_INFINITY, Point::max);
+    /// A block of up to four facets, about `center`.
+    pub(super) fn new(mesh: &FacetMesh, center: Point, facets: &[u32]) -> Self {
+        let mut corners = [[Point::ZERO; 4]; 4];
+        let (mut low, mut high) = (Point::INFINITY, Point::NEG_INFINITY);
+        for (corners, &facet) in corners.iter_mut().zip(facets) {
+            *corners = mesh.corners(facet as usize);
+            for p in corners {
+                *p -= center;
+                low = low.min(*p);
+                high = high.max(*p);
+            }
+        }
         let origin = low.to_array().map(round_down);
         let largest = (0..3).map(|a| high[a] - f64::from(origin[a])).fold(0.0, f64::max);
         let step = ((largest / 65535.0 * STEP_ROOM) as f32).max(LEAST_BLOCK_STEP);
         let mut block = Self { corners: [[0; 16]; 3], origin, step, facets: [u32::MAX; 4], positions: [[0; 4]; 4] };
-        for (lane, (facet, positions, corners)) in facets.iter().enumerate() {
-            block.facets[lane] = *facet;
-            block.positions[lane] = *positions;
-            for a in 0..3 {
-                let coarse = |k: usize| ((corners[k][a] - f64::from(origin[a])) / f64::from(step)).round() as u16;
-                for (place, k) in [0, 2, 1, 3].into_iter().enumerate() {
-                    block.corners[a][4 * place + lane] = coarse(k);
+        let per_step = 1.0 / f64::from(step);
+        for (lane, &facet) in facets.iter().enumerate().take(4) {
+            block.facets[lane] = facet;
+            block.positions[lane] = mesh.corner_positions(facet as usize);
+            for (place, k) in [0, 2, 1, 3].into_iter().enumerate() {
+                let p = corners[lane][k].to_array();
+                for a in 0..3 {
+                    // Rounded to the nearest, since casts cut off; half a step is what the sieve allows for.
+                    block.corners[a][4 * place + lane] = ((p[a] - f64::from(origin[a])) * per_step + 0.5) as u16;
                 }
             }
         }

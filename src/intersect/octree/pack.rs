@@ -2,108 +2,136 @@
 
 use super::cell::{Cell, ClippedFacet, Content, bounds};
 use super::clip::Box32;
+use std::ops::Range;
 
 /// Facets in a block.
 const WIDTH: usize = 4;
 /// From here down halves are equal, so that the depth stays logarithmic whatever the facets are.
 const BALANCED_FROM: u32 = 12;
 
-/// Room to work in, as long as the facets at hand.
-struct Workspace {
+/// Facets to be packed, by their places in one slice, with room to work in.
+struct Packing<'a> {
+    facets: &'a [ClippedFacet],
+    /// Places of facets, for each axis in the order of their middles; the same places in each stretch that is being packed. Sorted once:
+    /// sorting anew in each half took a third of the build.
+    orders: [Vec<u32>; 3],
+    /// By place: whether the facet goes left.
+    goes_left: Vec<bool>,
     areas: Vec<f32>,
-    /// For each axis the middles of the facets, ordered as integers, with the place of the facet below: sorting whole
-    /// facets took a third of the build.
-    keys: [Vec<u64>; 3],
-    facets: Vec<ClippedFacet>,
+    spare: Vec<u32>,
 }
 
 /// A tree of blocks over the facets.
-pub(super) fn pack(mut facets: Vec<ClippedFacet>) -> Cell {
+pub(super) fn pack(facets: Vec<ClippedFacet>) -> Cell {
     let n = facets.len();
-    let mut workspace =
-        Workspace { areas: vec![0.0; n], keys: std::array::from_fn(|_| vec![0; n]), facets: facets.clone() };
-    pack_slice(&mut facets, &mut workspace, 0)
+    if n <= WIDTH {
+        return block(bounds(&facets), facets.iter());
+    }
+    let mut packing = Packing {
+        facets: &facets,
+        orders: std::array::from_fn(|axis| sorted(&facets, axis)),
+        goes_left: vec![false; n],
+        areas: vec![0.0; n],
+        spare: vec![0; n],
+    };
+    packing.pack(0..n, 0)
 }
 
-impl Workspace {
-    /// Sorts the keys of an axis; equal middles keep the order of the facets.
-    fn sort(&mut self, facets: &[ClippedFacet], axis: usize) -> &[u64] {
-        let keys = &mut self.keys[axis][..facets.len()];
-        for (place, (key, p)) in keys.iter_mut().zip(facets).enumerate() {
+/// Places of facets in the order of their middles along an axis; equal ones keep the order of the facets.
+fn sorted(facets: &[ClippedFacet], axis: usize) -> Vec<u32> {
+    let mut keys: Vec<u64> = (facets.iter().enumerate())
+        .map(|(place, p)| {
             let bits = (p.bounds.low[axis] + p.bounds.high[axis]).to_bits();
+            // As integers in the order of the numbers.
             let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
-            *key = u64::from(ordered) << 32 | place as u64;
-        }
-        keys.sort_unstable();
-        keys
-    }
-
-    /// Puts the facets into the order of the sorted keys of an axis.
-    fn reorder(&mut self, facets: &mut [ClippedFacet], axis: usize) {
-        let copy = &mut self.facets[..facets.len()];
-        copy.copy_from_slice(facets);
-        for (facet, key) in facets.iter_mut().zip(&self.keys[axis]) {
-            *facet = copy[key_place(*key)];
-        }
-    }
+            u64::from(ordered) << 32 | place as u64
+        })
+        .collect();
+    keys.sort_unstable();
+    keys.into_iter().map(|key| key as u32).collect()
 }
 
-fn key_place(key: u64) -> usize {
-    (key & 0xFFFF_FFFF) as usize
+fn block<'a>(bounds: Box32, facets: impl ExactSizeIterator<Item = &'a ClippedFacet>) -> Cell {
+    let count = facets.len() as u8;
+    let mut lanes = [u32::MAX; WIDTH];
+    for (lane, clipped) in lanes.iter_mut().zip(facets) {
+        *lane = clipped.facet;
+    }
+    Cell { bounds, content: Content::Block(count, lanes) }
 }
 
 fn block_count(n: usize) -> f32 {
     n.div_ceil(WIDTH) as f32
 }
 
-fn pack_slice(facets: &mut [ClippedFacet], workspace: &mut Workspace, depth: u32) -> Cell {
-    let n = facets.len();
-    let bounds = bounds(facets);
-    if n <= WIDTH {
-        let mut lanes = [u32::MAX; WIDTH];
-        for (lane, clipped) in lanes.iter_mut().zip(facets.iter()) {
-            *lane = clipped.facet;
+impl Packing<'_> {
+    fn pack(&mut self, range: Range<usize>, depth: u32) -> Cell {
+        let mut bounds = Box32::EMPTY;
+        for &place in &self.orders[0][range.clone()] {
+            bounds.union(&self.facets[place as usize].bounds);
         }
-        return Cell { bounds, content: Content::Block(n as u8, lanes) };
+        if range.len() <= WIDTH {
+            let places = &self.orders[0][range];
+            return block(bounds, places.iter().map(|&place| &self.facets[place as usize]));
+        }
+        let (axis, left) = if depth >= BALANCED_FROM {
+            let widest = (0..3).fold(0, |w, a| if extent(&bounds, a) > extent(&bounds, w) { a } else { w });
+            (widest, range.len() / 2)
+        } else {
+            self.best_split(range.clone())
+        };
+        self.part(range.clone(), axis, left);
+        let middle = range.start + left;
+        let halves = vec![self.pack(range.start..middle, depth + 1), self.pack(middle..range.end, depth + 1)];
+        Cell { bounds, content: Content::Cells(halves) }
     }
-    let middle = if depth >= BALANCED_FROM {
-        let widest = (0..3).fold(0, |w, a| if extent(&bounds, a) > extent(&bounds, w) { a } else { w });
-        workspace.sort(facets, widest);
-        workspace.reorder(facets, widest);
-        n / 2
-    } else {
-        best_split(facets, workspace)
-    };
-    let (left, right) = facets.split_at_mut(middle);
-    let halves = vec![pack_slice(left, workspace, depth + 1), pack_slice(right, workspace, depth + 1)];
-    Cell { bounds, content: Content::Cells(halves) }
+
+    /// Moves the first so many places along an axis to the front of the other orders too.
+    fn part(&mut self, range: Range<usize>, axis: usize, left: usize) {
+        for (k, &place) in self.orders[axis][range.clone()].iter().enumerate() {
+            self.goes_left[place as usize] = k < left;
+        }
+        for other in (0..3).filter(|&a| a != axis) {
+            let order = &mut self.orders[other][range.clone()];
+            let (mut first, mut second) = (0, 0);
+            for k in 0..order.len() {
+                let place = order[k];
+                let goes_left = self.goes_left[place as usize];
+                // Both are written and one is kept: no branch on what cannot be foretold. What is overwritten was read before.
+                order[first] = place;
+                self.spare[second] = place;
+                first += usize::from(goes_left);
+                second += usize::from(!goes_left);
+            }
+            order[first..].copy_from_slice(&self.spare[..second]);
+        }
+    }
+
+    /// The best axis, and the number of facets that go left along it.
+    fn best_split(&mut self, range: Range<usize>) -> (usize, usize) {
+        let n = range.len();
+        let mut best = (f32::INFINITY, 2, n / 2);
+        for axis in 0..3 {
+            let order = &self.orders[axis][range.clone()];
+            let areas = &mut self.areas[..n];
+            let mut right = Box32::EMPTY;
+            for (area, &place) in areas.iter_mut().zip(order).rev() {
+                right.union(&self.facets[place as usize].bounds);
+                *area = right.half_area();
+            }
+            let mut left = Box32::EMPTY;
+            for i in 1..n {
+                left.union(&self.facets[order[i - 1] as usize].bounds);
+                let cost = left.half_area() * block_count(i) + areas[i] * block_count(n - i);
+                if cost < best.0 {
+                    best = (cost, axis, i);
+                }
+            }
+        }
+        (best.1, best.2)
+    }
 }
 
 fn extent(b: &Box32, axis: usize) -> f32 {
     b.high[axis] - b.low[axis]
-}
-
-/// Sorts the facets along the best axis and gives the number that go left.
-fn best_split(facets: &mut [ClippedFacet], workspace: &mut Workspace) -> usize {
-    let n = facets.len();
-    let mut best = (f32::INFINITY, 2, n / 2);
-    for axis in 0..3 {
-        workspace.sort(facets, axis);
-        let keys = &workspace.keys[axis][..n];
-        let mut right = Box32::EMPTY;
-        for (area, key) in workspace.areas[..n].iter_mut().zip(keys).rev() {
-            right.union(&facets[key_place(*key)].bounds);
-            *area = right.half_area();
-        }
-        let mut left = Box32::EMPTY;
-        for i in 1..n {
-            left.union(&facets[key_place(keys[i - 1])].bounds);
-            let cost = left.half_area() * block_count(i) + workspace.areas[i] * block_count(n - i);
-            if cost < best.0 {
-                best = (cost, axis, i);
-            }
-        }
-    }
-    workspace.reorder(facets, best.1);
-    best.2
 }
