@@ -53,6 +53,8 @@ pub struct Layer {
     pub values: Vec<f64>,
     /// Standard error of each value.
     pub error: Vec<f64>,
+    /// Error of each value from the facets, as [`Grid::geometric`].
+    pub geometric: Option<Vec<f64>>,
 }
 
 impl Layer {
@@ -103,11 +105,15 @@ impl Grid {
         column(&self.quantity, &self.unit)
     }
 
-    /// Both errors of the values under the names that every format gives them, where both are known.
-    pub(super) fn error_layers(&self) -> impl Iterator<Item = (&'static str, &Vec<f64>)> {
+    /// Both errors of the values, and the geometric ones of the layers, under the names that every format gives them, where they are known.
+    pub(super) fn error_layers(&self) -> impl Iterator<Item = (String, &Vec<f64>)> {
         let both = self.error.as_ref().zip(self.geometric.as_ref());
-        both.into_iter()
-            .flat_map(|(statistical, geometric)| [("statistical", statistical), ("geometric", geometric)])
+        let of_values = both.into_iter().flat_map(|(statistical, geometric)| {
+            [("statistical".to_owned(), statistical), ("geometric".to_owned(), geometric)]
+        });
+        let of_layer = |layer: &'_ Layer| format!("{}_geometric", layer.column());
+        let layers = self.layers.iter().filter_map(move |l| Some((of_layer(l), l.geometric.as_ref()?)));
+        of_values.chain(layers)
     }
 
     /// Smallest and largest finite value; `None` without any.
@@ -127,7 +133,7 @@ impl Grid {
 }
 
 /// Writes a grid as CSV: a header line, then one cell a line with its centre, value and standard error, the same of each
-/// layer, then both errors of the value as `statistical` and `geometric`, where both are known.
+/// layer, then both errors of the value as `statistical` and `geometric`, and the geometric ones of the layers, where they are known.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -162,7 +168,8 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
-/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, where both are known.
+/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, and an array of its name and `_geometric` is that
+/// of a layer, where they are known.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -187,7 +194,8 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
         arrays.push(NpyArray { name, shape: shape(), data: &layer.values });
         arrays.push(NpyArray { name: error, shape: shape(), data: &layer.error });
     }
-    for (name, values) in grid.error_layers() {
+    let errors: Vec<(String, &Vec<f64>)> = grid.error_layers().collect();
+    for (name, values) in &errors {
         arrays.push(NpyArray { name, shape: shape(), data: values });
     }
     write_npz(path, &arrays)

@@ -144,7 +144,7 @@ pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
             array(w, &format!("{}_standard_error", layer.column()), 1, Array::F64(&layer.error))?;
         }
         for (name, values) in grid.error_layers() {
-            array(w, name, 1, Array::F64(values))?;
+            array(w, &name, 1, Array::F64(values))?;
         }
         writeln!(w, "</CellData></Piece></ImageData></VTKFile>")
     })

@@ -45,6 +45,17 @@ impl SceneResults {
         }
     }
 
+    /// The same of each of its further channels.
+    pub fn geometric_channel_cells(&self, prepared: &PreparedScene, receiver: usize) -> Vec<Option<Vec<f64>>> {
+        let none = Some(vec![0.0; self.results.receivers[receiver].cells.len()]);
+        let of_channel = |c: usize| match (prepared.choice.intersector, &self.geometric) {
+            (IntersectorKind::Exact, _) => none.clone(),
+            (_, Some(error)) if error.rays == 0 => none.clone(),
+            (_, measured) => Some(measured.as_ref()?.receivers.get(receiver)?.channels.get(c)?.cells.clone()),
+        };
+        (0..self.results.receivers[receiver].channels.len()).map(of_channel).collect()
+    }
+
     /// The document of `results.json`, without what only its writer knows: files and where the numbers come from.
     ///
     /// # Errors

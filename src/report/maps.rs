@@ -51,6 +51,7 @@ fn layer(channel: &ChannelResult) -> Layer {
         unit: channel.unit.into(),
         values: channel.cells.clone(),
         error: channel.errors.clone(),
+        geometric: None,
     }
 }
 

@@ -272,15 +272,24 @@ impl SimulationReport<'_> {
 
     /// Colours and bands of wavelengths, receiver by receiver.
     fn channels(&self) -> Table {
-        let columns =
-            [("receiver", ""), ("channel", ""), ("total", ""), ("± (1σ)", ""), ("unit", ""), ("x", ""), ("y", "")];
+        let columns = [
+            ("receiver", ""),
+            ("channel", ""),
+            ("total", ""),
+            ("± rays (1σ)", ""),
+            ("± facets (1σ)", ""),
+            ("unit", ""),
+            ("x", ""),
+            ("y", ""),
+        ];
         let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
             receiver's CSV, NPZ and VTI files.";
         let mut table = Table::new("channels", "Channels", &columns).caption(caption);
-        for r in &self.results.receivers {
+        for (i, r) in self.results.receivers.iter().enumerate() {
             let sum: f64 = r.channels.iter().map(|c| c.total).sum();
-            for c in &r.channels {
-                let unit = if matches!(c.unit, "lx" | "cd") { "lm" } else { self.unit };
+            for (j, c) in r.channels.iter().enumerate() {
+                let figure = self.figures.get(i).and_then(|f| f.channels.get(j));
+                let geometric = figure.and_then(|f| f.figure.geometric);
                 let shown = |name: &str| c.name == name && sum > 0.0;
                 let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
                 let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
@@ -289,7 +298,8 @@ impl SimulationReport<'_> {
                     c.name.as_str().into(),
                     Cell::Number(c.total, 6),
                     Cell::Number(c.error, 2),
-                    unit.into(),
+                    geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2)),
+                    c.total_unit(self.unit).into(),
                     x,
                     y,
                 ]);

@@ -204,6 +204,13 @@ pub struct ChannelResult {
     pub errors: Vec<f64>,
 }
 
+impl ChannelResult {
+    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for the others.
+    pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
+        if matches!(self.unit, "lx" | "cd") { "lm" } else { power }
+    }
+}
+
 fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S::Error> {
     a.serialize(s)
 }

@@ -308,6 +308,9 @@ fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> W
 fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut(&str, f64, f64, f64)) {
     let s = &r.statistical;
     weigh("power", r.power.geometric(), s.power * sums, r.power.spline);
+    for c in &r.channels {
+        weigh(&c.name, c.total.geometric(), c.statistical * sums, c.total.spline);
+    }
     if r.unit.is_empty() {
         return;
     }

@@ -1,7 +1,7 @@
 //! The figures that a run prints for each receiver, each with both its errors.
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
-use crate::simulate::{ReceiverResult, Results};
+use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
 
 /// What is more to blame for the error of a figure.
@@ -62,11 +62,24 @@ pub struct ReceiverFigures {
     /// And along the second.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centroid_2: Option<Figure>,
+    /// Sums of the further channels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<ChannelFigure>,
+}
+
+/// The sum of a further channel.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelFigure {
+    /// Its name.
+    pub name: String,
+    /// The sum.
+    #[serde(flatten)]
+    pub figure: Figure,
 }
 
 impl ReceiverFigures {
     /// All of them with their names, as in `results.json`.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, &Figure)> {
+    pub fn named(&self) -> impl Iterator<Item = (&str, &Figure)> {
         let places = [
             ("max", &self.max),
             ("rms_1", &self.rms_1),
@@ -76,6 +89,7 @@ impl ReceiverFigures {
         ];
         std::iter::once(("power", &self.power))
             .chain(places.into_iter().filter_map(|(n, f)| Some((n, f.as_ref()?))))
+            .chain(self.channels.iter().map(|c| (c.name.as_str(), &c.figure)))
     }
 }
 
@@ -158,9 +172,11 @@ impl<'a> Errors<'a> {
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
         let power = self.geometric(self.lost_power, |m| m.power.geometric());
         let power = Figure::new(r.power, unit, r.power_error, power);
+        let channels = self.channels(r, unit);
         if r.kind == "absorbed" {
             return ReceiverFigures {
                 power,
+                channels,
                 max: None,
                 rms_1: None,
                 rms_2: None,
@@ -185,7 +201,18 @@ impl<'a> Errors<'a> {
             rms_2: along(r.rms[1], r.rms_error[1], &|m| m.rms[1]),
             centroid_1: along(r.centroid[0], r.centroid_error[0], &|m| m.centroid[0]),
             centroid_2: along(r.centroid[1], r.centroid_error[1], &|m| m.centroid[1]),
+            channels,
         }
+    }
+
+    fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
+        let of_channel = |(k, c): (usize, &ChannelResult)| {
+            let measured = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
+            let geometric = self.geometric(self.lost_share * c.total, measured);
+            let unit = c.total_unit(unit);
+            ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, c.error, geometric) }
+        };
+        r.channels.iter().enumerate().map(of_channel).collect()
     }
 }
 

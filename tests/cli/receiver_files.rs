@@ -64,6 +64,11 @@ fn every_channel_stands_in_the_files_cell_by_cell() {
             let total = found["receivers"][k]["channels"][c]["total"].as_f64().unwrap();
             assert!(total > 0.1 && (sum / total - 1.0).abs() < 1e-12, "{name} {wanted}: {sum} {total}");
             assert!(errors.1.iter().any(|e| *e > 0.0));
+            // No facet is in the way of this light, and that is said of every figure and cell.
+            let figure = &found["receivers"][k]["figures"]["channels"][c];
+            assert_eq!(figure["value"], found["receivers"][k]["channels"][c]["total"]);
+            let (_, geometric) = columns.iter().find(|(n, _)| *n == format!("{wanted}_geometric")).unwrap();
+            assert_eq!((figure["geometric"].as_f64(), geometric.iter().all(|g| *g == 0.0)), (Some(0.0), true));
         }
     }
     let mut zip = zip::ZipArchive::new(std::fs::File::open(folder.path().join("out/colour.npz")).unwrap()).unwrap();

@@ -118,6 +118,28 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
 }
 
+/// Light of one wavelength is in one of two bins: what facets change of that bin is what they change of the power, cell by cell.
+#[test]
+fn facets_change_a_bin_as_they_change_its_light() {
+    let mut known = known_scenes::parabolic_lamp(25.0, 0.2);
+    known.text += "bins_nm = [400, 500, 700]\n";
+    let (bound, settings) = bind(&known);
+    let source = ModelMeshSource::new(&known.model);
+    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let few = RunSettings { rays: 8192, replicates: 64, ..settings };
+    let error = geometric_error(&bound, [&octree, source.exact()], &few);
+    let [empty, full] = &error.receivers[0].channels[..] else { panic!("two bins") };
+    assert_eq!((empty.total, empty.statistical), (Default::default(), 0.0));
+    assert_eq!(full.total, error.receivers[0].power);
+    assert_eq!(full.cells, error.receivers[0].cells);
+    assert!(full.cells.iter().any(|&c| c > 0.0));
+    let results = simulate(&bound, &octree, &few, &|_| true);
+    let figures = figures(&results, Surface::Facets(&error), "W");
+    let bin = named(&figures[0], "500-700 nm");
+    assert_eq!((bin.value, bin.geometric), (figures[0].power.value, figures[0].power.geometric));
+}
+
 /// The choice and the light are the same for any number of threads and shards.
 #[test]
 fn the_choice_does_not_depend_on_threads() {

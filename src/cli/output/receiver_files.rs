@@ -13,16 +13,21 @@ use std::path::Path;
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.
 const WHOLE_RANGE_DEG: f64 = 1e-9;
 
-/// Writes all files of a receiver and gives their names; `geometric` are the errors of its cells from the facets, where they are known,
-/// `rays` those of the sample that it counted.
+/// Writes all files of a receiver and gives their names; `geometric` are the errors of its cells from the facets, where they are known, and
+/// those of its further channels, `rays` those of the sample that it counted.
 pub(crate) fn write(
     folder: &Path,
     receiver: &ReceiverResult,
-    geometric: Option<Vec<f64>>,
+    geometric: Vec<Option<Vec<f64>>>,
     rays: Vec<LightRay>,
 ) -> Result<Vec<String>, Failure> {
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
-    let grid = Grid { geometric: geometric.filter(|g| g.len() == grid.values.len()), ..grid };
+    let mut grid = grid;
+    let mut layers = geometric.into_iter().map(|layer| layer.filter(|g| g.len() == grid.values.len()));
+    grid.geometric = layers.next().flatten();
+    for (layer, geometric) in grid.layers.iter_mut().zip(layers) {
+        layer.geometric = geometric;
+    }
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
     let writers: [(&str, Writer); 4] =

@@ -79,7 +79,7 @@ pub(crate) fn write(
     for k in 0..run.results.receivers.len() {
         let rays = arrivals(&prepared.bound, k, &run.results);
         let receiver = &run.results.receivers[k];
-        let geometric = run.geometric_cells(prepared, k);
+        let geometric = [vec![run.geometric_cells(prepared, k)], run.geometric_channel_cells(prepared, k)].concat();
         run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
     }
     let all_figures = run.figures(prepared);

@@ -71,16 +71,19 @@ pub(super) struct CellPairs<'r> {
     /// From quanta to the receiver's unit, cell by cell.
     unit: Vec<f64>,
     replicates: [Vec<&'r ReplicateSums>; 2],
+    /// 0 for power, then the further channels.
+    layer: usize,
 }
 
 impl<'r> CellPairs<'r> {
-    pub(super) fn new(bound: &BoundScene, runs: [&'r ReplicatedRun; 2], k: usize) -> Self {
+    /// Of power, for `layer` 0, or of a further channel; `None` where too many to be kept apart.
+    pub(super) fn new(bound: &BoundScene, runs: [&'r ReplicatedRun; 2], k: usize, layer: usize) -> Option<Self> {
         let (receiver, result) = (&bound.receivers[k], &runs[1].results.receivers[k]);
         let replicates = runs.map(|run| run.replicates.iter().filter_map(|r| r.get(k)).collect::<Vec<_>>());
         let grid = result.grid;
         let mut cells = vec![Cell::default(); grid[0] * grid[1]];
         for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
-            add_replicate(&mut cells, facets, spline);
+            add_replicate(&mut cells, facets.layers.get(layer)?, spline.layers.get(layer)?);
         }
         let n = replicates[1].len().max(2) as f64;
         for c in &mut cells {
@@ -90,9 +93,10 @@ impl<'r> CellPairs<'r> {
         }
         // Lux and W/m² of cells in mm².
         let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
-        let quantum = runs[1].results.quantum;
+        let worth = if layer == 0 { 1.0 } else { receiver.channels.worth() };
+        let quantum = runs[1].results.quantum * worth;
         let unit = (0..cells.len()).map(|c| quantum * scale / receiver.measure(c % grid[0], c / grid[0])).collect();
-        Self { grid, cells, unit, replicates }
+        Some(Self { grid, cells, unit, replicates, layer })
     }
 
     fn inside(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
@@ -137,13 +141,13 @@ impl<'r> CellPairs<'r> {
         let inverse = |block: Block| self.inside(block).map(|c| 1.0 / self.unit[c]).sum::<f64>();
         let measures = [inverse(on_facets), inverse(block)];
         let by_replicate = |run: usize, block: Block| {
-            let nx = self.grid[0];
+            let (nx, layer) = (self.grid[0], self.layer);
             let within = move |c: usize| {
                 let (x, y) = (c % nx, c / nx);
                 (block.x..block.x + block.side).contains(&x) && (block.y..block.y + block.side).contains(&y)
             };
             let sum = move |s: &&ReplicateSums| {
-                s.cells.iter().filter(|(c, _)| within(*c as usize)).map(|(_, q)| *q as f64).sum::<f64>()
+                s.layers[layer].iter().filter(|(c, _)| within(*c as usize)).map(|(_, q)| *q as f64).sum::<f64>()
             };
             self.replicates[run].iter().map(move |s| sum(s) / measures[run])
         };
@@ -201,9 +205,9 @@ impl<'r> CellPairs<'r> {
     }
 }
 
-/// Adds one replicate of both runs to the sums of the cells.
-fn add_replicate(cells: &mut [Cell], facets: &ReplicateSums, spline: &ReplicateSums) {
-    let (mut a, mut b) = (facets.cells.iter().peekable(), spline.cells.iter().peekable());
+/// Adds what one replicate of both runs brought to the sums of the cells.
+fn add_replicate(cells: &mut [Cell], facets: &[(u32, u64)], spline: &[(u32, u64)]) {
+    let (mut a, mut b) = (facets.iter().peekable(), spline.iter().peekable());
     loop {
         let cell = match (a.peek(), b.peek()) {
             (None, None) => break,

@@ -63,6 +63,16 @@ pub(super) fn power(runs: [&ReplicatedRun; 2], receiver: usize) -> Paired {
     Paired { facets: facets.power, spline: spline.power, error }
 }
 
+/// Total of a further channel of a receiver.
+pub(super) fn channel(runs: [&ReplicatedRun; 2], receiver: usize, channel: usize, worth: f64) -> Paired {
+    let [facets, spline] = runs.map(|run| run.results.receivers[receiver].channels[channel].total);
+    let quanta =
+        |run: &ReplicatedRun| -> Vec<f64> { sums(run, receiver).map(|s| s.channels[channel] as f64).collect() };
+    let [a, b] = runs.map(quanta);
+    let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum * worth;
+    Paired { facets, spline, error }
+}
+
 /// Mean position, root mean square about the receiver's centre, and about the mean position, along an axis.
 pub(super) fn moments(runs: [&ReplicatedRun; 2], receiver: usize, axis: usize) -> [Paired; 3] {
     let result = &runs[1].results.receivers[receiver];

@@ -14,6 +14,7 @@ mod replicates;
 
 pub use cells::MapError;
 
+use cells::CellPairs;
 pub(in crate::study) use replicates::{MOST_CELLS, ReplicatedRun, trace_replicates};
 
 use crate::intersect::Intersector;
@@ -93,6 +94,23 @@ pub struct ReceiverError {
     /// Geometric error of each cell, in the receiver's unit.
     #[serde(skip)]
     pub cells: Vec<f64>,
+    /// Its further channels, in the order of the results.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub channels: Vec<ChannelError>,
+}
+
+/// What facets change of a further channel of a receiver.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ChannelError {
+    /// Its name.
+    pub name: String,
+    /// Sum over the receiver.
+    pub total: Paired,
+    /// Standard error of that on the spline, from these rays alone.
+    pub statistical: f64,
+    /// Geometric error of each cell, in the channel's unit; empty where there are too many.
+    #[serde(skip)]
+    pub cells: Vec<f64>,
 }
 
 /// Standard errors of the figures of one receiver.
@@ -146,9 +164,16 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
     let result = &runs[1].results.receivers[k];
     let power = estimate::power(runs, k);
     let mut statistical = Statistical { power: result.power_error, ..Statistical::default() };
+    let channels = (0..result.channels.len()).map(|c| channel_error(bound, runs, k, c)).collect();
     // Absorbed power is one number: it has neither places nor cells.
     if result.kind == "absorbed" {
-        return ReceiverError { name: result.name.clone(), power, statistical, ..ReceiverError::default() };
+        return ReceiverError {
+            name: result.name.clone(),
+            power,
+            statistical,
+            channels,
+            ..ReceiverError::default()
+        };
     }
     let [first, second] = [0, 1].map(|axis| estimate::moments(runs, k, axis));
     statistical.centroid = result.centroid_error;
@@ -161,17 +186,29 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
         rms: [first[1], second[1]],
         width: [first[2], second[2]],
         statistical,
+        channels,
         ..ReceiverError::default()
     };
-    if result.cells.len() <= replicates::MOST_CELLS {
-        error.set_cells(&cells::CellPairs::new(bound, runs, k));
+    if let Some(cells) = CellPairs::new(bound, runs, k, 0) {
+        error.set_cells(&cells);
     }
     error
 }
 
+fn channel_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize, channel: usize) -> ChannelError {
+    let result = &runs[1].results.receivers[k].channels[channel];
+    let worth = bound.receivers[k].channels.worth();
+    ChannelError {
+        name: result.name.clone(),
+        total: estimate::channel(runs, k, channel, worth),
+        statistical: result.error,
+        cells: CellPairs::new(bound, runs, k, 1 + channel).map_or_else(Vec::new, |cells| cells.layer().0),
+    }
+}
+
 impl ReceiverError {
     /// Takes in what was found of the cells.
-    fn set_cells(&mut self, cells: &cells::CellPairs<'_>) {
+    fn set_cells(&mut self, cells: &CellPairs<'_>) {
         let peak = cells.peak();
         self.peak = peak.density;
         self.peak_cells = peak.cells;

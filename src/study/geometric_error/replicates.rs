@@ -1,7 +1,7 @@
 //! A run taken apart into its replicates: what each of them brought to every receiver and every cell.
 
 use crate::intersect::Intersector;
-use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, replicates, trace};
+use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, Sum, replicates, trace};
 use std::sync::Mutex;
 
 /// Cells of a receiver up to which each replicate's are kept apart: 128 MB of sums, and a tenth of a second for all replicates.
@@ -13,8 +13,10 @@ pub(in crate::study) struct ReplicateSums {
     pub(in crate::study) power: u128,
     pub(in crate::study) first: [f64; 2],
     pub(in crate::study) second: [f64; 2],
-    /// The cells that it reached, rising, with their quanta.
-    pub(in crate::study) cells: Vec<(u32, u64)>,
+    /// The cells that it reached, rising, with their quanta: of power, then of each further channel.
+    pub(in crate::study) layers: Vec<Vec<(u32, u64)>>,
+    /// Quanta of each further channel.
+    pub(in crate::study) channels: Vec<u128>,
 }
 
 /// Results of a run with what each replicate brought: `replicates[replicate][receiver]`.
@@ -30,31 +32,55 @@ struct Totals {
     power: Vec<u128>,
     moments: Vec<Moments>,
     cells: Vec<Vec<u128>>,
+    channels: Vec<Vec<u128>>,
+}
+
+/// Cells of a receiver that are kept apart.
+#[derive(Clone, Copy)]
+struct KeptCells {
+    /// Of one layer.
+    cells: usize,
+    /// Power and further channels; none of grids that are too large, or power alone.
+    layers: usize,
+}
+
+impl KeptCells {
+    fn new(cells: usize, channels: usize) -> Self {
+        let fits = |layers: usize| cells * layers <= MOST_CELLS;
+        let layers = if fits(1 + channels) { 1 + channels } else { usize::from(fits(1)) };
+        Self { cells, layers }
+    }
 }
 
 impl Totals {
     /// Takes over the sums of a portion and gives what the one replicate that is new brought to each receiver.
-    fn advance(&mut self, portion: &PartialRun, cells: &[usize]) -> Option<(u32, Vec<ReplicateSums>)> {
+    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>)> {
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
         let tallies = &portion.tallies;
         self.power.resize(tallies.receivers.len(), 0);
         self.moments.resize(tallies.receivers.len(), Moments::default());
         self.cells.resize_with(tallies.receivers.len(), Vec::new);
+        self.channels.resize_with(tallies.receivers.len(), Vec::new);
         let sums = (0..tallies.receivers.len()).map(|k| {
             let (power, moments) = (tallies.receivers[k].total, tallies.moments[k]);
             // Exact until the last step: sums of whole numbers.
             let first = [0, 1].map(|a| (moments.first[a] - self.moments[k].first[a]) as f64 / Moments::GRAIN);
             let second = [0, 1].map(|a| (moments.second[a] - self.moments[k].second[a]) as f64 / Moments::GRAIN);
+            let KeptCells { cells, layers } = kept[k];
             let before = &mut self.cells[k];
-            before.resize(cells[k], 0);
-            let mut reached = Vec::new();
-            for (i, (before, now)) in (0u32..).zip(before.iter_mut().zip(&tallies.cells[k])) {
+            before.resize(cells * layers, 0);
+            let mut reached = vec![Vec::new(); layers];
+            for (i, (before, now)) in before.iter_mut().zip(&tallies.cells[k]).enumerate() {
                 if *before != now.total {
-                    reached.push((i, (now.total - *before) as u64));
+                    reached[i / cells].push(((i % cells) as u32, (now.total - *before) as u64));
                     *before = now.total;
                 }
             }
-            let brought = ReplicateSums { power: power - self.power[k], first, second, cells: reached };
+            let before = &mut self.channels[k];
+            before.resize(tallies.channels[k].len(), 0);
+            let channel = |(before, now): (&mut u128, &Sum)| now.total - std::mem::replace(before, now.total);
+            let channels = before.iter_mut().zip(&tallies.channels[k]).map(channel).collect();
+            let brought = ReplicateSums { power: power - self.power[k], first, second, layers: reached, channels };
             self.power[k] = power;
             self.moments[k] = moments;
             brought
@@ -72,13 +98,13 @@ pub(in crate::study) fn trace_replicates(
     settings: &RunSettings,
 ) -> ReplicatedRun {
     let count = replicates(bound, settings) as usize;
-    let counted = |cells: usize| if cells <= MOST_CELLS { cells } else { 0 };
-    let cells: Vec<usize> = bound.receivers.iter().map(|r| counted(r.cell_count())).collect();
+    let kept = bound.receivers.iter().map(|r| KeptCells::new(r.cell_count(), r.channels.count()));
+    let kept: Vec<KeptCells> = kept.collect();
     let state = Mutex::new((Totals::default(), vec![Vec::new(); count]));
     let finished = |portion: &PartialRun| {
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
         let (totals, by_replicate) = &mut *state;
-        if let Some((new, sums)) = totals.advance(portion, &cells) {
+        if let Some((new, sums)) = totals.advance(portion, &kept) {
             by_replicate[new as usize] = sums;
         }
     };
