@@ -7,7 +7,7 @@ use super::ray_sampler::RaySampler;
 use super::scene_results::SceneResults;
 use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::exact::{self, Exact};
+use crate::intersect::exact::Exact;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
@@ -74,11 +74,9 @@ fn recheck(
     if rays.is_empty() {
         return (None, pilot);
     }
-    let exact = in_stage(monitor, Stage::BuildingCheck("the spline"), || {
-        Exact::build(&prepared.job.loaded.model, &exact::Settings::for_few_rays())
-    });
+    let exact = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.spline_for_few_rays());
     let check = check_rays(prepared, intersector, &exact, &rays, monitor);
-    (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &exact])))
+    (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }
 
 /// Segments of some rays of the run, which are spread evenly over it and traced once more.

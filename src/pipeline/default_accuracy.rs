@@ -3,12 +3,14 @@
 use super::intersectors::IntersectorChoice;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
+use crate::intersect::exact::Exact;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::default_accuracy::{self, Chosen, Undecided};
 use crate::study::{MeasuredMesh, ModelMeshSource};
 use crate::tessellate;
+use std::sync::Arc;
 
 /// What was chosen, as far as it changes the run.
 pub(super) struct AccuracyChoice {
@@ -32,14 +34,14 @@ pub(super) fn is_asked(meshing: &MeshingSettings, tracing: &TracingSettings, sce
 
 /// Chooses for a run whose facets of the default tolerance are made.
 pub(super) fn choose(
-    model: &Model,
+    (model, spline): (&Model, Arc<Exact>),
     bound: &BoundScene,
     run: &RunSettings,
     (mesh, mesher): (&FacetMesh, &tessellate::Settings),
     monitor: &dyn Monitor,
 ) -> AccuracyChoice {
     let (chosen, finer) = in_stage(monitor, Stage::Choosing, || {
-        let mut source = ModelMeshSource::new(model);
+        let mut source = ModelMeshSource::with_spline(model, spline);
         source.mesher = mesher.clone();
         let tolerance = mesher.tolerance;
         default_accuracy::choose(&Undecided { model, bound, run, source: &source, facets: mesh, tolerance })

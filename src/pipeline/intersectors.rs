@@ -11,6 +11,7 @@ use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::simulate::Scene;
+use std::sync::Arc;
 
 /// What finds the hits, and how the normal there is got.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,11 +51,22 @@ pub fn with_intersector<T>(
     monitor: &dyn Monitor,
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
+    with_intersector_on(choice, &|| Arc::new(Exact::build(model, &exact::Settings::default())), mesh, monitor, work)
+}
+
+/// The same with a spline that may have been built before.
+pub(super) fn with_intersector_on<T>(
+    choice: IntersectorChoice,
+    spline: &dyn Fn() -> Arc<Exact>,
+    mesh: &FacetMesh,
+    monitor: &dyn Monitor,
+    work: impl FnOnce(&dyn Intersector, Footprint) -> T,
+) -> T {
     monitor.begin(Stage::Building(choice.intersector));
     if choice.intersector == IntersectorKind::Exact {
-        let exact = Exact::build(model, &exact::Settings::default());
+        let exact = spline();
         monitor.end();
-        return work(&exact, exact.footprint());
+        return work(&*exact, exact.footprint());
     }
     let normals = choice.normals.on_facets();
     let facets: Box<dyn Intersector + '_> = match choice.intersector {
@@ -70,7 +82,7 @@ pub fn with_intersector<T>(
         monitor.end();
         return work(&*facets, facets.footprint());
     }
-    let exact = Exact::build(model, &exact::Settings::default());
+    let exact = spline();
     let polished = Polished::new(&*facets, mesh, &exact);
     monitor.end();
     work(&polished, polished.footprint())

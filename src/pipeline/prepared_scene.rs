@@ -8,6 +8,7 @@ use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage};
 use super::settings::{MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
+use crate::intersect::exact::{self, Exact};
 use crate::simulate::scene::PowerUnit;
 use crate::simulate::{
     BoundScene, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range, trace,
@@ -16,7 +17,7 @@ use crate::study::accuracy_target::AccuracyPlan;
 use crate::study::default_accuracy::Chosen;
 use crate::tessellate::{self, Tessellation};
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Ray paths kept for pictures.
@@ -71,6 +72,8 @@ pub struct PreparedScene {
     pub rays: Option<u64>,
     /// Why it is traced as it is, where nobody asked for it.
     pub chosen: Option<Chosen>,
+    /// Built once for pilot, run and check.
+    spline: OnceLock<Arc<Exact>>,
 }
 
 /// How to trace beside the settings.
@@ -111,6 +114,7 @@ impl PreparedScene {
             threads,
             rays: None,
             chosen: None,
+            spline: OnceLock::new(),
         };
         if !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene) {
             prepared.choose_accuracy(monitor);
@@ -122,7 +126,8 @@ impl PreparedScene {
     fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
         let run = self.run_settings();
         let facets = (&self.tessellation.mesh, &self.mesh_settings);
-        let choice = default_accuracy::choose(&self.job.loaded.model, &self.bound, &run, facets, monitor);
+        let model = (&self.job.loaded.model, self.spline());
+        let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
         if let Some(finer) = choice.finer {
             self.tessellation.mesh = finer.mesh;
             self.tessellation_seconds += finer.seconds;
@@ -130,6 +135,18 @@ impl PreparedScene {
         }
         self.choice = choice.intersector;
         self.chosen = Some(choice.chosen);
+    }
+
+    /// The exact spline of the model.
+    fn spline(&self) -> Arc<Exact> {
+        let build = || Arc::new(Exact::build(&self.job.loaded.model, &exact::Settings::default()));
+        self.spline.get_or_init(build).clone()
+    }
+
+    /// The exact spline of the model, for some thousands of rays: the one of pilot or run, else one that is built sooner.
+    pub(super) fn spline_for_few_rays(&self) -> Arc<Exact> {
+        let build = || Arc::new(Exact::build(&self.job.loaded.model, &exact::Settings::for_few_rays()));
+        self.spline.get().cloned().unwrap_or_else(build)
     }
 
     /// The run's settings: the scene's, with what was asked over them.
@@ -167,10 +184,14 @@ impl PreparedScene {
 
     /// Builds the intersector of the run for `work`, which also gets the seconds that it took.
     pub fn with_intersector<T>(&self, monitor: &dyn Monitor, work: impl FnOnce(&dyn Intersector, f64) -> T) -> T {
-        let (model, mesh) = (&self.job.loaded.model, &self.tessellation.mesh);
-        intersectors::with_intersector(self.choice, model, mesh, monitor, |intersector, footprint| {
-            work(intersector, footprint.build_seconds)
-        })
+        let mesh = &self.tessellation.mesh;
+        intersectors::with_intersector_on(
+            self.choice,
+            &|| self.spline(),
+            mesh,
+            monitor,
+            |intersector, footprint| work(intersector, footprint.build_seconds),
+        )
     }
 
     /// Traces; ends early when the monitor asks for it.

@@ -10,11 +10,12 @@ use crate::intersect::{Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::tessellate::{self, tessellate};
+use std::sync::Arc;
 
 /// The product's own mesher, trees and spline, for studies of a model.
 pub struct ModelMeshSource<'a> {
     model: &'a Model,
-    exact: Exact,
+    exact: Arc<Exact>,
     /// Everything of the mesher but the tolerance.
     pub mesher: tessellate::Settings,
 }
@@ -22,7 +23,11 @@ pub struct ModelMeshSource<'a> {
 impl<'a> ModelMeshSource<'a> {
     /// Builds the exact spline of the model.
     pub fn new(model: &'a Model) -> Self {
-        let exact = Exact::build(model, &exact::Settings::default());
+        Self::with_spline(model, Arc::new(Exact::build(model, &exact::Settings::default())))
+    }
+
+    /// With the exact spline of the model, which was built before.
+    pub fn with_spline(model: &'a Model, exact: Arc<Exact>) -> Self {
         Self { model, exact, mesher: tessellate::Settings::default() }
     }
 
@@ -76,6 +81,6 @@ impl MeshSource for ModelMeshSource<'_> {
     }
 
     fn exact(&self) -> &dyn Intersector {
-        &self.exact
+        &*self.exact
     }
 }

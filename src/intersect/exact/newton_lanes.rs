@@ -103,10 +103,10 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
         let step_v = dot(&g, &du).div(slope);
         let across = dot(&g, &g).sqrt();
         let rounding = V::splat(ROUNDING * f64::EPSILON).mul(largest(&origin).add(largest(&p)));
-        let moves = step_u.abs().max(step_v.abs()).less(V::splat(LAST_STEP));
-        let stalled = across.less(near) & last.mul(V::splat(0.5)).at_most(across);
-        let settled = across.at_most(rounding.mul(V::splat(SETTLED))) | stalled;
-        let on_ray = across.at_most(near.add(rounding));
+        let moves = step_u.abs().max(step_v.abs()).mask_less(V::splat(LAST_STEP));
+        let stalled = across.mask_less(near) & last.mul(V::splat(0.5)).mask_at_most(across);
+        let settled = across.mask_at_most(rounding.mul(V::splat(SETTLED))) | stalled;
+        let on_ray = across.mask_at_most(near.add(rounding));
         let ends = (moves | settled) & on_ray & !ended;
         if ends != 0 {
             // The point is moved along by a step that needs no further evaluation.
@@ -122,8 +122,8 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
             residual = across.select(ends, residual);
             let (square, square_u, square_v) = (dot(&n, &n), dot(&du, &du), dot(&dv, &dv));
             let trusted = V::load(&starts.trusted);
-            let clear = square_u.mul(square_v).mul(V::splat(LEAST_SINE_SQUARED)).less(square);
-            regular |= ends & trusted.less(square_u) & trusted.less(square_v) & clear;
+            let clear = square_u.mul(square_v).mul(V::splat(LEAST_SINE_SQUARED)).mask_less(square);
+            regular |= ends & trusted.mask_less(square_u) & trusted.mask_less(square_v) & clear;
             let length = square.sqrt();
             let unit = [n[0].div(length), n[1].div(length), n[2].div(length)];
             normal = select(ends, &unit, &normal);

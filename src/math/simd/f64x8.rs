@@ -31,9 +31,9 @@ pub(crate) trait F64x8: Copy {
     fn max(self, other: Self) -> Self;
     fn sqrt(self) -> Self;
     /// In which lanes it is less, one bit each; in none where one is not a number.
-    fn less(self, other: Self) -> u8;
-    /// In which lanes it is less or equal, as [`F64x8::less`].
-    fn at_most(self, other: Self) -> u8;
+    fn mask_less(self, other: Self) -> u8;
+    /// In which lanes it is less or equal, as [`F64x8::mask_less`].
+    fn mask_at_most(self, other: Self) -> u8;
     /// `self` in the lanes of the mask, else `other`.
     fn select(self, mask: u8, other: Self) -> Self;
 }
@@ -108,11 +108,11 @@ impl F64x8 for Array {
         Self(self.0.map(f64::sqrt))
     }
     #[inline(always)]
-    fn less(self, other: Self) -> u8 {
+    fn mask_less(self, other: Self) -> u8 {
         self.mask(other, |a, b| a < b)
     }
     #[inline(always)]
-    fn at_most(self, other: Self) -> u8 {
+    fn mask_at_most(self, other: Self) -> u8 {
         self.mask(other, |a, b| a <= b)
     }
     #[inline(always)]
@@ -212,11 +212,11 @@ mod registers {
             Self(unsafe { _mm512_sqrt_pd(self.0) })
         }
         #[inline(always)]
-        fn less(self, other: Self) -> u8 {
+        fn mask_less(self, other: Self) -> u8 {
             unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) }
         }
         #[inline(always)]
-        fn at_most(self, other: Self) -> u8 {
+        fn mask_at_most(self, other: Self) -> u8 {
             unsafe { _mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.0, other.0) }
         }
         #[inline(always)]
@@ -302,7 +302,7 @@ mod registers {
             unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
         }
         #[inline(always)]
-        fn less(self, other: Self) -> u8 {
+        fn mask_less(self, other: Self) -> u8 {
             unsafe {
                 let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0));
                 let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.1, other.1));
@@ -310,7 +310,7 @@ mod registers {
             }
         }
         #[inline(always)]
-        fn at_most(self, other: Self) -> u8 {
+        fn mask_at_most(self, other: Self) -> u8 {
             unsafe {
                 let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0));
                 let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.1, other.1));
@@ -363,7 +363,7 @@ mod tests {
             std::array::from_fn(|k| std::array::from_fn(|c| 0.7 + (k * 4 + c) as f64 * 1.3 - 9.0 * (c as f64)));
         let [a, b, c, d] = V::transpose([0, 1, 2, 3, 4, 5, 6, 7].map(|k| &rows[k]));
         let not_a_number = V::splat(f64::NAN).select(0b1000_0100, b);
-        let masks = [a.less(b), b.at_most(b), a.less(not_a_number), not_a_number.at_most(b)];
+        let masks = [a.mask_less(b), b.mask_at_most(b), a.mask_less(not_a_number), not_a_number.mask_at_most(b)];
         let results = [
             a.add(b),
             a.sub(b),
