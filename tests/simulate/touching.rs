@@ -1,24 +1,39 @@
 //! Light through curved faces of two bodies that touch, on facets of the default tolerance: none is lost or misled between them.
 
-use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole};
+use crate::turned::{assembly, ball_in_cup, doublet, lens, ring_in_groove, rod_in_hole, turned};
 use lampyris::intersect::Intersector;
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
+use lampyris::math::{Frame, Point, Vector};
 use lampyris::model::Model;
-use lampyris::simulate::{Results, RunSettings, Scene, simulate};
+use lampyris::nurbs::{Curve, conic};
+use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::tessellate::{self, tessellate};
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
-/// Traces a scene on facets of the default tolerance, and on the spline.
-fn both(model: &Model, text: &str) -> [Results; 2] {
+/// Traces a scene on facets of the default tolerance.
+fn on_facets(model: &Model, text: &str) -> Results {
+    let (scene, bound) = bind(model, text);
+    let mesh = tessellate(model, &tessellate::Settings { glue_mm: scene.run.glue_mm, ..Default::default() }).mesh;
+    run(&scene, &bound, &Octree::build(&mesh, &octree::Settings::default()))
+}
+
+/// Traces a scene on the spline.
+fn on_spline(model: &Model, text: &str) -> Results {
+    let (scene, bound) = bind(model, text);
+    run(&scene, &bound, &Exact::build(model, &exact::Settings::default()))
+}
+
+fn bind(model: &Model, text: &str) -> (Scene, BoundScene) {
     let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
     let bound = scene.bind(model).unwrap();
-    let mesh = tessellate(model, &tessellate::Settings { glue_mm: scene.run.glue_mm, ..Default::default() }).mesh;
-    let octree = Octree::build(&mesh, &octree::Settings::default());
-    let exact = Exact::build(model, &exact::Settings::default());
+    (scene, bound)
+}
+
+fn run(scene: &Scene, bound: &BoundScene, intersector: &dyn Intersector) -> Results {
     let settings = RunSettings { threads: 2, ..RunSettings::from(&scene.run) };
-    let run = |on: &dyn Intersector| simulate(&bound, on, &settings, &|_| true);
-    [run(&octree), run(&exact)]
+    simulate(bound, intersector, &settings, &|_| true)
 }
 
 fn scene(parts: [(&str, f64); 2], source: &str) -> String {
@@ -35,7 +50,7 @@ fn scene(parts: [(&str, f64); 2], source: &str) -> String {
 
 /// What is lost, as a share of what is emitted, and how far the receiver's power is from that on the spline.
 fn check(name: &str, model: &Model, text: &str) {
-    let [facets, spline] = both(model, text);
+    let [facets, spline] = [on_facets(model, text), on_spline(model, text)];
     let emitted = facets.power.emitted;
     assert!(facets.power.lost <= 1e-6 * emitted, "{name}: {:?} {:?}", facets.power, facets.ledger.first());
     assert!(facets.notes.is_empty(), "{name}: {:?}", facets.notes);
@@ -77,4 +92,56 @@ fn light_passes_a_ring_in_its_groove() {
         "kind = 'collimated'\nat = [20, 0, -8]\ndirection = [0, 0, 1]\nradius = 1.5\npower = 1",
     );
     check("ring", &ring_in_groove(0.9), &text);
+}
+
+fn at(r: f64, z: f64) -> Point {
+    Point::new(r, 0.0, z)
+}
+
+fn profile(points: &[[f64; 2]]) -> Vec<Curve> {
+    points.windows(2).map(|w| Curve::line(at(w[0][0], w[0][1]), at(w[1][0], w[1][1]), [0.0, 1.0])).collect()
+}
+
+/// An arc about (0, z) from an angle over the horizontal up to the axis.
+fn cap(z: f64, radius: f64, from: f64) -> Curve {
+    conic::arc(&Frame::from_axis(at(0.0, z), -Vector::Y, Some(Vector::X)), radius, [from, FRAC_PI_2])
+}
+
+/// The second lens ends within the first, or is a cubic spline through the sphere that they share, with a parametrisation of its own.
+#[test]
+fn light_passes_doublets_whose_faces_differ() {
+    let text = scene(
+        [("crown", 1.517), ("flint", 1.62)],
+        "kind = 'collimated'\nat = [0, 0, -10]\ndirection = [0, 0, 1]\nradius = 9\npower = 1",
+    );
+    check("smaller flint", &doublet(10.0, 0.7), &text);
+    let angles: Vec<f64> = (0..=16).map(|k| (12.0f64 / 40.0).asin() * f64::from(k) / 16.0).collect();
+    let points: Vec<Point> = angles.iter().map(|t| at(40.0 * t.sin(), 40.0 * t.cos() - 32.0)).collect();
+    let slopes: Vec<Vector> = angles.iter().map(|t| at(40.0 * t.cos(), -40.0 * t.sin())).collect();
+    let front = Curve::hermite(&angles, &points, &slopes);
+    let back = cap(-109.0, 120.0, (12.0f64 / 120.0).acos());
+    let rim = Curve::line(front.evaluate(angles[16]), back.evaluate(back.domain()[0]), [0.0, 1.0]);
+    let crown = lens("crown", [0.0, 8.0], [60.0, -40.0], 12.0, 0.0);
+    check("fitted flint", &assembly(vec![crown, turned("flint", &[front, rim, back], 0.7)]), &text);
+}
+
+/// A round die with a flat or a curved top in the pocket of its dome.
+#[test]
+fn light_passes_from_a_die_into_its_dome() {
+    let text = scene([("die", 2.4), ("dome", 1.41)], "kind = 'point'\nat = [0.1, 0.2, 0.2]\npower = 1");
+    let text = text.replace("rays = 20000", "rays = 2000");
+    let top = cap(0.4 - 3f64.sqrt(), 2.0, (3f64.sqrt() / 2.0).asin());
+    let flat = Curve::line(at(1.0, 0.4), at(0.0, 0.4), [0.0, 1.0]);
+    for (name, top) in [("flat die", flat), ("curved die", top)] {
+        let mut die = profile(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.4]]);
+        die.push(top.clone());
+        let mut dome = vec![top.reversed()];
+        dome.extend(profile(&[[1.0, 0.4], [1.0, 0.0], [5.0, 0.0]]));
+        dome.push(cap(0.0, 5.0, 0.0));
+        let model = assembly(vec![turned("die", &die, 0.0), turned("dome", &dome, 0.9)]);
+        let facets = on_facets(&model, &text);
+        assert!(facets.power.lost <= 1e-6 * facets.power.emitted, "{name}: {:?}", facets.ledger.first());
+        assert!(facets.notes.is_empty(), "{name}: {:?}", facets.notes);
+        assert!(facets.receivers[0].power > 0.04 * facets.power.emitted, "{name}: {:?}", facets.power);
+    }
 }
