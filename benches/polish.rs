@@ -47,9 +47,7 @@ fn bench(name: &str, model: &Model) {
         for (who, times) in [&octree as &dyn Intersector, &polished].into_iter().zip(&mut seconds) {
             cost = Cost::default();
             let start = clock();
-            for (ray, hit) in rays.iter().zip(&mut hits) {
-                *hit = who.intersect(ray, &mut cost);
-            }
+            who.intersect_batch(&rays, &mut hits, &mut cost);
             times.push(clock() - start);
         }
     }
