@@ -130,10 +130,7 @@ impl<C: RayPayload> Division<'_, C> {
         d: Vector,
         at: &mut SurfaceInteraction<'_>,
     ) -> Vector {
-        path.payload = self.payload;
-        if let Some([r, _]) = &self.matrices {
-            turn_polarisation(context, &mut path.payload, r, d, self.normal);
-        }
+        self.take_payload::<0>(context, path, d);
         let specular = at.mirrored(d, self.normal);
         self.scattered(context, path, specular, at)
     }
@@ -147,12 +144,18 @@ impl<C: RayPayload> Division<'_, C> {
         d: Vector,
         at: &mut SurfaceInteraction<'_>,
     ) -> Vector {
-        path.payload = self.payload;
-        if let Some([_, t]) = &self.matrices {
-            turn_polarisation(context, &mut path.payload, t, d, self.normal);
-        }
+        self.take_payload::<1>(context, path, d);
         path.payload = path.payload.with_media_of(self.across);
         self.scattered(context, path, self.transmitted, at)
+    }
+
+    /// Gives the path its payload as the interface left it on one of both ways, 0 reflected and 1 transmitted.
+    #[inline(always)]
+    fn take_payload<const WAY: usize>(&self, context: &Context<'_>, path: &mut Path<C>, d: Vector) {
+        path.payload = self.payload;
+        if let Some(matrices) = &self.matrices {
+            turn_polarisation(context, &mut path.payload, &matrices[WAY], d, self.normal);
+        }
     }
 
     /// The direction after scatter; `specular` where the surface is smooth.

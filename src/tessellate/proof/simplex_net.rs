@@ -4,12 +4,11 @@
 //! patch of degrees (p, q) gives total degree p + q. All steps are convex combinations when the triangle lies in the
 //! patch, so weights stay positive and the control points hull the piece. On the way coefficients are those of plain
 //! powers, multiplied by their multinomials, which spares each step a factor.
-//! With AVX the same steps are compiled a second time, four numbers at once; no operation is fused or reordered, so the bits are
-//! the same. The one unsafe call is to that copy, after the processor was asked.
+//! With AVX2 the same steps are compiled a second time, four numbers at once; no operation is fused or reordered, so the bits are
+//! the same.
 //! Source: T. D. DeRose, *Composing Bézier simplexes*, ACM TOG 7 (1988).
 
-#![allow(unsafe_code)]
-
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Homogeneous, Uv};
 use crate::nurbs::BezierPatch;
 use std::sync::OnceLock;
@@ -54,6 +53,22 @@ const fn size(corners: usize, d: usize) -> usize {
     if corners == 2 { d + 1 } else { (d + 1) * (d + 2) / 2 }
 }
 
+/// A piece of a patch whose net is wanted.
+struct Expansion<'a, const N: usize> {
+    nets: &'a mut SimplexNets,
+    patch: &'a BezierPatch,
+    corners: [Uv; N],
+}
+
+impl<const N: usize> Kernel for Expansion<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        self.nets.expand_plain(self.patch, self.corners);
+    }
+}
+
 impl SimplexNets {
     /// Control points over the simplex with 2 or 3 corners, given in local parameters.
     pub(in crate::tessellate) fn expand<const N: usize>(
@@ -66,13 +81,7 @@ impl SimplexNets {
             self.shares_for = (N, degree);
             multinomials::<N>(degree, &mut self.shares);
         }
-        #[cfg(target_arch = "x86_64")]
-        if std::is_x86_feature_detected!("avx") {
-            // Sound: the processor has what the function was compiled for.
-            unsafe { self.expand_avx(patch, corners) };
-            return &self.out;
-        }
-        self.expand_plain(patch, corners);
+        simd::dispatch(Expansion { nets: self, patch, corners });
         &self.out
     }
 
@@ -104,12 +113,6 @@ impl SimplexNets {
             })
         }));
         &self.out
-    }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx")]
-    fn expand_avx<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) {
-        self.expand_plain(patch, corners);
     }
 
     #[inline(always)]
