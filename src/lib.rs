@@ -64,6 +64,11 @@
 //! Lengths are millimetres, angles radians unless a name says otherwise (`angle_deg`), and every result is the same
 //! bits for any number of threads.
 
+/// The program of the README, as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod formats;

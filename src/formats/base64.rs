@@ -1,6 +1,11 @@
 //! Bytes as text, for data that stands within HTML, SVG and VTK files.
 
 /// Standard base64 (RFC 4648 §4, with padding).
+///
+/// ```
+/// // RFC 4648, section 10.
+/// assert_eq!(["f", "fo", "foobar"].map(|text| lampyris::formats::base64(text.as_bytes())), ["Zg==", "Zm8=", "Zm9vYmFy"]);
+/// ```
 pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);

@@ -26,6 +26,11 @@ pub fn write_facets(path: &Path, facets: &Facets) -> Result<(), Error> {
 }
 
 /// Whether [`write_facets`] knows the extension of this name.
+///
+/// ```
+/// use lampyris::formats::is_facet_file;
+/// assert!(is_facet_file("lamp.GLB".as_ref()) && !is_facet_file("lamp.stp".as_ref()));
+/// ```
 pub fn is_facet_file(path: &Path) -> bool {
     let extension = lower_extension(path);
     FACET_EXTENSIONS.split(' ').any(|known| known[1..] == extension)

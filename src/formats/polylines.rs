@@ -3,6 +3,15 @@
 use crate::math::{Aabb, Point};
 
 /// Open polylines with one value each of any number of quantities: ray paths, usually.
+///
+/// ```
+/// use lampyris::formats::Polylines;
+/// use lampyris::math::Point;
+/// let mut paths = Polylines::default();
+/// paths.push([Point::ZERO, Point::X]);
+/// paths.push([Point::Y, Point::Z, Point::ONE]);
+/// assert_eq!(paths.lines().map(|line| line.len()).collect::<Vec<_>>(), [2, 3]);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Polylines {
     /// The points of all lines, one line after the other, mm.

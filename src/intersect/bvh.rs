@@ -85,6 +85,21 @@ impl Default for Settings {
 }
 
 /// A hierarchy over the facets of a mesh.
+///
+/// ```
+/// use lampyris::intersect::bvh::{Bvh, Settings};
+/// use lampyris::intersect::{Cost, Intersector};
+/// use lampyris::math::{FaceId, Point, Ray, Uv, Vector};
+/// use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
+///
+/// let positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y];
+/// let vertices = (0..4).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect();
+/// let facets = vec![Facet { vertices: [0, 1, 2, 3], face: FaceId(0) }];
+/// let mesh = FacetMesh { positions, vertices, facets, sag: vec![] };
+/// let bvh = Bvh::build(&mesh, &Settings { cured: true, ..Settings::default() });
+/// let ray = Ray::new(Point::new(0.25, 0.5, 3.0), -Vector::Z);
+/// assert_eq!(bvh.intersect(&ray, &mut Cost::default()).unwrap().t, 3.0);
+/// ```
 pub struct Bvh<'m> {
     surroundings: Surroundings<'m>,
     normals: NormalMode,

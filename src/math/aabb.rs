@@ -3,6 +3,14 @@
 use super::{Point, Ray, Vector};
 
 /// An axis-aligned box `[min, max]`; empty when any `min > max`.
+///
+/// ```
+/// use lampyris::math::{Aabb, Point, Ray, Vector};
+/// let cube = Aabb::from_points([Point::ZERO, Point::ONE]);
+/// let (near, far) = cube.clip(&Ray::new(Point::new(0.5, 0.5, -2.0), Vector::Z)).unwrap();
+/// // Wider by a few roundings, never narrower.
+/// assert!(near <= 2.0 && far >= 3.0 && far - near < 1.0 + 1e-14);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Lower corner, mm.

@@ -5,6 +5,13 @@ use super::{Point, Vector};
 /// A similarity placement `x ↦ origin + scale · (x·X + y·Y + z·Z)`: right- or left-handed axes of unit length.
 ///
 /// Placements of parts, and positions of analytic surfaces, are frames; `scale` is 1 for the latter.
+///
+/// ```
+/// use lampyris::math::{Frame, Point, Vector};
+/// let frame = Frame::from_axis(Point::new(1.0, 2.0, 3.0), Vector::X, Some(Vector::Y));
+/// assert_eq!(frame.point(Point::new(0.0, 0.0, 5.0)), Point::new(6.0, 2.0, 3.0));
+/// assert_eq!(frame.compose(&frame.inverse()).point(Point::ONE), Point::ONE);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Image of the origin.

@@ -6,6 +6,13 @@ use std::ops::{Add, Mul, Neg, Sub};
 ///
 /// Each operation is computed to nearest and then moved outward by one ulp: wider than directed rounding by at
 /// most one ulp a side, and free of rounding-mode switches. NaN bounds stand for "anything".
+///
+/// ```
+/// use lampyris::math::Interval;
+/// let tenth = Interval::point(1.0).checked_div(Interval::point(10.0)).unwrap();
+/// // 1/10 is no binary number; it lies between the bounds, and so does ten times it.
+/// assert!(tenth.lo < tenth.hi && (tenth * Interval::point(10.0)).contains(1.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower bound.

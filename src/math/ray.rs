@@ -3,6 +3,12 @@
 use super::{FaceId, Point, Uv, Vector};
 
 /// A half-line or segment `origin + t·direction`, `t` in `[t_min, t_max]`.
+///
+/// ```
+/// use lampyris::math::{Point, Ray};
+/// let ray = Ray::from_points(Point::ZERO, Point::new(3.0, 4.0, 0.0)).unwrap();
+/// assert!((ray.point_at(10.0) - Point::new(6.0, 8.0, 0.0)).length() < 1e-14);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Where `t = 0`.

@@ -3,6 +3,12 @@
 /// Real roots of `a·x² + b·x + c`, ascending, without cancellation; one root when `a = 0`, none when all vanish.
 ///
 /// Source: Press et al., *Numerical Recipes*, 5.6, with the discriminant by fused multiply-add (Kahan).
+///
+/// ```
+/// // The small root of x² − 10⁸x + 1 is 10⁻⁸; the school's formula loses most of its digits.
+/// let (small, _) = lampyris::math::quadratic_roots(1.0, -1e8, 1.0);
+/// assert!((small.unwrap() - 1e-8).abs() < 1e-22);
+/// ```
 pub fn quadratic_roots(a: f64, b: f64, c: f64) -> (Option<f64>, Option<f64>) {
     if a == 0.0 {
         return if b == 0.0 { (None, None) } else { (Some(-c / b), None) };
@@ -21,6 +27,11 @@ pub fn quadratic_roots(a: f64, b: f64, c: f64) -> (Option<f64>, Option<f64>) {
 ///
 /// `f` returns the value and the derivative. `None` when the values at the ends have the same sign. The result is
 /// accurate to `tolerance` in `x` (or to the last bit when that is smaller).
+///
+/// ```
+/// let root = lampyris::math::safe_newton(|x| (x * x - 2.0, 2.0 * x), 0.0, 2.0, 1e-15);
+/// assert!((root.unwrap() - std::f64::consts::SQRT_2).abs() < 1e-15);
+/// ```
 pub fn safe_newton(mut f: impl FnMut(f64) -> (f64, f64), lo: f64, hi: f64, tolerance: f64) -> Option<f64> {
     let ((f_lo, _), (f_hi, _)) = (f(lo), f(hi));
     if f_lo == 0.0 {

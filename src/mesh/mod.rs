@@ -11,6 +11,17 @@ use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 pub use topology::Topology;
 
 /// A mesh of quad facets; a triangle is a quad whose last two corners coincide.
+///
+/// ```
+/// use lampyris::math::{FaceId, Point, Uv, Vector};
+/// use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
+///
+/// let positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y];
+/// let vertices = (0..4).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect();
+/// let facets = vec![Facet { vertices: [0, 1, 2, 3], face: FaceId(0) }];
+/// let square = FacetMesh { positions, vertices, facets, sag: vec![] };
+/// assert_eq!((square.area(), square.topology(0..1).open_edges), (1.0, 4));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FacetMesh {
     /// Distinct points, mm; bit-equal where faces meet.

@@ -143,6 +143,13 @@ impl Face {
     }
 
     /// Area inside the trims in the part's coordinates, mm²: by Green's theorem along the loops, relatively within about 1e-5.
+    ///
+    /// ```
+    /// use lampyris::{math::Frame, model::Face, nurbs::sweep};
+    /// use std::f64::consts::PI;
+    /// let ball = sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+    /// assert!((Face::whole(ball).area() / (400.0 * PI) - 1.0).abs() < 1e-5);
+    /// ```
     pub fn area(&self) -> f64 {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];

@@ -16,6 +16,14 @@ fn breakpoints([a, b]: [f64; 2]) -> Vec<f64> {
 /// The arc `radius·(cos φ, sin φ, 0)` in a frame, `φ` in `[a, b]` with `a < b ≤ a + 2π`; its domain is `[a, b]`.
 ///
 /// At every breakpoint the parameter is the angle; between them see [`parameter_of_angle`].
+///
+/// ```
+/// use lampyris::{math::Frame, nurbs::conic};
+/// let quarter = conic::arc(&Frame::IDENTITY, 2.0, [0.0, std::f64::consts::FRAC_PI_2]);
+/// // A rational spline is a circle to the last digits, wherever it is evaluated.
+/// let [a, b] = quarter.domain();
+/// assert!((0..=10).all(|k| (quarter.evaluate(a + (b - a) * k as f64 / 10.0).length() - 2.0).abs() < 1e-14));
+/// ```
 pub fn arc(frame: &Frame, radius: f64, range: [f64; 2]) -> Curve {
     let (knots, local) = unit_arc(range);
     let points = local

@@ -7,6 +7,14 @@ use crate::math::{Uv, Vector};
 const SINGULAR: f64 = 1e-9;
 
 /// First and second fundamental form of a surface at a point, with respect to `Su × Sv`.
+///
+/// ```
+/// use lampyris::{math::Frame, math::Uv, nurbs::sweep};
+/// let tube = sweep::cylinder(&Frame::IDENTITY, 4.0, [0.0, 3.0], [0.0, 10.0]);
+/// // Straight along the axis, and away from the outward normal with 1/r around it.
+/// let [along, around] = tube.forms(Uv::new(1.0, 5.0)).unwrap().principal();
+/// assert!(along.abs() < 1e-12 && (around + 0.25).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FundamentalForms {
     /// `Su·Su`, `Su·Sv`, `Sv·Sv`, mm² per parameter².

@@ -5,6 +5,15 @@ use super::{Curve, SecondDerivatives, Surface};
 use crate::math::{Aabb, Homogeneous, Uv};
 
 /// A rational Bézier patch: one polynomial piece of a surface, over local parameters `[0, 1]²`.
+///
+/// ```
+/// use lampyris::{math::Frame, math::Uv, nurbs::sweep};
+/// let patch = &sweep::sphere(&Frame::IDENTITY, 1.0, [0.0, 1.0], [0.0, 1.0]).bezier_patches()[0];
+/// let [low, high] = patch.halves(0);
+/// // Both halves end in the middle.
+/// let [a, b, c] = [(patch, 0.5), (&low, 1.0), (&high, 0.0)].map(|(p, u)| p.homogeneous(Uv::new(u, 0.3))[0]);
+/// assert!((a - b).length() < 1e-14 && (a - c).length() < 1e-14);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BezierPatch {
     /// Polynomial degrees in u and v.

@@ -15,6 +15,14 @@ const SEEDS: usize = 8;
 const CONVERGED_SHARE: f64 = 1e-15;
 
 /// The parameter of the point of the curve that is nearest to `p`, and the distance.
+///
+/// ```
+/// use lampyris::math::Point;
+/// use lampyris::nurbs::{Curve, project};
+/// let line = Curve::line(Point::ZERO, Point::new(10.0, 0.0, 0.0), [0.0, 1.0]);
+/// let (t, distance) = project::nearest(&line, Point::new(3.0, 4.0, 0.0));
+/// assert!((t - 0.3).abs() < 1e-12 && (distance - 4.0).abs() < 1e-12);
+/// ```
 pub fn nearest(curve: &Curve, p: Point) -> (f64, f64) {
     nearest_by(curve, |q| q - p, None)
 }

@@ -14,6 +14,16 @@ const INSIDE_SHARE: f64 = 1e-4;
 const NO_NORMAL: f64 = 1e-12;
 
 /// A rational B-spline surface with clamped ends in both directions.
+///
+/// ```
+/// use lampyris::math::{Frame, Uv};
+/// use lampyris::nurbs::sweep;
+///
+/// let ball = sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 6.0], [-1.5, 1.5]);
+/// let uv = Uv::new(1.0, 0.5);
+/// let (point, normal) = (ball.evaluate(uv), ball.normal(uv).unwrap());
+/// assert!((point.length() - 10.0).abs() < 1e-13 && (normal - point / 10.0).length() < 1e-13);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Polynomial degrees in u and v, 1 to [`super::MAX_DEGREE`].

@@ -12,6 +12,13 @@ const SUM_ROUNDING: f64 = 1e-12;
 const TABLE_ROUNDING: f64 = 1e-9;
 
 /// What an interface does to the power that meets it.
+///
+/// ```
+/// use lampyris::optics::Coating;
+/// // Straight onto bare glass of index 1.5: R = ((n − 1)/(n + 1))².
+/// let split = Coating::Bare.split(1.0, 1.0, 1.5, 550.0);
+/// assert!((split.reflected.unpolarised() - 0.04).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Coating {

@@ -32,6 +32,12 @@ impl Medium {
 /// Refractive index over the vacuum wavelength.
 ///
 /// The formulas take λ in µm inside, as their sources print the coefficients.
+///
+/// ```
+/// use lampyris::optics::Index;
+/// // Cauchy: n = a + b/λ², λ in µm.
+/// assert!((Index::Cauchy(vec![1.5, 0.005]).value(500.0) - 1.52).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Index {
@@ -117,6 +123,14 @@ pub mod line {
 }
 
 /// Loss of power along the way, by Beer and Lambert's law.
+///
+/// ```
+/// use lampyris::optics::Absorption;
+/// // Beer and Lambert: what halves the light in 1 mm leaves an eighth of it in 3 mm.
+/// let dye = Absorption::per_mm(std::f64::consts::LN_2)?;
+/// assert!((dye.transmittance(3.0, 550.0) - 0.125).abs() < 1e-15);
+/// # Ok::<(), lampyris::optics::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Absorption {

@@ -5,6 +5,15 @@ use crate::math::{Vector, orthonormal_pair};
 use std::f64::consts::PI;
 
 /// Scattering inside a medium, with the phase function of Henyey and Greenstein (Astrophys. J. 93, 70, 1941).
+///
+/// ```
+/// use lampyris::optics::BulkScatter;
+/// let fog = BulkScatter::new(0.1, 0.0)?;
+/// // Isotropic, and after ten mm a share of 1/e has not been scattered.
+/// assert!((fog.density(0.3) - 0.25 / std::f64::consts::PI).abs() < 1e-15);
+/// assert!((fog.free_path(1.0 - (-1f64).exp()) - 10.0).abs() < 1e-12);
+/// # Ok::<(), lampyris::optics::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BulkScatter {
     /// Scattering events per mm of way.

@@ -12,6 +12,16 @@ use crate::math::{Vector, orthonormal_pair};
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A Stokes vector with the transverse axis it refers to.
+///
+/// ```
+/// use lampyris::math::Vector;
+/// use lampyris::optics::polarised::{Stokes, reflected};
+/// // At Brewster's angle, tan θ = n, only light across the plane of incidence is reflected.
+/// let angle = 1.5f64.atan();
+/// let d = Vector::new(angle.sin(), 0.0, -angle.cos());
+/// let mirrored = Stokes::unpolarised(1.0, d).through(&reflected(angle.cos(), 1.0 / 1.5), d, Vector::Z);
+/// assert!((mirrored.degree() - 1.0).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stokes {
     /// Power.

@@ -19,6 +19,14 @@ pub struct Scatter {
 }
 
 /// A distribution of directions about the specular one or the normal.
+///
+/// ```
+/// use lampyris::math::Vector;
+/// use lampyris::optics::Lobe;
+/// // A Lambertian surface sends cos θ / π per steradian.
+/// let out = Vector::new(0.6, 0.0, 0.8);
+/// assert!((Lobe::Lambertian.density(Vector::Z, Vector::Z, out) - 0.8 / std::f64::consts::PI).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Lobe {

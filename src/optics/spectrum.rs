@@ -9,6 +9,13 @@ use super::table::Table;
 pub const MAX_EFFICACY: f64 = 683.0;
 
 /// The power of a source over the wavelength, up to a factor.
+///
+/// ```
+/// use lampyris::optics::{MAX_EFFICACY, Spectrum};
+/// // The lumen is defined at 540 THz, 555 nm in air, where the eye sees most.
+/// assert!((Spectrum::line(555.0).sampler()?.efficacy() / MAX_EFFICACY - 1.0).abs() < 1e-3);
+/// # Ok::<(), lampyris::optics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Spectrum {

@@ -3,6 +3,13 @@
 use super::error::{Error, ErrorKind, require};
 
 /// A function of wavelength (or of an angle) given at points, linear between them, constant beyond the ends.
+///
+/// ```
+/// use lampyris::optics::Table;
+/// let table = Table::new("index", [(400.0, 1.6), (600.0, 1.5)])?;
+/// assert_eq!((table.value(500.0), table.value(700.0)), (1.55, 1.5));
+/// # Ok::<(), lampyris::optics::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     x: Vec<f64>,

@@ -16,6 +16,12 @@ pub struct IntensityMap {
 }
 
 /// A value with both its errors, candela.
+///
+/// ```
+/// // Errors of different causes add as squares.
+/// let reading = lampyris::regulation::Reading { value: 1000.0, statistical: 3.0, geometric: 4.0 };
+/// assert_eq!(reading.error(), 5.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// The value.

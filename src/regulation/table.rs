@@ -24,6 +24,13 @@ pub enum Traffic {
 }
 
 /// A lamp function of a regulation: its rows and how they are measured.
+///
+/// ```
+/// use lampyris::regulation::Regulation;
+/// let beam = Regulation::find("UN R112 B passing")?;
+/// assert!(beam.function.rows.iter().any(|row| row.id == "75R" && row.min.is_some()));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Regulation {
     /// The name it is asked for by, such as `UN R149-01 C passing`.

@@ -7,6 +7,26 @@ use crate::optics::Effects;
 const WAVEFRONT: usize = 1024;
 
 /// What a simulation is run with: the scene's own settings, which the command may override, and how to spread the work.
+///
+/// ```
+/// use lampyris::intersect::octree::{self, Octree};
+/// use lampyris::simulate::{RunSettings, Scene, simulate};
+/// use lampyris::{FacetMesh, Model};
+///
+/// let text = "source = [{ kind = 'point' }]\nreceiver = [{ name = 'ball', kind = 'sphere', radius = 10 }]";
+/// let scene = Scene::parse(text, "scene.toml", ".".as_ref())?.bind(&Model::default())?;
+/// let mesh = FacetMesh::default();
+/// let nothing = Octree::build(&mesh, &octree::Settings::default());
+/// let run = |threads| {
+///     let settings = RunSettings { rays: 10_000, threads, ..RunSettings::default() };
+///     simulate(&scene, &nothing, &settings, &|_| true)
+/// };
+/// // All light reaches the sphere around its source, and the result is the same bits for any number of threads.
+/// let (one, two) = (run(1), run(2));
+/// assert_eq!(one.power.received, one.power.emitted);
+/// assert_eq!(one.digest, two.digest);
+/// # Ok::<(), lampyris::simulate::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSettings {
     /// Number of rays that leave the sources.

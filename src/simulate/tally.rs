@@ -40,6 +40,14 @@ fn nearest_integer(x: f64) -> i64 {
 }
 
 /// A sum over all rays and the sum of squares of its replicates.
+///
+/// ```
+/// use lampyris::simulate::Sum;
+/// // Two replicates of 10 and 14 units of 2²⁰ quanta: their spread makes a standard error of the sum of 4.
+/// let mut sum = Sum::default();
+/// [10u64, 14].iter().for_each(|n| sum.add_replicate(n << 20));
+/// assert_eq!((sum.total >> 20, sum.error(2)), (24, 4.0 * 1_048_576.0));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sum {
     /// Quanta.

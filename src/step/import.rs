@@ -40,6 +40,11 @@ pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
 
 /// Reads the bytes of a STEP file; `name` is for messages and the model's name.
 ///
+/// ```
+/// use lampyris::step::{Settings, read_bytes};
+/// assert!(read_bytes("letter.txt", b"Dear Sir or Madam,", &Settings::default()).is_err());
+/// ```
+///
 /// # Errors
 /// When the bytes are no Part 21 text, or when its assemblies place more than [`Settings::max_placed`].
 pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Import, Error> {

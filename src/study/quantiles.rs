@@ -10,6 +10,14 @@ const BINS: usize = 64 * 120;
 
 /// Counts of non-negative values in logarithmic bins: quantiles of any number of values in fixed memory, the same for
 /// any order of adding and merging. Maximum and the sums are exact (sums up to rounding).
+///
+/// ```
+/// use lampyris::study::Quantiles;
+/// let mut errors = Quantiles::default();
+/// (1..=1000).for_each(|k| errors.add(f64::from(k)));
+/// assert_eq!((errors.count(), errors.max(), errors.mean()), (1000, 1000.0, 500.5));
+/// assert!((errors.quantile(0.99) / 990.0 - 1.0).abs() < 0.006);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Quantiles {
     bins: Vec<u64>,

@@ -6,6 +6,13 @@ use crate::math::Vector;
 ///
 /// The generator is SplitMix64 (Steele, Lea, Flood, *Fast Splittable Pseudorandom Number Generators*, 2014) started from a
 /// mix of seed and index; enough for picking rays, not for estimating power (that is `simulate`'s).
+///
+/// ```
+/// use lampyris::study::Random;
+/// // The same seed and index give the same numbers, whatever else was drawn.
+/// assert_eq!(Random::new(7, 3).unit(), Random::new(7, 3).unit());
+/// assert!((Random::new(7, 4).direction().length() - 1.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Random {
     state: u64,

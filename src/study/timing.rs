@@ -15,6 +15,11 @@ pub struct Progress {
 }
 
 /// Seconds of repeated runs: never a single one.
+///
+/// ```
+/// let timing = lampyris::study::Timing::from_seconds(vec![3.0, 1.0, 2.0]);
+/// assert_eq!((timing.min, timing.median, timing.runs), (1.0, 2.0, 3));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {
     /// The fastest run.

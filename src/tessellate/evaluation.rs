@@ -131,6 +131,18 @@ fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64
 /// Samples how far any mesh of a model lies from its splines: the largest distance and the mean weighted by area, mm.
 ///
 /// Vertices need their `uv`. This is how [`Report::sag_mm`] is sampled, for meshes of others.
+///
+/// ```
+/// use lampyris::math::Frame;
+/// use lampyris::model::{Face, Model, Part, Shell};
+/// use lampyris::{nurbs::sweep, tessellate};
+///
+/// let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 20.0]));
+/// let model = Model::from_part(Part { shells: vec![Shell { faces: vec![tube], ..Shell::default() }], ..Part::default() });
+/// let made = tessellate::tessellate(&model, &tessellate::Settings::uniform(0.05));
+/// let [largest, mean] = tessellate::sampled_sag(&made.mesh, &model);
+/// assert!(mean < largest && largest <= 0.05);
+/// ```
 pub fn sampled_sag(mesh: &FacetMesh, model: &Model) -> [f64; 2] {
     let sampled = sample::sample_mesh(mesh, model);
     let areas = (0..mesh.facets.len()).map(|f| mesh.facet_area(f));

@@ -32,6 +32,25 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
 }
 
+/// The scene that the README shows runs as it stands there, beside a file of the name that it gives.
+#[test]
+fn the_scene_of_the_readme_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let readme = include_str!("../../README.md");
+    let scene = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    assert!(scene.lines().count() <= 15, "a newcomer reads this in a minute:\n{scene}");
+    fs::write(path.join("scene.toml"), scene).unwrap();
+    fs::copy(fixture("step/lamp_multicavity.stp"), path.join("lamp.stp")).unwrap();
+    let arguments = ["trace", "scene.toml", "--rays", "20000", "-o", "out", "--json", "--no-report"];
+    let (code, out, err) = lampyris_in(path, &arguments);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    // No light starts towards the wall: what arrives has met the mirror once at least.
+    let [emitted, received] = ["emitted", "received"].map(|key| found["power"][key].as_f64().unwrap());
+    assert!(emitted == 1.0 && received > 0.5 && received < 0.95, "{received} of {emitted}");
+}
+
 #[test]
 fn media_and_licences_are_listed() {
     let (code, out, _) = lampyris(&["media", "--json"]);

@@ -30,6 +30,22 @@ pub enum Seeds {
 }
 
 /// Every ray against every surface.
+///
+/// ```
+/// use lampyris::intersect::exact::traditional::{Seeds, Traditional};
+/// use lampyris::intersect::exact::{Exact, Settings};
+/// use lampyris::intersect::{Cost, Intersector};
+/// use lampyris::math::{Frame, Point, Ray, Vector};
+/// use lampyris::model::{Face, Model, Part, Shell};
+/// use lampyris::nurbs::sweep;
+///
+/// let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 20.0]));
+/// let model = Model::from_part(Part { shells: vec![Shell { faces: vec![tube], ..Shell::default() }], ..Part::default() });
+/// let exact = Exact::build(&model, &Settings::default());
+/// let slow = Traditional::new(&model, &exact, Seeds::Sampled(4));
+/// let hit = slow.intersect(&Ray::new(Point::new(0.0, 30.0, 5.0), -Vector::Y), &mut Cost::default()).unwrap();
+/// assert!((hit.t - 20.0).abs() < 1e-9);
+/// ```
 #[derive(Debug)]
 pub struct Traditional<'a> {
     exact: &'a Exact,

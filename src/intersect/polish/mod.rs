@@ -63,6 +63,31 @@ const NO_FACET: u32 = u32::MAX;
 const UNPROVED_SAG: f64 = 0.2;
 
 /// An intersector whose hits lie on the spline.
+///
+/// ```
+/// use lampyris::intersect::exact::{self, Exact};
+/// use lampyris::intersect::octree::{self, Octree};
+/// use lampyris::intersect::polish::Polished;
+/// use lampyris::intersect::{Cost, Intersector};
+/// use lampyris::math::{Frame, Point, Ray, Vector};
+/// use lampyris::model::{Face, Model, Part, Shell};
+/// use lampyris::{nurbs::sweep, tessellate};
+/// use std::f64::consts::PI;
+///
+/// let ball = Face::whole(sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]));
+/// let shell = Shell { faces: vec![ball], closed: true, ..Shell::default() };
+/// let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+/// let made = tessellate::tessellate(&model, &tessellate::Settings::uniform(0.1));
+/// let octree = Octree::build(&made.mesh, &octree::Settings::default());
+/// let exact = Exact::build(&model, &exact::Settings::default());
+/// let polished = Polished::new(&octree, &made.mesh, &exact);
+///
+/// // Facets are up to 0.1 mm off the ball, polished hits lie on it.
+/// let ray = Ray::new(Point::new(3.0, 4.0, 30.0), -Vector::Z);
+/// let truth = 30.0 - (100.0f64 - 25.0).sqrt();
+/// let distance = |who: &dyn Intersector| who.intersect(&ray, &mut Cost::default()).unwrap().t;
+/// assert!((distance(&octree) - truth).abs() < 0.15 && (distance(&polished) - truth).abs() < 1e-9);
+/// ```
 pub struct Polished<'a> {
     facets: &'a dyn Intersector,
     mesh: &'a FacetMesh,
