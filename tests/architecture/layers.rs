@@ -475,8 +475,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "simulate/scene",
         &[
-            "conditions",
             "lenient",
+            "conditions",
             "suggest",
             "selector",
             "locate mod medium surface material",

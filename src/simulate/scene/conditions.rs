@@ -1,6 +1,8 @@
 //! What the JSON Schema says of keys that go together, beside the types that it reads off the structs: what an editor can show before
 //! the command does. Whatever it refuses the reader of scenes refuses too; not the other way round.
 
+use super::lenient::LARGEST_COUNT;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 
 /// Adds the conditions to the schema of a scene.
@@ -78,4 +80,15 @@ fn merge(into: &mut Value, more: &Value) {
         }
         (into, more) => *into = more.clone(),
     }
+}
+
+/// What a schema says of a whole number that may be written as `1e6`.
+pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
+}
+
+/// What a schema says of two numbers, or one for both.
+pub(super) fn range_schema(generator: &mut SchemaGenerator) -> Schema {
+    let two = <[f64; 2]>::json_schema(generator);
+    json_schema!({"anyOf": [{"type": "number"}, two]})
 }

@@ -1,12 +1,11 @@
 //! Numbers as people write them: `1e6` rays, one length where two may stand.
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserializer;
 use serde::de::{Error, SeqAccess, Unexpected, Visitor};
 use std::fmt;
 
 /// Whole numbers up to this one are exact where they are written as `1e6`: just below 2⁵³.
-const LARGEST_COUNT: f64 = 9e15;
+pub(super) const LARGEST_COUNT: f64 = 9e15;
 
 /// A whole number, which may be written as `1e6`.
 pub(super) fn count<'de, D: Deserializer<'de>>(d: D) -> Result<u64, D::Error> {
@@ -21,17 +20,6 @@ pub(super) fn optional_count<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u
 /// Two numbers, or one for both.
 pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
     d.deserialize_any(Range).map(Some)
-}
-
-/// What a schema says of a whole number that may be written as `1e6`.
-pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
-}
-
-/// What a schema says of two numbers, or one for both.
-pub(super) fn range_schema(generator: &mut SchemaGenerator) -> Schema {
-    let two = <[f64; 2]>::json_schema(generator);
-    json_schema!({"anyOf": [{"type": "number"}, two]})
 }
 
 struct Count;

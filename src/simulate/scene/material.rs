@@ -2,11 +2,11 @@
 
 use super::selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use super::{Error, ErrorKind, Key, Scene};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A CAD file and where it stands.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ModelUse {
     /// STEP file, relative to the scene file.
@@ -53,7 +53,8 @@ impl ModelUse {
 }
 
 /// A placement: scale, then turn, then shift.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Placement {
     /// Where the file's origin comes to stand, mm.
@@ -73,7 +74,8 @@ impl Default for Placement {
 }
 
 /// What the faces that a rule selects are made of. All selectors that are given must hold; `*` in a name stands for anything.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Material {
     /// Name of the part.
@@ -117,7 +119,8 @@ pub struct Material {
 }
 
 /// Surface scatter.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct ScatterKey {
     /// The lobe.
@@ -133,7 +136,8 @@ pub struct ScatterKey {
 }
 
 /// The lobes of surface scatter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum LobeKind {
@@ -170,7 +174,8 @@ impl Material {
 }
 
 /// A share of power, constant or by angle of incidence.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum Reflectance {
     /// At every angle.
@@ -182,7 +187,8 @@ pub enum Reflectance {
 }
 
 /// What happens to light at a surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SurfaceKind {

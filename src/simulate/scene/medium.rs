@@ -3,17 +3,17 @@
 use super::{Key, Scene, suggest};
 use crate::optics::{self, Absorption, BulkScatter, Index, Table, catalogue};
 use crate::simulate::{Error, ErrorKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A transparent medium, with exactly one of the ways to give its index.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Medium {
     /// Name that materials use.
     pub name: String,
     /// Refractive index, the same for every wavelength.
-    #[schemars(range(min = 0.1, max = 10))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.1, max = 10)))]
     pub index: Option<f64>,
     /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`.
     pub catalogue: Option<String>,
@@ -28,15 +28,16 @@ pub struct Medium {
     /// Bulk absorption coefficient (natural logarithm), 1/mm: a number, or pairs `[nm, 1/mm]`.
     pub absorption_per_mm: Option<ByWavelength>,
     /// Scattering events per mm of way.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub scatter_per_mm: Option<f64>,
     /// Mean cosine of the scattering angle (Henyey and Greenstein's g), in (−1, 1).
-    #[schemars(range(min = -1, max = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = -1, max = 1)))]
     pub anisotropy: Option<f64>,
 }
 
 /// A value, constant or by wavelength.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum ByWavelength {
     /// At every wavelength.

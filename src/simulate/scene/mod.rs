@@ -4,6 +4,7 @@
 //! [`Scene::bind`](crate::simulate::BoundScene) then finds the faces of a model that each rule means. Lengths are mm, angles degrees
 //! where the key says `_deg`, wavelengths nm, powers watts (or lumens: the receivers answer in the unit of the sources).
 
+#[cfg(feature = "schema")]
 mod conditions;
 mod lenient;
 mod locate;
@@ -23,7 +24,6 @@ pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, Scatter
 pub use medium::{ByWavelength, Medium};
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
-use schemars::JsonSchema;
 pub use selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use serde::{Deserialize, Serialize};
 pub(crate) use source::POWERS;
@@ -56,7 +56,8 @@ use std::sync::Arc;
 /// assert!(slip.to_string().contains("scene.toml:2:1") && slip.to_string().contains("`rays`"), "{slip}");
 /// # Ok::<(), lampyris::simulate::Error>(())
 /// ```
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Scene {
     /// What the scene is, for the report.
@@ -126,7 +127,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The JSON Schema of a scene file.
+    /// The JSON Schema of a scene file; with the feature `schema`.
+    #[cfg(feature = "schema")]
     pub fn schema() -> serde_json::Value {
         let mut schema = schemars::schema_for!(Self).to_value();
         conditions::add(&mut schema);

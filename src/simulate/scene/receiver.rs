@@ -2,15 +2,15 @@
 
 use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where light is counted. Planes and spheres stand in space and are no part of a model.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Receiver {
     /// Name, used in reports and file names.
-    #[schemars(length(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(length(min = 1)))]
     pub name: String,
     /// What it is.
     pub kind: ReceiverKind,
@@ -25,10 +25,10 @@ pub struct Receiver {
     /// Sides of a plane, mm.
     pub size: Option<[f64; 2]>,
     /// Radius of a sphere, mm.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
     /// Number of cells along both sides.
-    #[schemars(inner(range(min = 1)))]
+    #[cfg_attr(feature = "schema", schemars(inner(range(min = 1))))]
     pub cells: [u32; 2],
     /// Whether light ends at a plane or sphere; otherwise it is counted and goes on.
     pub absorbs: bool,
@@ -83,7 +83,8 @@ impl Default for Receiver {
 }
 
 /// The kinds of receivers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ReceiverKind {
@@ -98,7 +99,8 @@ pub enum ReceiverKind {
 }
 
 /// What a receiver counts besides power, for sources in watts with a spectrum.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Channels {
@@ -109,7 +111,8 @@ pub enum Channels {
 }
 
 /// How directions become two angles (CIE 121, IES LM-75).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum FarFieldType {
     /// Vertical polar axis, as for headlamps: V is the elevation above the horizontal plane, H turns about the vertical.
     #[default]

@@ -2,7 +2,6 @@
 
 use super::{Key, Scene, lenient, suggest};
 use crate::simulate::{Error, ErrorKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The helium d line, at which catalogues give n_d, nm.
@@ -27,12 +26,13 @@ const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Settings of the run.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Run {
     /// Number of rays that leave the sources, such as 1_000_000 or 1e6.
     #[serde(deserialize_with = "lenient::count")]
-    #[schemars(schema_with = "lenient::count_schema")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
     pub rays: u64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -41,32 +41,32 @@ pub struct Run {
     /// What happens to a ray at a partly reflecting interface.
     pub interfaces: Interfaces,
     /// Below this share of a ray's first power an interface no longer splits the ray but chooses a side.
-    #[schemars(range(min = 0, max = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub split_floor: f64,
     /// Whether the polarisation of each ray is followed; otherwise light is unpolarised at every hit.
     pub polarisation: bool,
     /// Wavelength of sources without a spectrum, nm.
-    #[schemars(range(min = 1, max = 1e6))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1, max = 1e6)))]
     pub wavelength_nm: f64,
     /// Unit of the sources' powers, and so of all results.
     pub unit: PowerUnit,
     /// Hits after which a path ends and counts as cut off: what is caught in a clear block goes round for ever.
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub max_bounces: u32,
     /// Diagonals of a body that light goes in it by total reflection alone before it counts as caught there and is cut off, where the
     /// body absorbs nothing; `inf` for a guide that is wound up on itself.
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub caught_after: f64,
     /// Length after which a path ends and counts as cut off, mm.
     pub max_length_mm: f64,
     /// Share of a ray's first power below which its path ends and counts as cut off.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub power_floor: f64,
     /// Faces of two solids at most this far apart are one interface, mm.
-    #[schemars(range(min = 1e-9, max = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1)))]
     pub glue_mm: f64,
     /// Independent parts the run is divided into; errors are computed from how much they differ. At least 16 rays go into each.
-    #[schemars(range(min = 2, max = 65536))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 65536)))]
     pub replicates: u32,
 }
 
@@ -92,7 +92,8 @@ impl Default for Run {
 }
 
 /// Unit of power.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum PowerUnit {
     /// Watts: receivers answer in W/m² and W/sr.
     #[default]
@@ -104,7 +105,8 @@ pub enum PowerUnit {
 }
 
 /// How a source is sampled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// An Owen-scrambled Sobol net in each replicate: smaller errors, honestly estimated.
@@ -115,7 +117,8 @@ pub enum Sampling {
 }
 
 /// What happens at a partly reflecting interface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Interfaces {
     /// The ray is reflected or transmitted by chance, with its whole power.
@@ -126,12 +129,13 @@ pub enum Interfaces {
 }
 
 /// How the models are faceted and traced.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Accuracy {
     /// Smallest and largest sag of a facet, mm; one number for both.
     #[serde(deserialize_with = "lenient::range")]
-    #[schemars(schema_with = "lenient::range_schema")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::range_schema"))]
     pub tolerance_mm: Option<[f64; 2]>,
     /// Largest angle between the normals of a facet's corners, degrees.
     pub angle_deg: Option<f64>,

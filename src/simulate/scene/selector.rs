@@ -1,10 +1,10 @@
 //! Which faces of a model a rule means: by names, numbers, looks, figures and places.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// One value or a list of them.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum OneOrMany<T> {
     /// One.
@@ -24,7 +24,8 @@ impl<T> OneOrMany<T> {
 }
 
 /// A solid by its number in the part, or by its name.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum SolidKey {
     /// From 0, in the file's order; ready meshes are one more solid behind the others.
@@ -34,7 +35,8 @@ pub enum SolidKey {
 }
 
 /// Faces of a model. All selectors that are given must hold; `*` in a name stands for anything.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FaceSelector {
     /// Name of the part.
@@ -68,7 +70,8 @@ impl FaceSelector {
 }
 
 /// A colour as three numbers or as `#rrggbb`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum ColourKey {
     /// Red, green, blue in `[0, 1]`.

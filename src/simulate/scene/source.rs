@@ -2,13 +2,13 @@
 
 use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
 use crate::simulate::{Error, ErrorKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A source of light.
 ///
 /// It shines from a point, or evenly from a disc (`radius`) or rectangle (`size`) around `at`, square to `direction`.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Source {
     /// Name for the report.
@@ -16,7 +16,7 @@ pub struct Source {
     /// How the light leaves.
     pub kind: SourceKind,
     /// Power, watts (or lumens, as the run says); 1 unless said otherwise, or what the source's file says.
-    #[schemars(range(min = 1e-30, max = 1e30))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1e-30, max = 1e30)))]
     pub power: Option<f64>,
     /// IES LM-63, EULUMDAT, ray file (IES TM-25, Zemax or LightTools binary, CSV or NPZ) or Data_1, relative to the scene file.
     ///
@@ -33,15 +33,15 @@ pub struct Source {
     /// Direction of the first side of `size`, as far as `direction` lets it.
     pub x: Option<[f64; 3]>,
     /// Radius of a disc, mm.
-    #[schemars(range(min = 0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
     /// Sides of a rectangle, mm.
     pub size: Option<[f64; 2]>,
     /// Half the opening angle of a cone, degrees.
-    #[schemars(range(min = 0, max = 180))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 180)))]
     pub half_angle_deg: Option<f64>,
     /// Exponent n of a cosⁿ lobe.
-    #[schemars(range(min = 0, max = 1e6))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1e6)))]
     pub exponent: Option<f64>,
     /// Names of the instances that the source lies inside of, outermost first; without, geometry tells. `[]` for none.
     pub inside: Option<OneOrMany<String>>,
@@ -52,7 +52,7 @@ pub struct Source {
     pub polarised: Option<[f64; 3]>,
     /// Number of its rays; by its share of the power otherwise.
     #[serde(deserialize_with = "lenient::optional_count")]
-    #[schemars(schema_with = "lenient::count_schema")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
     pub rays: Option<u64>,
 }
 
@@ -80,7 +80,8 @@ impl Default for Source {
 }
 
 /// How light leaves a source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SourceKind {

@@ -2,11 +2,11 @@
 
 use super::PowerUnit;
 use crate::optics::{Spectrum, Table, Wavelengths, WhiteLed};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The spectrum of a source: `{ kind = … }` with the keys of that kind.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct SpectrumKey {
     /// Which spectrum.
@@ -24,7 +24,8 @@ pub struct SpectrumKey {
 }
 
 /// The spectra there are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SpectrumName {

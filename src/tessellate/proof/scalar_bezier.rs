@@ -86,7 +86,7 @@ impl ScalarBezier {
             }
             depths.extend([depth - 1, depth - 1]);
         }
-        // From W·(d − limit) ≤ most < 0 follows d ≤ limit + most/W, and W is at most its largest coefficient.
+        // From W·(d − limit) ≤ most ≤ 0 follows d ≤ limit + most/W, and W is at most its largest coefficient.
         Some(limit + most / heaviest)
     }
 
