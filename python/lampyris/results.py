@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from . import _html, _lampyris
 from ._types import FloatArray, Path
 from .verdicts import Assessment
@@ -207,6 +209,18 @@ class Run(Mapping[str, Receiver]):
     def paths(self) -> dict[str, Any]:
         """Recorded paths vertex by vertex: arrays ``ray``, ``branch``, ``bounce``, ``point`` (n, 3) in mm and ``power``."""
         return dict(zip(("ray", "branch", "bounce", "point", "power"), self._results.paths()))
+
+    def paths_to_pyvista(self) -> Any:
+        """Recorded paths as a ``pyvista.PolyData`` of lines, with ``power`` at their points, to be shown beside the facets."""
+        import pyvista
+
+        paths = self.paths
+        starts = np.flatnonzero(np.r_[True, np.diff(paths["ray"]) != 0] | np.r_[True, np.diff(paths["branch"].astype(int)) != 0])
+        ends = np.r_[starts[1:], len(paths["ray"])]
+        lines = [np.r_[end - start, np.arange(start, end)] for start, end in zip(starts, ends) if end - start > 1]
+        mesh = pyvista.PolyData(paths["point"], lines=np.concatenate(lines) if lines else None)
+        mesh.point_data["power"] = paths["power"]
+        return mesh
 
     def assess(
         self, regulation: str, receiver: str | None = None, *, left_hand: bool = False, as_placed: bool = False

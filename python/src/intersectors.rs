@@ -1,8 +1,9 @@
 //! Octree, BVH and spline, asked about arrays of rays.
 
-use crate::arrays::{columns, length, rows, shaped, vector};
+use crate::arrays::{columns, length, rows, vector};
 use crate::background::interruptible;
 use crate::errors::SceneError;
+use crate::hits::{HitArrays, Hits};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::names::normal_mode;
@@ -11,9 +12,8 @@ use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
-use lampyris::intersect::{Certainty, Cost, Footprint};
+use lampyris::intersect::{Cost, Footprint};
 use lampyris::{FacetMesh, Hit, Intersector, Ray};
-use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -78,102 +78,6 @@ pub(crate) struct Tracer {
     name: &'static str,
 }
 
-/// Nearest hits, an array each.
-#[pyclass(frozen, module = "lampyris")]
-pub(crate) struct Hits {
-    /// Distance along the ray, mm; infinite for a miss, (n,).
-    #[pyo3(get)]
-    t: Py<PyArrayDyn<f64>>,
-    /// Outward unit normal to shade with, NaN for a miss, (n, 3).
-    #[pyo3(get)]
-    normal: Py<PyArrayDyn<f64>>,
-    /// Outward unit normal of the flat facet, or of the spline, NaN for a miss, (n, 3).
-    #[pyo3(get)]
-    geometric_normal: Py<PyArrayDyn<f64>>,
-    /// Placed face, −1 for a miss, (n,).
-    #[pyo3(get)]
-    face: Py<PyArrayDyn<i32>>,
-    /// Facet, or patch of the spline, −1 for a miss, (n,).
-    #[pyo3(get)]
-    primitive: Py<PyArrayDyn<i32>>,
-    /// Parameters on the face's surface, NaN for a miss, (n, 2).
-    #[pyo3(get)]
-    uv: Py<PyArrayDyn<f64>>,
-    /// How sure it is: 0 a miss, 1 a facet, 2 polished, 3 certified, 4 tangent, 5 not certified, (n,).
-    #[pyo3(get)]
-    certainty: Py<PyArrayDyn<u8>>,
-    /// Nodes visited, over all rays.
-    #[pyo3(get)]
-    nodes: u64,
-    /// Facets or patches tested, over all rays.
-    #[pyo3(get)]
-    tests: u64,
-}
-
-/// Arrays of hits in the making.
-struct HitArrays {
-    t: Vec<f64>,
-    normal: Vec<f64>,
-    geometric_normal: Vec<f64>,
-    face: Vec<i32>,
-    primitive: Vec<i32>,
-    uv: Vec<f64>,
-    certainty: Vec<u8>,
-}
-
-impl HitArrays {
-    /// Pages that the system hands out as zeros when they are first written.
-    fn new(n: usize) -> Self {
-        Self {
-            t: vec![0.0; n],
-            normal: vec![0.0; 3 * n],
-            geometric_normal: vec![0.0; 3 * n],
-            face: vec![0; n],
-            primitive: vec![0; n],
-            uv: vec![0.0; 2 * n],
-            certainty: vec![0; n],
-        }
-    }
-}
-
-/// The rows of the arrays that one task writes.
-struct HitRows<'a> {
-    t: &'a mut [f64],
-    normal: &'a mut [f64],
-    geometric_normal: &'a mut [f64],
-    face: &'a mut [i32],
-    primitive: &'a mut [i32],
-    uv: &'a mut [f64],
-    certainty: &'a mut [u8],
-}
-
-impl HitRows<'_> {
-    fn write(&mut self, k: usize, hit: Option<&Hit>) {
-        let Some(hit) = hit else {
-            self.t[k] = f64::INFINITY;
-            self.normal[3 * k..3 * k + 3].fill(f64::NAN);
-            self.geometric_normal[3 * k..3 * k + 3].fill(f64::NAN);
-            self.face[k] = -1;
-            self.primitive[k] = -1;
-            self.uv[2 * k..2 * k + 2].fill(f64::NAN);
-            return;
-        };
-        self.t[k] = hit.t;
-        self.normal[3 * k..3 * k + 3].copy_from_slice(&hit.normal.to_array());
-        self.geometric_normal[3 * k..3 * k + 3].copy_from_slice(&hit.geometric_normal.to_array());
-        self.face[k] = hit.face.0 as i32;
-        self.primitive[k] = hit.primitive as i32;
-        self.uv[2 * k..2 * k + 2].copy_from_slice(&hit.uv.to_array());
-        self.certainty[k] = match hit.certainty {
-            Certainty::Facet => 1,
-            Certainty::Polished => 2,
-            Certainty::Certified => 3,
-            Certainty::Tangent => 4,
-            _ => 5,
-        };
-    }
-}
-
 /// The ray of two rows; `None` where a number is not finite or the direction has no length.
 fn ray(origin: &[f64], direction: &[f64], range: [f64; 2]) -> Option<Ray> {
     let (origin, given) = (vector(origin), vector(direction));
@@ -192,22 +96,7 @@ fn ask(
     into: &mut HitArrays,
 ) -> (Cost, Option<usize>) {
     let bad = AtomicUsize::new(usize::MAX);
-    let rows = (into.t.par_chunks_mut(CHUNK))
-        .zip(into.normal.par_chunks_mut(3 * CHUNK))
-        .zip(into.geometric_normal.par_chunks_mut(3 * CHUNK))
-        .zip(into.face.par_chunks_mut(CHUNK))
-        .zip(into.primitive.par_chunks_mut(CHUNK))
-        .zip(into.uv.par_chunks_mut(2 * CHUNK))
-        .zip(into.certainty.par_chunks_mut(CHUNK))
-        .map(|((((((t, normal), geometric_normal), face), primitive), uv), certainty)| HitRows {
-            t,
-            normal,
-            geometric_normal,
-            face,
-            primitive,
-            uv,
-            certainty,
-        });
+    let rows = into.chunks(CHUNK);
     let buffers = || (Vec::with_capacity(CHUNK), vec![None; CHUNK]);
     let cost = rows
         .enumerate()
@@ -354,17 +243,7 @@ impl Tracer {
                 &along[3 * k..3 * k + 3]
             )));
         }
-        Ok(Hits {
-            t: shaped(py, arrays.t, &[n])?.unbind(),
-            normal: shaped(py, arrays.normal, &[n, 3])?.unbind(),
-            geometric_normal: shaped(py, arrays.geometric_normal, &[n, 3])?.unbind(),
-            face: shaped(py, arrays.face, &[n])?.unbind(),
-            primitive: shaped(py, arrays.primitive, &[n])?.unbind(),
-            uv: shaped(py, arrays.uv, &[n, 2])?.unbind(),
-            certainty: shaped(py, arrays.certainty, &[n])?.unbind(),
-            nodes: cost.nodes,
-            tests: cost.tests,
-        })
+        arrays.into_hits(py, n, cost)
     }
 
     /// Seconds of the crate's own call on the same rays, which are its own already, and the number of hits: what `intersect` is measured

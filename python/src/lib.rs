@@ -6,6 +6,7 @@
 mod arrays;
 mod background;
 mod errors;
+mod hits;
 mod intersectors;
 mod mesh;
 mod model;
@@ -23,7 +24,9 @@ mod _lampyris {
     #[pymodule_export]
     use super::errors::{Defect, InputError, SceneError};
     #[pymodule_export]
-    use super::intersectors::{Hits, Tracer};
+    use super::hits::Hits;
+    #[pymodule_export]
+    use super::intersectors::Tracer;
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]

@@ -20,6 +20,11 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// Results, or the part that was done, and the exception that stopped it.
+type Traced = (Option<Results>, Option<Part>, Option<PyErr>);
+/// The same with what came of the error that was asked for, as JSON.
+type TracedUntil = (Option<Results>, Option<Part>, Option<PyErr>, String);
+
 /// What stands at the head of the bytes of a part.
 #[derive(Deserialize, Serialize)]
 struct PartHeader {
@@ -156,7 +161,7 @@ impl Prepared {
         shard: Option<[u32; 2]>,
         progress: Option<Py<PyAny>>,
         verify: bool,
-    ) -> PyResult<(Option<Results>, Option<Part>, Option<PyErr>)> {
+    ) -> PyResult<Traced> {
         if let Some(part) = resume.filter(|p| p.asked_of != self.fingerprint) {
             return Err(PyValueError::new_err(format!(
                 "resume: this part is of another run ({}); trace it with the same scene, files, settings and version",
@@ -187,12 +192,7 @@ impl Prepared {
 
     /// Traces as many rays as the error asks for; gives what was found of it as JSON too.
     #[pyo3(signature = (until, progress = None))]
-    fn trace_until(
-        &self,
-        py: Python<'_>,
-        until: &str,
-        progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Option<Results>, Option<Part>, Option<PyErr>, String)> {
+    fn trace_until(&self, py: Python<'_>, until: &str, progress: Option<Py<PyAny>>) -> PyResult<TracedUntil> {
         let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
         let mut scene = PreparedScene::clone(&self.scene);
         let work = move |monitor: &dyn pipeline::Monitor| {

@@ -20,8 +20,16 @@ pub(crate) struct Results {
     found: SceneResults,
 }
 
-/// A layer of a receiver: values, and their statistical and geometric errors where these are known.
-type Layers<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Option<Bound<'py, PyArrayDyn<f64>>>);
+/// An array of floats.
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+/// Values with their statistical errors, or the edges along both axes.
+type Pair<'py> = (Floats<'py>, Floats<'py>);
+/// Values, and their statistical and geometric errors where these are known.
+type Layers<'py> = (Floats<'py>, Floats<'py>, Option<Floats<'py>>);
+/// Whole numbers.
+type Numbers<'py, T> = Bound<'py, PyArrayDyn<T>>;
+/// Vertices of paths: rays, branches, bounces, points, powers.
+type Vertices<'py> = (Numbers<'py, u64>, Numbers<'py, u32>, Numbers<'py, u32>, Floats<'py>, Floats<'py>);
 
 impl Results {
     pub(crate) fn new(scene: Arc<PreparedScene>, found: SceneResults) -> Self {
@@ -62,12 +70,7 @@ impl Results {
     }
 
     /// The cells of a further channel of a receiver and their statistical errors.
-    fn channel<'py>(
-        &self,
-        py: Python<'py>,
-        receiver: usize,
-        channel: usize,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+    fn channel<'py>(&self, py: Python<'py>, receiver: usize, channel: usize) -> PyResult<Pair<'py>> {
         let r = self.receiver(receiver)?;
         let c = r
             .channels
@@ -78,11 +81,7 @@ impl Results {
     }
 
     /// The edges of the cells along both axes: mm of planes, degrees of angles.
-    fn edges<'py>(
-        &self,
-        py: Python<'py>,
-        receiver: usize,
-    ) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+    fn edges<'py>(&self, py: Python<'py>, receiver: usize) -> PyResult<Pair<'py>> {
         let r = self.receiver(receiver)?;
         let along = |axis: usize| -> Vec<f64> {
             let (n, low) = (r.grid[axis], r.middle[axis] - r.half[axis]);
@@ -94,17 +93,7 @@ impl Results {
     }
 
     /// Recorded paths vertex by vertex: ray, branch, bounce, point (n, 3), power.
-    #[allow(clippy::type_complexity)]
-    fn paths<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyArrayDyn<u64>>,
-        Bound<'py, PyArrayDyn<u32>>,
-        Bound<'py, PyArrayDyn<u32>>,
-        Bound<'py, PyArrayDyn<f64>>,
-        Bound<'py, PyArrayDyn<f64>>,
-    )> {
+    fn paths<'py>(&self, py: Python<'py>) -> PyResult<Vertices<'py>> {
         let paths = &self.found.results.paths;
         let n = paths.len();
         Ok((

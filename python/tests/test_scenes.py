@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -234,3 +236,39 @@ def test_studies_give_arrays() -> None:
     assert check["facets_vs_exact"]["unexplained"] == 0
     with pytest.raises(TypeError, match="takes a Model"):
         lp.study.check("lens.stp")  # type: ignore[arg-type]
+
+
+def test_other_threads_go_on_while_light_is_traced() -> None:
+    ticks: list[float] = []
+    over = threading.Event()
+
+    def tick() -> None:
+        while not over.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.005)
+
+    other = threading.Thread(target=tick)
+    other.start()
+    scene = lamp(400_000)
+    scene.trace(intersector="octree", progress=False)
+    over.set()
+    other.join()
+    # A trace that held the GIL would leave one long gap.
+    assert len(ticks) > 10 and np.diff(ticks).max() < 0.5 * (ticks[-1] - ticks[0])
+
+
+def test_paths_are_shown_in_three_dimensions() -> None:
+    pytest.importorskip("pyvista")
+    run = lamp(4000).trace(intersector="octree", progress=False)
+    lines = run.paths_to_pyvista()
+    assert lines.n_points == len(run.paths["ray"]) and lines.n_lines > 100
+
+
+def test_the_lines_of_the_readme_run(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    lp.write_demo(".")
+    text = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    code = text.split("```python\n", 1)[1].split("```", 1)[0]
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["run"]["far"].candela.max() > 0
