@@ -13,7 +13,7 @@ PACKAGE = pathlib.Path(__file__).parents[1]
 
 
 def test_the_stubs_are_those_of_the_extension() -> None:
-    line = [sys.executable, "-m", "mypy.stubtest", "lampyris._lampyris"]
+    line = [sys.executable, "-m", "mypy.stubtest", "--mypy-config-file", "pyproject.toml", "lampyris._lampyris"]
     done = subprocess.run(line, capture_output=True, text=True, cwd=PACKAGE)
     assert done.returncode == 0, done.stdout + done.stderr
 
