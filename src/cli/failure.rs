@@ -148,7 +148,9 @@ impl From<simulate::Error> for Failure {
 
 impl From<step::Error> for Failure {
     fn from(e: step::Error) -> Self {
-        pipeline::Error::from(e).into()
+        let is_limit = matches!(e.kind(), step::ErrorKind::TooManyPlaced { .. });
+        let failure: Self = pipeline::Error::from(e).into();
+        if is_limit { failure.with_help("`info`, `facet` and `check` take --max-placed COUNT") } else { failure }
     }
 }
 

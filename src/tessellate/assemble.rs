@@ -9,7 +9,7 @@ use super::fallback;
 use super::nodes::Position;
 use super::report::Repair;
 use super::settings::{FaceSelector, Settings, ToleranceField};
-use super::taken_chords::{TakenChords, doubled_chords};
+use super::taken_chords::{NO_CHORDS, TakenChords, doubled_chords};
 use super::triangulator::guarded;
 use crate::math::{FaceId, Point};
 use crate::model::{EdgeId, Face, Model, Part, PartId};
@@ -110,7 +110,7 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
     let (divisions, shared, mut meshes) = loop {
         let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
-            let (surface, taken) = (surface.as_ref()?, TakenChords::none());
+            let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
             mesh_face(&FaceInput { part, face, surface, divisions: &divisions, shared: &shared, settings, taken })
         };
         let meshes: Vec<Option<FaceMesh>> = match before.take() {

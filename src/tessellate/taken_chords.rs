@@ -7,22 +7,17 @@
 use super::face_mesh::FaceMesh;
 use super::nodes::Position;
 use crate::model::Part;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::ops::Range;
-use std::sync::LazyLock;
 
 /// Chords between shared positions that a face must not have inside.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TakenChords(FxHashSet<[u32; 2]>);
 
-static NONE: LazyLock<TakenChords> = LazyLock::new(TakenChords::default);
+/// Nothing is taken.
+pub(super) static NO_CHORDS: TakenChords = TakenChords(FxHashSet::with_hasher(FxBuildHasher));
 
 impl TakenChords {
-    /// Nothing is taken.
-    pub(super) fn none() -> &'static Self {
-        &NONE
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

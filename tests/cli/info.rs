@@ -101,6 +101,16 @@ fn a_truncated_file_is_read_as_far_as_it_goes_and_the_rest_is_named() {
 }
 
 #[test]
+fn what_assemblies_place_has_a_limit_that_an_option_raises() {
+    let lamp = step("lamp_multicavity.stp");
+    for command in ["info", "facet", "check"] {
+        let (code, _, err) = lampyris(&[command, &lamp, "--max-placed", "2"]);
+        assert!(code == 3 && err.contains("beyond 2") && err.contains("--max-placed"), "{command}: {code} {err}");
+    }
+    assert_eq!(lampyris(&["info", &lamp, "--max-placed", "1000"]).0, 0);
+}
+
+#[test]
 fn the_schema_of_a_scene_is_a_json_schema() {
     let (code, out, _) = lampyris(&["schema"]);
     let schema: Value = serde_json::from_str(&out).unwrap();

@@ -327,6 +327,22 @@ fn rectangles_of_parameters_are_in_the_units_of_their_context() {
     }
 }
 
+/// A sphere whose points are all at the origin, and whose radius is where doubles are a millimetre apart.
+#[test]
+fn a_face_that_reaches_beyond_all_rounding_is_refused_by_name() {
+    let sphere = |radius: &str| {
+        points(&[(10, [0.0; 3])])
+            + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n"
+            + &format!("#39=SPHERICAL_SURFACE('',#30,{radius});\n")
+            + "#40=VERTEX_POINT('',#10);\n#50=VERTEX_LOOP('',#40);\n#51=FACE_BOUND('',#50,.T.);\n#900=ADVANCED_FACE('',(#51),#39,.T.);\n"
+    };
+    close(area(&import(&sphere("5."))), 100.0 * PI, 1e-5);
+    let far = import(&sphere("1.E16"));
+    assert_eq!((far.report.faces.converted, far.report.faces.refused), (0, 1));
+    let reason = &far.report.refusals[0].reason;
+    assert!(reason.contains("#39 SPHERICAL_SURFACE") && reason.contains("1e12 mm"), "{reason}");
+}
+
 /// A solid whose shell is written inside out is turned, and a void is left as it is.
 #[test]
 fn the_shell_of_a_solid_that_is_inside_out_is_turned() {

@@ -2,6 +2,7 @@
 
 use super::help_text;
 use super::options::{AccuracyOption, MeshingOptions, TracingOptions};
+use crate::step;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -52,6 +53,8 @@ pub(crate) enum Command {
         faces: bool,
         #[command(flatten)]
         limits: RefusalLimit,
+        #[command(flatten)]
+        placed: PlacedLimit,
     },
     /// Tessellate a STEP file into quad facets
     #[command(after_help = help_text::FACET, after_long_help = help_text::FACET_LONG)]
@@ -181,6 +184,8 @@ pub(crate) struct FacetCommand {
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) limits: RefusalLimit,
+    #[command(flatten)]
+    pub(crate) placed: PlacedLimit,
 }
 
 /// What `check` takes.
@@ -210,6 +215,8 @@ pub(crate) struct CheckCommand {
     pub(crate) disagreements: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) limits: RefusalLimit,
+    #[command(flatten)]
+    pub(crate) placed: PlacedLimit,
 }
 
 /// Options of `trace` alone.
@@ -271,6 +278,27 @@ pub(crate) struct PageOption {
 impl PageOption {
     pub(crate) fn is_wanted(self) -> bool {
         !self.no_report
+    }
+}
+
+/// How much the assemblies of a STEP file may place.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub(crate) struct PlacedLimit {
+    /// Most products and shapes that the assemblies of a STEP file may place; beyond it the file is refused
+    #[arg(long, value_name = "COUNT", default_value_t = step::Settings::default().max_placed)]
+    max_placed: u64,
+}
+
+impl PlacedLimit {
+    /// How a file is read within it.
+    pub(crate) fn settings(self) -> step::Settings {
+        step::Settings { max_placed: self.max_placed, ..step::Settings::default() }
+    }
+}
+
+impl Default for PlacedLimit {
+    fn default() -> Self {
+        Self { max_placed: step::Settings::default().max_placed }
     }
 }
 

@@ -2,6 +2,7 @@
 //! thread and on all; answers that differ are judged with twice the digits.
 
 use super::demo;
+use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::octree_shape::OctreeShape;
@@ -49,7 +50,7 @@ pub(crate) fn run(
 ) -> Result<BvhBenchmark, Failure> {
     let loaded = match file {
         None => demo::lamp()?.1,
-        Some(path) => match input_files::either(path, console)? {
+        Some(path) => match input_files::either(path, PlacedLimit::default(), console)? {
             input_files::Input::Step(loaded) | input_files::Input::Scene(_, loaded) => loaded,
         },
     };

@@ -45,7 +45,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     }
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
-    let input = input_files::either(&command.file, console)?;
+    let input = input_files::either(&command.file, command.placed, console)?;
     let (scene, loaded) = match &input {
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),

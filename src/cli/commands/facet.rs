@@ -27,7 +27,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         make_folder(&folder_of(path))?;
     }
     threads::set_threads(command.threads)?;
-    let loaded = input_files::model_file(&command.file, console)?;
+    let loaded = input_files::model_file(&command.file, command.placed, console)?;
     let monitor = TerminalMonitor::new(console);
     let (meshing, reached) = settings_for_accurate_facets(
         command.precision.accuracy,

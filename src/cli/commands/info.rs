@@ -1,14 +1,14 @@
 //! `lampyris info`: what a STEP file holds and what could not be read.
 
 use super::faces::print_faces;
-use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::arguments::command::{PlacedLimit, RefusalLimit};
 use crate::cli::console::{Console, print};
 use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::report::{bytes, figures, grouped, seconds};
-use crate::step::{self, ImportReport};
+use crate::step::ImportReport;
 use std::path::Path;
 
 /// Names and notes shown without -v: what fits a screen.
@@ -19,9 +19,10 @@ pub(crate) fn run(
     path: &Path,
     faces: bool,
     limits: RefusalLimit,
+    placed: PlacedLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
-    let import = input_files::step_file(path, &step::Settings::default(), console)?;
+    let import = input_files::step_file(path, &placed.settings(), console)?;
     let report = import.report;
     if faces {
         print_faces(&import.model, console)?;

@@ -1,5 +1,6 @@
 //! `lampyris init`: a commented scene for a STEP file, ready to be traced and to be changed.
 
+use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -26,7 +27,7 @@ const RECEIVER_WIDTHS: f64 = 4.0;
 
 /// Writes the scene; a file that is there is never written over.
 pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
-    let loaded = input_files::model_file(file, console)?;
+    let loaded = input_files::model_file(file, PlacedLimit::default(), console)?;
     let scene_file = match output {
         Some(path) => path.to_path_buf(),
         None => PathBuf::from(last_component(file)).with_extension("toml"),

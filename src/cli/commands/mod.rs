@@ -26,7 +26,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
         Command::Demo { output, page, meshing, tracing } => {
             demo::run(&output, meshing.settings(), tracing.settings(), page, console)
         }
-        Command::Info { file, faces, limits } => info::run(&file, faces, limits, console),
+        Command::Info { file, faces, limits, placed } => info::run(&file, faces, limits, placed, console),
         Command::Facet(command) => facet::run(&command, console),
         Command::Trace { scene, output, meshing, tracing, extra } => {
             let command = trace::TraceCommand {

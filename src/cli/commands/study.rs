@@ -1,7 +1,7 @@
 //! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
 use super::demo;
-use crate::cli::arguments::command::{PageOption, StudyKind};
+use crate::cli::arguments::command::{PageOption, PlacedLimit, StudyKind};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{octree_shape, terminal_tables};
@@ -169,7 +169,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
         return Ok((Some(scene), loaded, "three-cavity lamp".into()));
     };
     let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    Ok(match input_files::either(path, console)? {
+    Ok(match input_files::either(path, PlacedLimit::default(), console)? {
         Input::Step(loaded) => (None, loaded, name),
         Input::Scene(scene, loaded) => (Some(*scene), loaded, name),
     })

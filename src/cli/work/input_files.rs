@@ -1,6 +1,7 @@
 //! STEP files and scenes from disk.
 
 use super::terminal_monitor::TerminalMonitor;
+use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::pipeline::{LoadedModel, read_scene};
@@ -26,9 +27,9 @@ pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Consol
 }
 
 /// A STEP file as a model.
-pub(crate) fn model_file(path: &Path, console: &Console) -> Result<LoadedModel, Failure> {
+pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) -> Result<LoadedModel, Failure> {
     let start = Instant::now();
-    let settings = step::Settings { measure_box: false, ..step::Settings::default() };
+    let settings = step::Settings { measure_box: false, ..placed.settings() };
     let Import { model, report } = step_file(path, &settings, console)?;
     if model.placed_face_count() == 0 {
         let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
@@ -37,13 +38,13 @@ pub(crate) fn model_file(path: &Path, console: &Console) -> Result<LoadedModel, 
     Ok(LoadedModel { model, reports: vec![report], seconds: start.elapsed().as_secs_f64() })
 }
 
-/// A scene when the name ends in `.toml`, a STEP file otherwise.
-pub(crate) fn either(path: &Path, console: &Console) -> Result<Input, Failure> {
+/// A scene when the name ends in `.toml`, a STEP file within a limit otherwise.
+pub(crate) fn either(path: &Path, placed: PlacedLimit, console: &Console) -> Result<Input, Failure> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let (scene, loaded) = read_scene(path, &TerminalMonitor::new(console))?;
         return Ok(Input::Scene(Box::new(scene), loaded));
     }
-    Ok(Input::Step(model_file(path, console)?))
+    Ok(Input::Step(model_file(path, placed, console)?))
 }
 
 /// Says what was refused and whether that is more than allowed.

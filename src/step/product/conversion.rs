@@ -13,7 +13,7 @@ use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::units::Units;
-use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::geometry::{FARTHEST_MM, Geometry, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
@@ -286,6 +286,14 @@ fn asks_for_edges(file: &File<'_>, surface: u64) -> bool {
     file.entity(surface).is_some_and(|e| !e.keywords().any(known))
 }
 
+/// The refusal of a face whose surface reaches farther than numbers tell places apart.
+fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
+    let surface = geometry.file.entity_name(plan.surface);
+    let reason =
+        format!("#{} {surface}: reaches beyond {FARTHEST_MM:e} mm, where rounding eats shapes", plan.surface);
+    Refusal { id, entity: geometry.file.entity_name(id), reason }
+}
+
 fn convert_face(
     geometry: &Geometry<'_, '_>,
     id: u64,
@@ -313,6 +321,11 @@ fn convert_face(
     let points: Vec<Point> = curves.values().take(asked).flat_map(along).collect();
     let chart = geometry.chart(plan.surface, FaceExtent::from_bounds(bounds, &points), 0).map_err(|r| blame(&r))?;
 
+    // Points are in reach, but a radius or a sweep may not be.
+    if !(chart.size <= FARTHEST_MM) {
+        return Err(beyond_rounding(geometry, id, plan));
+    }
+
     // Points are one within what the file states, less on small faces, more where its edges leave gaps.
     let stated = geometry.units.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
     let accuracy = stated.min(ACCURACY_SHARE * bounds.diagonal().max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0]);
@@ -330,6 +343,10 @@ fn convert_face(
         let surface = geometry.file.entity_name(plan.surface);
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
     })?;
+    let reach = built.surface.bounds();
+    if !(reach.min.abs().max(reach.max.abs()).max_element() <= FARTHEST_MM) {
+        return Err(beyond_rounding(geometry, id, plan));
+    }
     built.repairs.extend(repairs.into_iter().map(String::from));
     Ok(built)
 }

@@ -22,7 +22,7 @@ use super::border::polygons::{self, ImprintedPoints};
 use super::face::{FaceInput, mesh_with_imprint};
 use super::imprint::{CarrierFacets, Imprint};
 use super::settings::Settings;
-use super::taken_chords::TakenChords;
+use super::taken_chords::NO_CHORDS;
 use crate::math::Point;
 use crate::model::{Face, Model};
 use detection::{CARRIER_SHARE, Contact};
@@ -109,7 +109,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
                     divisions: &divisions,
                     shared: &shared,
                     settings: self.settings,
-                    taken: TakenChords::none(),
+                    taken: &NO_CHORDS,
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
@@ -126,7 +126,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             divisions: &mesh.divisions,
             shared: &mesh.shared,
             settings: self.settings,
-            taken: TakenChords::none(),
+            taken: &NO_CHORDS,
         }
     }
 
