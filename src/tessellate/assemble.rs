@@ -24,9 +24,9 @@ pub(super) struct PartMesh {
 
 /// Times that borders are sampled more densely where facets beside them are not proved, and that doubled chords are looked for.
 const MAX_ROUNDS: u32 = 3;
-/// The same where borders cross or leave nothing: the sixth holds chords to 1/4096 of the tolerance. Two rims 2 µm apart cross before the
-/// fourth at 0.2 mm.
-const MAX_ROUNDS_OF_REPAIRED: u32 = 6;
+/// The same where borders cross or leave nothing: the fourth holds chords to 1/256 of the tolerance. Two rims 2 µm apart cross before it at
+/// 0.2 mm; a border that crosses itself in the file gains nothing, and with two more rounds such a face trebled the facets of a turbine.
+const MAX_ROUNDS_OF_REPAIRED: u32 = 4;
 /// Samples of an edge up to which its chords may be why its face comes to nothing.
 const FEW_CHORDS: usize = 500;
 
