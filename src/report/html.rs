@@ -3,13 +3,17 @@
 use super::document::{Block, Report, Section};
 use super::provenance::Provenance;
 use super::table::Table;
-use super::{plotly, raster, static_chart};
+use super::view::View;
+use super::{plotly, static_chart};
 use crate::formats::{base64, printable, printable_json};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sha2::{Digest, Sha256};
 
 /// The page's own script.
 const PAGE_SCRIPT: &str = include_str!("page.js");
+
+/// Gives the picture of a view as the bytes of a PNG file, or why it could not be drawn.
+pub(super) type PngOf<'a> = &'a dyn Fn(&View) -> Result<Vec<u8>, String>;
 
 /// Stands for the scripts until the rest of the page is made; no text of a report can hold it, for its marks are escaped there.
 const SCRIPTS_GO_HERE: &str = "<!--scripts-->";
@@ -27,7 +31,7 @@ fn policy(scripts: &[&str]) -> String {
 }
 
 /// The page, complete: styles, scripts, data, static twins.
-pub(super) fn page(report: &Report) -> String {
+pub(super) fn page(report: &Report, png: PngOf) -> String {
     let interactive =
         report.sections.iter().flat_map(|s| &s.blocks).any(|b| !matches!(b, Block::Text(_) | Block::Table(_)));
     let library = if interactive { plotly::script() } else { String::new() };
@@ -55,7 +59,7 @@ pub(super) fn page(report: &Report) -> String {
                 main {
                     h1 { (report.title) }
                     p #answer.answer tabindex="-1" { (emphasised(&report.answer)) }
-                    @for section in &report.sections { (part(section)) }
+                    @for section in &report.sections { (part(section, png)) }
                     (origin(&report.provenance))
                 }
                 (PreEscaped(SCRIPTS_GO_HERE))
@@ -68,7 +72,7 @@ pub(super) fn page(report: &Report) -> String {
     page.replacen(SCRIPTS_GO_HERE, &scripts, 1)
 }
 
-fn part(section: &Section) -> Markup {
+fn part(section: &Section, png: PngOf) -> Markup {
     let mut rows: Vec<Vec<&Block>> = Vec::new();
     // Neighbouring pictures share a row, at most two.
     for block in &section.blocks {
@@ -82,14 +86,14 @@ fn part(section: &Section) -> Markup {
         section id=(anchor(&section.title)) {
             h2 { (section.title) }
             @for row in rows {
-                @if row.len() == 2 { div.pair { @for block in row { (content(block)) } } }
-                @else { @for block in row { (content(block)) } }
+                @if row.len() == 2 { div.pair { @for block in row { (content(block, png)) } } }
+                @else { @for block in row { (content(block, png)) } }
             }
         }
     }
 }
 
-fn content(block: &Block) -> Markup {
+fn content(block: &Block, png: PngOf) -> Markup {
     match block {
         Block::Text(text) => html! { p { (emphasised(text)) } },
         Block::Table(table) => table_markup(table),
@@ -98,7 +102,7 @@ fn content(block: &Block) -> Markup {
             figure(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
         }
         Block::View(view) => {
-            let drawing = match raster::render(view).to_png() {
+            let drawing = match png(view) {
                 Ok(png) => html! { img src={ "data:image/png;base64," (base64(&png)) } alt=(view.title); },
                 Err(e) => html! { p { "This view could not be drawn: " (e) } },
             };

@@ -1,14 +1,16 @@
 //! A report as a folder: the page, a static picture of every figure, a CSV of every table.
 
 use super::document::{Block, Report};
+use super::view::View;
 use super::{chart_png, html, raster, static_chart};
 use crate::formats::{Error, ErrorKind, printable, write_atomic, write_png};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 impl Report {
     /// The page as one self-contained HTML text.
     pub fn to_html(&self) -> String {
-        html::page(self)
+        html::page(self, &drawn)
     }
 
     /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; gives the files written,
@@ -20,7 +22,15 @@ impl Report {
         let make = |path: &Path| std::fs::create_dir_all(path).map_err(|e| Error::new(path, ErrorKind::Write(e)));
         make(folder)?;
         let page = folder.join("report.html");
-        write_atomic(&page, |w| w.write_all(self.to_html().as_bytes()))?;
+        // The page and the folder have the same pictures: drawn once.
+        let views = self.sections.iter().flat_map(|s| &s.blocks).filter_map(|block| match block {
+            Block::View(view) => Some((view.name.as_str(), drawn(view))),
+            _ => None,
+        });
+        let pictures: HashMap<&str, Result<Vec<u8>, String>> = views.collect();
+        let html =
+            html::page(self, &|view| pictures.get(view.name.as_str()).cloned().unwrap_or_else(|| drawn(view)));
+        write_atomic(&page, |w| w.write_all(html.as_bytes()))?;
         let mut written = vec![page];
         for block in self.sections.iter().flat_map(|s| &s.blocks) {
             let inside = |kind: &str, file: String| -> Result<PathBuf, Error> {
@@ -42,7 +52,10 @@ impl Report {
                 }
                 Block::View(view) => {
                     let path = inside("figures", format!("{}.png", view.name))?;
-                    write_png(&path, &raster::render(view))?;
+                    match pictures.get(view.name.as_str()) {
+                        Some(Ok(png)) => write_atomic(&path, |w| w.write_all(png))?,
+                        _ => write_png(&path, &raster::render(view))?,
+                    }
                     written.push(path);
                 }
                 Block::Table(table) => {
@@ -54,4 +67,9 @@ impl Report {
         }
         Ok(written)
     }
+}
+
+/// The picture of a view as the bytes of a PNG file, or why it could not be drawn.
+fn drawn(view: &View) -> Result<Vec<u8>, String> {
+    raster::render(view).to_png().map_err(|e| e.to_string())
 }

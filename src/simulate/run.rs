@@ -163,7 +163,9 @@ fn thread_count(settings: &RunSettings) -> usize {
 /// are theirs.
 pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings, rays: &[u64]) -> Results {
     let start = Instant::now();
-    let mut context = Context::new(bound, intersector, settings);
+    // Of each ray alone a wave has one place.
+    let single = RunSettings { batch: 1, ..settings.clone() };
+    let mut context = Context::new(bound, intersector, &single);
     context.plan.record_all();
     let kind = kernel_kind(bound, settings);
     let mut partial = PartialRun::empty(bound, context.plan.replicates);

@@ -42,6 +42,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "cli/commands",
         &[
+            "cache",
             "check",
             "demo",
             "bvh_benchmark",
@@ -65,6 +66,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "mod",
             "threads",
+            "cache_folder",
+            "usage",
             "path_file",
             "terminal_monitor",
             "input_files",
@@ -87,6 +90,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "settings",
             "monitor",
             "loading",
+            "cache",
             "facets",
             "intersectors",
             "ray_sampler",
@@ -243,6 +247,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "flatten",
             "frame",
             "tree",
+            "stored",
             "ray",
             "quad_edges",
             "facet_pair",
@@ -454,6 +459,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "mod",
             "payload",
+            "receiver_index",
             "context",
             "path",
             "tolerances",

@@ -20,8 +20,16 @@ impl RaySampler {
     /// For the numbers of a stream; the first of its rays has the number `first` in the run.
     pub(crate) fn new(emitter: &Emitter, stream: Stream, first: u64) -> Self {
         let stream = stream.with_pairs(emitter.needed_pairs());
-        let packed = stream.sampling() == Sampling::Sobol && stream.needs_numbers() && emitter.fits_packets();
+        let packed = stream.sampling() == Sampling::Sobol
+            && stream.needs_numbers()
+            && emitter.fits_packets()
+            && !stream.is_short();
         Self { stream, packet: packed.then(RayPacket::boxed), first }
+    }
+
+    /// The memory of its numbers, for the next source.
+    pub(crate) fn into_stream(self) -> Stream {
+        self.stream
     }
 
     /// Puts the ray to start after `started` others into `ray`. By reference: a whole ray that is written in pieces and copied at
@@ -55,5 +63,36 @@ impl RaySampler {
     #[inline(always)]
     fn index(&self, in_stream: u32) -> RayIndex {
         RayIndex { in_run: self.first + u64::from(in_stream), in_stream }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Scene;
+    use std::path::Path;
+
+    /// However few rays a source has in a replicate, each is the ray of its number, made by itself, and each starts once.
+    #[test]
+    fn few_rays_are_those_of_many() {
+        let sources = ["kind = 'point'", "kind = 'collimated'\nradius = 4", "kind = 'lambertian'\nsize = [2, 3]"];
+        for source in sources {
+            let scene = Scene::parse(&format!("[[source]]\n{source}\n"), "test.toml", Path::new(".")).unwrap();
+            let bound = scene.bind(&crate::model::Model::default()).unwrap();
+            let emitter = &bound.emitters[0];
+            let sampler = |rays: u64| RaySampler::new(emitter, Stream::new(7, Sampling::Sobol, 3, 0, rays), 100);
+            for rays in [1, 5, 8, 9, 70] {
+                let mut seen = vec![false; rays as usize];
+                let mut queue = sampler(rays);
+                for started in 0..rays as u32 {
+                    let [mut ray, mut alone] = [Ray::new(crate::math::Point::ZERO, crate::math::Vector::Z); 2];
+                    let (index, _) = queue.next_ray(emitter, started, &mut ray);
+                    sampler(rays).single_ray(emitter, index.in_stream, &mut alone);
+                    assert_eq!(ray, alone, "{source}: {started} of {rays}");
+                    assert!(!std::mem::replace(&mut seen[index.in_stream as usize], true));
+                }
+                assert!(seen.iter().all(|s| *s));
+            }
+        }
     }
 }

@@ -14,12 +14,21 @@ const CELL_BITS: u32 = 6;
 /// Rays in a chunk: one for each cell.
 const CHUNK: usize = 1 << (2 * CELL_BITS);
 
+/// Rays of a source in a replicate up to which each is made by itself: eight take as long as a packet of 64.
+const SHORT: u32 = 8;
+
 /// The lowest bits of a number with a gap after each.
 #[inline(always)]
 fn interleaved(x: u32) -> u32 {
     let x = (x | x << 4) & 0x0f0f;
     let x = (x | x << 2) & 0x3333;
     (x | x << 1) & 0x5555
+}
+
+/// The cell of a pair of numbers along a Z-curve.
+#[inline(always)]
+fn z_order_cell(x: u32, y: u32) -> u16 {
+    (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16
 }
 
 /// Width of the steps that a 32-bit number counts, 2⁻³².
@@ -47,6 +56,8 @@ pub(crate) struct Stream {
     order: Vec<u32>,
     pairs: [bool; 3],
     numbers: [Vec<u32>; random::DIMENSIONS],
+    /// The ray of the first number, modulo those of a chunk.
+    first_number: u32,
 }
 
 /// A ray of a source.
@@ -65,7 +76,27 @@ impl Stream {
         let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
         let rays = rays.min(u64::from(u32::MAX)) as u32;
         let numbers = Default::default();
-        Self { seed, sampling, scrambles, lattice: [0, 1], rays, order: Vec::new(), pairs: [true; 3], numbers }
+        Self {
+            seed,
+            sampling,
+            scrambles,
+            lattice: [0, 1],
+            rays,
+            order: Vec::new(),
+            pairs: [true; 3],
+            numbers,
+            first_number: 0,
+        }
+    }
+
+    /// The same stream in the memory of one that is no longer needed.
+    pub(crate) fn in_place_of(self, old: Self) -> Self {
+        Self { order: old.order, numbers: old.numbers, ..self }
+    }
+
+    /// Whether so few rays are drawn that making them singly costs less than a packet.
+    pub(super) fn is_short(&self) -> bool {
+        self.rays <= SHORT
     }
 
     /// The same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
@@ -125,32 +156,36 @@ impl Stream {
     pub(super) fn prepare_single(&mut self, index: u32) {
         if self.sampling == Sampling::Sobol {
             for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
-                self.numbers[d].resize(CHUNK, 0);
-                self.numbers[d][index as usize % CHUNK] = random::scrambled(index, d, self.scrambles[d]);
+                self.numbers[d] = vec![random::scrambled(index, d, self.scrambles[d])];
             }
         }
+        self.first_number = index;
     }
 
     /// Makes the numbers of a chunk and the order in which its rays start. Loops, not closures, which would be compiled without the
     /// caller's instruction set.
     #[inline(always)]
     fn fill_chunk(&mut self, first: u32) {
+        // What a source with few rays does not ask for is not made.
+        let n = CHUNK.min((self.rays - first) as usize);
+        if self.is_short() {
+            return self.fill_short(first, n);
+        }
         for d in 0..random::DIMENSIONS {
             if !self.pairs[d / 2] {
                 continue;
             }
-            self.numbers[d].resize(CHUNK, 0);
+            self.numbers[d].resize(n.next_multiple_of(random::BLOCK), 0);
             for (block, numbers) in self.numbers[d].chunks_mut(random::BLOCK).enumerate() {
                 random::scrambled_block(first + (block * random::BLOCK) as u32, d, self.scrambles[d], numbers);
             }
         }
-        let n = CHUNK.min((self.rays - first) as usize);
-        let along = if self.pairs[1] { 2 } else { 0 };
+        let along = self.sorted_dimension();
         let mut cells = [0u16; CHUNK];
         for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
             // Morton order of the directions (or places): rays that start one after another go through the same part of the scene, whose
             // nodes are still in the cache.
-            *cell = (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16;
+            *cell = z_order_cell(*x, *y);
         }
         // Counting sort: most cells hold one ray of a chunk.
         let mut ends = [0u16; CHUNK];
@@ -162,13 +197,36 @@ impl Stream {
             sum += *end;
             *end = sum;
         }
-        self.order.resize(CHUNK, 0);
+        self.order.resize(n, 0);
         // From the back, so that rays of one cell keep their order: the sort is stable and its result the same everywhere.
         for (k, cell) in cells[..n].iter().enumerate().rev() {
             let end = &mut ends[usize::from(*cell) % CHUNK];
             *end -= 1;
             self.order[usize::from(*end)] = k as u32;
         }
+    }
+
+    /// The same for a few rays.
+    #[inline(always)]
+    fn fill_short(&mut self, first: u32, n: usize) {
+        for d in 0..random::DIMENSIONS {
+            if self.pairs[d / 2] {
+                self.numbers[d].clear();
+                self.numbers[d].extend((0..n as u32).map(|k| random::scrambled(first + k, d, self.scrambles[d])));
+            }
+        }
+        let along = self.sorted_dimension();
+        let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
+        self.order.clear();
+        self.order.extend(0..n as u32);
+        // Stable, as the counting sort of a chunk is.
+        self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
+    }
+
+    /// The first of the two dimensions along which rays are put in order: those of the direction, or of the place where all have one.
+    #[inline(always)]
+    fn sorted_dimension(&self) -> usize {
+        if self.pairs[1] { 2 } else { 0 }
     }
 
     /// The numbers of a pair for the rays that start from the `started`-th on; of no meaning beyond the last of them, and for a pair
@@ -197,7 +255,7 @@ impl Stream {
         match self.sampling {
             Sampling::Random => self.random(index, pair),
             Sampling::Sobol => {
-                let k = index.in_stream as usize % CHUNK;
+                let k = (index.in_stream - self.first_number) as usize % CHUNK;
                 let number = |d: usize| unit(self.numbers[d][k]);
                 [number(2 * pair as usize), number(2 * pair as usize + 1)]
             }

@@ -1,6 +1,7 @@
 //! What all replicates of a run share.
 
 use super::payload::RayPayload;
+use super::receiver_index::ReceiverIndex;
 use crate::intersect::Intersector;
 use crate::math::Aabb;
 use crate::simulate::bind::BoundScene;
@@ -34,11 +35,11 @@ pub(crate) struct Context<'a> {
     /// Takes the vertices of all paths as they come; without, a sample is kept.
     pub(crate) paths: Option<PathSink<'a>>,
     /// Receivers that stand among the faces and end light.
-    pub(super) blocking: Vec<u32>,
+    pub(super) blocking: ReceiverIndex,
     /// Receivers that end light and do not meet `region`.
-    pub(super) outside: Vec<u32>,
+    pub(super) outside: ReceiverIndex,
     /// Receivers that count light passing through.
-    pub(super) passing: Vec<u32>,
+    pub(super) passing: ReceiverIndex,
     /// Receivers of the far field.
     pub(super) far: Vec<u32>,
     /// A box around all faces and sources; only how fast a path is followed depends on it.
@@ -55,9 +56,8 @@ impl<'a> Context<'a> {
         settings: &'a RunSettings,
     ) -> Self {
         // Receivers are sorted once by how a segment must ask them, so that the hot loop walks four short lists and tests no kind.
-        let select = |wanted: &dyn Fn(&Receiver) -> bool| -> Vec<u32> {
-            (0..bound.receivers.len()).filter(|&i| wanted(&bound.receivers[i])).map(|i| i as u32).collect()
-        };
+        let all = &bound.receivers[..];
+        let far = |&i: &usize| matches!(all[i].shape, Shape::FarField { .. });
         let region = bound.region;
         // A far field has no place, and faces that receive are found by the hit itself: only planes and spheres cut segments.
         let stands = |r: &Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
@@ -68,10 +68,10 @@ impl<'a> Context<'a> {
             plan: Plan::new(bound, settings),
             paths: None,
             // Most receivers stand around the scene: no segment from face to face can reach those, see `clip_outside`.
-            blocking: select(&|r| r.absorbs && stands(r) && r.meets(&region)),
-            outside: select(&|r| r.absorbs && stands(r) && !r.meets(&region)),
-            passing: select(&|r| !r.absorbs && stands(r)),
-            far: select(&|r| matches!(r.shape, Shape::FarField { .. })),
+            blocking: ReceiverIndex::new(all, |r| r.absorbs && stands(r) && r.meets(&region)),
+            outside: ReceiverIndex::new(all, |r| r.absorbs && stands(r) && !r.meets(&region)),
+            passing: ReceiverIndex::new(all, |r| !r.absorbs && stands(r)),
+            far: (0..all.len()).filter(far).map(|i| i as u32).collect(),
             region,
             starting_media: Vec::new(),
         }

@@ -61,6 +61,10 @@ impl SourceQueue {
         let rays = self.range[1] - self.range[0];
         let stream = Stream::new(s.seed, s.sampling, self.replicate, source as u32, rays)
             .with_lattice(context.plan.lattice(self.replicate));
+        let stream = match self.sampler.take() {
+            Some(sampler) => stream.in_place_of(sampler.into_stream()),
+            None => stream,
+        };
         self.sampler = Some(RaySampler::new(emitter, stream, self.range[0]));
     }
 

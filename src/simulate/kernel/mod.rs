@@ -16,6 +16,7 @@ mod interaction;
 mod media_at;
 mod path;
 pub(crate) mod payload;
+mod receiver_index;
 mod receivers;
 mod simd_dispatch;
 mod start;

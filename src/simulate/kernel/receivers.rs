@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::path::{NO_RECEIVER, Path, SCATTERS};
 use super::payload::RayPayload;
+use super::receiver_index::Candidates;
 use super::tolerances::{LONGEST_SEGMENT, rounding};
 use super::tracer::Tracer;
 use crate::intersect::Hit;
@@ -28,7 +29,8 @@ pub(super) fn clip_segment<C: RayPayload>(context: &Context<'_>, path: &mut Path
         ray.t_max = scatter.free_path(path.key(context).unit(Purpose::Bulk));
         path.receiver = SCATTERS;
     }
-    for &r in &context.blocking {
+    let mut room = Candidates::new();
+    for &r in context.blocking.candidates(ray, ray.t_max, &mut room) {
         if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, ray.t_max) {
             // One that lies in a face is met before the face.
             ray.t_max = (t - in_front(ray, t)).max(ray.t_min);
@@ -60,8 +62,9 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
         end = h.t;
     }
     let mut first = None;
+    let mut room = Candidates::new();
     // `end` shrinks with every receiver that is met, so that the nearest one is left.
-    for &r in &context.outside {
+    for &r in context.outside.candidates(ray, end, &mut room) {
         if let Some(t) = context.bound.receivers[r as usize].crossing(ray, ray.t_min, end) {
             (end, first) = (t, Some(r));
         }
@@ -79,7 +82,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
         let start = ray.t_min + in_front(ray, 0.0);
         let end = end + in_front(ray, end.min(LONGEST_SEGMENT));
-        for &r in &context.passing {
+        let mut room = Candidates::new();
+        for &r in context.passing.candidates(ray, end, &mut room) {
             // A sphere may be crossed twice.
             let mut passed = start;
             while let Some(t) = context.bound.receivers[r as usize].crossing(ray, passed, end) {
