@@ -5,6 +5,7 @@ use crate::report::Provenance;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
+use std::time::Instant;
 
 /// Bold, dim, and normal again (ECMA-48, SGR).
 const EMPHASIS: [&str; 3] = ["\x1b[1m", "\x1b[2m", "\x1b[0m"];
@@ -26,6 +27,8 @@ pub(crate) struct Console {
     pub(crate) verbose: u8,
     /// The command as typed.
     pub(crate) command: String,
+    /// When it began.
+    pub(crate) started: Instant,
     colour: bool,
     terminal: bool,
 }
@@ -41,6 +44,7 @@ impl Console {
             quiet,
             verbose,
             command: command_line(typed),
+            started: Instant::now(),
             colour: terminal && !no_colour && !dumb,
             terminal: terminal && !dumb,
         }

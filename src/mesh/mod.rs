@@ -5,6 +5,8 @@
 //! facet whose last two corners are the same vertex. Positions are shared across faces, normals are each face's own,
 //! so creases stay sharp.
 
+pub(crate) mod arrays;
+mod stored;
 mod topology;
 
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};

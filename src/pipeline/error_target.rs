@@ -7,7 +7,7 @@ use super::error::Error;
 use super::monitor::Monitor;
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::suggest;
-use crate::simulate::{PartialRun, ReceiverResult, Results, Scene};
+use crate::simulate::{GROWING_REPLICATE, PartialRun, ReceiverResult, Results, Scene};
 use serde::Serialize;
 
 /// Rays of the first run.
@@ -49,6 +49,8 @@ pub struct TargetResult {
     pub rays: u64,
     /// Whether the error found is at most the one asked for.
     pub reached: bool,
+    /// Rays that are still missing, as far as the error tells, in whole replicates of a run that grows; 0 where it is reached.
+    pub missing_rays: u64,
 }
 
 impl ErrorTarget {
@@ -90,27 +92,38 @@ impl ErrorTarget {
         loop {
             prepared.rays = Some(rays);
             let (portion, found) = self.attempt(prepared, monitor);
-            let reached = found.is_some_and(|e| e <= self.percent);
-            let is_stopped = !portion.is_whole();
-            if reached || is_stopped || rays >= most {
-                let quantity = if self.cells { "cells" } else { "power" };
-                let result = TargetResult {
-                    receiver: self.receiver.clone(),
-                    quantity,
-                    asked_percent: self.percent,
-                    found_percent: found,
-                    rays,
-                    reached,
-                };
+            let result = self.result_of(found, rays);
+            if result.reached || !portion.is_whole() || rays >= most {
                 return (portion, result);
             }
-            // The error falls at least as the root of the rays.
-            let growth = found.map_or(GROWTH_FROM_NOTHING, |e| {
-                (GROWTH_MARGIN * (e / self.percent).powi(2)).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1])
-            });
-            rays = ((rays as f64 * growth) as u64).min(most);
+            rays = ((rays as f64 * self.growth(found).max(GROWTH_RANGE[0])) as u64).min(most);
             monitor.grows(found, rays);
         }
+    }
+
+    /// What these results came to.
+    pub fn result(&self, results: &Results) -> TargetResult {
+        self.result_of(self.error(results), results.rays)
+    }
+
+    fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
+        let reached = found.is_some_and(|e| e <= self.percent);
+        let wanted = (rays as f64 * self.growth(found)) as u64;
+        let missing = wanted.saturating_sub(rays).next_multiple_of(GROWING_REPLICATE).max(GROWING_REPLICATE);
+        TargetResult {
+            receiver: self.receiver.clone(),
+            quantity: if self.cells { "cells" } else { "power" },
+            asked_percent: self.percent,
+            found_percent: found,
+            rays,
+            reached,
+            missing_rays: if reached { 0 } else { missing },
+        }
+    }
+
+    /// How many times as many rays the error asks for: it falls at least as the root of the rays.
+    fn growth(&self, found: Option<f64>) -> f64 {
+        found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
     }
 
     fn attempt(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Option<f64>) {
@@ -133,6 +146,15 @@ fn light_weighted_error(r: &ReceiverResult) -> (f64, f64) {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    /// Twice the error asks for four times the rays and a tenth more, in whole replicates.
+    #[test]
+    fn missing_rays_follow_from_the_error() {
+        let target = ErrorTarget { percent: 1.0, receiver: "wall".into(), cells: false };
+        let missing = |found: Option<f64>| target.result_of(found, 100_000).missing_rays;
+        assert_eq!((missing(Some(2.0)), missing(Some(1.0))), (340_000, 0));
+        assert_eq!((missing(Some(1.000_1)), missing(None)), (15_000, 1_500_000));
+    }
 
     #[test]
     fn the_words_are_understood_or_explained() {

@@ -51,14 +51,24 @@ pub fn with_intersector<T>(
     monitor: &dyn Monitor,
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
-    with_intersector_on(choice, &|| Arc::new(Exact::build(model, &exact::Settings::default())), mesh, monitor, work)
+    let builders = Builders {
+        octree: &|settings| Octree::build(mesh, settings),
+        spline: &|| Arc::new(Exact::build(model, &exact::Settings::default())),
+    };
+    with_built_intersector(choice, builders, mesh, monitor, work)
 }
 
-/// The same with a spline that may have been built before.
-pub(super) fn with_intersector_on<T>(
+/// How the caller makes octree and spline: anew, or from what was built before.
+pub(super) struct Builders<'a, 'm> {
+    pub(super) octree: &'a dyn Fn(&octree::Settings) -> Octree<'m>,
+    pub(super) spline: &'a dyn Fn() -> Arc<Exact>,
+}
+
+/// The same with octree and spline of the caller's making.
+pub(super) fn with_built_intersector<'m, T>(
     choice: IntersectorChoice,
-    spline: &dyn Fn() -> Arc<Exact>,
-    mesh: &FacetMesh,
+    Builders { octree, spline }: Builders<'_, 'm>,
+    mesh: &'m FacetMesh,
     monitor: &dyn Monitor,
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
@@ -75,7 +85,7 @@ pub(super) fn with_intersector_on<T>(
         }
         IntersectorKind::Cwbvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
         IntersectorKind::Octree | IntersectorKind::Exact => {
-            Box::new(Octree::build(mesh, &octree::Settings { normals, ..Default::default() }))
+            Box::new(octree(&octree::Settings { normals, ..Default::default() }))
         }
     };
     if choice.normals != NormalMode::Exact {

@@ -16,11 +16,12 @@
 //!
 //! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `facets` and
-//! `intersectors` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
+//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `cache`, `facets`
+//! and `intersectors` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
 //! `cross_check` (the run), `fingerprint` and `error_target` (what is made of it).
 
 mod accuracy_target;
+mod cache;
 mod cross_check;
 mod default_accuracy;
 mod error;
@@ -37,6 +38,7 @@ mod settings;
 mod suggest;
 
 pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
+pub use cache::{Cache, CacheEntry};
 pub use cross_check::LIFT_IN_TOLERANCES;
 pub use error::{Error, ErrorKind, Excerpt};
 pub use error_target::{ErrorTarget, TargetResult};

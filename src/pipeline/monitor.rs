@@ -43,6 +43,9 @@ pub trait Monitor: Sync {
     /// The stage is over.
     fn end(&self) {}
 
+    /// Something went wrong that changes no result.
+    fn warns(&self, _message: &str) {}
+
     /// Tolerance, normals and intersector were chosen.
     fn chosen(&self, _chosen: &Chosen) {}
 

@@ -1,5 +1,6 @@
 //! A scene that is bound and faceted, and the tracing of it.
 
+use super::cache::{Cache, CachedFacets, facets_key};
 use super::default_accuracy;
 use super::error::Error;
 use super::facets::{mesh_settings, tessellate_model};
@@ -9,16 +10,18 @@ use super::monitor::{Monitor, Stage};
 use super::settings::{MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
 use crate::intersect::exact::{self, Exact};
+use crate::intersect::octree::{self, Octree};
 use crate::simulate::scene::PowerUnit;
 use crate::simulate::{
-    BoundScene, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range, trace,
+    BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range,
+    trace,
 };
 use crate::study::accuracy_target::AccuracyPlan;
 use crate::study::default_accuracy::Chosen;
 use crate::tessellate::{self, Tessellation};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Ray paths kept for pictures.
 const RECORDED_PATHS: u64 = 2000;
@@ -36,6 +39,8 @@ pub struct SceneJob {
     pub tracing: TracingSettings,
     /// How an accuracy that was asked for was reached.
     pub accuracy: Option<AccuracyPlan>,
+    /// Where facets and octree are kept for other runs; built anew where there is none.
+    pub cache: Option<Cache>,
 }
 
 impl SceneJob {
@@ -47,7 +52,27 @@ impl SceneJob {
             meshing: MeshingSettings::default(),
             tracing: TracingSettings::default(),
             accuracy: None,
+            cache: None,
         }
+    }
+
+    /// The facets of the model with these settings, and the seconds that they took; those that are kept have no report.
+    fn facets(&self, settings: &tessellate::Settings, monitor: &dyn Monitor) -> (Tessellation, f64) {
+        let (start, model) = (Instant::now(), &self.loaded.model);
+        let Some((cache, key)) = self.cached(settings) else { return tessellate_model(model, settings, monitor) };
+        let kept = CachedFacets { cache, key: &key, monitor };
+        if let Some(mesh) = kept.mesh(model.placed_faces().count()) {
+            return (Tessellation { mesh, ..Tessellation::default() }, start.elapsed().as_secs_f64());
+        }
+        let (made, seconds) = tessellate_model(model, settings, monitor);
+        kept.keep_mesh(&made.mesh);
+        (made, seconds)
+    }
+
+    /// The cache, and the name that facets of these settings have in it.
+    fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
+        let cache = self.cache.as_ref()?;
+        Some((cache, facets_key(&self.scene, settings)?))
     }
 }
 
@@ -103,7 +128,7 @@ impl PreparedScene {
         let choice = IntersectorChoice::new(&job.tracing, Some(&job.scene))?;
         let bound = job.scene.bind(&job.loaded.model)?;
         let mesh_settings = mesh_settings(&job.meshing, Some(&job.scene), &job.loaded.model)?;
-        let (tessellation, tessellation_seconds) = tessellate_model(&job.loaded.model, &mesh_settings, monitor);
+        let (tessellation, tessellation_seconds) = job.facets(&mesh_settings, monitor);
         let mut prepared = Self {
             job,
             bound,
@@ -185,13 +210,14 @@ impl PreparedScene {
     /// Builds the intersector of the run for `work`, which also gets the seconds that it took.
     pub fn with_intersector<T>(&self, monitor: &dyn Monitor, work: impl FnOnce(&dyn Intersector, f64) -> T) -> T {
         let mesh = &self.tessellation.mesh;
-        intersectors::with_intersector_on(
-            self.choice,
-            &|| self.spline(),
-            mesh,
-            monitor,
-            |intersector, footprint| work(intersector, footprint.build_seconds),
-        )
+        let octree = |settings: &octree::Settings| match self.job.cached(&self.mesh_settings) {
+            Some((cache, key)) => CachedFacets { cache, key: &key, monitor }.octree(mesh, settings),
+            None => Octree::build(mesh, settings),
+        };
+        let builders = intersectors::Builders { octree: &octree, spline: &|| self.spline() };
+        intersectors::with_built_intersector(self.choice, builders, mesh, monitor, |intersector, footprint| {
+            work(intersector, footprint.build_seconds)
+        })
     }
 
     /// Traces; ends early when the monitor asks for it.

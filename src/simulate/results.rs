@@ -9,6 +9,7 @@ use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
+use super::seconds::Seconds;
 use super::settings::RunSettings;
 use super::tallies::Tallies;
 use super::tally::Sum;
@@ -73,19 +74,6 @@ pub struct Results {
     pub quantum: f64,
     /// Hash of all tallies: equal if and only if all of them are, bit by bit.
     pub digest: String,
-}
-
-/// Seconds of each stage.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Seconds {
-    /// Reading the models.
-    pub read: f64,
-    /// Making facets.
-    pub tessellate: f64,
-    /// Building the intersector.
-    pub build: f64,
-    /// Tracing.
-    pub trace: f64,
 }
 
 /// What was simulated and what not, each with the reason.

@@ -402,6 +402,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "simulate",
         &[
             "error",
+            "seconds",
             "mod",
             "outcome",
             "random",

@@ -10,7 +10,7 @@ use std::path::Path;
 const SETTINGS: [&str; 4] = ["--tolerance", "0.1", "--normals", "bilinear"];
 
 /// A folder with the lens of scene S1 and so many rays.
-fn lens(rays: &str) -> tempfile::TempDir {
+pub(crate) fn lens(rays: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(fixture("step/lens_planoconvex_nurbs.stp"), folder.path().join("model.stp")).unwrap();
     let scene = std::fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
@@ -67,6 +67,38 @@ fn ranges_of_rays_merge_to_the_bits_of_one_run() {
     assert!(code == 3 && err.contains("rays 0..200000"), "{err}");
     let (code, _, err) = lampyris_in(path, &["merge", "some.tally", "-o", "no"]);
     assert!(code == 3 && err.contains("rays 200000..420000"), "{err}");
+}
+
+/// What merge says is missing, traced and merged again, reaches the error; until then the exit code is 4.
+#[test]
+fn merged_ranges_grow_until_the_error_is_reached() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    trace(path, &["--rays", "0..5000", "-o", "parts"]);
+    let mut rays = 5_000;
+    for round in 0.. {
+        let arguments =
+            ["merge", "parts", "-o", "out", "--until-error", "0.5%@focus:cells", "--no-report", "--json"];
+        let (code, out, err) = lampyris_in(path, &arguments);
+        let answer: Value = serde_json::from_str(&out).unwrap();
+        let answer = &answer["until_error"];
+        assert_eq!(answer["rays"], rays);
+        if answer["reached"] == true {
+            assert!(code == 0 && round > 0 && answer["missing_rays"] == 0, "{round}: {code} {err}");
+            assert!(answer["found_percent"].as_f64().unwrap() <= 0.5);
+            break;
+        }
+        assert!(code == 4 && round < 6, "{round}: {code} {err}");
+        let missing = answer["missing_rays"].as_u64().unwrap();
+        assert!(missing > 0 && missing.is_multiple_of(5_000));
+        trace(path, &["--rays", &format!("{rays}..{}", rays + missing), "-o", "parts"]);
+        rays += missing;
+    }
+    // Further ranges than there are can be waited for.
+    let more = (rays + 5_000).to_string();
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "no", "--rays", &more, "--wait", "0.1"]);
+    assert!(code == 3 && err.contains(&format!("rays {rays}..{more}")), "{err}");
+    assert_eq!(lampyris_in(path, &["merge", "parts", "-o", "no", "--rays", "5000"]).0, 2);
 }
 
 #[test]

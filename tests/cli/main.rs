@@ -1,6 +1,7 @@
 //! The command as a user starts it: every test runs the real binary and judges its output, exit code and files.
 
 mod arguments;
+mod cache;
 mod check;
 mod cluster;
 mod demo;

@@ -1,7 +1,7 @@
 //! The commands and their own options.
 
 use super::help_text;
-use super::options::{AccuracyOption, MeshingOptions, TracingOptions};
+use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, count};
 use crate::step;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -108,13 +108,30 @@ pub(crate) enum Command {
         /// Wait at most so many seconds until all parts are there
         #[arg(long, value_name = "SECONDS")]
         wait: Option<f64>,
+        /// As many rays as the merged run is to have, where further ranges of a run that grows are still to come
+        #[arg(long, value_name = "N", value_parser = count)]
+        rays: Option<u64>,
+        /// Say how many rays are still missing until the statistical error (1σ) of a receiver's power, or of its :cells, is below P
+        /// percent; the exit code is 4 as long as there are any
+        #[arg(long, value_name = "P%@RECEIVER")]
+        until_error: Option<String>,
         /// Largest share of energy that may be lost before the exit code becomes 4
         #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
         max_lost: f64,
         #[command(flatten)]
+        cache: CacheOption,
+        #[command(flatten)]
         page: PageOption,
         #[command(flatten)]
         limits: RefusalLimit,
+    },
+    /// Look at what is built once and kept, or remove it
+    Cache {
+        #[command(flatten)]
+        folder: CacheOption,
+        /// Remove all of it
+        #[arg(long)]
+        clear: bool,
     },
     /// Judge a far field by a lamp regulation: pass, fail or unsure, row by row
     Assess {
@@ -258,6 +275,8 @@ pub(crate) struct TraceOptions {
     /// Largest share of energy that may be lost before the exit code becomes 4
     #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
     pub(crate) max_lost: f64,
+    #[command(flatten)]
+    pub(crate) cache: CacheOption,
     #[command(flatten)]
     pub(crate) page: PageOption,
     #[command(flatten)]

@@ -5,6 +5,7 @@ use crate::intersect::NormalMode;
 use crate::pipeline::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
+use std::path::PathBuf;
 
 /// A direction error asked for in place of a tolerance.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -54,6 +55,15 @@ impl MeshingOptions {
             plan: None,
         }
     }
+}
+
+/// Where facets and octrees are kept from one run to the next.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(crate) struct CacheOption {
+    /// Keep facets and octree in this folder, which runs and machines may share, and take them from there; by default what the
+    /// variable LAMPYRIS_CACHE names, else nothing is kept. At most 20 GB, or what LAMPYRIS_CACHE_GB says
+    #[arg(long, help_heading = "Facets", value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
 }
 
 /// Options of everything that traces.
@@ -165,7 +175,7 @@ fn ray_range(text: &str) -> Result<RayRange, String> {
 const MOST_RAYS: f64 = 9e15;
 
 /// A whole positive number; `1e6`, `1_000_000` and `10M` are understood.
-fn count(text: &str) -> Result<u64, String> {
+pub(crate) fn count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
     let (digits, factor) = match plain.chars().last() {
         Some('k') => (&plain[..plain.len() - 1], 1000.0),

@@ -1,19 +1,24 @@
 //! `lampyris merge`: the results of all parts of a run.
 
 use crate::cli::arguments::command::RefusalLimit;
+use crate::cli::arguments::options::CacheOption;
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
+use crate::cli::output::json::json_value;
+use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::shards::{is_tally, replicates_of_shard};
 use crate::cli::work::tally_file::TallyHeader;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
+use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
-use crate::pipeline::{PreparedScene, SceneJob, TraceRequest, fingerprint, read_scene};
+use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, fingerprint, read_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -23,6 +28,9 @@ pub(crate) struct MergeCommand<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) scene: Option<&'a Path>,
     pub(crate) wait: Option<f64>,
+    pub(crate) rays: Option<u64>,
+    pub(crate) until_error: Option<&'a str>,
+    pub(crate) cache: &'a CacheOption,
     pub(crate) max_lost: f64,
     pub(crate) with_page: bool,
     pub(crate) limits: RefusalLimit,
@@ -44,14 +52,16 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     })?;
     set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
-    let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
+    let cache = cache_folder::cache(command.cache)?;
+    let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
+    let job = SceneJob { meshing, tracing, cache, ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
-    let mut whole = sum(&part_files(command.parts)?, &header, &prepared)?;
+    let (mut whole, mut usage) = sum(command, &header, &prepared)?;
     while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, &header)) {
-        whole = sum(&part_files(command.parts)?, &header, &prepared)?;
+        (whole, usage) = sum(command, &header, &prepared)?;
     }
     if is_tally(command.folder) {
-        return write_sum(command, &prepared, &scene_path, &whole, console);
+        return write_sum(command, &prepared, &scene_path, (&whole, usage), console);
     }
     if !whole.is_whole() {
         let failure = Failure::input(missing_parts(&whole, &header));
@@ -68,20 +78,30 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
+    run.results.seconds.merged = usage.total();
+    let result = target.map(|target| target.result(&run.results));
+    let sentences: Vec<String> = result.iter().map(closing::error_sentence).collect();
+    for sentence in &sentences {
+        console.say(sentence.replace("**", ""));
+    }
     let written =
-        results_folder::write(&prepared, command.folder, &mut run, Vec::new(), command.with_page, console);
-    let (document, answer) = match written {
+        results_folder::write(&prepared, command.folder, &mut run, sentences.clone(), command.with_page, console);
+    let (mut document, answer) = match written {
         Ok(written) => written,
         Err(failure) => {
-            let place = results_folder::write_anywhere(&prepared, &mut run, &[], command.with_page, console);
+            let place = results_folder::write_anywhere(&prepared, &mut run, &sentences, command.with_page, console);
             let saved = place.map(|folder| format!("nothing is lost: the results are in {}", folder.display()));
             return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
         }
     };
+    if let Some(result) = &result {
+        document["until_error"] = json_value(result)?;
+    }
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console);
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
-        .and(refused))
+        .and(refused)
+        .and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
 }
 
 /// Writes the sum of the parts as a tally, for a merge of merges.
@@ -89,12 +109,12 @@ fn write_sum(
     command: &MergeCommand,
     prepared: &PreparedScene,
     scene: &Path,
-    sum: &PartialRun,
+    (sum, usage): (&PartialRun, Usage),
     console: &Console,
 ) -> Result<Completion, Failure> {
     let file = command.folder.to_path_buf();
     let _owned = OutputPlace::file(&file)?;
-    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save(sum)?;
+    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save_sum(sum, usage)?;
     console.say(format_args!(
         "{} of {} replicates in {}",
         sum.done.len(),
@@ -174,10 +194,16 @@ fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// The sum of all parts, each of which must be of the run that the first one's header names.
-fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Result<PartialRun, Failure> {
+fn sum(
+    command: &MergeCommand,
+    header: &TallyHeader,
+    prepared: &PreparedScene,
+) -> Result<(PartialRun, Usage), Failure> {
     let expected = fingerprint(prepared)?.0;
+    let usage = RefCell::new(Usage::default());
     let check = |h: &TallyHeader| {
         if h.fingerprint == expected {
+            usage.borrow_mut().add(&h.usage);
             return Ok(());
         }
         Err(if h.fingerprint == header.fingerprint {
@@ -192,14 +218,25 @@ fn sum(files: &[PathBuf], header: &TallyHeader, prepared: &PreparedScene) -> Res
         })
     };
     let mut sum: Option<PartialRun> = None;
-    for path in files {
+    for path in &part_files(command.parts)? {
         let part = PartialRun::read(&read(path)?, check, &prepared.bound).map_err(|m| unreadable(path, m))?;
         match &mut sum {
             Some(sum) => sum.merge(&part).map_err(|m| unreadable(path, m))?,
             None => sum = Some(part),
         }
     }
-    sum.ok_or_else(|| Failure::arguments("merge: no parts given"))
+    let mut sum = sum.ok_or_else(|| Failure::arguments("merge: no parts given"))?;
+    if let Some(rays) = command.rays {
+        let replicates = u32::try_from(rays.div_ceil(GROWING_REPLICATE)).unwrap_or(u32::MAX);
+        if !sum.grows || replicates < sum.replicates {
+            let there = u64::from(sum.replicates) * GROWING_REPLICATE;
+            let message =
+                if sum.grows { format!("the parts reach to ray {there}") } else { "the run does not grow".into() };
+            return Err(Failure::arguments(format!("--rays {rays}: {message}")));
+        }
+        sum.replicates = replicates;
+    }
+    Ok((sum, usage.into_inner()))
 }
 
 /// Which shards are not there, or which rays of a run that grows.

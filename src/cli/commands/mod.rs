@@ -2,6 +2,7 @@
 
 mod assess;
 mod bvh_benchmark;
+mod cache;
 mod check;
 mod demo;
 mod faces;
@@ -53,18 +54,22 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
                 console,
             )
         }
-        Command::Merge { parts, output, scene, wait, max_lost, page, limits } => {
+        Command::Merge { parts, output, scene, wait, rays, until_error, max_lost, cache, page, limits } => {
             let command = merge::MergeCommand {
                 parts: &parts,
                 folder: &output,
                 scene: scene.as_deref(),
                 wait,
+                rays,
+                until_error: until_error.as_deref(),
                 max_lost,
+                cache: &cache,
                 with_page: page.is_wanted(),
                 limits,
             };
             merge::run(&command, console)
         }
+        Command::Cache { folder, clear } => cache::run(&folder, clear, console),
         Command::Init { file, output } => init::run(&file, output.as_deref(), console),
         Command::Media => media::run(console),
         Command::Licences => licences::run(),

@@ -9,6 +9,7 @@ use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::rule_table::{rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
+use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
 use crate::cli::work::path_file::PathFile;
@@ -59,7 +60,13 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let requested = (command.meshing.clone(), command.tracing.clone());
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
-    let job = SceneJob { meshing, tracing, accuracy: plan, ..SceneJob::new(scene, loaded) };
+    let job = SceneJob {
+        meshing,
+        tracing,
+        accuracy: plan,
+        cache: cache_folder::cache(&extra.cache)?,
+        ..SceneJob::new(scene, loaded)
+    };
     let mut prepared = PreparedScene::new(job, &monitor)?;
     let target =
         extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &prepared.job.scene)).transpose()?;

@@ -74,8 +74,12 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
 pub(crate) fn error_sentence(result: &TargetResult) -> String {
     let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
     let verdict = if result.reached { "reached" } else { "**not reached**" };
+    let missing = match result.missing_rays {
+        0 => String::new(),
+        more => format!("; about {} more are missing", grouped(more)),
+    };
     format!(
-        "Asked for a statistical error of {} % of the {} on {}: {verdict} with {} rays ({found}).",
+        "Asked for a statistical error of {} % of the {} on {}: {verdict} with {} rays ({found}){missing}.",
         result.asked_percent,
         result.quantity,
         result.receiver,

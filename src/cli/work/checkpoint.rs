@@ -2,13 +2,14 @@
 
 use super::output_place::{folder_of, make_folder, rescue_folders};
 use super::tally_file::TallyHeader;
+use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::{read_bytes, write_atomic};
 use crate::pipeline::{PreparedScene, fingerprint};
 use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 /// Name of the file that an interrupted run leaves in its folder.
@@ -24,6 +25,8 @@ pub(crate) struct Checkpoint<'a> {
     pub(crate) file: PathBuf,
     every: Duration,
     last: Mutex<Instant>,
+    /// What earlier processes took for it.
+    earlier: Mutex<Usage>,
     pub(crate) console: &'a Console,
 }
 
@@ -43,7 +46,15 @@ impl<'a> Checkpoint<'a> {
         // Made before tracing: the files of the scene may be gone when it ends.
         let header = TallyHeader::new(prepared, scene, shard, console)?;
         let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
-        Ok(Self { prepared, header, file, every, last: Mutex::new(Instant::now()), console })
+        Ok(Self {
+            prepared,
+            header,
+            file,
+            every,
+            last: Mutex::new(Instant::now()),
+            earlier: Mutex::default(),
+            console,
+        })
     }
 
     /// How often to look whether it is time to save.
@@ -64,6 +75,7 @@ impl<'a> Checkpoint<'a> {
         let expected = fingerprint(self.prepared)?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {
+                *self.earlier() = h.usage.clone();
                 Ok(())
             } else {
                 Err(format!("it was left by another run: {}", h.command))
@@ -91,7 +103,25 @@ impl<'a> Checkpoint<'a> {
     /// Saves the run now.
     pub(crate) fn save(&self, portion: &PartialRun) -> Result<(), Failure> {
         make_folder(&folder_of(&self.file))?;
-        Ok(write_atomic(&self.file, |w| portion.write(&self.header, w))?)
+        let header = self.header_now();
+        Ok(write_atomic(&self.file, |w| portion.write(&header, w))?)
+    }
+
+    /// The sum of other parts, with what these took.
+    pub(crate) fn save_sum(&self, sum: &PartialRun, usage: Usage) -> Result<(), Failure> {
+        make_folder(&folder_of(&self.file))?;
+        let header = self.header.with_usage(usage);
+        Ok(write_atomic(&self.file, |w| sum.write(&header, w))?)
+    }
+
+    fn earlier(&self) -> MutexGuard<'_, Usage> {
+        self.earlier.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// The header with what it took so far.
+    fn header_now(&self) -> TallyHeader {
+        let wall = self.console.started.elapsed().as_secs_f64();
+        self.header.with_usage(Usage::of_process(wall).continued(&self.earlier()))
     }
 
     /// Saves the run in its own file or, where that cannot be written, wherever one can; gives the file.
@@ -105,7 +135,8 @@ impl<'a> Checkpoint<'a> {
         };
         let name = format!("lampyris-rescued-{}.tally", std::process::id());
         let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
-        places.find(|file| write_atomic(file, |w| portion.write(&self.header, w)).is_ok()).ok_or(reason)
+        let header = self.header_now();
+        places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)
     }
 
     /// Why a run stopped before its end, and how to go on from what was saved of it.

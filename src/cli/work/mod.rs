@@ -4,6 +4,7 @@
 //! `output_place`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and `contenders` (what is made
 //! of a run).
 
+pub(super) mod cache_folder;
 pub(super) mod checkpoint;
 pub(super) mod contenders;
 pub(super) mod input_files;
@@ -16,3 +17,4 @@ pub(super) mod shards;
 pub(super) mod tally_file;
 pub(super) mod terminal_monitor;
 pub(super) mod threads;
+pub(super) mod usage;

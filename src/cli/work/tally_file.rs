@@ -1,5 +1,6 @@
 //! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
 
+use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::intersect::NormalMode;
@@ -37,6 +38,9 @@ pub(crate) struct TallyHeader {
     normals: Option<String>,
     pub(crate) shard: Option<[u32; 2]>,
     pub(crate) command: String,
+    /// What it took.
+    #[serde(default)]
+    pub(crate) usage: Usage,
 }
 
 impl TallyHeader {
@@ -68,7 +72,13 @@ impl TallyHeader {
             normals: t.normals.map(|n| n.to_string()),
             shard,
             command: console.command.clone(),
+            usage: Usage::default(),
         })
+    }
+
+    /// The same with what it took.
+    pub(crate) fn with_usage(&self, usage: Usage) -> Self {
+        Self { usage, ..self.clone() }
     }
 
     /// Where the scene was when the part was traced.

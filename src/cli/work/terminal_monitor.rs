@@ -84,6 +84,10 @@ impl Monitor for TerminalMonitor<'_> {
         shown.saveable = None;
     }
 
+    fn warns(&self, message: &str) {
+        self.console.say(message);
+    }
+
     fn chosen(&self, chosen: &Chosen) {
         let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
         let how = match chosen.intersector {

@@ -39,6 +39,7 @@ mod ray;
 mod ray_state;
 mod settings;
 mod statistics;
+mod stored;
 mod subdivision;
 mod tree;
 mod walk;
@@ -49,10 +50,12 @@ use crate::intersect::prefetch::prefetch;
 use crate::math::simd::Level;
 use crate::math::{Aabb, Ray};
 use crate::mesh::FacetMesh;
+use crate::mesh::arrays::ArrayReader;
 use horizon::Horizons;
 use light_buffer::LightBuffer;
 pub use settings::{InstructionSet, Settings};
 pub use statistics::Statistics;
+use std::io::{self, Write};
 use std::sync::{OnceLock, PoisonError, RwLock};
 use std::time::Instant;
 use tree::Tree;
@@ -94,7 +97,33 @@ impl<'m> Octree<'m> {
         let started = Instant::now();
         let mut statistics = Statistics::default();
         let tree = Tree::build(mesh, settings, &mut statistics);
-        let build_seconds = started.elapsed().as_secs_f64();
+        Self::with_tree(tree, settings, statistics, started)
+    }
+
+    /// Writes the tree without its mesh.
+    ///
+    /// # Errors
+    /// When `to` cannot be written.
+    pub(crate) fn write_arrays(&self, to: &mut dyn Write) -> io::Result<()> {
+        self.tree.write_arrays(&self.statistics, to)
+    }
+
+    /// Reads the tree of a mesh.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is no tree of this mesh.
+    pub(crate) fn read_arrays(
+        mesh: &'m FacetMesh,
+        settings: &Settings,
+        from: &mut ArrayReader,
+    ) -> io::Result<Self> {
+        let started = Instant::now();
+        let (tree, statistics) = Tree::read_arrays(mesh, from)?;
+        Ok(Self::with_tree(tree, settings, statistics, started))
+    }
+
+    /// A tree that has been made since `started`.
+    fn with_tree(tree: Tree<'m>, settings: &Settings, statistics: Statistics, started: Instant) -> Self {
         Self {
             tree,
             settings: *settings,
@@ -102,7 +131,7 @@ impl<'m> Octree<'m> {
             horizons: OnceLock::new(),
             light_buffers: RwLock::default(),
             statistics,
-            build_seconds,
+            build_seconds: started.elapsed().as_secs_f64(),
         }
     }
 

@@ -3,6 +3,7 @@
 use super::clip::{Box32, round_down};
 use crate::math::{Aabb, Point};
 use crate::mesh::FacetMesh;
+use bytemuck::{Pod, Zeroable};
 
 /// By how much steps are made larger, so that the last bound reaches the far side whatever their rounding to f32: sixteen roundings.
 const STEP_ROOM: f64 = 1.0 + 1e-6;
@@ -79,7 +80,7 @@ impl Link {
 }
 
 /// Up to eight children with boxes in eight bits a bound, `origin + bound · step`; an unused child has an empty box.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(128))]
 pub(super) struct Node {
     /// Lower and upper bounds along x, y, z.
@@ -144,7 +145,7 @@ impl Node {
 }
 
 /// Up to four facets; corners in 16 bits, `origin + corner · step`, to sort out what a ray cannot hit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Block {
     /// x, y, z of corners 0 (lanes 0–3), 2 (4–7), 1 (8–11) and 3 (12–15) of the four facets.

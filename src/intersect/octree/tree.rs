@@ -31,15 +31,20 @@ pub(super) struct Tree<'m> {
 impl<'m> Tree<'m> {
     /// Builds the tree with the threads of the current rayon pool.
     pub(super) fn build(mesh: &'m FacetMesh, settings: &Settings, statistics: &mut Statistics) -> Self {
-        let surroundings = Surroundings::new(mesh);
-        let finite = surroundings.bounds;
-        let center = if finite.is_empty() { Point::ZERO } else { finite.center() };
+        let center = middle(&Surroundings::new(mesh));
         let cell = subdivide(mesh, center, settings, statistics);
         let flat = cell.map(|cell| flatten::flatten(mesh, center, cell, settings, statistics));
         let (nodes, blocks, root) = match flat {
             Some(flat) => (flat.nodes, flat.blocks, Some(flat.root)),
             None => (Vec::new(), Vec::new(), None),
         };
+        Self::new(mesh, nodes, blocks, root)
+    }
+
+    /// Of nodes and blocks about the middle of the mesh.
+    pub(super) fn new(mesh: &'m FacetMesh, nodes: Vec<Node>, blocks: Vec<Block>, root: Option<Link>) -> Self {
+        let surroundings = Surroundings::new(mesh);
+        let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
         let frame = Frame::new(center, &bounds);
         let mut slopes = huge_pages::with_capacity(mesh.facets.len());
@@ -77,4 +82,9 @@ impl<'m> Tree<'m> {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.slopes)
     }
+}
+
+/// The middle of a mesh; the origin of one without points.
+fn middle(surroundings: &Surroundings) -> Point {
+    if surroundings.bounds.is_empty() { Point::ZERO } else { surroundings.bounds.center() }
 }

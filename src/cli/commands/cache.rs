@@ -1,0 +1,46 @@
+//! `lampyris cache`: what is built once and kept.
+
+use crate::cli::arguments::options::CacheOption;
+use crate::cli::completion::Completion;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::json::json_text;
+use crate::cli::work::cache_folder::{self, FOLDER_VARIABLE};
+use crate::report::{bytes, grouped};
+use serde_json::json;
+
+/// Says what the folder holds, or empties it.
+pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Result<Completion, Failure> {
+    let Some(cache) = cache_folder::cache(option)? else {
+        let failure = Failure::arguments("there is no cache: nothing is kept from one run to the next");
+        return Err(failure
+            .with_help(format!("--cache DIR or the variable {FOLDER_VARIABLE} names the folder to keep it in")));
+    };
+    let unreadable = |e: std::io::Error| Failure::running(format!("{}: {e}", cache.folder().display()));
+    let removed = if clear { cache.clear().map_err(unreadable)? } else { 0 };
+    let entries = cache.entries().map_err(unreadable)?;
+    let total: u64 = entries.iter().map(|e| e.bytes).sum();
+    if console.json {
+        let entries: Vec<_> = (entries.iter())
+            .map(|e| {
+                let unused = e.used.elapsed().map_or(0.0, |age| age.as_secs_f64());
+                json!({"file": e.file.display().to_string(), "bytes": e.bytes, "seconds_since_use": unused})
+            })
+            .collect();
+        let document = json!({"folder": cache.folder().display().to_string(), "bytes": total,
+            "limit_bytes": cache.limit(), "removed": removed, "entries": entries});
+        print(&json_text(&document)?)?;
+        return Ok(Completion::Complete);
+    }
+    if clear {
+        console.say(format_args!("removed {} files", grouped(removed as u64)));
+    }
+    print(&format!(
+        "{}: {} facets and octrees, {} of at most {}\n",
+        cache.folder().display(),
+        entries.len(),
+        bytes(total),
+        bytes(cache.limit())
+    ))?;
+    Ok(Completion::Complete)
+}

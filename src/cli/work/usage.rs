@@ -1,0 +1,114 @@
+//! What the parts of a run took, machine by machine.
+
+use crate::simulate::MergedSeconds;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What parts took, by the name of the machine.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub(crate) struct Usage(BTreeMap<String, MachineUsage>);
+
+/// What the parts of one machine took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct MachineUsage {
+    parts: u32,
+    /// Of all threads of all parts; absent where the system does not tell.
+    cpu_seconds: Option<f64>,
+    /// Of the slowest part, from the start of its process.
+    slowest_seconds: f64,
+}
+
+impl Usage {
+    /// What this process took so far, as one part.
+    pub(crate) fn of_process(wall_seconds: f64) -> Self {
+        let usage = MachineUsage { parts: 1, cpu_seconds: cpu_seconds(), slowest_seconds: wall_seconds };
+        Self(BTreeMap::from([(machine_name(), usage)]))
+    }
+
+    /// Adds what other parts took.
+    pub(crate) fn add(&mut self, other: &Self) {
+        for (machine, theirs) in &other.0 {
+            let Some(mine) = self.0.get_mut(machine) else {
+                self.0.insert(machine.clone(), *theirs);
+                continue;
+            };
+            mine.parts += theirs.parts;
+            mine.cpu_seconds = mine.cpu_seconds.zip(theirs.cpu_seconds).map(|(a, b)| a + b);
+            mine.slowest_seconds = mine.slowest_seconds.max(theirs.slowest_seconds);
+        }
+    }
+
+    /// The same part after it was gone on with.
+    pub(crate) fn continued(mut self, other: &Self) -> Self {
+        for (machine, theirs) in &other.0 {
+            match self.0.get_mut(machine) {
+                Some(mine) => {
+                    mine.cpu_seconds = mine.cpu_seconds.zip(theirs.cpu_seconds).map(|(a, b)| a + b);
+                    mine.slowest_seconds += theirs.slowest_seconds;
+                }
+                None => drop(self.0.insert(machine.clone(), MachineUsage { parts: 0, ..*theirs })),
+            }
+        }
+        self
+    }
+
+    /// All of it in four numbers; `None` where nothing is known.
+    pub(crate) fn total(&self) -> Option<MergedSeconds> {
+        let machines = u32::try_from(self.0.len()).ok().filter(|n| *n > 0)?;
+        Some(MergedSeconds {
+            parts: self.0.values().map(|m| m.parts).sum(),
+            machines,
+            cpu: self.0.values().map(|m| m.cpu_seconds).sum(),
+            slowest: self.0.values().fold(0.0, |slowest, m| m.slowest_seconds.max(slowest)),
+        })
+    }
+}
+
+#[cfg(unix)]
+fn cpu_seconds() -> Option<f64> {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    /// Nanoseconds in a second.
+    const NANOSECONDS: f64 = 1e9;
+    Some(time.tv_sec as f64 + time.tv_nsec as f64 / NANOSECONDS)
+}
+
+#[cfg(not(unix))]
+fn cpu_seconds() -> Option<f64> {
+    None
+}
+
+#[cfg(unix)]
+fn machine_name() -> String {
+    rustix::system::uname().nodename().to_string_lossy().into_owned()
+}
+
+#[cfg(not(unix))]
+fn machine_name() -> String {
+    std::env::var("COMPUTERNAME").unwrap_or_else(|_| "one machine".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(machine: &str, cpu: f64, wall: f64) -> Usage {
+        let usage = MachineUsage { parts: 1, cpu_seconds: Some(cpu), slowest_seconds: wall };
+        Usage(BTreeMap::from([(machine.into(), usage)]))
+    }
+
+    #[test]
+    fn parts_add_up_and_the_slowest_counts() {
+        let mut sum = Usage::default();
+        assert_eq!(sum.total(), None);
+        for usage in [part("a", 3.0, 2.0), part("b", 1.0, 5.0), part("a", 4.0, 1.0)] {
+            sum.add(&usage);
+        }
+        assert_eq!(sum.total(), Some(MergedSeconds { parts: 3, machines: 2, cpu: Some(8.0), slowest: 5.0 }));
+        // One part that was stopped and gone on with, on the same machine and on another.
+        let resumed = part("a", 3.0, 2.0).continued(&part("a", 1.0, 4.0));
+        assert_eq!(resumed.total(), Some(MergedSeconds { parts: 1, machines: 1, cpu: Some(4.0), slowest: 6.0 }));
+        let moved = part("a", 3.0, 2.0).continued(&part("b", 1.0, 4.0)).total();
+        assert_eq!(moved.map(|m| (m.parts, m.machines)), Some((1, 2)));
+    }
+}

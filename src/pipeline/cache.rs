@@ -1,0 +1,315 @@
+//! What is built once: facets and octrees in a folder that runs, processes and machines may share.
+//!
+//! An entry is named by a hash of all that decides it: program, kind of machine, models, settings of the mesher. It is written under
+//! another name and renamed when it is whole; so a hundred processes that start at once need no lock: each finds an entry, or builds its
+//! own, and all build the same. A checksum at its end notices damage, and what is damaged is removed and built anew. Of too much, what
+//! was not used for longest goes.
+//!
+//! Guarantee: a run has the same bits with and without it. Known weakness: who may write the folder is trusted with results: an entry
+//! changed on purpose may change them, though no index of it leaves its array. Processes that start at once on an empty folder build
+//! each for itself.
+
+use super::monitor::Monitor;
+use crate::intersect::octree::{self, Octree};
+use crate::mesh::FacetMesh;
+use crate::mesh::arrays::ArrayReader;
+use crate::simulate::{Fingerprint, Scene};
+use crate::tessellate;
+use std::fs::{self, File};
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// First bytes of an entry.
+const MAGIC: &[u8] = b"lampyris cache 1\n";
+/// Bytes of the checksum at the end of an entry.
+const CHECKSUM_BYTES: u64 = 4;
+/// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.
+const MOST_BYTES: u64 = 20_000_000_000;
+/// After so long an entry that was never finished is of a process that is no more.
+const STALE: Duration = Duration::from_secs(86_400);
+/// Bytes that are gathered before they are written.
+const WRITTEN_AT_ONCE: usize = 1 << 20;
+/// What follows the hash in the names of entries.
+const KINDS: [&str; 2] = [".facets", ".octree"];
+/// What follows in the names of those that are not whole yet.
+const UNFINISHED: &str = ".part";
+
+/// A folder of what is built once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cache {
+    folder: PathBuf,
+    most_bytes: u64,
+}
+
+/// One thing in the folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CacheEntry {
+    /// Its file.
+    pub file: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// When it was last used.
+    pub used: SystemTime,
+}
+
+impl Cache {
+    /// In a folder, which is made when something is kept.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), most_bytes: MOST_BYTES }
+    }
+
+    /// With another limit, in bytes: beyond it, what was not used for longest is removed.
+    pub fn with_limit(self, most_bytes: u64) -> Self {
+        Self { most_bytes, ..self }
+    }
+
+    /// Where it is.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Bytes beyond which entries are removed.
+    pub fn limit(&self) -> u64 {
+        self.most_bytes
+    }
+
+    /// What it holds, what was not used for longest first; nothing where there is no folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
+    pub fn entries(&self) -> io::Result<Vec<CacheEntry>> {
+        let mut entries = self.files(|name| KINDS.iter().any(|kind| is_entry(name, kind)))?;
+        entries.sort_by(|a, b| (a.used, &a.file).cmp(&(b.used, &b.file)));
+        Ok(entries)
+    }
+
+    /// Removes all entries, whole or not, and gives their number; other files in the folder stay.
+    ///
+    /// # Errors
+    /// When one cannot be removed.
+    pub fn clear(&self) -> io::Result<usize> {
+        let files = self.files(|name| is_unfinished(name) || KINDS.iter().any(|kind| is_entry(name, kind)))?;
+        for entry in &files {
+            remove(&entry.file)?;
+        }
+        Ok(files.len())
+    }
+
+    fn files(&self, is_wanted: impl Fn(&str) -> bool) -> io::Result<Vec<CacheEntry>> {
+        let folder = match fs::read_dir(&self.folder) {
+            Ok(folder) => folder,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(e),
+        };
+        let mut files = Vec::new();
+        for entry in folder {
+            let entry = entry?;
+            if !entry.file_name().to_str().is_some_and(&is_wanted) {
+                continue;
+            }
+            // Another process may just have removed it.
+            let Ok(metadata) = entry.metadata() else { continue };
+            if metadata.is_file() {
+                let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
+                files.push(CacheEntry { file: entry.path(), bytes: metadata.len(), used });
+            }
+        }
+        Ok(files)
+    }
+
+    /// Reads an entry; `None` where there is none, or a damaged one, which is removed.
+    fn fetch<T>(
+        &self,
+        name: &str,
+        monitor: &dyn Monitor,
+        read: impl FnOnce(&mut ArrayReader) -> io::Result<T>,
+    ) -> Option<T> {
+        let path = self.folder.join(name);
+        let metadata = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?;
+        let mut file = File::open(&path).ok()?;
+        match read_entry(&mut file, metadata.len(), read) {
+            Ok(made) => {
+                // Where others own it, it only looks older than it is.
+                let _ = file.set_modified(SystemTime::now());
+                Some(made)
+            }
+            Err(e) => {
+                monitor.warns(&format!("{}: {e}: built anew", path.display()));
+                let _ = fs::remove_file(&path);
+                None
+            }
+        }
+    }
+
+    /// Keeps an entry; a run whose work cannot be kept goes on.
+    fn keep(&self, name: &str, monitor: &dyn Monitor, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+        let random = RandomState::new().build_hasher().finish();
+        let beside = self.folder.join(format!(".{name}.{random:016x}{UNFINISHED}"));
+        let attempt = || {
+            fs::create_dir_all(&self.folder)?;
+            // A name that no process of any machine has.
+            let file = File::options().write(true).create_new(true).open(&beside)?;
+            write_entry(file, write)?;
+            fs::rename(&beside, self.folder.join(name))
+        };
+        if let Err(e) = attempt().and_then(|()| self.remove_excess()) {
+            let _ = fs::remove_file(&beside);
+            monitor.warns(&format!("{}: nothing is kept: {e}", self.folder.display()));
+        }
+    }
+
+    /// Removes what was not used for longest beyond the limit, and what was never finished.
+    fn remove_excess(&self) -> io::Result<()> {
+        for unfinished in self.files(is_unfinished)? {
+            if unfinished.used.elapsed().is_ok_and(|age| age > STALE) {
+                remove(&unfinished.file)?;
+            }
+        }
+        let entries = self.entries()?;
+        let mut total: u64 = entries.iter().map(|e| e.bytes).sum();
+        for entry in entries {
+            if total <= self.most_bytes {
+                break;
+            }
+            remove(&entry.file)?;
+            total -= entry.bytes;
+        }
+        Ok(())
+    }
+}
+
+/// What a cache holds of one scene and one way to mesh it.
+#[derive(Clone, Copy)]
+pub(super) struct CachedFacets<'a> {
+    pub(super) cache: &'a Cache,
+    pub(super) key: &'a Fingerprint,
+    pub(super) monitor: &'a dyn Monitor,
+}
+
+impl CachedFacets<'_> {
+    /// The facets of a model of so many faces.
+    pub(super) fn mesh(&self, faces: usize) -> Option<FacetMesh> {
+        let read = |from: &mut ArrayReader| FacetMesh::read_arrays(from, faces);
+        self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
+    }
+
+    pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
+        self.cache.keep(&self.name(KINDS[0]), self.monitor, |to| mesh.write_arrays(to));
+    }
+
+    /// The octree of the facets; built and kept where there is none.
+    pub(super) fn octree<'m>(&self, mesh: &'m FacetMesh, settings: &octree::Settings) -> Octree<'m> {
+        let name = self.name(KINDS[1]);
+        let read = |from: &mut ArrayReader| Octree::read_arrays(mesh, settings, from);
+        self.cache.fetch(&name, self.monitor, read).unwrap_or_else(|| {
+            let built = Octree::build(mesh, settings);
+            self.cache.keep(&name, self.monitor, |to| built.write_arrays(to));
+            built
+        })
+    }
+
+    fn name(&self, kind: &str) -> String {
+        format!("{}{kind}", self.key.0)
+    }
+}
+
+/// A hash of all that decides facets and octree; `None` where a file of the scene can no longer be read.
+pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option<Fingerprint> {
+    let machine = if cfg!(target_endian = "big") { "big" } else { "little" };
+    let program = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
+    let words = format!("{program} {machine} {mesher:?} {:?}", scene.models);
+    let mut pieces = vec![words.into_bytes()];
+    for model in &scene.models {
+        pieces.push(crate::formats::read_bytes(&scene.resolve(&model.file)).ok()?);
+    }
+    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
+    Some(Fingerprint::new(&pieces))
+}
+
+/// Whether a name is a hash with this ending.
+fn is_entry(name: &str, kind: &str) -> bool {
+    name.strip_suffix(kind).is_some_and(|hash| hash.len() == 32 && hash.bytes().all(|b| b.is_ascii_hexdigit()))
+}
+
+/// Whether a name is that of an entry that is being written.
+fn is_unfinished(name: &str) -> bool {
+    let entry = name.strip_prefix('.').and_then(|n| n.strip_suffix(UNFINISHED)).and_then(|n| n.rsplit_once('.'));
+    entry.is_some_and(|(entry, _)| KINDS.iter().any(|kind| is_entry(entry, kind)))
+}
+
+/// Removes a file that another process may have removed already.
+fn remove(file: &Path) -> io::Result<()> {
+    match fs::remove_file(file) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut to =
+        HashingWriter { to: BufWriter::with_capacity(WRITTEN_AT_ONCE, file), sum: crc32fast::Hasher::new() };
+    to.write_all(MAGIC)?;
+    write(&mut to)?;
+    let sum = to.sum.finalize();
+    to.to.write_all(&sum.to_le_bytes())?;
+    to.to.into_inner().map_err(|e| e.into_error())?;
+    Ok(())
+}
+
+fn read_entry<T>(
+    file: &mut File,
+    bytes: u64,
+    read: impl FnOnce(&mut ArrayReader) -> io::Result<T>,
+) -> io::Result<T> {
+    let damaged = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
+    let payload = bytes.checked_sub(CHECKSUM_BYTES).ok_or_else(|| damaged("cut short"))?;
+    let mut from = HashingReader { from: file, sum: crc32fast::Hasher::new() };
+    let mut magic = vec![0; MAGIC.len()];
+    from.read_exact(&mut magic)?;
+    if magic != MAGIC {
+        return Err(damaged("no entry of this version"));
+    }
+    let made = read(&mut ArrayReader::new(&mut from, payload.saturating_sub(MAGIC.len() as u64)))?;
+    let sum = from.sum.finalize();
+    let mut kept = [0; CHECKSUM_BYTES as usize];
+    file.read_exact(&mut kept)?;
+    let is_end = file.read(&mut [0])? == 0;
+    if u32::from_le_bytes(kept) != sum || !is_end {
+        return Err(damaged("damaged: its checksum is wrong"));
+    }
+    Ok(made)
+}
+
+/// Hashes what it writes.
+struct HashingWriter<W> {
+    to: W,
+    sum: crc32fast::Hasher,
+}
+
+impl<W: Write> Write for HashingWriter<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.to.write(bytes)?;
+        self.sum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// Hashes what it reads.
+struct HashingReader<'a> {
+    from: &'a mut File,
+    sum: crc32fast::Hasher,
+}
+
+impl Read for HashingReader<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = self.from.read(bytes)?;
+        self.sum.update(&bytes[..read]);
+        Ok(read)
+    }
+}

@@ -1,0 +1,32 @@
+//! What the stages of a run took.
+
+use serde::Serialize;
+
+/// Seconds of each stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Reading the models.
+    pub read: f64,
+    /// Making facets.
+    pub tessellate: f64,
+    /// Building the intersector.
+    pub build: f64,
+    /// Tracing; of a merged run that of all parts together.
+    pub trace: f64,
+    /// What the parts of a merged run took.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub merged: Option<MergedSeconds>,
+}
+
+/// What the parts of a merged run took, from the start of each process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MergedSeconds {
+    /// Parts.
+    pub parts: u32,
+    /// Machines that traced them, by name.
+    pub machines: u32,
+    /// Seconds of all threads of all parts; absent where a system did not tell.
+    pub cpu: Option<f64>,
+    /// Seconds of the slowest part.
+    pub slowest: f64,
+}
