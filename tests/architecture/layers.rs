@@ -74,6 +74,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "paired_receivers",
             "contenders",
             "output_place",
+            "ray_input",
             "shards",
             "lost_rays",
             "results_folder",

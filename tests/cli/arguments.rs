@@ -25,6 +25,8 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
         (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),
         (&["study", "stability", "--rays", "5"], "its questions are fixed"),
+        (&["study", "accuracy", "--rays-in", "a.csv"], "study accuracy does not take --rays-in"),
+        (&["study", "bvh", "--rays-in", "a.csv", "--rays", "5"], "the file of --rays-in has all of them"),
         (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
         (&["tarce"], "trace"),
         (&[], "Usage"),

@@ -51,6 +51,39 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     boxes_are_closed_and_hold_the_lens(folder.path());
 }
 
+#[test]
+fn the_race_asks_the_rays_of_a_file_and_keeps_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = folder.path().join("rays.csv");
+    // Down the axis of the lens and beside it, and one that leaves everything behind it.
+    std::fs::write(&list, "x,y,z,dx,dy,dz,power\n0,0,50,0,0,-1,1\n1,2,50,0,0,-1,1\n0,0,50,0,0,1,1\n").unwrap();
+    let model = fixture("step/lens_planoconvex_nurbs.stp").display().to_string();
+    let path = folder.path().join("out").display().to_string();
+    let list = list.display().to_string();
+    let options = ["--json", "--tolerance", "0.05", "--rays-in", &list, "--threads", "1", "-o", &path, &model];
+    let (code, out, err) = lampyris(&[&["study", "bvh"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let rows = document["rows"].as_array().unwrap();
+    // Six entrants, batch and single.
+    assert_eq!(rows.len(), 6 * 2);
+    for row in rows {
+        assert_eq!(
+            (&row["rays_kind"], &row["rays"], &row["hits"]),
+            (&"given".into(), &3.into(), &2.into()),
+            "{row}"
+        );
+    }
+    let kept = Path::new(&path).join(format!("rays/given-{}.npz", rows[0]["facets"]));
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(kept).unwrap()).unwrap();
+    let mut array = |name: &str| -> Vec<f64> {
+        npyz::NpyFile::new(zip.by_name(&format!("{name}.npy")).unwrap()).unwrap().into_vec().unwrap()
+    };
+    assert_eq!(array("origin"), [0.0, 0.0, 50.0, 1.0, 2.0, 50.0, 0.0, 0.0, 50.0]);
+    assert_eq!(array("direction"), [0.0, 0.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0]);
+    assert_eq!(array("facet"), [-1.0; 3]);
+}
+
 /// Boxes as other programs read them: six quads each, inside the lens' own box grown by a step of the nodes.
 fn boxes_are_closed_and_hold_the_lens(folder: &Path) {
     let vtk = vtkio::Vtk::import(folder.join("octree.vtu")).unwrap();

@@ -87,6 +87,9 @@ pub(crate) enum Command {
         /// Folder for report, rows and pictures
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
+        /// `bvh`: ask the rays of a file (CSV, NPZ, TM-25, Zemax, LightTools, or records as `check --rays-out` writes them)
+        #[arg(long, value_name = "FILE")]
+        rays_in: Option<PathBuf>,
         #[command(flatten)]
         page: PageOption,
         #[command(flatten)]

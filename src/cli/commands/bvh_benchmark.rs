@@ -1,24 +1,27 @@
-//! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, in alternating rounds, on one
-//! thread and on all; answers that differ are judged with twice the digits.
+//! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, its own or those of a file, in alternating
+//! rounds, on one thread and on all; answers that differ are judged with twice the digits, and the rays are kept for other programs.
 
 use super::demo;
 use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::octree_shape::OctreeShape;
+use crate::cli::work::output_place::{folder_of, make_folder};
+use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::{input_files, threads};
+use crate::formats::{NpyArray, write_npz};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
-use crate::math::Ray;
+use crate::math::{Aabb, Ray};
 use crate::mesh::FacetMesh;
 use crate::pipeline::{MeshingSettings, TracingSettings};
 use crate::report::{figures, grouped};
-use crate::study::Progress;
 use crate::study::arbiter::{Verdict, arbitrate, same_distance};
 use crate::study::cross_check::{Competitor, measure};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
 use crate::study::surface_rays::SurfacePaths;
+use crate::study::{Progress, Timing};
 use crate::tessellate::{self, tessellate};
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -41,116 +44,162 @@ pub(crate) struct BvhBenchmark {
     pub(crate) shapes: Vec<OctreeShape>,
 }
 
+/// What the benchmark was asked for.
+pub(crate) struct BvhCommand<'a> {
+    pub(crate) file: Option<&'a Path>,
+    /// Rays to ask in place of its own.
+    pub(crate) rays_in: Option<&'a Path>,
+    /// Where the rays are written that were asked.
+    pub(crate) folder: &'a Path,
+    pub(crate) meshing: &'a MeshingSettings,
+    pub(crate) tracing: &'a TracingSettings,
+}
+
 pub(crate) fn run(
-    file: Option<&Path>,
-    meshing: &MeshingSettings,
-    tracing: &TracingSettings,
+    command: &BvhCommand,
     console: &Console,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<BvhBenchmark, Failure> {
-    let loaded = match file {
+    let given = command.rays_in.map(read_rays).transpose()?;
+    let loaded = match command.file {
         None => demo::lamp()?.1,
         Some(path) => match input_files::either(path, PlacedLimit::default(), console)? {
             input_files::Input::Step(loaded) | input_files::Input::Scene(_, loaded) => loaded,
         },
     };
-    let name = file.map_or("three-cavity lamp".into(), |p| p.display().to_string());
-    let threads = threads::set_threads(tracing.threads)?;
-    let tolerances = meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
+    let name = command.file.map_or("three-cavity lamp".into(), |p| p.display().to_string());
+    let threads = threads::set_threads(command.tracing.threads)?;
+    let tolerances = command.meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
     let mut benchmark = BvhBenchmark { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
     for (k, &tolerance) in tolerances.iter().enumerate() {
         let done = k as f64 / tolerances.len() as f64;
         progress(Progress { stage: format!("{tolerance} mm"), done, remaining_seconds: None });
         let mesh = tessellate(&loaded.model, &tessellate::Settings::uniform(tolerance)).mesh;
-        benchmark.measure_mesh(&name, &mesh, tolerance, tracing, threads);
+        let octree = Octree::build(&mesh, &octree::Settings::default());
+        let kinds = match &given {
+            Some(rays) => vec![(GIVEN, rays.clone())],
+            None => own_rays(&mesh, &octree, tolerance, command.tracing),
+        };
+        for (kind, rays) in &kinds {
+            write_rays(&command.folder.join(format!("rays/{kind}-{}.npz", mesh.facets.len())), rays)?;
+        }
+        benchmark.measure_mesh(&name, &mesh, &octree, &kinds, threads);
     }
     benchmark.answer = sentence(&benchmark.rows);
     Ok(benchmark)
 }
 
+/// The kind of rays that come from a file.
+const GIVEN: &str = "given";
+
+/// Rays by their kind.
+type Kinds = Vec<(&'static str, Vec<Ray>)>;
+
+/// The benchmark's own rays.
+fn own_rays(mesh: &FacetMesh, octree: &Octree, tolerance: f64, tracing: &TracingSettings) -> Kinds {
+    let count = tracing.rays().unwrap_or(RAYS);
+    let seed = tracing.seed.unwrap_or(1);
+    let bounds = mesh.bounds();
+    let bounces = Bounces::new(&bounds, octree, 4.0 * tolerance, seed, count);
+    let surface = SurfacePaths::new(mesh, octree, seed, count);
+    vec![
+        ("coherent", Camera::new(&bounds, count).rays(0..count)),
+        ("incoherent", bounces.rays(0..count)),
+        ("surface", surface.rays(0..count)),
+        ("adversarial", edge_rays(mesh, &bounds, seed, count)),
+    ]
+}
+
+/// Writes rays as arrays that NumPy opens: where they start, mm, their directions, and the facet that each leaves, −1 for none.
+fn write_rays(path: &Path, rays: &[Ray]) -> Result<(), Failure> {
+    make_folder(&folder_of(path))?;
+    let origin: Vec<f64> = rays.iter().flat_map(|ray| ray.origin.to_array()).collect();
+    let direction: Vec<f64> = rays.iter().flat_map(|ray| ray.direction.to_array()).collect();
+    let facet: Vec<f64> = rays.iter().map(|ray| ray.departure.map_or(-1.0, |d| f64::from(d.primitive))).collect();
+    let n = rays.len();
+    Ok(write_npz(
+        path,
+        &[
+            NpyArray { name: "origin", shape: vec![n, 3], data: &origin },
+            NpyArray { name: "direction", shape: vec![n, 3], data: &direction },
+            NpyArray { name: "facet", shape: vec![n], data: &facet },
+        ],
+    )?)
+}
+
+/// One of those that race.
+struct Entrant<'a> {
+    name: &'static str,
+    build: &'static str,
+    who: &'a dyn Intersector,
+}
+
+/// Rays of one kind on one mesh.
+struct Question<'a> {
+    model: &'a str,
+    mesh: &'a FacetMesh,
+    kind: &'a str,
+    rays: &'a [Ray],
+}
+
 impl BvhBenchmark {
     /// All intersectors on one mesh.
-    fn measure_mesh(
-        &mut self,
-        name: &str,
-        mesh: &FacetMesh,
-        tolerance: f64,
-        tracing: &TracingSettings,
-        threads: usize,
-    ) {
-        let count = tracing.rays().unwrap_or(RAYS);
-        let seed = tracing.seed.unwrap_or(1);
-        let octree = Octree::build(mesh, &octree::Settings::default());
+    fn measure_mesh(&mut self, model: &str, mesh: &FacetMesh, octree: &Octree, kinds: &Kinds, threads: usize) {
         let textbook = Octree::build(mesh, &octree::Settings::textbook());
         let binary = Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..Default::default() });
         let cured = Bvh::build(mesh, &bvh::Settings::default());
         let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..Default::default() });
         let slow = Bvh::build(mesh, &bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() });
-        let entrants: [(&str, &str, &dyn Intersector); 6] = [
-            ("octree", "T = 128", &octree),
-            ("octree, textbook", "T = 8", &textbook),
-            ("bvh2", "medium", &binary),
-            ("cwbvh", "medium", &cured),
-            ("cwbvh", "very slow", &slow),
-            ("cwbvh as shipped", "medium", &shipped),
+        let entrants = [
+            Entrant { name: "octree", build: "T = 128", who: octree },
+            Entrant { name: "octree, textbook", build: "T = 8", who: &textbook },
+            Entrant { name: "bvh2", build: "medium", who: &binary },
+            Entrant { name: "cwbvh", build: "medium", who: &cured },
+            Entrant { name: "cwbvh", build: "very slow", who: &slow },
+            Entrant { name: "cwbvh as shipped", build: "medium", who: &shipped },
         ];
-        let bounds = mesh.bounds();
-        let bounces = Bounces::new(&bounds, &octree, 4.0 * tolerance, seed, count);
-        let surface = SurfacePaths::new(mesh, &octree, seed, count);
-        let kinds: [(&str, Vec<Ray>); 4] = [
-            ("coherent", Camera::new(&bounds, count).rays(0..count)),
-            ("incoherent", bounces.rays(0..count)),
-            ("surface", surface.rays(0..count)),
-            ("adversarial", edge_rays(mesh, &bounds, seed, count)),
-        ];
-        let mut shape = OctreeShape::new(&octree);
-        for (kind, rays) in &kinds {
-            let truth = answers(&octree, rays).0;
-            let hits = truth.iter().flatten().count();
-            let judged: Vec<(Comparison, Cost)> = (entrants.iter())
-                .map(|(_, _, who)| {
-                    let (hits, cost) = answers(*who, rays);
-                    (Comparison::new(mesh, rays, &truth, &hits), cost)
-                })
-                .collect();
-            // The octree errs where any other is right against it.
-            let octree_wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
-            shape.costs.push(((*kind).into(), judged[0].1));
-            for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
-                if call == "batch" && threads == 1 && self.has_row(mesh, kind, call, 1) {
-                    continue;
-                }
-                // As many rays for each thread as for one: waking the threads took a tenth of a shorter round.
-                let crowd = rays.repeat(threads);
-                let shared: Vec<ParallelBatches> =
-                    entrants.iter().map(|(_, _, who)| ParallelBatches(*who)).collect();
-                let competitors: Vec<Competitor> = (entrants.iter().zip(&shared))
-                    .map(|((name, _, who), shared)| {
-                        let who: &dyn Intersector = if threads > 1 { shared } else { *who };
-                        Competitor { name, who, batch }
-                    })
-                    .collect();
-                for (((who, build, structure), (_, t)), (comparison, cost)) in
-                    entrants.iter().zip(measure(&competitors, &crowd, ROUNDS)).zip(&judged)
-                {
-                    let footprint = structure.footprint();
-                    let rate = |seconds: f64| crowd.len() as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
-                    let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
-                    let wrong = if *who == "octree" { octree_wrong } else { comparison.wrong };
-                    self.rows.push(json!({
-                        "model": name, "facets": mesh.facets.len(), "intersector": who, "build": build,
-                        "rays_kind": kind, "call": call, "threads": threads,
-                        "mrays_per_s_min": rate(t.p90), "mrays_per_s_median": rate(t.median), "mrays_per_s_p90": rate(t.min),
-                        "build_seconds": footprint.build_seconds,
-                        "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
-                        "nodes_per_ray": per_ray(cost.nodes), "tests_per_ray": per_ray(cost.tests),
-                        "rays": rays.len(), "hits": hits,
-                        "wrong": wrong, "differs": comparison.differs, "undecided": comparison.undecided,
-                    }));
-                }
-            }
+        let mut shape = OctreeShape::new(octree);
+        for (kind, rays) in kinds {
+            let cost = self.measure_rays(&Question { model, mesh, kind, rays }, &entrants, threads);
+            shape.costs.push(((*kind).into(), cost));
         }
         self.shapes.push(shape);
+    }
+
+    /// All intersectors on rays of one kind, on one thread and on all; what the first of them, the octree, did for them.
+    fn measure_rays(&mut self, question: &Question, entrants: &[Entrant; 6], threads: usize) -> Cost {
+        let Question { mesh, kind, rays, .. } = *question;
+        let truth = answers(entrants[0].who, rays).0;
+        let hits = truth.iter().flatten().count();
+        let mut judged: Vec<(Comparison, Cost)> = (entrants.iter())
+            .map(|entrant| {
+                let (hits, cost) = answers(entrant.who, rays);
+                (Comparison::new(mesh, rays, &truth, &hits), cost)
+            })
+            .collect();
+        // The octree errs where any other is right against it.
+        judged[0].0.wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
+        for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
+            if call == "batch" && threads == 1 && self.has_row(mesh, kind, call, 1) {
+                continue;
+            }
+            // As many rays for each thread as for one: waking the threads took a tenth of a shorter round.
+            let crowd = rays.repeat(threads);
+            let shared: Vec<ParallelBatches> = entrants.iter().map(|e| ParallelBatches(e.who)).collect();
+            let competitors: Vec<Competitor> = (entrants.iter().zip(&shared))
+                .map(|(entrant, shared)| {
+                    let who: &dyn Intersector = if threads > 1 { shared } else { entrant.who };
+                    Competitor { name: entrant.name, who, batch }
+                })
+                .collect();
+            let timings = measure(&competitors, &crowd, ROUNDS);
+            for ((entrant, (_, timing)), judgement) in entrants.iter().zip(timings).zip(&judged) {
+                let mut row = row(question, entrant, (call, threads), timing, judgement);
+                row["hits"] = hits.into();
+                self.rows.push(row);
+            }
+        }
+        judged[0].1
     }
 
     fn has_row(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
@@ -161,6 +210,29 @@ impl BvhBenchmark {
                 && r["threads"] == threads
         })
     }
+}
+
+/// What one intersector did with one call on so many threads.
+fn row(
+    question: &Question,
+    entrant: &Entrant,
+    (call, threads): (&str, usize),
+    timing: Timing,
+    (comparison, cost): &(Comparison, Cost),
+) -> Value {
+    let Question { model, mesh, kind, rays } = *question;
+    let footprint = entrant.who.footprint();
+    let rate = |seconds: f64| (rays.len() * threads) as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
+    let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
+    json!({
+        "model": model, "facets": mesh.facets.len(), "intersector": entrant.name, "build": entrant.build,
+        "rays_kind": kind, "call": call, "threads": threads,
+        "mrays_per_s_min": rate(timing.p90), "mrays_per_s_median": rate(timing.median), "mrays_per_s_p90": rate(timing.min),
+        "build_seconds": footprint.build_seconds,
+        "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
+        "nodes_per_ray": per_ray(cost.nodes), "tests_per_ray": per_ray(cost.tests), "rays": rays.len(), "hits": 0,
+        "wrong": comparison.wrong, "differs": comparison.differs, "undecided": comparison.undecided,
+    })
 }
 
 /// An intersector whose batches all threads share.
@@ -185,7 +257,7 @@ impl Intersector for ParallelBatches<'_> {
 }
 
 /// Random rays aimed at corners and at points of edges, where careless tests leak.
-fn edge_rays(mesh: &crate::mesh::FacetMesh, bounds: &crate::math::Aabb, seed: u64, count: u64) -> Vec<Ray> {
+fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray> {
     let random = Uniform::new(bounds, seed ^ 0xad5e, count).rays(0..count);
     let facets = mesh.facets.len().max(1);
     (random.into_iter().enumerate())
@@ -239,20 +311,21 @@ impl Comparison {
 
 fn sentence(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);
+    let kind = if rows.iter().any(|r| r["rays_kind"] == GIVEN) { GIVEN } else { "incoherent" };
     let rate = |name: &str, build: &str, call: &str| {
         let fits = |r: &&Value| {
             r["facets"] == most
                 && r["intersector"] == name
                 && r["build"] == build
                 && r["call"] == call
-                && r["rays_kind"] == "incoherent"
+                && r["rays_kind"] == kind
                 && r["threads"] == 1
         };
         rows.iter().find(fits).and_then(|r| r["mrays_per_s_median"].as_f64()).unwrap_or(f64::NAN)
     };
     let (octree, cwbvh) = (rate("octree", "T = 128", "batch"), rate("cwbvh as shipped", "medium", "single"));
     format!(
-        "With {} facets and incoherent rays on one thread the octree answers **{} million rays/s**, obvhs' CwBvh as shipped {}: \
+        "With {} facets and {kind} rays on one thread the octree answers **{} million rays/s**, obvhs' CwBvh as shipped {}: \
          **{} ×** (medians of {ROUNDS} alternating rounds).",
         grouped(most),
         figures(octree, 3),

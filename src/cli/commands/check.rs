@@ -10,9 +10,10 @@ use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, time_all};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
+use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{paired_receivers, threads};
-use crate::formats::{file_name, open_file, write_atomic};
+use crate::formats::{file_name, write_atomic};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
@@ -30,7 +31,6 @@ use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
 use crate::study::{Quantiles, Summary, records};
 use serde_json::Value;
-use std::path::Path;
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;
@@ -191,16 +191,6 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
             console.say(console.dim("  -o DIR writes a page with the rays that differ in 3-D"));
         }
         None => {}
-    }
-}
-
-fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
-    let open = open_file(path);
-    let read = open.and_then(|f| records::read(&mut std::io::BufReader::new(f)));
-    match read {
-        Ok(list) if list.is_empty() => Err(Failure::input(format!("{}: no rays in it", path.display()))),
-        Ok(list) => Ok(list.into_iter().map(|(ray, _)| ray).collect()),
-        Err(e) => Err(Failure::input(format!("{}: cannot be read as a file of rays: {e}", path.display()))),
     }
 }
 

@@ -40,19 +40,17 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             trace::run(&command, console)
         }
         Command::Check(command) => check::run(&command, console),
-        Command::Study { kind, file, output, page, meshing, tracing } => {
-            let (file, output) = (file.as_deref(), output.as_ref());
-            study::run(
-                &study::StudyCommand {
-                    kind,
-                    file,
-                    output,
-                    page,
-                    meshing: meshing.settings(),
-                    tracing: tracing.settings(),
-                },
-                console,
-            )
+        Command::Study { kind, file, output, rays_in, page, meshing, tracing } => {
+            let command = study::StudyCommand {
+                kind,
+                file: file.as_deref(),
+                output: output.as_ref(),
+                rays_in: rays_in.as_deref(),
+                page,
+                meshing: meshing.settings(),
+                tracing: tracing.settings(),
+            };
+            study::run(&command, console)
         }
         Command::Merge { parts, output, scene, wait, rays, until_error, max_lost, cache, page, limits } => {
             let command = merge::MergeCommand {

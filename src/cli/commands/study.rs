@@ -1,5 +1,6 @@
 //! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
 
+use super::bvh_benchmark::BvhCommand;
 use super::demo;
 use crate::cli::arguments::command::{PageOption, PlacedLimit, StudyKind};
 use crate::cli::console::{Console, print, show_progress};
@@ -38,6 +39,8 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) kind: StudyKind,
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
+    /// Rays to ask in place of those of the study.
+    pub(crate) rays_in: Option<&'a Path>,
     pub(crate) page: PageOption,
     pub(crate) meshing: MeshingSettings,
     pub(crate) tracing: TracingSettings,
@@ -89,6 +92,13 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
         ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
         ("--angle", m.angle_deg.is_some(), faceted, "it goes through facets of its own"),
+        ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it asks rays of its own"),
+        (
+            "--rays",
+            t.ray_range.is_some() && command.rays_in.is_some(),
+            false,
+            "the file of --rays-in has all of them",
+        ),
         ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
     ];
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
@@ -114,8 +124,14 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         StudyKind::Complexity => study_complexity(command, seed, threads, &progress)?,
         StudyKind::Stability => study_stability(&progress)?,
         StudyKind::Bvh => {
-            let benchmark =
-                super::bvh_benchmark::run(command.file, &command.meshing, &command.tracing, console, &progress)?;
+            let race = BvhCommand {
+                file: command.file,
+                rays_in: command.rays_in,
+                folder: &folder,
+                meshing: &command.meshing,
+                tracing: &command.tracing,
+            };
+            let benchmark = super::bvh_benchmark::run(&race, console, &progress)?;
             shapes = benchmark.shapes;
             StudyResult::new(&benchmark.rows, benchmark.answer)?
         }

@@ -12,6 +12,7 @@ pub(super) mod lost_rays;
 pub(super) mod output_place;
 pub(super) mod paired_receivers;
 pub(super) mod path_file;
+pub(super) mod ray_input;
 pub(super) mod results_folder;
 pub(super) mod shards;
 pub(super) mod tally_file;

@@ -1,0 +1,29 @@
+//! Files of rays that a command is told to ask: records as `check --rays-out` writes them, lists and measured ray sets.
+
+use crate::cli::failure::Failure;
+use crate::formats::{Flux, open_file, read_ray_set};
+use crate::math::Ray;
+use crate::study::records;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Extensions of lists (CSV, NPZ) and measured ray sets (TM-25, Zemax, LightTools); all others are records.
+const RAY_SETS: [&str; 7] = ["csv", "txt", "npz", "tm25ray", "dat", "sdf", "ray"];
+
+/// The rays of a file, in the order they stand there.
+pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let rays: Vec<Ray> = if RAY_SETS.contains(&extension.as_str()) {
+        // Which flux a set has says nothing about where its rays run.
+        let set = read_ray_set(path, Flux::Radiant).map_err(|e| Failure::input(e.to_string()))?;
+        set.rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect()
+    } else {
+        let read = open_file(path).and_then(|file| records::read(&mut BufReader::new(file)));
+        let unreadable = |e| Failure::input(format!("{}: cannot be read as a file of rays: {e}", path.display()));
+        read.map_err(unreadable)?.into_iter().map(|(ray, _)| ray).collect()
+    };
+    if rays.is_empty() {
+        return Err(Failure::input(format!("{}: no rays in it", path.display())));
+    }
+    Ok(rays)
+}
