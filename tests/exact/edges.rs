@@ -164,6 +164,34 @@ fn a_gap_that_only_the_neighbour_knows_of_is_flagged() {
 }
 
 #[test]
+fn what_passes_within_the_band_of_an_edge_is_told_on_either_side() {
+    let path = fixture("step/lens_planoconvex_analytic.stp");
+    let mut model = read_model(&path).expect("fixtures are readable");
+    // One face alone: what its trims turn away no neighbour takes.
+    model.parts[0].shells[0].faces.truncate(1);
+    model.parts[0].shells[0].closed = false;
+    let uses: Vec<_> = model.parts[0].shells[0].faces[0].loops.iter().flat_map(|l| &l.uses).collect();
+    let edges: Vec<&Edge> =
+        uses.iter().filter_map(|u| u.edge).map(|e| &model.parts[0].edges[e.0 as usize]).collect();
+    let exact = Exact::build(&model, &Settings::default());
+    let (mut s, mut turned_away) = (Stream(29), 0);
+    for edge in edges.iter().cycle().take(600) {
+        let [a, b] = edge.curve.domain();
+        let target = model.instances[0].placement.point(edge.curve.evaluate(s.within(a, b)));
+        let d = s.direction();
+        let ray = Ray::new(target + s.direction() * (2e-7 * s.next()) - d * 1000.0, d);
+        let near = |t: &f64| (t - 1000.0).abs() < 1e-3;
+        let Passage { crossings, near_trims } = exact.passage(&ray, &mut Cost::default());
+        assert!(near_trims.iter().any(near), "not told: {target} {d}, {crossings:?}");
+        if !crossings.iter().any(|hit| near(&hit.t)) {
+            turned_away += 1;
+            assert!(exact.first(&ray, &mut Cost::default()).near_trim, "not told: {target} {d}");
+        }
+    }
+    assert!(turned_away > 100, "{turned_away} turned away");
+}
+
+#[test]
 #[ignore = "a minute: every corpus model that reads"]
 fn corpus_finds_exactly_one_face_at_an_edge() {
     let folder = corpus();

@@ -227,3 +227,85 @@ fn a_batch_gives_the_bits_of_rays_asked_alone() {
         assert_eq!(bits(&prepared), bits(&alone), "{name}");
     }
 }
+
+#[test]
+fn a_point_that_newton_has_not_reached_is_none() {
+    let exact = Exact::build(&model([sphere(50.0)]), &Settings::default());
+    let mut s = Stream(41);
+    let mut points = [0; 4];
+    for k in 0..2000 {
+        let (d, target) = (s.direction(), s.direction() * 50.0);
+        let ray = Ray::new(target - d * 150.0, d);
+        // From a tenth of a turn away, with too few steps for most.
+        let uv = exact.first(&ray, &mut Cost::default()).hit.unwrap().uv
+            + Uv::new(s.within(-0.1, 0.1), s.within(-0.1, 0.1));
+        let steps = k % 4;
+        if let Some(point) = exact.converge(&ray, FaceId(0), uv, steps) {
+            points[steps as usize] += 1;
+            let off = ray.point_at(point.t).length() - 50.0;
+            assert!(
+                off.abs() < 2e-9 / ray.direction.dot(point.normal).abs().max(1e-3),
+                "{off:e} off after {steps} steps"
+            );
+        }
+    }
+    assert!(points[0] < points[3] && points[3] > 100, "{points:?}");
+}
+
+#[test]
+fn a_reversed_face_has_its_normals_turned() {
+    let mut model = model([sphere(50.0)]);
+    model.parts[0].shells[0].faces[0].reversed = true;
+    let exact = Exact::build(&model, &Settings::default());
+    let mesh = tessellate(&model, &tessellate::Settings { measure: false, ..Default::default() }).mesh;
+    let facets = EveryFacet(&mesh);
+    let polished = Polished::new(&facets, &mesh, &exact);
+    let mut s = Stream(43);
+    for _ in 0..50 {
+        let ray = Ray::new(s.direction() * 20.0, s.direction());
+        for (name, ground) in [("polished", &polished as &dyn Intersector), ("spline", &exact)] {
+            let hit = ground.intersect(&ray, &mut Cost::default()).unwrap();
+            let inward = -ray.point_at(hit.t) / 50.0;
+            assert!(hit.normal.distance(inward) < 1e-9, "{name}: {} for {inward}", hit.normal);
+        }
+        let hit = exact.first(&ray, &mut Cost::default()).hit.unwrap();
+        let point = exact.converge(&ray, hit.face, hit.uv, 4).unwrap();
+        assert!(point.normal.distance(hit.normal) < 1e-9, "{} for {}", point.normal, hit.normal);
+    }
+}
+
+#[test]
+fn newton_goes_on_across_the_seam_of_a_closed_surface() {
+    let surface = sphere(50.0);
+    let [[first, last], [low, high]] = surface.domain();
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let mut s = Stream(47);
+    for k in 0..200 {
+        let aside = 0.01 * (last - first);
+        let (near, far) = (first + aside * s.next(), last - aside * s.next());
+        let (at, seed) = if k % 2 == 0 { (near, far) } else { (far, near) };
+        let v = s.within(low + 0.2 * (high - low), high - 0.2 * (high - low));
+        let target = surface.evaluate(Uv::new(at, v));
+        let d = (s.direction() * 0.3 - target / 50.0).normalize();
+        let point = exact.converge(&Ray::new(target - d * 150.0, d), FaceId(0), Uv::new(seed, v), 20);
+        assert!(point.is_some_and(|p| (p.t - 150.0).abs() < 1e-9), "{point:?} from {seed} to {at}");
+    }
+}
+
+#[test]
+fn a_chord_shorter_than_a_micrometre_is_no_start() {
+    let exact = Exact::build(&model([sphere(50.0)]), &Settings::default());
+    let mut s = Stream(53);
+    for _ in 0..300 {
+        let first = Ray::new(s.direction() * 20.0, s.direction());
+        let hit = exact.first(&first, &mut Cost::default()).hit.unwrap();
+        let start = first.point_at(hit.t);
+        let chord = s.within(7e-4, 9.9e-4);
+        // Of a ball of radius R a chord at sine s is 2Rs long.
+        let (n, sine) = (start.normalize(), chord / 100.0);
+        let d = (n.cross(s.direction()).normalize() * (1.0 - sine * sine).sqrt() - n * sine).normalize();
+        let ray = Ray::new(start, d).with_departure(hit.departure());
+        let next = exact.first(&ray, &mut Cost::default()).hit;
+        assert!(next.is_some_and(|h| (h.t - chord).abs() < 1e-6), "{next:?} for {chord} by {ray:?}");
+    }
+}

@@ -65,8 +65,8 @@ FAULTS = [
     ("box not rounded up", OCTREE + "clip.rs", "if «f64::from(y) < x» { y.next_up()", "false", FACETS + " lib:octree"),
     ("boxes shrunk", OCTREE + "clip.rs", "round_down(«low[a] - pad»)", "low[a] + 0.01 * (high[a] - low[a])", FACETS),
     ("second triangle of a facet left out", OCTREE + "clip.rs", "«if c == d { 1 } else { 2 }»", "1", FACETS),
-    ("node bound to nearest below", OCTREE + "node.rs", "let low = «((f64::from(bounds.low[a]) - origin) / step).floor()»;", "((f64::from(bounds.low[a]) - origin) / step).round()", FACETS),
-    ("node bound to nearest above", OCTREE + "node.rs", "let high = «((f64::from(bounds.high[a]) - origin) / step).ceil()»;", "((f64::from(bounds.high[a]) - origin) / step).round()", FACETS),
+    ("node bound to nearest below", OCTREE + "node.rs", "let low = «(f64::from(bounds.low[a]) - origin) / step»;", "((f64::from(bounds.low[a]) - origin) / step).round()", FACETS),
+    ("node bound to nearest above", OCTREE + "node.rs", "let high = «(f64::from(bounds.high[a]) - origin) / step»;", "((f64::from(bounds.high[a]) - origin) / step).round()", FACETS),
     ("steps too short", OCTREE + "node.rs", "/ 254.0 * «STEP_ROOM») as f32", "(1.0 - 1e-3)", FACETS),
     ("box slack dropped", OCTREE + "ray_state.rs", "b.slack[a] = «((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs()»;", "0.0", FACETS),
     ("sieve slack dropped", OCTREE + "ray_state.rs", "self.sieve.slack = «moved»;", "0.0", FACETS),
@@ -93,4 +93,6 @@ FAULTS = [
 ]
 
 # Faults that no test can see, with the reason.
-EQUIVALENT = {}
+EQUIVALENT = {
+    "unsettled roots told as certified": "what stays open begins two radii of the leaf before its root, so that every answer with it is flagged anyhow",
+}
