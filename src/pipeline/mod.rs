@@ -18,7 +18,7 @@
 //!
 //! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `cache`, `facets`
 //! and `intersectors` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
-//! `cross_check` (the run), `fingerprint` and `error_target` (what is made of it).
+//! `cross_check` (the run), `fingerprint`, `error_target`, `verdicts` and `settled_target` (what is made of it).
 
 mod accuracy_target;
 mod cache;
@@ -35,7 +35,9 @@ mod prepared_scene;
 mod ray_sampler;
 mod scene_results;
 mod settings;
+mod settled_target;
 mod suggest;
+mod verdicts;
 
 pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
 pub use cache::{Cache, CacheEntry};
@@ -51,3 +53,5 @@ pub use prepared_scene::{PreparedScene, SceneJob, TraceRequest};
 pub use ray_sampler::RaySampler;
 pub use scene_results::SceneResults;
 pub use settings::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
+pub use settled_target::trace_until_settled;
+pub use verdicts::ReceiverVerdict;

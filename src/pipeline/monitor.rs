@@ -37,6 +37,9 @@ pub trait Monitor: Sync {
         true
     }
 
+    /// A run whose verdicts leave so many rows unsure goes on with so many rays.
+    fn unsettled(&self, _rows: usize, _rays: u64) {}
+
     /// How far a study has come.
     fn study_progress(&self, _progress: &study::Progress) {}
 

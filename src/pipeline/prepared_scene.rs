@@ -7,7 +7,7 @@ use super::facets::{mesh_settings, tessellate_model};
 use super::intersectors::{self, IntersectorChoice};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage};
-use super::settings::{MeshingSettings, TracingSettings};
+use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
@@ -119,6 +119,11 @@ pub struct TraceRequest<'a> {
 }
 
 impl PreparedScene {
+    /// Finest and loosest tolerance of the facets that the run is traced on, mm; `None` where it is traced on the spline.
+    pub fn tolerance_mm(&self) -> Option<[f64; 2]> {
+        (self.choice.intersector != IntersectorKind::Exact).then_some(self.mesh_settings.tolerance)
+    }
+
     /// Binds the scene (so that its mistakes come before any work), makes the facets, and chooses how to trace where nobody asks.
     ///
     /// # Errors

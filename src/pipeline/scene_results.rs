@@ -72,6 +72,7 @@ impl SceneResults {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
         }
         document["halving"] = serde_json::to_value(figures::halving(&self.results, self.geometric.as_ref()))?;
+        document["tolerance_mm"] = serde_json::to_value(prepared.tolerance_mm())?;
         if let Some(chosen) = &prepared.chosen {
             document["chosen"] = serde_json::to_value(chosen)?;
         }

@@ -87,6 +87,17 @@ impl IntensityMap {
         Ok(Self { h_edges, v_edges, cells })
     }
 
+    /// The same map whose cells hold at least the error of one ray of this flux, lm: a cell that no ray met may hold as much.
+    pub fn with_ray_flux(mut self, flux: f64) -> Self {
+        let width: Vec<f64> = self.h_edges.windows(2).map(|e| (e[1] - e[0]).to_radians()).collect();
+        let height = |row: usize| self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin();
+        let columns = width.len();
+        for (index, cell) in self.cells.iter_mut().enumerate() {
+            cell[1] = cell[1].max(flux / (width[index % columns] * height(index / columns)));
+        }
+        self
+    }
+
     /// The largest side of a cell, degrees.
     pub(super) fn coarsest_deg(&self) -> f64 {
         let sides = |edges: &[f64]| edges.windows(2).map(|e| e[1] - e[0]).fold(0.0, f64::max);

@@ -53,15 +53,8 @@ impl IntensityMap {
         }
         let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
         let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
-        let mut cells: Vec<[f64; 3]> = cells.into_values().collect();
-        if let Some(flux) = ray_flux {
-            let width = (h_edges[1] - h_edges[0]).to_radians();
-            let height = |row: usize| v_edges[row + 1].to_radians().sin() - v_edges[row].to_radians().sin();
-            for (index, cell) in cells.iter_mut().enumerate() {
-                cell[1] = cell[1].max(flux / (width * height(index / (h_edges.len() - 1))));
-            }
-        }
-        Self::new(h_edges, v_edges, cells)
+        let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
+        Ok(ray_flux.into_iter().fold(map, Self::with_ray_flux))
     }
 }
 

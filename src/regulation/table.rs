@@ -81,7 +81,8 @@ pub struct Row {
     pub(super) v0: Option<f64>,
     pub(super) h1: Option<f64>,
     pub(super) v1: Option<f64>,
-    pub(super) polygon: Option<Vec<[f64; 2]>>,
+    /// Corners of a zone, degrees.
+    pub polygon: Option<Vec<[f64; 2]>>,
     pub(super) points: Option<Vec<[f64; 2]>>,
     /// Least intensity, candela.
     pub min: Option<f64>,

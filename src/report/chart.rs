@@ -1,5 +1,7 @@
 //! Pictures in two dimensions as plain data: series, bars and maps with their axes.
 
+use super::contour::{Isoline, isolines, round_levels};
+use super::figures;
 use crate::formats::{ColourMap, Grid};
 
 /// A picture in two dimensions: interactive in the page, static beside it.
@@ -15,6 +17,8 @@ pub struct Chart {
     pub x: AxisStyle,
     /// The vertical axis.
     pub y: AxisStyle,
+    /// Whether a length is the same along both axes.
+    pub equal_scales: bool,
     /// What is drawn.
     pub content: Content,
 }
@@ -51,7 +55,31 @@ pub enum Content {
         grid: Box<Grid>,
         /// Colours.
         map: ColourMap,
+        /// Lines and points over it.
+        marks: Box<Marks>,
     },
+}
+
+/// What is drawn over a map, in its coordinates.
+#[derive(Clone, Debug, Default)]
+pub struct Marks {
+    /// Lines of equal value.
+    pub lines: Vec<Isoline>,
+    /// Named places.
+    pub points: Vec<MapPoint>,
+    /// Borders of zones.
+    pub outlines: Vec<Vec<[f64; 2]>>,
+}
+
+/// A named place on a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapPoint {
+    /// What it is called.
+    pub name: String,
+    /// What the pointer shows beside the name.
+    pub note: String,
+    /// Where it is.
+    pub at: [f64; 2],
 }
 
 /// A line or a cloud of points.
@@ -119,23 +147,55 @@ impl AxisStyle {
 }
 
 impl Chart {
-    /// A map of a grid; the axes are the grid's.
+    /// A map of a grid with lines of equal value at round levels; the axes are the grid's.
     pub fn map(name: &str, title: &str, caption: &str, grid: Grid) -> Self {
         let axis = |k: usize| AxisStyle::linear(&grid.axes[k].label, &grid.axes[k].unit);
+        let levels = round_levels(grid.values.iter().copied().fold(0.0, f64::max));
+        let lines = isolines(&grid, &levels);
+        let named: Vec<String> = levels.iter().map(|l| figures(*l, 3)).collect();
+        let word = match grid.unit.as_str() {
+            "cd" => "Isocandela lines",
+            "lx" => "Isolux lines",
+            _ => "Lines of equal value",
+        };
+        let lines_caption = if lines.is_empty() {
+            String::new()
+        } else {
+            format!(" {word} at {} {}, through values averaged with their neighbours.", named.join(", "), grid.unit)
+        };
         Self {
             name: name.into(),
             title: title.into(),
-            caption: caption.into(),
+            caption: format!("{caption}{lines_caption}"),
             x: axis(0),
             y: axis(1),
-            content: Content::Map { grid: Box::new(grid), map: ColourMap::Inferno },
+            equal_scales: false,
+            content: Content::Map {
+                grid: Box::new(grid),
+                map: ColourMap::Inferno,
+                marks: Box::new(Marks { lines, ..Marks::default() }),
+            },
         }
+    }
+
+    /// The map with named places and borders of zones.
+    pub fn with_marks(mut self, points: Vec<MapPoint>, outlines: Vec<Vec<[f64; 2]>>) -> Self {
+        if let Content::Map { marks, .. } = &mut self.content {
+            (marks.points, marks.outlines) = (points, outlines);
+        }
+        self
+    }
+
+    /// The chart with the same length for a unit of both axes.
+    pub fn with_equal_scales(self) -> Self {
+        Self { equal_scales: true, ..self }
     }
 
     /// Points and lines.
     pub fn series(name: &str, title: &str, caption: &str, axes: [AxisStyle; 2], series: Vec<Series>) -> Self {
         let [x, y] = axes;
         let content = Content::Series(series);
-        Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, content }
+        let equal_scales = false;
+        Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, equal_scales, content }
     }
 }

@@ -57,12 +57,12 @@ fn paint(pixels: &mut Pixmap, element: &Element, font: &FontRef) -> Option<()> {
             let path = PathBuilder::from_circle(x, y, *radius as f32)?;
             pixels.fill_path(&path, &solid(*ink, *opacity), FillRule::Winding, zoom, None);
         }
-        Element::Text { text, place, anchor, opacity, turned } => {
+        Element::Text { text, place, anchor, opacity, turned, ink } => {
             let [x, y] = single(place);
             let turn = if *turned { Transform::from_rotate(-90.0) } else { Transform::identity() };
             let place = turn.post_translate(x, y).post_concat(zoom);
             let path = outline(text, *anchor, font)?;
-            pixels.fill_path(&path, &solid(Ink::Text, *opacity), FillRule::Winding, place, None);
+            pixels.fill_path(&path, &solid(*ink, *opacity), FillRule::Winding, place, None);
         }
         Element::Pixels { corner, size, picture } => {
             let ([x, y], [width, height]) = (single(corner), single(size));
@@ -207,7 +207,8 @@ mod tests {
         assert_eq!([pixel(1, 4), pixel(18, 4), pixel(9, 12)], [[255; 3]; 3]);
         let text = |turned: bool| {
             let text = "llllllll".to_owned();
-            let element = Element::Text { text, place: [40.0, 40.0], anchor: Anchor::Middle, opacity: 1.0, turned };
+            let (anchor, ink) = (Anchor::Middle, Ink::Text);
+            let element = Element::Text { text, place: [40.0, 40.0], anchor, opacity: 1.0, turned, ink };
             let made = drawn([80.0, 80.0], &[element]);
             let dark: Vec<usize> = (0..made.rgb.len() / 3).filter(|k| made.rgb[3 * k] < 128).collect();
             let extent = |of: fn(usize) -> usize| {

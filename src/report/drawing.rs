@@ -33,7 +33,7 @@ pub(super) enum Element {
     /// A filled circle.
     Disc { centre: Place, radius: f64, ink: Ink, opacity: f64 },
     /// A line of text on its baseline; a turned one reads upward.
-    Text { text: String, place: Place, anchor: Anchor, opacity: f64, turned: bool },
+    Text { text: String, place: Place, anchor: Anchor, opacity: f64, turned: bool, ink: Ink },
     /// A picture whose pixels stay sharp.
     Pixels { corner: Place, size: Place, picture: Picture },
 }
@@ -129,7 +129,7 @@ impl Element {
                 let [x, y, fill] = [rounded(*x), rounded(*y), ink.svg()];
                 write!(svg, r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}"{opacity}/>"#)
             }
-            Self::Text { text, place: [x, y], anchor, opacity, turned } => {
+            Self::Text { text, place: [x, y], anchor, opacity, turned, ink } => {
                 let anchor = match anchor {
                     Anchor::Start => "",
                     Anchor::Middle => r#" text-anchor="middle""#,
@@ -142,7 +142,9 @@ impl Element {
                     format!(r#"x="{x}" y="{y}""#)
                 };
                 let opacity = opacity_attribute("opacity", *opacity);
-                write!(svg, "<text {place}{anchor}{opacity}>{}</text>", escape(text))
+                // Text has the colour of what is around the drawing unless it says otherwise.
+                let fill = if *ink == Ink::Text { String::new() } else { format!(r#" fill="{}""#, ink.svg()) };
+                write!(svg, "<text {place}{anchor}{fill}{opacity}>{}</text>", escape(text))
             }
             Self::Pixels { corner: [x, y], size: [width, height], picture } => {
                 // A picture without pixels leaves its place empty.
@@ -169,6 +171,7 @@ mod tests {
             anchor: Anchor::End,
             opacity,
             turned: false,
+            ink: Ink::Text,
         };
         let drawing =
             |element: Element| Drawing { title: "<t>".into(), size: [3.0, 4.0], elements: vec![element] }.svg();

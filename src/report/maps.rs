@@ -70,7 +70,7 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
-/// The values along both axes through the peak, with their statistical errors; `None` for a grid without cells.
+/// The values along both axes through the peak, with their errors; `None` for a grid without cells.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
     let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y]))?;
@@ -78,7 +78,10 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
         name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
         points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
-        errors: grid.error.iter().flat_map(|e| (0..axis.cells).map(|k| e[cell(k)])).collect(),
+        errors: grid.error.as_ref().map_or_else(Vec::new, |e| {
+            let facets = |k: usize| grid.geometric.as_ref().and_then(|g| g.get(cell(k))).copied();
+            (0..axis.cells).map(|k| facets(k).map_or(e[cell(k)], |g| g.hypot(e[cell(k)]))).collect()
+        }),
         style: SeriesStyle::Line,
         ..Series::default()
     };
@@ -87,7 +90,11 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let axes =
         [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
     let name = format!("{}-cuts", file_stem(&r.name));
-    let caption = "One row and one column of cells; bars are one standard error.";
+    let caption = if grid.geometric.is_some() {
+        "One row and one column of cells; bars are one standard error of rays and facets together."
+    } else {
+        "One row and one column of cells; bars are one standard error of the rays."
+    };
     Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series))
 }
 

@@ -26,7 +26,7 @@
     box.replaceChildren();
     figure.data.forEach(label);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
-      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); })
+      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); })
       .catch(() => { box.replaceChildren(...twin); });
   };
 
@@ -48,6 +48,26 @@
       shown.textContent = selector;
       navigator.clipboard?.writeText(selector).then(() => { shown.textContent = `${selector}  (copied)`; }, () => {});
     });
+  };
+
+  // Maps of light on a linear or a logarithmic scale of colours, over four decades below the peak.
+  const scales = (box) => {
+    const trace = box._fullData[0], linear = [...trace.z].map((row) => [...row]);
+    const most = Math.max(...linear.map((row) => Math.max(...row)));
+    if (!(most > 0)) return;
+    const floor = most * 1e-4, decades = [];
+    for (let e = Math.ceil(Math.log10(floor)); e <= Math.log10(most); e++) decades.push(e);
+    const logarithmic = linear.map((row) => row.map((value) => Math.log10(Math.max(value, floor))));
+    const hover = box.data[0].hovertemplate;
+    const button = Object.assign(document.createElement("button"), { type: "button", className: "scale", textContent: "Logarithmic scale" });
+    let log = false;
+    button.addEventListener("click", () => {
+      log = !log;
+      button.textContent = log ? "Linear scale" : "Logarithmic scale";
+      Plotly.restyle(box, { z: [log ? logarithmic : linear], customdata: [linear], hovertemplate: [log ? hover.replace("%{z:", "%{customdata:") : hover],
+        "colorbar.tickvals": [log ? decades : null], "colorbar.ticktext": [log ? decades.map((e) => (10 ** e).toLocaleString("en", { maximumSignificantDigits: 3 })) : null] }, [0]);
+    });
+    box.after(button);
   };
 
   const keys = (box) => {

@@ -1,7 +1,10 @@
 //! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
 
-use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
+use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
+use super::contour::Isoline;
+use super::figures;
 use super::raster::{EYE, common_range};
+use super::static_chart::longest_of_levels;
 use super::view::{Shape, View};
 use crate::formats::{ColourMap, base64};
 use serde_json::{Value, json};
@@ -77,7 +80,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
             let mode = if *stacked { "stack" } else { "group" };
             (bars.collect(), json!({"barmode": mode, "xaxis": {"type": "category", "automargin": true}}))
         }
-        Content::Map { grid, map } => {
+        Content::Map { grid, map, marks } => {
             let [a, b] = &grid.axes;
             let bytes: Vec<u8> = grid.values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
             let z = json!({"dtype": "f4", "bdata": base64(&bytes), "shape": format!("{}, {}", b.cells, a.cells)});
@@ -93,7 +96,13 @@ pub(super) fn chart(chart: &Chart) -> Value {
             // Degrees against degrees and mm against mm look as they are, unless that makes a thin stripe.
             let same = a.unit == b.unit && (0.3..3.4).contains(&ratio);
             let anchor = if same { json!({"scaleanchor": "x", "constrain": "domain"}) } else { json!({}) };
-            (vec![heat], json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}}))
+            let mut data = vec![heat];
+            data.extend(mark_traces(marks));
+            (
+                data,
+                json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_labels(marks),
+                "showlegend": false, "meta": {"unit": grid.unit, "scales": "both"}}),
+            )
         }
     };
     let along = |k: usize| -> Vec<f64> {
@@ -110,7 +119,55 @@ pub(super) fn chart(chart: &Chart) -> Value {
         "margin": {"l": 60, "r": 14, "t": 10, "b": 48}, "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom"},
         "hoverlabel": {"align": "left"}});
     merge(&mut layout, extra);
+    if chart.equal_scales {
+        merge(&mut layout, json!({"yaxis": {"scaleanchor": "x", "constrain": "domain"}}));
+    }
     json!({"data": data, "layout": layout})
+}
+
+/// Lines of equal value, borders of zones and named points as traces over a map; a NaN lifts the pen between two lines.
+fn mark_traces(marks: &Marks) -> Vec<Value> {
+    let joined = |lines: &mut dyn Iterator<Item = &Vec<[f64; 2]>>| -> [Vec<f32>; 2] {
+        let mut along = [Vec::new(), Vec::new()];
+        for line in lines {
+            for (k, numbers) in along.iter_mut().enumerate() {
+                numbers.extend(line.iter().map(|p| p[k] as f32).chain([f32::NAN]));
+            }
+        }
+        along
+    };
+    let lines = |[x, y]: [Vec<f32>; 2], style: Value| {
+        json!({"type": "scatter", "mode": "lines", "hoverinfo": "skip", "line": style,
+            "x": singles(x.into_iter()), "y": singles(y.into_iter())})
+    };
+    let mut traces = Vec::new();
+    if !marks.lines.is_empty() {
+        let all = joined(&mut marks.lines.iter().map(|l| &l.points));
+        traces.push(lines(all, json!({"color": "rgba(255,255,255,0.75)", "width": 1})));
+    }
+    if !marks.outlines.is_empty() {
+        let all = joined(&mut marks.outlines.iter());
+        traces.push(lines(all, json!({"color": "#5eead4", "width": 1.2, "dash": "dash"})));
+    }
+    if !marks.points.is_empty() {
+        let along = |k: usize| doubles(marks.points.iter().map(move |p| p.at[k]));
+        let names: Vec<&str> = marks.points.iter().map(|p| p.name.as_str()).collect();
+        let notes: Vec<String> = marks.points.iter().map(|p| format!("{}: {}", p.name, p.note)).collect();
+        traces.push(json!({"type": "scatter", "mode": "markers+text", "x": along(0), "y": along(1), "text": names,
+            "hovertext": notes, "hoverinfo": "text", "textposition": "top right",
+            "textfont": {"color": "#5eead4", "size": 11}, "marker": {"color": "#5eead4", "size": 7}}));
+    }
+    traces
+}
+
+/// The level at the middle of the longest line of each.
+fn level_labels(marks: &Marks) -> Vec<Value> {
+    let label = |line: &Isoline| {
+        let [x, y] = line.points[line.points.len() / 2];
+        json!({"x": x, "y": y, "text": figures(line.level, 3), "showarrow": false, "font": {"color": "#ffffff", "size": 11},
+            "bgcolor": "rgba(0,0,0,0.35)"})
+    };
+    longest_of_levels(&marks.lines).into_iter().map(label).collect()
 }
 
 fn trace(colour: &str, s: &Series) -> Value {

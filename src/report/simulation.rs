@@ -2,12 +2,14 @@
 
 use super::cross_check::{self, verdict};
 use super::errors;
-use super::maps::{cuts, photometric_grid, reading, receiver_grid, spoken};
-use super::{Block, Cell, Chart, Provenance, Report, Section, Table, View};
+use super::maps::{cuts, photometric_grid, receiver_grid, spoken};
+use super::receiver_blocks;
+use super::verdicts::{self, verdict_sentence};
+use super::{Block, Cell, Provenance, Report, Section, Table, View};
 use super::{figures, grouped, seconds};
-use crate::formats::file_stem;
 use crate::formats::{Facets, Grid, Polylines};
-use crate::simulate::{Event, PathVertex, ReceiverResult, Results};
+use crate::regulation::Assessment;
+use crate::simulate::{Event, PathVertex, Results};
 use crate::study::cross_check::CrossCheck;
 use crate::study::default_accuracy::Chosen;
 use crate::study::figures::ReceiverFigures;
@@ -34,6 +36,8 @@ pub struct SimulationReport<'a> {
     pub geometric: Option<&'a GeometricError>,
     /// Why the run was traced as it was, where it was not asked for.
     pub chosen: Option<&'a Chosen>,
+    /// What regulations say of receivers, by their index.
+    pub verdicts: &'a [(usize, Assessment)],
     /// More 3-D views: of the facets, of the octree.
     pub views: Vec<View>,
     /// More tables: of the model, of the facets.
@@ -116,6 +120,7 @@ impl SimulationReport<'_> {
                 n => format!("{} were", grouped(n)),
             }
         );
+        text += &self.verdicts.iter().map(|(_, a)| verdict_sentence(a)).collect::<String>();
         text += &self.cut_off();
         text.extend(self.geometric.map(|g| errors::limits(g, self.figures)));
         text.extend(self.chosen.map(errors::choice));
@@ -156,7 +161,12 @@ impl SimulationReport<'_> {
 
     /// The whole report.
     pub fn report(&self) -> Report {
-        let mut sections = vec![self.light(), self.energy()];
+        let mut sections = vec![self.light()];
+        for (receiver, assessment) in self.verdicts {
+            let grid = self.results.receivers.get(*receiver).and_then(receiver_grid);
+            sections.extend(grid.map(|grid| verdicts::section(assessment, &grid)));
+        }
+        sections.push(self.energy());
         if let Some(check) = self.check {
             sections.push(self.cross_check(check));
         }
@@ -167,10 +177,9 @@ impl SimulationReport<'_> {
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
         let mut section = notes.fold(Section::new("Light"), |s, note| s.with_block(note.as_str()));
-        let grids = |r| [photometric_grid(r), receiver_grid(r)].into_iter().flatten().map(move |grid| (r, grid));
-        let mut maps: Vec<(&ReceiverResult, Grid)> = self.results.receivers.iter().flat_map(grids).collect();
+        let mut maps = self.maps();
         // Directions first: what a lamp is judged by.
-        maps.sort_by_key(|(r, _)| r.kind != "far_field");
+        maps.sort_by_key(|(k, _)| self.results.receivers[*k].kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
         let around = self.facets.mesh.bounds();
         let lines = lines.inside(&around.grown(0.35 * around.diagonal().max(1.0)));
@@ -183,22 +192,18 @@ impl SimulationReport<'_> {
                 .lines("rays that end inside", &stay, [0.85, 0.30, 0.30])
                 .caption(note),
         );
-        for (r, grid) in maps {
-            let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
-            let cuts = cuts(r, &grid);
-            let name = if grid.unit == r.unit {
-                file_stem(&r.name)
-            } else {
-                format!("{}-{}", file_stem(&r.name), grid.unit)
-            };
-            section = section.with_block(Chart::map(&name, &title, &reading(r, &grid), grid));
+        for (k, grid) in maps {
+            let r = &self.results.receivers[k];
+            section = section.with_block(receiver_blocks::map(r, &grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
                 section = section.with_block(view);
-                if let Some(cuts) = cuts {
+                if let Some(cuts) = cuts(r, &grid) {
                     section = section.with_block(cuts);
                 }
             }
+            let judged = self.verdicts.iter().find(|(receiver, _)| *receiver == k).map(|(_, a)| a);
+            section.blocks.extend(receiver_blocks::more(r, &grid, self.results, judged));
         }
         if let Some(view) = view {
             section = section.with_block(view);
@@ -207,6 +212,18 @@ impl SimulationReport<'_> {
             section = section.with_block(sentence.as_str());
         }
         section
+    }
+
+    /// Every receiver's grids, with the index of the receiver and the errors of the facets where they are known.
+    fn maps(&self) -> Vec<(usize, Grid)> {
+        let mut maps = Vec::new();
+        for (k, r) in self.results.receivers.iter().enumerate() {
+            maps.extend(photometric_grid(r).map(|grid| (k, grid)));
+            let geometric = self.geometric.and_then(|g| g.receivers.get(k)).map(|error| error.cells.clone());
+            let geometric = geometric.filter(|cells| cells.len() == r.cells.len());
+            maps.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
+        }
+        maps
     }
 
     fn energy(&self) -> Section {

@@ -1,6 +1,7 @@
 //! The static picture of a chart: its scales, axes, lines, bars, legend or map as elements.
 
-use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
+use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
+use super::contour::Isoline;
 use super::drawing::{Anchor, Drawing, Element, Ink, Place};
 use super::number::figures;
 use crate::formats::{ColourMap, Grid, Picture};
@@ -84,7 +85,10 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
     match &chart.content {
         Content::Series(series) => series_chart(elements, chart, series),
         Content::Bars { categories, layers, stacked } => bar_chart(elements, chart, categories, layers, *stacked),
-        Content::Map { grid, map } => map_chart(elements, chart, grid, *map),
+        Content::Map { grid, map, marks } => {
+            let scales = map_chart(elements, chart, grid, *map);
+            draw_marks(elements, marks, &grid.unit, scales);
+        }
     }
     drawing
 }
@@ -95,11 +99,11 @@ fn grid_line(from: Place, to: Place) -> Element {
 
 /// A number at an axis or a name below a bar.
 fn tick_label(text: String, place: Place, anchor: Anchor) -> Element {
-    Element::Text { text, place, anchor, opacity: NUMBER_OPACITY, turned: false }
+    Element::Text { text, place, anchor, opacity: NUMBER_OPACITY, turned: false, ink: Ink::Text }
 }
 
 fn label(text: String, place: Place, anchor: Anchor) -> Element {
-    Element::Text { text, place, anchor, opacity: 1.0, turned: false }
+    Element::Text { text, place, anchor, opacity: 1.0, turned: false, ink: Ink::Text }
 }
 
 fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
@@ -122,6 +126,7 @@ fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale
         anchor: Anchor::Middle,
         opacity: 1.0,
         turned: true,
+        ink: Ink::Text,
     });
 }
 
@@ -142,8 +147,11 @@ fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
 fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     let [left, top, right, bottom] = AREA;
     let all = || series.iter().flat_map(|s| &s.points);
-    let x = Scale::new(all().map(|p| p[0]), &chart.x, [left, right], false);
-    let y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
+    let mut x = Scale::new(all().map(|p| p[0]), &chart.x, [left, right], false);
+    let mut y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
+    if chart.equal_scales {
+        equalise(&mut x, &mut y);
+    }
     axes(elements, chart, Some(&x), &y, right);
     let mut names = Vec::new();
     for (s, colour) in series.iter().zip(colours(series)) {
@@ -153,6 +161,16 @@ fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
         one_series(elements, s, Ink::hex(colour), [&x, &y]);
     }
     legend(elements, &names);
+}
+
+/// Widens the range of one linear scale, so that a unit is as long on both.
+fn equalise(x: &mut Scale, y: &mut Scale) {
+    let unit = |s: &Scale| (s.high - s.low) / (s.to - s.from).abs();
+    let most = unit(x).max(unit(y));
+    for scale in [x, y] {
+        let (middle, half) = (0.5 * (scale.low + scale.high), 0.5 * most * (scale.to - scale.from).abs());
+        (scale.low, scale.high) = (middle - half, middle + half);
+    }
 }
 
 /// The line of a series, then its error bars, then its points on top.
@@ -249,7 +267,7 @@ fn bar_chart(
     legend(elements, &names);
 }
 
-fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) {
+fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) -> [Scale; 2] {
     let [left, top, right, bottom] = AREA;
     let right = right - 74.0;
     let plain =
@@ -272,4 +290,61 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
         elements.push(tick_label(figures(t, 3), [right + 30.0, bar.position(t) + 4.0], Anchor::Start));
     }
     elements.push(label(grid.unit.clone(), [right + 30.0, bottom + 19.0], Anchor::Middle));
+    [x, y]
+}
+
+/// The colour of lines and words on a map, and of the borders of zones: both stand against every colour of it.
+const MARK: Ink = Ink::Colour([255, 255, 255]);
+const ZONE: Ink = Ink::Colour([0x5e, 0xea, 0xd4]);
+
+/// How strongly the lines of equal value stand against the map.
+const LINE_OPACITY: f64 = 0.75;
+
+/// Lines of equal value with their levels, borders of zones, and named points.
+fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str, [x, y]: [Scale; 2]) {
+    let place = |p: &[f64; 2]| [x.position(p[0]), y.position(p[1])];
+    let word = |text: String, place: Place, ink: Ink, anchor: Anchor| Element::Text {
+        text,
+        place,
+        anchor,
+        opacity: 1.0,
+        turned: false,
+        ink,
+    };
+    for line in &marks.lines {
+        let points: Vec<Place> = line.points.iter().map(place).collect();
+        elements.push(Element::Line { points, ink: MARK, width: 1.0, opacity: LINE_OPACITY, dashed: false });
+    }
+    for outline in &marks.outlines {
+        let points: Vec<Place> = outline.iter().map(place).collect();
+        elements.push(Element::Line { points, ink: ZONE, width: 1.2, opacity: 1.0, dashed: true });
+    }
+    for line in longest_of_levels(&marks.lines) {
+        let middle = place(&line.points[line.points.len() / 2]);
+        elements.push(word(figures(line.level, 3), middle, MARK, Anchor::Middle));
+    }
+    for point in &marks.points {
+        let at = place(&point.at);
+        elements.push(Element::Disc { centre: at, radius: 3.5, ink: ZONE, opacity: 1.0 });
+        elements.push(word(point.name.clone(), [at[0] + 6.0, at[1] - 5.0], ZONE, Anchor::Start));
+    }
+    // A map without lines has no level to name.
+    if let Some(line) = marks.lines.first().filter(|_| marks.points.is_empty()) {
+        let corner = [AREA[0] + 8.0, AREA[3] - 8.0];
+        let text = format!("lines: {unit}, from {}", figures(line.level, 3));
+        elements.push(word(text, corner, MARK, Anchor::Start));
+    }
+}
+
+/// The longest line of each level, which bears its name.
+pub(super) fn longest_of_levels(lines: &[Isoline]) -> Vec<&Isoline> {
+    let mut longest: Vec<&Isoline> = Vec::new();
+    for line in lines {
+        match longest.iter_mut().find(|l| l.level == line.level) {
+            Some(known) if known.points.len() < line.points.len() => *known = line,
+            Some(_) => {}
+            None => longest.push(line),
+        }
+    }
+    longest
 }

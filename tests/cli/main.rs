@@ -8,6 +8,7 @@ mod demo;
 #[path = "../support/files.rs"]
 mod files;
 mod growing;
+mod headlamp;
 mod info;
 mod mishaps;
 mod names;

@@ -261,6 +261,9 @@ pub(crate) struct TraceOptions {
     /// its cells weighted by their light; --rays is then the most to trace
     #[arg(long, value_name = "P%@RECEIVER", conflicts_with_all = ["shard", "resume", "verify_pruning", "paths"])]
     pub(crate) until_error: Option<String>,
+    /// Trace until no row of the scene's [[regulation]] is unsure by the rays, or say that it cannot; --rays is then the most to trace
+    #[arg(long, conflicts_with_all = ["shard", "resume", "verify_pruning", "paths", "until_error"])]
+    pub(crate) until_settled: bool,
     /// Write every vertex of every ray path, in constant memory: arrays ray, branch, bounce, event, point (mm) and power (share
     /// of an average ray), in no particular order; events from 0: emitted, split, reflected, transmitted, scattered, absorbed,
     /// received, escaped, cut off, lost

@@ -2,12 +2,10 @@
 
 use crate::cli::console::{Console, print};
 use crate::cli::output::json::json_text;
-use crate::cli::output::terminal_tables::blank_table;
+use crate::cli::output::verdict::summary;
 use crate::cli::work::output_place::folder_of;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::regulation::{Assessment, Assumptions, IntensityMap, Regulation, RowVerdict, Traffic, Verdict, assess};
-use crate::report::figures;
-use comfy_table::CellAlignment;
+use crate::regulation::{Assumptions, IntensityMap, Regulation, Traffic, assess};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -19,9 +17,6 @@ pub(crate) struct AssessCommand<'a> {
     pub(crate) left_hand: bool,
     pub(crate) as_placed: bool,
 }
-
-/// Significant digits of intensities: more than any photometer has.
-const DIGITS: usize = 5;
 
 /// Prints what there are tables of.
 pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
@@ -54,7 +49,7 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
     let assessment = assess(&map, &regulation, &assumptions).map_err(|e| {
         Failure::arguments(e).with_help("set `cells`, `h_deg` and `v_deg` of the far field and trace again")
     })?;
-    let document = json_document(&assessment);
+    let document = assessment.document();
     if console.json {
         print(&json_text(&document)?)?;
     } else {
@@ -121,93 +116,8 @@ impl ResultsFile {
         IntensityMap::from_csv(&text, ray_flux).map_err(failure)
     }
 
-    /// The upper end of the tolerance that the run chose or was given, where it traced facets.
+    /// The upper end of the tolerance of the run's facets, where it traced any.
     fn tolerance_mm(&self) -> Option<f64> {
-        let tolerance = &self.results["chosen"]["tolerance_mm"];
-        tolerance.as_f64().or_else(|| tolerance["max"].as_f64()).or_else(|| tolerance[1].as_f64())
+        self.results["tolerance_mm"][1].as_f64()
     }
-}
-
-fn json_document(a: &Assessment) -> Value {
-    let rows = a.rows.iter().map(|r| {
-        let settles = r.settles.map(|s| json!({"rays": s.rays, "tolerance_mm": s.tolerance_mm}));
-        json!({
-            "id": r.row.id, "kind": r.row.kind,
-            "h_deg": r.direction.map(|d| d[0]), "v_deg": r.direction.map(|d| d[1]),
-            "min": r.row.min, "max": r.row.max,
-            "value": r.reading.map(|x| x.value),
-            "statistical": r.reading.map(|x| x.statistical),
-            "geometric": r.reading.map(|x| x.geometric),
-            "verdict": r.verdict.map(|v| v.to_string()),
-            "settles": settles, "when": r.row.when, "note": r.row.note,
-            "source": r.row.source, "evidence": r.row.evidence,
-        })
-    });
-    json!({
-        "regulation": a.regulation.id, "title": a.regulation.title, "checked": a.regulation.checked(),
-        "aim": {"h_deg": a.aim.h_deg, "v_deg": a.aim.v_deg, "how": a.aim.how},
-        "sensor_deg": a.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": a.verdict.to_string(),
-    })
-}
-
-fn summary(a: &Assessment, console: &Console) -> String {
-    let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
-    text += &format!("  aim     {}\n", a.aim.how);
-    text += &format!("  sensor  {:.3}° from side to side\n", a.sensor_deg);
-    text += &format!("  tables  {}\n", a.regulation.checked());
-    let mut table = blank_table(console.width());
-    table.set_header(["", "direction", "asked [cd]", "read [cd]", "± stat.", "± geom.", "verdict", "settled by"]);
-    for row in &a.rows {
-        table.add_row(cells(row));
-    }
-    for column in 2..=5 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    let count = |v: Verdict| a.rows.iter().filter(|r| r.verdict == Some(v)).count();
-    let counts = [Verdict::Pass, Verdict::Fail, Verdict::Unsure].map(count);
-    let unjudged = a.rows.len() - counts.iter().sum::<usize>();
-    text += &format!("{table}\n  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
-    text += &if unjudged > 0 { format!(", {unjudged} not judged (notes and conditions)") } else { String::new() };
-    text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
-}
-
-fn cells(row: &RowVerdict) -> [String; 8] {
-    let number = |x: f64| figures(x, DIGITS);
-    let asked = match (row.row.min, row.row.max) {
-        (Some(min), Some(max)) => format!("{} … {}", number(min), number(max)),
-        (Some(min), None) => format!("≥ {}", number(min)),
-        (None, Some(max)) => format!("≤ {}", number(max)),
-        (None, None) => row
-            .row
-            .when
-            .clone()
-            .unwrap_or_else(|| if row.row.kind == "relative" { "relative".into() } else { "–".into() }),
-    };
-    let side = |x: f64, positive: char, negative: char| match x {
-        x if x > 0.0 => format!("{}{positive}", figures(x, 3)),
-        x if x < 0.0 => format!("{}{negative}", figures(-x, 3)),
-        _ => "0".to_owned(),
-    };
-    let direction = row.direction.map(|[h, v]| format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D')));
-    let read = |value: fn(crate::regulation::Reading) -> f64| {
-        row.reading.map_or("–".to_owned(), |r| figures(value(r), DIGITS))
-    };
-    let settles = row.settles.map(|s| {
-        let rays = format!("{:.1e} rays", s.rays as f64);
-        s.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
-    });
-    // What a note or a condition has not is an empty cell.
-    let cell = |text: Option<String>| text.map_or(String::new(), |t| t);
-    [
-        row.row.id.clone(),
-        cell(direction),
-        asked,
-        read(|r| r.value),
-        read(|r| r.statistical),
-        read(|r| r.geometric),
-        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
-        cell(settles),
-    ]
 }

@@ -16,6 +16,7 @@ mod meta;
 mod replay;
 mod study;
 mod trace;
+mod verdicts;
 
 use crate::cli::arguments::command::Command;
 use crate::cli::console::Console;

@@ -1,6 +1,6 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::replay;
+use super::{replay, verdicts};
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
@@ -17,8 +17,8 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{input_files, lost_rays, results_folder, shards};
 use crate::pipeline::{
-    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TraceRequest,
-    TracingSettings, read_scene, settings_for_accuracy,
+    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TargetResult,
+    TraceRequest, TracingSettings, read_scene, settings_for_accuracy,
 };
 use crate::report::{bytes, grouped, seconds};
 use crate::simulate::{GROWING_REPLICATE, PartialRun, PathSink, PathVertex, grows};
@@ -106,6 +106,7 @@ fn trace_whole(
 
     // With an error to reach, the number of rays is found by tracing.
     let found = target.map(|target| target.trace(prepared, &TerminalMonitor::of_saveable(console, None)));
+    let settled = if extra.until_settled { Some(verdicts::trace_until_settled(prepared, console)?) } else { None };
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
     let (traced, result) = match found {
@@ -116,15 +117,9 @@ fn trace_whole(
             )));
         }
         Some((portion, result)) => (Some(portion), Some(result)),
-        None => (None, None),
+        None => (settled, None),
     };
-    let saved = if extra.resume { checkpoint.read()? } else { None };
-    if extra.resume {
-        console.say(match &saved {
-            Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
-            None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
-        });
-    }
+    let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
 
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
@@ -150,10 +145,7 @@ fn trace_whole(
     };
     say_verification(&run, console)?;
 
-    let sentences: Vec<String> = result.as_ref().map(closing::error_sentence).into_iter().collect();
-    for sentence in &sentences {
-        console.say(sentence.replace("**", ""));
-    }
+    let sentences = say_target(result.as_ref(), console);
     let written = results_folder::write(prepared, folder, &mut run, sentences.clone(), with_page, console);
     let (mut document, answer) = match written {
         Ok(written) => written,
@@ -167,12 +159,34 @@ fn trace_whole(
         document["until_error"] = json_value(result)?;
     }
     // What was missed comes before what was found.
-    let missed = result.as_ref().is_some_and(|result| !result.reached);
+    let unsettled = extra.until_settled && verdicts::are_unsettled(&document);
+    let missed = result.as_ref().is_some_and(|result| !result.reached) || unsettled;
+    let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
+    verdicts::say(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     checkpoint.remove();
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
-    Ok(lost.and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
+    Ok(lost.and(Completion::incomplete_if(missed)))
+}
+
+/// What is done of an interrupted run; `None` where there is none.
+fn saved_run(checkpoint: &Checkpoint, folder: &Path, console: &Console) -> Result<Option<PartialRun>, Failure> {
+    let saved = checkpoint.read()?;
+    console.say(match &saved {
+        Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
+        None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
+    });
+    Ok(saved)
+}
+
+/// Says what came of --until-error, and gives the sentence for the page.
+fn say_target(result: Option<&TargetResult>, console: &Console) -> Vec<String> {
+    let sentences: Vec<String> = result.map(closing::error_sentence).into_iter().collect();
+    for sentence in &sentences {
+        console.say(sentence.replace("**", ""));
+    }
+    sentences
 }
 
 /// Tries all that is to be written, and begins the file of paths where one is wanted.

@@ -7,3 +7,4 @@ pub(super) mod octree_shape;
 pub(super) mod receiver_files;
 pub(super) mod rule_table;
 pub(super) mod terminal_tables;
+pub(super) mod verdict;

@@ -10,6 +10,7 @@ use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
+use crate::regulation::Assessment;
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, path_lines};
 use crate::simulate::arrivals;
 use crate::study::figures::ReceiverFigures;
@@ -96,6 +97,11 @@ pub(crate) fn write(
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     document["provenance"] = json_value(&provenance)?;
+    let verdicts = run.verdicts(prepared).map_err(Failure::running)?;
+    if !verdicts.is_empty() {
+        document["regulations"] = verdicts.iter().map(|v| v.assessment.document()).collect();
+    }
+    let verdicts: Vec<(usize, Assessment)> = verdicts.into_iter().map(|v| (v.receiver, v.assessment)).collect();
     if has_lost_rays {
         document["ledger"] = LEDGER.into();
     }
@@ -104,7 +110,8 @@ pub(crate) fn write(
     if with_page {
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
-    let report = page(prepared, run, &all_figures, &facets, sentences, provenance);
+    let found = (all_figures.as_slice(), verdicts.as_slice());
+    let report = page(prepared, run, found, &facets, sentences, provenance);
     let answer = report.answer();
     if with_page {
         report.with_views(views(prepared, &facets)).report().write(folder)?;
@@ -117,7 +124,7 @@ pub(crate) fn write(
 fn page<'a>(
     prepared: &'a PreparedScene,
     run: &'a SceneResults,
-    all_figures: &'a [ReceiverFigures],
+    (all_figures, verdicts): (&'a [ReceiverFigures], &'a [(usize, Assessment)]),
     facets: &'a Facets,
     sentences: Vec<String>,
     provenance: Provenance,
@@ -133,6 +140,7 @@ fn page<'a>(
         figures: all_figures,
         geometric: run.geometric.as_ref(),
         chosen: prepared.chosen.as_ref(),
+        verdicts,
         views: Vec::new(),
         tables: [
             (!prepared.bound.rules().is_empty())

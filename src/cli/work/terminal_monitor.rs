@@ -101,6 +101,11 @@ impl Monitor for TerminalMonitor<'_> {
         self.console.say(answer);
     }
 
+    fn unsettled(&self, rows: usize, rays: u64) {
+        let rows = if rows == 1 { "1 row is".to_owned() } else { format!("{rows} rows are") };
+        self.console.say(format_args!("{rows} unsure: going on with {} rays", grouped(rays)));
+    }
+
     fn grows(&self, found_percent: Option<f64>, rays: u64) {
         let found = found_percent.map_or("nothing arrives".into(), |e| figures(e, 2));
         self.console.say(format_args!("{found} %: going on with {} rays", grouped(rays)));

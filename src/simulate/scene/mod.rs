@@ -11,6 +11,7 @@ mod locate;
 mod material;
 pub(crate) mod medium;
 mod receiver;
+mod regulation;
 mod run;
 mod selector;
 mod source;
@@ -23,6 +24,7 @@ use crate::formats::file_stem;
 pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceKind};
 pub use medium::{ByWavelength, Medium};
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
+pub use regulation::RegulationUse;
 pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
 pub use selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use serde::{Deserialize, Serialize};
@@ -85,6 +87,9 @@ pub struct Scene {
     /// Where light is counted.
     #[serde(rename = "receiver")]
     pub receivers: Vec<Receiver>,
+    /// Regulations that a far field is judged by.
+    #[serde(rename = "regulation")]
+    pub regulations: Vec<RegulationUse>,
     /// The file it came from, for messages.
     #[serde(skip)]
     pub origin: Origin,
@@ -168,6 +173,7 @@ impl Scene {
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         self.check_receiver_names()?;
+        self.regulations.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         let sums: u64 = self.receivers.iter().map(Receiver::sums).sum();
         if sums > MOST_SUMS {
             let largest = (0..self.receivers.len()).max_by_key(|&i| self.receivers[i].sums());

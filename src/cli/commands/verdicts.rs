@@ -1,0 +1,53 @@
+//! `[[regulation]]` and `trace --until-settled`: what the regulations of a scene say of its run.
+
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::cli::output::verdict::summary;
+use crate::cli::work::terminal_monitor::TerminalMonitor;
+use crate::pipeline::{self, PreparedScene, SceneResults};
+use crate::report::grouped;
+use crate::simulate::PartialRun;
+use serde_json::Value;
+
+/// What is said where --until-settled did not settle every row.
+pub(super) const UNSETTLED: &str = "**Not settled**: rows stay unsure, by the facets or at the most rays; the column 'settled by' says what \
+    would do, and --intersector exact takes the errors of the facets away.";
+
+/// Prints every verdict of the run.
+///
+/// # Errors
+/// When a far field cannot be judged.
+pub(super) fn say(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
+    for verdict in run.verdicts(prepared).map_err(Failure::running)? {
+        console.say(summary(&verdict.assessment, console));
+    }
+    Ok(())
+}
+
+/// Whether a row of a verdict is unsure.
+pub(super) fn are_unsettled(document: &Value) -> bool {
+    let verdicts = document["regulations"].as_array().into_iter().flatten();
+    let mut rows = verdicts.flat_map(|v| v["rows"].as_array()).flatten();
+    rows.any(|row| row["verdict"] == "unsure")
+}
+
+/// Traces as many rays as the verdicts of the scene's regulations need.
+///
+/// # Errors
+/// When the scene names no regulation, its sources have their own numbers of rays, or the run is interrupted.
+pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Console) -> Result<PartialRun, Failure> {
+    let scene = &prepared.job.scene;
+    if scene.regulations.is_empty() {
+        let failure = Failure::arguments("--until-settled: the scene names no regulation");
+        return Err(failure.with_help("add a [[regulation]] with its `id`"));
+    }
+    if scene.sources.iter().any(|s| s.rays.is_some()) {
+        let failure = Failure::arguments("--until-settled: a source with `rays` of its own does not grow");
+        return Err(failure.with_help("take `rays` out of the [[source]]s"));
+    }
+    let (portion, rays) = pipeline::trace_until_settled(prepared, &TerminalMonitor::of_saveable(console, None));
+    if portion.is_whole() {
+        return Ok(portion);
+    }
+    Err(Failure::running(format!("interrupted at {} rays", grouped(rays))))
+}

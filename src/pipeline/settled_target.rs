@@ -1,0 +1,50 @@
+//! As many rays as the verdicts of a scene's regulations need until no row is unsure.
+//!
+//! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of the
+//! rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
+
+use super::monitor::Monitor;
+use super::prepared_scene::{PreparedScene, TraceRequest};
+use super::verdicts::verdict;
+use crate::regulation::{RowVerdict, Verdict};
+use crate::simulate::{PartialRun, Results};
+
+/// Rays of the first run, and the most, where the settings do not say.
+const FIRST_RAYS: u64 = 200_000;
+const MOST_RAYS: u64 = 10_000_000_000;
+
+/// More rays than a row asks for, for its error has an error; least and greatest growth of a run.
+const GROWTH_MARGIN: f64 = 1.1;
+const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
+
+/// Traces until no row of a verdict is unsure by the errors of the rays, the most rays are traced, or the monitor asks to stop: then not all
+/// is traced. Gives the sums and the number of rays.
+pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, u64) {
+    let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
+    let mut rays = FIRST_RAYS.min(most);
+    loop {
+        prepared.rays = Some(rays);
+        let settings = prepared.run_settings();
+        let (portion, wanted) = prepared.with_intersector(monitor, |intersector, _| {
+            let traced = prepared.run(intersector, &settings, TraceRequest::default(), monitor);
+            let portion = traced.partial.clone();
+            (portion, rays_wanted(prepared, &Results::new(&prepared.bound, &settings, traced)))
+        });
+        let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
+            return (portion, rays);
+        };
+        let growth = (GROWTH_MARGIN * most_wanted as f64 / rays as f64).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1]);
+        rays = ((rays as f64 * growth) as u64).min(most);
+        monitor.unsettled(wanted.len(), rays);
+    }
+}
+
+/// The rays that would settle each unsure row. A row at its very limit asks for no number: then twice as
+/// many are tried.
+fn rays_wanted(prepared: &PreparedScene, results: &Results) -> Vec<u64> {
+    let all = prepared.job.scene.regulations.iter();
+    let verdicts = all.filter_map(|wanted| verdict(wanted, prepared, results, |_| None).ok());
+    let is_unsure = |row: &RowVerdict| row.verdict == Some(Verdict::Unsure);
+    let rays = |row: &RowVerdict| row.settles.map_or(results.rays.saturating_mul(2), |s| s.rays);
+    verdicts.flat_map(|v| v.assessment.rows).filter(is_unsure).map(|row| rays(&row)).collect()
+}

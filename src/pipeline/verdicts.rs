@@ -1,0 +1,66 @@
+//! Verdicts of the regulations that a scene names, about the far fields of its run.
+
+use super::prepared_scene::PreparedScene;
+use super::scene_results::SceneResults;
+use crate::regulation::{Assessment, Assumptions, IntensityMap, Regulation, Traffic, assess};
+use crate::simulate::scene::RegulationUse;
+use crate::simulate::{ReceiverResult, Results};
+
+/// A regulation's answer about a receiver.
+#[derive(Clone, Debug)]
+pub struct ReceiverVerdict {
+    /// Index of the receiver in the results.
+    pub receiver: usize,
+    /// The answer.
+    pub assessment: Assessment,
+}
+
+/// The intensities of a far field over H and V, with both errors; geometric ones are zero where none are given.
+fn intensities(
+    receiver: &ReceiverResult,
+    geometric: Option<&[f64]>,
+    ray_flux: f64,
+) -> Result<IntensityMap, String> {
+    let edges = |k: usize| -> Vec<f64> {
+        let step = 2.0 * receiver.half[k] / receiver.grid[k] as f64;
+        (0..=receiver.grid[k]).map(|i| receiver.middle[k] - receiver.half[k] + step * i as f64).collect()
+    };
+    let error = |k: usize| geometric.map_or(Some(0.0), |g| g.get(k).copied());
+    let cells: Option<Vec<[f64; 3]>> = (receiver.cells.iter().zip(&receiver.errors).enumerate())
+        .map(|(k, (value, statistical))| Some([*value, *statistical, error(k)?]))
+        .collect();
+    let cells = cells.ok_or("its cells have no errors from the facets")?;
+    Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_ray_flux(ray_flux))
+}
+
+/// The verdict of one regulation about a run's results.
+pub(super) fn verdict(
+    wanted: &RegulationUse,
+    prepared: &PreparedScene,
+    results: &Results,
+    geometric: impl Fn(usize) -> Option<Vec<f64>>,
+) -> Result<ReceiverVerdict, String> {
+    let regulation = Regulation::find(&wanted.id)?;
+    let receiver = wanted.receiver_index(&prepared.job.scene).ok_or("the scene has no such far field")?;
+    let errors = geometric(receiver);
+    let ray_flux = results.power.emitted / results.rays.max(1) as f64;
+    let map = intensities(&results.receivers[receiver], errors.as_deref(), ray_flux)?;
+    let assumptions = Assumptions {
+        traffic: if wanted.left_hand { Traffic::Left } else { Traffic::Right },
+        as_placed: wanted.as_placed,
+        rays: results.rays,
+        tolerance_mm: prepared.tolerance_mm().map(|[_, high]| high),
+    };
+    Ok(ReceiverVerdict { receiver, assessment: assess(&map, &regulation, &assumptions)? })
+}
+
+impl SceneResults {
+    /// The verdicts of the scene's regulations, in its order.
+    ///
+    /// # Errors
+    /// When a far field cannot be judged; the message says why.
+    pub fn verdicts(&self, prepared: &PreparedScene) -> Result<Vec<ReceiverVerdict>, String> {
+        let wanted = &prepared.job.scene.regulations;
+        wanted.iter().map(|w| verdict(w, prepared, &self.results, |k| self.geometric_cells(prepared, k))).collect()
+    }
+}

@@ -1,0 +1,29 @@
+//! An assessment as the document that `assess --json` prints and `results.json` holds.
+
+use super::verdict::Assessment;
+use serde_json::{Value, json};
+
+impl Assessment {
+    /// Regulation, aim, photometer and every row with both errors and its verdict.
+    pub fn document(&self) -> Value {
+        let rows = self.rows.iter().map(|r| {
+            let settles = r.settles.map(|s| json!({"rays": s.rays, "tolerance_mm": s.tolerance_mm}));
+            json!({
+                "id": r.row.id, "kind": r.row.kind,
+                "h_deg": r.direction.map(|d| d[0]), "v_deg": r.direction.map(|d| d[1]),
+                "min": r.row.min, "max": r.row.max,
+                "value": r.reading.map(|x| x.value),
+                "statistical": r.reading.map(|x| x.statistical),
+                "geometric": r.reading.map(|x| x.geometric),
+                "verdict": r.verdict.map(|v| v.to_string()),
+                "settles": settles, "when": r.row.when, "note": r.row.note,
+                "source": r.row.source, "evidence": r.row.evidence,
+            })
+        });
+        json!({
+            "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
+            "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "how": self.aim.how},
+            "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
+        })
+    }
+}

@@ -1,0 +1,169 @@
+//! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
+
+use super::number::figures;
+use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
+use crate::formats::Grid;
+use crate::regulation::Assessment;
+use crate::simulate::{ReceiverResult, Results};
+
+/// Radii at which the encircled power is drawn.
+const RADII: usize = 200;
+
+/// Width over which values along a line through the peak stay above half of it, in the units of the axis; `None` where they are above
+/// half up to the end of the grid.
+fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
+    let peak = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
+    let half = 0.5 * values[peak];
+    let fraction = |inner: f64, outer: f64| (inner - half) / (inner - outer);
+    let after = (peak + 1..values.len()).find(|&k| values[k] < half)?;
+    let before = (0..peak).rev().find(|&k| values[k] < half)?;
+    let right = (after - 1) as f64 + fraction(values[after - 1], values[after]);
+    let left = (before + 1) as f64 - fraction(values[before + 1], values[before]);
+    Some((right - left) * step)
+}
+
+/// Values along both axes through the brightest cell.
+fn lines_through_peak(grid: &Grid) -> Option<[Vec<f64>; 2]> {
+    let cells = grid.axes[0].cells;
+    let peak = (0..grid.values.len()).max_by(|a, b| grid.values[*a].total_cmp(&grid.values[*b]))?;
+    let row = grid.values[peak / cells * cells..][..cells].to_vec();
+    let column = grid.values.iter().skip(peak % cells).step_by(cells).copied().collect();
+    Some([row, column])
+}
+
+/// A table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
+pub(super) fn table(
+    receiver: &ReceiverResult,
+    grid: &Grid,
+    results: &Results,
+    assessment: Option<&Assessment>,
+) -> Table {
+    let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
+    let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
+    let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("unit", ""), ("where", "")]);
+    let degrees = |[h, v]: [f64; 2]| {
+        format!("{} {}°, {} {}°", grid.axes[0].label, figures(h, 3), grid.axes[1].label, figures(v, 3))
+    };
+    if let Some((place, value)) = grid.peak() {
+        table.row(["Imax".into(), Cell::Number(value, 5), "cd".into(), degrees(place).into()]);
+    }
+    let lumens = receiver.photometric().map_or(receiver.power, |channel| channel.total);
+    table.row(["flux".into(), Cell::Number(lumens, 5), "lm".into(), "into the far field".into()]);
+    let share = 100.0 * receiver.power / results.power.emitted;
+    table.row(["efficiency".into(), Cell::Number(share, 4), "%".into(), "of what the sources emit".into()]);
+    if let Some(lines) = lines_through_peak(grid) {
+        for (axis, values) in grid.axes.iter().zip(&lines) {
+            let width = width_at_half(values, axis.step()).map_or(Cell::Empty, |w| Cell::Number(w, 3));
+            let name = format!("width at half, along {}", axis.label);
+            table.row([name.into(), width, "°".into(), "through Imax".into()]);
+        }
+    }
+    if let Some(value) = value_ahead(grid) {
+        table.row(["HV".into(), Cell::Number(value, 5), "cd".into(), "H 0°, V 0° as placed".into()]);
+    }
+    if let Some(assessment) = assessment {
+        table.row(["cut-off and gradient G".into(), Cell::Empty, "".into(), assessment.aim.how.as_str().into()]);
+        for row in assessment.rows.iter().filter(|r| r.reading.is_some()) {
+            let value = row.reading.map_or(Cell::Empty, |r| Cell::Number(r.value, 5));
+            let place = row.direction.map_or(String::new(), degrees);
+            table.row([row.row.id.as_str().into(), value, "cd".into(), place.into()]);
+        }
+    }
+    table
+}
+
+/// The intensity straight ahead: of the cell there, or the mean of those that meet there.
+fn value_ahead(grid: &Grid) -> Option<f64> {
+    let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
+        (0..axis.cells).filter(|&k| axis.center(k).abs() <= 0.5 * axis.step() * (1.0 + 1e-9)).collect()
+    };
+    let (columns, rows) = (cells(&grid.axes[0]), cells(&grid.axes[1]));
+    let values: Vec<f64> = (rows.iter())
+        .flat_map(|j| columns.iter().map(move |i| j * grid.axes[0].cells + i))
+        .map(|k| grid.values[k])
+        .collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// The share of a plane's power within a radius around the mean position of its light.
+pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
+    let [a, b] = &grid.axes;
+    let total: f64 = grid.values.iter().sum();
+    if receiver.kind != "plane" || total <= 0.0 {
+        return None;
+    }
+    let centre = receiver.centroid;
+    let mut cells: Vec<(f64, f64)> = (0..grid.values.len())
+        .filter(|&k| grid.values[k] > 0.0)
+        .map(|k| {
+            let (x, y) = (a.center(k % a.cells), b.center(k / a.cells));
+            ((x - centre[0]).hypot(y - centre[1]), grid.values[k] / total)
+        })
+        .collect();
+    cells.sort_by(|p, q| p.0.total_cmp(&q.0));
+    let mut sum = 0.0;
+    let summed: Vec<[f64; 2]> = cells
+        .iter()
+        .map(|(radius, share)| {
+            sum += share;
+            [*radius, 100.0 * sum]
+        })
+        .collect();
+    let radius_of = |percent: f64| summed.iter().find(|p| p[1] >= percent).map_or(0.0, |p| p[0]);
+    let caption = format!(
+        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm.",
+        figures(a.step(), 2),
+        figures(radius_of(50.0), 3),
+        figures(radius_of(80.0), 3),
+        figures(radius_of(95.0), 3)
+    );
+    let mut points: Vec<[f64; 2]> = summed.iter().step_by(summed.len().div_ceil(RADII)).copied().collect();
+    points.extend(summed.last());
+    let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
+    let name = format!("{}-encircled", crate::formats::file_stem(&receiver.name));
+    let title = format!("{}: encircled power", super::maps::spoken(&receiver.name));
+    let axes = [AxisStyle::linear("radius", "mm"), AxisStyle::linear("power within", "%")];
+    Some(Chart::series(&name, &title, &caption, axes, series))
+}
+
+/// The polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below.
+pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
+    let [c, gamma] = &grid.axes;
+    if c.label != "C" || c.cells < 4 || (c.range[1] - c.range[0] - 360.0).abs() > 1e-6 {
+        return None;
+    }
+    let half_plane = |angle: f64| {
+        let column = ((angle - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
+        // A plane between two cells takes their mean.
+        let (after, before) = (column.floor() as usize % c.cells, (column.ceil() as usize + c.cells - 1) % c.cells);
+        let value = |j: usize| 0.5 * (grid.values[j * c.cells + after] + grid.values[j * c.cells + before]);
+        (0..gamma.cells).map(|j| (gamma.center(j).to_radians(), value(j))).collect::<Vec<_>>()
+    };
+    let plane = |name: &str, right: f64| {
+        let left = half_plane(right + 180.0).into_iter().rev().map(|(g, i)| [-i * g.sin(), -i * g.cos()]);
+        let right = half_plane(right).into_iter().map(|(g, i)| [i * g.sin(), -i * g.cos()]);
+        let points = left.chain(right).collect();
+        Series { name: name.into(), points, style: SeriesStyle::Line, ..Series::default() }
+    };
+    let series = vec![plane("C 0–180", 0.0), plane("C 90–270", 90.0)];
+    let name = format!("{}-polar", crate::formats::file_stem(&receiver.name));
+    let title = format!("{}: polar diagram", super::maps::spoken(&receiver.name));
+    let unit = grid.unit.as_str();
+    let axes = [AxisStyle::linear("intensity aside", unit), AxisStyle::linear("intensity up", unit)];
+    let caption =
+        "The length of the arrow from the origin to the curve is the intensity in its direction; γ 0 points down.";
+    Some(Chart::series(&name, &title, caption, axes, series).with_equal_scales())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widths_at_half_are_those_of_the_curve() {
+        // A triangle of half width 10 steps falls to half after 5.
+        let triangle: Vec<f64> = (0..41).map(|k| 10.0 - (f64::from(k) - 20.0).abs().min(10.0)).collect();
+        assert!((width_at_half(&triangle, 0.1).unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!(width_at_half(&[1.0, 2.0, 1.5], 1.0), None, "no end within the grid");
+    }
+}

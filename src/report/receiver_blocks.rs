@@ -1,0 +1,31 @@
+//! What the page shows of one receiver: its map, and what people of the trade read beside it.
+
+use super::framing::lit_part;
+use super::lamp_figures::{encircled_power, polar, table};
+use super::maps::{reading, spoken};
+use super::{Block, Chart};
+use crate::formats::{Grid, file_stem};
+use crate::regulation::Assessment;
+use crate::simulate::{ReceiverResult, Results};
+
+/// The map of a receiver, framed around its light.
+pub(super) fn map(r: &ReceiverResult, grid: &Grid) -> Chart {
+    let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
+    let stem = file_stem(&r.name);
+    let name = if grid.unit == r.unit { stem } else { format!("{stem}-{}", grid.unit) };
+    let caption = reading(r, grid);
+    match lit_part(grid) {
+        Some(part) => {
+            let caption = format!("{caption} Shown: the part that is lit; the files hold all of it.");
+            Chart::map(&name, &title, &caption, part)
+        }
+        None => Chart::map(&name, &title, &caption, grid.clone()),
+    }
+}
+
+/// The polar diagram of a luminaire, the encircled power of a spot, the figures of a lamp: those that apply.
+pub(super) fn more(r: &ReceiverResult, grid: &Grid, results: &Results, judged: Option<&Assessment>) -> Vec<Block> {
+    let in_candela = r.kind == "far_field" && grid.unit == "cd";
+    let charts = [polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
+    charts.chain(in_candela.then(|| Block::Table(table(r, grid, results, judged)))).collect()
+}

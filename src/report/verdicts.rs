@@ -1,0 +1,122 @@
+//! What a regulation says of a far field: row by row, and as a picture of its test points over isocandela lines.
+
+use super::chart::MapPoint;
+use super::framing::lit_part;
+use super::{Cell, Chart, Section, Table, figures, road};
+use crate::formats::{Grid, file_stem};
+use crate::regulation::{Assessment, RowVerdict, Verdict};
+
+/// Significant digits of intensities: more than any photometer has.
+const DIGITS: usize = 5;
+
+/// How many rows have each verdict: pass, fail, unsure.
+pub fn verdict_counts(a: &Assessment) -> [usize; 3] {
+    [Verdict::Pass, Verdict::Fail, Verdict::Unsure].map(|v| a.rows.iter().filter(|r| r.verdict == Some(v)).count())
+}
+
+/// A sentence about the whole.
+pub fn verdict_sentence(a: &Assessment) -> String {
+    let [pass, fail, unsure] = verdict_counts(a);
+    format!("**{}: {}** ({pass} rows pass, {fail} fail, {unsure} unsure). ", a.regulation.id, a.verdict)
+}
+
+/// What is asked of a row.
+pub fn requirement_text(row: &RowVerdict) -> String {
+    let number = |x: f64| figures(x, DIGITS);
+    match (row.row.min, row.row.max) {
+        (Some(min), Some(max)) => format!("{} … {}", number(min), number(max)),
+        (Some(min), None) => format!("≥ {}", number(min)),
+        (None, Some(max)) => format!("≤ {}", number(max)),
+        (None, None) => {
+            let other = if row.row.kind == "relative" { "relative" } else { "–" };
+            row.row.when.clone().unwrap_or_else(|| other.to_owned())
+        }
+    }
+}
+
+/// A direction as the tables write it: `3.43L 0.57U`.
+pub fn direction_text([h, v]: [f64; 2]) -> String {
+    let side = |x: f64, positive: char, negative: char| match x {
+        x if x > 0.0 => format!("{}{positive}", figures(x, 3)),
+        x if x < 0.0 => format!("{}{negative}", figures(-x, 3)),
+        _ => "0".to_owned(),
+    };
+    format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
+}
+
+/// What would settle an unsure row.
+pub fn settling_text(row: &RowVerdict) -> String {
+    let Some(settles) = row.settles else { return String::new() };
+    let rays = format!("{:.1e} rays", settles.rays as f64);
+    settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
+}
+
+/// The section of one verdict; `grid` is the far field that was judged, as placed.
+pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
+    let aim = [a.aim.h_deg, a.aim.v_deg];
+    let text = format!(
+        "{}Aim: {}. Photometer: {} from side to side. {}. An engineer's answer about a simulated lamp, not a statement of conformity.",
+        verdict_sentence(a),
+        a.aim.how,
+        format_args!("{:.3}°", a.sensor_deg),
+        a.regulation.checked()
+    );
+    let title = format!("Verdict by {}", a.regulation.id);
+    let name = file_stem(&grid.name);
+    Section::new(&title)
+        .with_block(text.as_str())
+        .with_block(table(a, &name))
+        .with_block(picture(a, grid, &name))
+        .with_block(road::from_above(&name, grid, aim))
+        .with_block(road::from_driver(&name, grid, aim))
+}
+
+fn table(a: &Assessment, name: &str) -> Table {
+    let columns = [
+        ("row", ""),
+        ("direction", ""),
+        ("asked", "cd"),
+        ("read", "cd"),
+        ("± rays", "cd"),
+        ("± facets", "cd"),
+        ("verdict", ""),
+        ("settled by", ""),
+    ];
+    let caption = "Pass and fail only where the value is more than three combined standard errors from its limit; H right, V up, degrees \
+        of the table after aiming.";
+    let mut table = Table::new(&format!("{name}-verdict"), &a.regulation.function.name, &columns).caption(caption);
+    for row in &a.rows {
+        let number = |x: Option<f64>, digits| x.map_or(Cell::Empty, |x| Cell::Number(x, digits));
+        table.row([
+            row.row.id.as_str().into(),
+            row.direction.map_or(String::new(), direction_text).into(),
+            requirement_text(row).into(),
+            number(row.reading.map(|r| r.value), DIGITS),
+            number(row.reading.map(|r| r.statistical), 2),
+            number(row.reading.map(|r| r.geometric), 2),
+            row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
+            settling_text(row).into(),
+        ]);
+    }
+    table
+}
+
+/// The test points where they were read, over the far field as placed.
+fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
+    let shown = lit_part(grid).unwrap_or_else(|| grid.clone());
+    let placed = |[h, v]: [f64; 2]| [h + a.aim.h_deg, v + a.aim.v_deg];
+    let within =
+        |p: &[f64; 2]| shown.axes.iter().zip(p).all(|(axis, x)| (axis.range[0]..=axis.range[1]).contains(x));
+    let mut points = Vec::new();
+    for row in &a.rows {
+        let verdict = row.verdict.map_or("not judged".to_owned(), |v| v.to_string());
+        let at = row.direction.map(placed).filter(within);
+        points.extend(at.map(|at| MapPoint { name: row.row.id.clone(), note: verdict, at }));
+    }
+    let outlines = a.rows.iter().filter_map(|r| r.row.polygon.as_ref());
+    let outlines = outlines.map(|p| p.iter().chain(p.first()).map(|q| placed(*q)).collect::<Vec<_>>());
+    let outlines = outlines.filter(|p| p.iter().all(within)).collect();
+    let title = format!("{}: test points over isocandela lines", a.regulation.id);
+    let caption = "Points and zones lie where the aimed photometer read them.";
+    Chart::map(&format!("{name}-points"), &title, caption, shown).with_marks(points, outlines)
+}

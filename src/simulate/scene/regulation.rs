@@ -1,0 +1,77 @@
+//! The key `[[regulation]]`: by which tables a far field of the run is judged.
+
+use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
+use crate::regulation::{Assumptions, IntensityMap, Regulation, assess};
+use crate::simulate::{Error, ErrorKind};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A regulation whose verdict is printed with the run.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RegulationUse {
+    /// The regulation and function, as `lampyris assess --list` names them: `UN R112 B passing`.
+    pub id: String,
+    /// Name of the far field over H and V; the only one there is unless said otherwise.
+    pub receiver: Option<String>,
+    /// Left-hand traffic: the tables mirrored.
+    pub left_hand: bool,
+    /// Measures the lamp as it was placed, without the regulation's aiming.
+    pub as_placed: bool,
+}
+
+impl RegulationUse {
+    /// The far field that is judged, as an index into the scene's receivers.
+    pub fn receiver_index(&self, scene: &Scene) -> Option<usize> {
+        let fits = |r: &Receiver| match &self.receiver {
+            Some(name) => r.name == *name,
+            None => r.kind == ReceiverKind::FarField && r.angles == FarFieldType::A,
+        };
+        let mut found = scene.receivers.iter().enumerate().filter(|(_, r)| fits(r)).map(|(k, _)| k);
+        let first = found.next();
+        if found.next().is_some() { None } else { first }
+    }
+
+    /// Judges a far field without light: what the regulation wants of its cells is known before anything is traced.
+    fn try_assess(&self, receiver: &Receiver) -> Result<(), String> {
+        let (h, v) = receiver.angles_deg();
+        let edges = |[low, high]: [f64; 2], cells: u32| -> Vec<f64> {
+            (0..=cells).map(|k| low + (high - low) * f64::from(k) / f64::from(cells)).collect()
+        };
+        let [columns, rows] = receiver.cells;
+        let dark = vec![[0.0; 3]; columns as usize * rows as usize];
+        let map = IntensityMap::new(edges(h, columns), edges(v, rows), dark)?;
+        let assumptions = Assumptions { as_placed: true, ..Assumptions::default() };
+        assess(&map, &Regulation::find(&self.id)?, &assumptions).map(|_| ())
+    }
+
+    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+        let fail = |key: &str, message: String, help: &str| {
+            let at = [Key::Name("regulation"), Key::Index(index), Key::Name(key)];
+            Err(scene.error(ErrorKind::Value, &at, message).help(help))
+        };
+        if let Err(message) = Regulation::find(&self.id) {
+            return fail("id", message, "`lampyris assess --list` shows what there is");
+        }
+        if scene.run.unit != PowerUnit::Lumen {
+            let message = "a regulation asks for candela, but the run counts watts".into();
+            return fail("id", message, "set `unit = \"lm\"` in [run]");
+        }
+        let Some(receiver) = self.receiver_index(scene) else {
+            let message = match &self.receiver {
+                Some(name) => format!("the scene has no one receiver '{name}'"),
+                None => "the scene has no far field over H and V, or several".into(),
+            };
+            return fail("receiver", message, "name a receiver of `kind = \"far_field\"`");
+        };
+        let receiver = &scene.receivers[receiver];
+        if receiver.kind != ReceiverKind::FarField || receiver.angles != FarFieldType::A {
+            let message = format!("'{}' is no far field over H and V", receiver.name);
+            return fail("receiver", message, "a verdict needs `kind = \"far_field\"` with `angles = \"A\"`");
+        }
+        if let Err(message) = self.try_assess(receiver) {
+            return fail("receiver", message, "set `cells`, `h_deg` and `v_deg` of the far field");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,148 @@
+//! A low beam from its STEP file to the verdict of a regulation, in one command.
+
+use crate::files::fixture;
+use crate::support::{lampyris, lampyris_in};
+use serde_json::Value;
+use std::fs;
+
+/// The scene of the fixture with other lines, in a folder of its own.
+fn low_beam(change: impl Fn(&str) -> String) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(fixture("headlamp/low_beam.stp"), folder.path().join("low_beam.stp")).unwrap();
+    let scene = fs::read_to_string(fixture("headlamp/low_beam.toml")).unwrap();
+    fs::write(folder.path().join("low_beam.toml"), change(&scene)).unwrap();
+    folder
+}
+
+fn verdict(found: &Value) -> &str {
+    found["regulations"][0]["verdict"].as_str().unwrap()
+}
+
+/// The model is what its program writes.
+#[test]
+fn the_model_is_made_again_byte_for_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("low_beam.stp");
+    let program = fixture("headlamp/make_low_beam.py");
+    // Without Python there is nothing to compare.
+    let Ok(status) = std::process::Command::new("python3").arg(program).arg(&made).status() else { return };
+    assert!(status.success());
+    assert!(fs::read(made).unwrap() == fs::read(fixture("headlamp/low_beam.stp")).unwrap());
+}
+
+#[test]
+fn a_low_beam_goes_from_step_to_verdict() {
+    let folder = low_beam(str::to_owned);
+    let (code, out, err) = lampyris_in(folder.path(), &["trace", "low_beam.toml", "-o", "out", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(verdict(&found), "pass", "{}", found["regulations"][0]);
+    let rows = found["regulations"][0]["rows"].as_array().unwrap();
+    let value = |id: &str| rows.iter().find(|r| r["id"] == id).unwrap()["value"].as_f64().unwrap();
+    // 17 kcd in the hot spot: 90 lm over 8.58 mm² into a cone of 20° (0.379 sr) through 707 mm² of a lens that passes 92 %.
+    let expected = 90.0 / 8.58 / 0.379 * 707.0 * 0.92;
+    assert!((value("50R") / expected - 1.0).abs() < 0.15, "{} {expected}", value("50R"));
+    // The same by assess, from the files alone.
+    let arguments = ["assess", "out", "--regulation", "UN R112 B passing", "--json"];
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let again: Value = serde_json::from_str(&out).unwrap();
+    for (a, b) in rows.iter().zip(again["rows"].as_array().unwrap()) {
+        assert_eq!((&a["id"], &a["verdict"]), (&b["id"], &b["verdict"]));
+    }
+    // The page shows the verdict, the pictures of the trade and their words.
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    for word in [
+        "Verdict by UN R112 B passing",
+        "test points over isocandela lines",
+        "The road from above",
+        "as the driver sees it",
+        "Imax",
+        "cut-off",
+        "G = ",
+        "HV",
+        "50R",
+        "Zone III",
+        "efficiency",
+        "width at half",
+    ] {
+        assert!(page.contains(word), "{word}");
+    }
+    for picture in ["road-points.png", "road-road.png", "road-driver.png"] {
+        assert!(folder.path().join("out/figures").join(picture).is_file(), "{picture}");
+    }
+}
+
+#[test]
+fn a_regulation_that_means_nothing_is_refused_before_tracing() {
+    for (from, to, says) in [
+        ("\"UN R112 B passing\"", "\"UN R999\"", "no regulation is called"),
+        ("cells = [150, 75]", "cells = [50, 25]", "0.149"),
+        ("kind = \"far_field\"", "kind = \"far_field\"\nangles = \"B\"", "far field over H and V"),
+        ("unit = \"lm\"", "unit = \"W\"", "counts watts"),
+    ] {
+        let folder = low_beam(|scene| scene.replace(from, to));
+        let (code, _, err) = lampyris_in(folder.path(), &["trace", "low_beam.toml", "--dry-run"]);
+        assert!(code == 2 && err.contains(says), "{to}: {code} {err}");
+    }
+}
+
+#[test]
+fn until_settled_traces_on_or_says_what_it_cannot() {
+    // Numbers of rays of their own cannot grow.
+    let folder = low_beam(str::to_owned);
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "low_beam.toml", "--until-settled"]);
+    assert!(code == 2 && err.contains("does not grow"), "{err}");
+    let grown = |most: &str| {
+        let folder =
+            low_beam(|scene| scene.lines().filter(|l| !l.starts_with("rays")).map(|l| format!("{l}\n")).collect());
+        let arguments = [
+            "trace",
+            "low_beam.toml",
+            "--until-settled",
+            "--rays",
+            most,
+            "--json",
+            "--no-report",
+            "--intersector",
+            "exact",
+        ];
+        let (code, out, err) = lampyris_in(folder.path(), &arguments);
+        (code, serde_json::from_str::<Value>(&out).unwrap(), err)
+    };
+    let (code, found, err) = grown("30_000");
+    assert_eq!((code, verdict(&found)), (4, "unsure"), "{err}");
+    assert_eq!(found["rays"], 30_000);
+}
+
+/// The tolerance of a run stands in one place, whoever chose it.
+#[test]
+fn results_name_the_tolerance() {
+    let folder =
+        low_beam(|scene| scene.lines().filter(|l| !l.starts_with("rays")).map(|l| format!("{l}\n")).collect());
+    for (option, expected) in [
+        (&["--tolerance", "0.01..0.02"][..], serde_json::json!([0.01, 0.02])),
+        (&["--intersector", "exact"][..], Value::Null),
+    ] {
+        let arguments =
+            [&["trace", "low_beam.toml", "--rays", "2000", "--json", "--no-report"][..], option].concat();
+        let (code, out, err) = lampyris_in(folder.path(), &arguments);
+        assert_eq!(code, 0, "{err}");
+        let found: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(found["tolerance_mm"], expected);
+    }
+}
+
+/// A run that misses the error it was asked for says so first, not last.
+#[test]
+fn a_missed_error_stands_before_the_answer() {
+    let scene = fixture("scenes/s3_reflector.toml").display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out").display().to_string();
+    let arguments =
+        ["trace", &scene, "--until-error", "0.5%@wall:cells", "--rays", "20_000", "-o", &output, "--no-report"];
+    let (code, _, err) = lampyris(&arguments);
+    assert_eq!(code, 4, "{err}");
+    let answer = err.find(" emitted, ").unwrap();
+    assert!(err[..answer].rfind("not reached").is_some(), "{err}");
+}
