@@ -4,7 +4,8 @@
 use crate::files::{corpus, read_model, step_files};
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::model::{Analytic, Model, PlacedFace};
+use lampyris::mesh::FacetMesh;
+use lampyris::model::{Analytic, Model, PlacedFace, TessellatedFace};
 use lampyris::simulate::{Error, RuleFaces, Scene, face_selectors};
 use std::collections::HashSet;
 use std::path::Path;
@@ -77,6 +78,17 @@ fn what_selects_nothing_is_refused_with_what_there_is() {
         let error = rules(&twins(), &format!("[[material]]\n{selector}\nsurface = 'mirror'\n")).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");
     }
+}
+
+/// Ready meshes bear names as surfaces do.
+#[test]
+fn faces_that_are_meshes_are_named_too() {
+    let mut model = twins();
+    let mesh = FacetMesh::default();
+    let face = TessellatedFace { name: "net".into(), entity: None, colour: None, layer: None, mesh };
+    model.parts[0].tessellated.push(face);
+    let table = rules(&model, "[[material]]\nface = 'net'\nsurface = 'mirror'\n").unwrap();
+    assert_eq!(table[0].faces, [2]);
 }
 
 /// Receivers count what single faces absorb.

@@ -120,7 +120,10 @@ fn each_name_means_something(
 ) -> Result<(), Error> {
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
     let instances = model.instances.iter().map(|i| i.name.as_str());
-    let faces = model.placed_faces().map(|f| f.face.map_or("", |f| f.name.as_str()));
+    let faces = model.placed_faces().filter_map(|f| match (f.face, f.tessellated) {
+        (Some(face), _) => Some(face.name.as_str()),
+        (None, ready) => ready.map(|t| t.name.as_str()),
+    });
     let layers = model.parts.iter().flat_map(|part| {
         let of_faces = part.shells.iter().flat_map(|s| &s.faces).filter_map(|f| f.layer.as_deref());
         of_faces.chain(part.tessellated.iter().filter_map(|t| t.layer.as_deref()))
