@@ -111,7 +111,8 @@ fn until_settled_traces_on_or_says_what_it_cannot() {
         (code, serde_json::from_str::<Value>(&out).unwrap(), err)
     };
     let (code, found, err) = grown("30_000");
-    assert_eq!((code, verdict(&found)), (4, "unsure"), "{err}");
+    let rows = found["regulations"][0]["rows"].as_array().unwrap();
+    assert!(code == 4 && rows.iter().any(|row| row["verdict"] == "unsure"), "{err}");
     assert_eq!(found["rays"], 30_000);
 }
 
@@ -143,6 +144,6 @@ fn a_missed_error_stands_before_the_answer() {
         ["trace", &scene, "--until-error", "0.5%@wall:cells", "--rays", "20_000", "-o", &output, "--no-report"];
     let (code, _, err) = lampyris(&arguments);
     assert_eq!(code, 4, "{err}");
-    let answer = err.find(" emitted, ").unwrap();
+    let answer = err.find("emitted,").unwrap();
     assert!(err[..answer].rfind("not reached").is_some(), "{err}");
 }

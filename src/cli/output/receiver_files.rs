@@ -1,9 +1,9 @@
-//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, Data_3 for planes, IES LM-63 for whole far fields in candela.
+//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, Data_3 and TM-25 for planes, IES LM-63 for whole far fields in candela.
 
 use crate::cli::failure::Failure;
 use crate::formats::{
-    Data3, Grid, LightRay, PhotometricType, Photometry, printable_line, write_data3, write_grid_csv,
-    write_grid_npz, write_grid_png, write_ies, write_vti,
+    Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_grid_csv,
+    write_grid_npz, write_grid_png, write_ies, write_tm25, write_vti,
 };
 use crate::report::{file_stem, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
@@ -39,6 +39,8 @@ pub(crate) fn write(
     }
     if receiver.kind == "plane" {
         names.push(format!("{stem}.data3"));
+        names.push(format!("{stem}.tm25ray"));
+        write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
         let size = [receiver.grid[1], receiver.grid[0]];
         let data = Data3 { size, results: receiver.cells.clone(), rays };
         write_data3(&folder.join(format!("{stem}.data3")), &data)?;
@@ -53,6 +55,20 @@ pub(crate) fn write(
     }
     Ok(names)
 }
+
+/// The sampled rays of a plane as a TM-25 file.
+fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
+    let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
+    let mut file = Tm25::from_rays(rays, flux);
+    file.header.descriptions[SOFTWARE] = concat!("lampyris ", env!("CARGO_PKG_VERSION")).into();
+    file.header.descriptions[ADDITIONAL] =
+        "a sample of the rays of a simulation where they met the plane; each stands for many".into();
+    file
+}
+
+/// Places of two of the nine texts of a TM-25 header (4.7.3): equipment or software, additional information.
+const SOFTWARE: usize = 4;
+const ADDITIONAL: usize = 7;
 
 /// A far field in candela over all its directions, with the ends of both ranges that LM-63 wants: values there are those of the
 /// nearest cells, at a pole the mean of its ring.
