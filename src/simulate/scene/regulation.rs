@@ -3,11 +3,11 @@
 use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
 use crate::regulation::{Assumptions, IntensityMap, Regulation, assess};
 use crate::simulate::{Error, ErrorKind};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A regulation whose verdict is printed with the run.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RegulationUse {
     /// The regulation and function, as `lampyris assess --list` names them: `UN R112 B passing`.
