@@ -181,7 +181,7 @@ fn trims_that_touch_themselves_need_no_repair() {
     for (loops, area) in touching {
         let made = tessellate(&face(plane(), &loops), &measured(0.1));
         let r = &made.report;
-        assert_eq!((r.faces.failed, r.faces.repaired, r.over_tolerance), (0, 0, Some(0)));
+        assert_eq!((r.faces.failed, r.faces.repaired, r.over_tolerance), (0, 0, Some(0)), "{:?}", r.repaired);
         assert!((r.area_mm2 - area).abs() < 1e-9, "{} {area}", r.area_mm2);
         assert_rim(&made, &loops);
     }
