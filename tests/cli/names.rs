@@ -20,7 +20,7 @@ fn texts(folder: &Path, found: &mut Vec<(String, String)>) {
             texts(&path, found);
             continue;
         }
-        let binary = ["png", "npz", "glb", "vti", "vtp", "vtu", "tally"];
+        let binary = ["png", "npz", "glb", "vti", "vtp", "vtu", "tally", "tm25ray"];
         if path.extension().is_none_or(|e| !binary.iter().any(|b| e == *b)) {
             let text = String::from_utf8_lossy(&fs::read(&path).unwrap()).into_owned();
             found.push((path.display().to_string(), text));
