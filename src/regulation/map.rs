@@ -33,7 +33,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Both errors together.
+    /// Root of the sum of squares of the statistical and the geometric standard error.
     pub fn error(&self) -> f64 {
         self.statistical.hypot(self.geometric)
     }

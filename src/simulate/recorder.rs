@@ -28,6 +28,6 @@ impl<'c, 'a> Recorder<'c, 'a> {
             dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
         }
         tally.paths.append(&mut self.tally.paths);
-        self.tally.clear();
+        self.tally.discard();
     }
 }

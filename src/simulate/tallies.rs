@@ -54,8 +54,8 @@ impl ReplicateTally {
         }
     }
 
-    /// Empties it, as [`Tallies::take`] does, of what nobody asks about.
-    pub(crate) fn clear(&mut self) {
+    /// Empties it without adding it to any sums: after a trace whose counts are not wanted.
+    pub(crate) fn discard(&mut self) {
         self.receivers.iter_mut().chain([&mut self.absorbed, &mut self.bulk]).for_each(Grid::clear);
         self.receiver_totals.fill(0);
         self.moments.fill(Moments::default());

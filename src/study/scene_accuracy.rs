@@ -29,7 +29,8 @@ pub fn scene_accuracy(
         return (accuracy::accuracy(name, mesh_source, settings, progress), Vec::new());
     };
     let pilot = Pilot::time(plain, bound, run, middle);
-    let seconds_after = pilot.spline + uniform.iter().flat_map(|&t| pilot.expected(t, |_| None)).sum::<f64>();
+    let seconds_after =
+        pilot.spline + uniform.iter().flat_map(|&t| pilot.expected_seconds(t, |_| None)).sum::<f64>();
     let settings = accuracy::Settings { seconds_after, ..settings.clone() };
     let study = accuracy::accuracy(name, mesh_source, &settings, progress);
     let threads = study.rows.iter().map(|r| r.threads).max().unwrap_or(1);
@@ -45,7 +46,7 @@ pub fn scene_accuracy(
     };
     let mut combinations = Vec::new();
     for &t in &uniform {
-        let seconds = pilot.expected(t, |normals| slower(t, normals));
+        let seconds = pilot.expected_seconds(t, |normals| slower(t, normals));
         combinations.extend(KINDS.into_iter().zip(seconds).map(|(n, seconds)| Combination {
             tolerance: t,
             normals: n,
@@ -93,9 +94,9 @@ impl Pilot {
         })
     }
 
-    /// Seconds for each of [`KINDS`] at a tolerance; `slower` tells how much slower tracing is there than at the middle one, where
+    /// Seconds for each of [`KINDS`] at a tolerance: tracing there, and an equal share of making facets, which goes with 1/tolerance; `slower` tells how much slower tracing is there than at the middle one, where
     /// that is known.
-    fn expected(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
+    fn expected_seconds(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
         // Facets go with 1/tolerance, tracing grows by about a tenth per halving.
         let finer = self.middle / tolerance;
         let usual = (1.0 + 0.1 * finer.log2()).max(0.5);

@@ -290,7 +290,7 @@ fn trace_shard(
     let checkpoint =
         Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console)?;
     let from = checkpoint.read()?;
-    if let Some(portion) = from.as_ref().filter(|p| shards::is_complete(p, replicates.clone(), shard)) {
+    if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
         say_shard(&checkpoint.file, portion, shard, console)?;
         return Ok(Completion::Complete);
@@ -307,7 +307,7 @@ fn trace_shard(
         ..TraceRequest::default()
     };
     let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
-    if !shards::is_complete(&portion, replicates, shard) {
+    if !shards::is_shard_done(&portion, replicates, shard) {
         return Err(checkpoint.stopped(&portion, "interrupted"));
     }
     let file = checkpoint.save_anywhere(&portion)?;

@@ -118,8 +118,8 @@ pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> 
     first(index)..first(index + 1)
 }
 
-/// Whether all replicates of the shard of these are done.
-pub(crate) fn is_complete(portion: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
+/// Whether a part holds every replicate that its shard (index from 0, count) has of all replicates.
+pub(crate) fn is_shard_done(portion: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
     replicates_of_shard(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 

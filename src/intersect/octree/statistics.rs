@@ -20,6 +20,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
+    /// Counts a block of a leaf, up to four facets, so many nodes below the root.
     pub(super) fn count_block(&mut self, depth: u32, facets: u8) {
         let depth = depth as usize;
         if self.depths.len() <= depth {

@@ -152,7 +152,7 @@ impl Polished<'_> {
             return Some(if is_clear { [0.0, slack] } else { [slack; 2] });
         };
         let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
-        let sine = f64::from(record.clear_sine(ray)?.abs()).max(LEAST_SLACK_SINE);
+        let sine = f64::from(record.decisive_sine(ray)?.abs()).max(LEAST_SLACK_SINE);
         (ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag).then(|| [slack / sine; 2])
     }
 
@@ -160,7 +160,7 @@ impl Polished<'_> {
     #[inline(always)]
     fn decide(&self, ray: &Ray, facet_hit: Option<&Hit>, point: Option<&SurfacePoint>) -> Decision {
         let left = ray.departure.map(|from| &self.records[from.primitive as usize]);
-        let inward = left.and_then(|record| record.clear_sine(ray)).is_some_and(|sine| sine < 0.0);
+        let inward = left.and_then(|record| record.decisive_sine(ray)).is_some_and(|sine| sine < 0.0);
         let Some(facet_hit) = facet_hit else {
             // What goes into a closed solid comes out of it.
             let comes_out = inward && ray.t_max == f64::INFINITY && left.is_some_and(FacetRecord::is_of_solid);

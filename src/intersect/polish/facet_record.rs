@@ -64,9 +64,10 @@ impl FacetRecord {
             .collect()
     }
 
-    /// The sine of a ray's angle to the facet, negative for rays that go in; `None` where that tells nothing of the spline.
+    /// The sine of a ray's angle to the facet, negative for rays that go in; `None` at or below the facet's
+    /// `least_sine`, where the spline may be met from the other side.
     #[inline(always)]
-    pub(super) fn clear_sine(&self, ray: &Ray) -> Option<f32> {
+    pub(super) fn decisive_sine(&self, ray: &Ray) -> Option<f32> {
         let ([x, y, z], d) = (self.normal, ray.direction.as_vec3());
         let sine = x * d.x + y * d.y + z * d.z;
         (sine.abs() > self.least_sine).then_some(sine)

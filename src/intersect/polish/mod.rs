@@ -1,7 +1,8 @@
 //! Facet hits moved to the spline: exact position, normal and parameters for a small surcharge.
 //!
 //! A facet hit carries the parameters of its place on the surface; Newton's method takes three or four steps from there, for eight hits
-//! at a time ([`batch`]), and across patches where a hit is asked alone. What the facets mislead about is put right: a root outside the trims, or none, is sought in a short window
+//! at a time, and across patches where a hit is asked alone. What the facets mislead about is put right: a root outside the trims, or
+//! none, is sought in a short window
 //! of the ray on the exact model; the root that the ray leaves is recognised by face, parameters and place, and the search
 //! goes on behind it; a ray that leaves its own surface so flat that its next root hides inside the sag is asked exactly.
 //! A ray that goes into a closed solid must come out of it, and the other way round: an answer that says otherwise, as beside an

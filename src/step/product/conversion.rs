@@ -37,7 +37,7 @@ const LARGEST_GAP_MM: f64 = 0.05;
 const FOLLOWING_SHARE: f64 = 0.1;
 /// An edge shorter than this has no length, mm.
 const EMPTY_EDGE_MM: f64 = 1e-9;
-/// Edges of a face whose places are asked for where a surface may touch its own axis.
+/// Edges of a face whose points are asked for where a surface is sized by them.
 const ASKED_EDGES: usize = 64;
 
 /// Converts the items of a representation.
@@ -98,7 +98,8 @@ fn remark(file: &File<'_>, id: u64, reason: String) -> Refusal {
     Refusal { id, entity: file.entity_name(id), reason }
 }
 
-/// Moves edges into the part; their numbers there, none for edges without length or that failed.
+/// Moves edges, and the vertices that they share, into the part; the number of each key's edge there, none for edges that failed or have
+/// no length. Of the latter the two vertices become one.
 fn add_edges(
     geometry: &Geometry<'_, '_>,
     keys: &[EdgeKey],
@@ -279,8 +280,9 @@ fn face_edges<'e>(
     Ok(found)
 }
 
-/// Whether the edges must say which part of a surface is meant: of one that may touch its own axis.
-fn asks_for_edges(file: &File<'_>, surface: u64) -> bool {
+/// Whether points of the edges are needed to choose the part of a surface that is meant: of every kind but planes, cylinders, cones, spheres
+/// and B-splines, told by keyword alone.
+fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
     let known = |k: &str| simple.iter().any(|s| k.starts_with(s));
     file.entity(surface).is_some_and(|e| !e.keywords().any(known))
@@ -313,7 +315,7 @@ fn convert_face(
 
     // The surface, as much of it as the edges need.
     geometry.entity(plan.surface)?;
-    let asked = if asks_for_edges(geometry.file, plan.surface) { ASKED_EDGES } else { 0 };
+    let asked = if is_sized_by_edges(geometry.file, plan.surface) { ASKED_EDGES } else { 0 };
     let along = |curve: &&Curve| {
         let [a, b] = curve.domain();
         [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| curve.evaluate(a + f * (b - a)))

@@ -99,7 +99,7 @@ pub fn meet_target_for_rays(
         }
     }
     clock.report("done", 1.0);
-    let found = best.unwrap_or_else(|| search.no_solution());
+    let found = best.unwrap_or_else(|| search.nothing_tried());
     let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
     let range =
@@ -339,10 +339,11 @@ impl Search<'_> {
             }
             plan.scale(growth);
         }
-        best.unwrap_or_else(|| self.no_solution())
+        best.unwrap_or_else(|| self.nothing_tried())
     }
 
-    fn no_solution(&self) -> Solution {
+    /// What stands for a result when no candidate was measured: infinite error, no facets.
+    fn nothing_tried(&self) -> Solution {
         Solution {
             normals: NormalMode::Exact,
             plan: TolerancePlan::uniform(self.coarse),

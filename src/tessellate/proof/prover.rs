@@ -71,7 +71,8 @@ impl<'s, 'a> Prover<'s, 'a> {
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space.
     ///
-    /// Stops refining as soon as the answer is at most `limit`, or clearly is not.
+    /// Stops refining as soon as the answer is at most `limit`, or clearly is not: above `limit` the value says only that nothing nearer was
+    /// shown, and may be a sample. With [`Acceptance::Sampled`] it is an estimate where the surface is not affine.
     pub(in crate::tessellate) fn triangle_bound(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
         if self.surface.affine {
             let off = [0, 1, 2].map(|i| FlatTriangle::new(&xyz).distance(self.surface.point(uv[i])));
