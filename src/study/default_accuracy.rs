@@ -207,7 +207,7 @@ impl Undecided<'_> {
         } else if self.judged_rays() <= SHORT_RUN {
             ("exact", "the run is so short that the spline costs less than to find out whether facets do")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
-            ("exact", "the rays of a file cannot be divided for a pilot")
+            ("exact", "a source has so many rays of its own that a pilot would trace most of the run")
         } else if self.has_huge_map() {
             ("exact", "a map of so many cells takes longer to compare than the spline to trace")
         } else {
