@@ -105,6 +105,7 @@ impl Aabb {
             }
             let (a, b) = ((self.min[axis] - o) / d, (self.max[axis] - o) / d);
             let (a, b) = if a <= b { (a, b) } else { (b, a) };
+            // The difference and the quotient round by half an ulp each: four times that.
             near = near.max(a - a.abs() * 4.0 * f64::EPSILON);
             far = far.min(b + b.abs() * 4.0 * f64::EPSILON);
         }

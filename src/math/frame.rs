@@ -49,6 +49,7 @@ impl Frame {
             .filter(|p| p.length_squared() > PARALLEL * PARALLEL)
             .and_then(|p| p.try_normalize())
             .unwrap_or_else(|| {
+                // Whichever of the two is not nearly along the axis.
                 let pick = if z.x.abs() < 0.9 { Vector::X } else { Vector::Y };
                 (pick - z * pick.dot(z)).normalize()
             });
@@ -98,6 +99,7 @@ impl Frame {
 
     /// The placement that undoes this one.
     pub fn inverse(&self) -> Self {
+        // Axes of unit length at right angles: the inverse of the turn is its transpose.
         let row = |i: usize| Vector::new(self.x[i], self.y[i], self.z[i]);
         let turned = Self { origin: Point::ZERO, x: row(0), y: row(1), z: row(2), scale: 1.0 / self.scale };
         Self { origin: -turned.vector(self.origin), ..turned }

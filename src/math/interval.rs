@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// A closed interval of reals whose arithmetic rounds outward, so that results always contain the exact ones.
 ///
 /// Each operation is computed to nearest and then moved outward by one ulp: wider than directed rounding by at
-/// most one ulp a side, and free of rounding-mode switches. NaN bounds stand for "anything".
+/// most one ulp a side, and free of rounding-mode switches. Bounds must be numbers: products pass over those that are not.
 ///
 /// ```
 /// use lampyris::math::Interval;
@@ -72,6 +72,7 @@ impl Interval {
 
     /// The square, never negative.
     pub fn square(self) -> Self {
+        // Not `self * self`, in which the two factors vary apart: −1 to 1 would give −1 to 1.
         let (a, b) = (self.lo * self.lo, self.hi * self.hi);
         let lo = if self.may_be_zero() { 0.0 } else { a.min(b).next_down().max(0.0) };
         Self { lo, hi: a.max(b).next_up() }

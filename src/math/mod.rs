@@ -1,6 +1,6 @@
-//! Points, rays, boxes, frames, intervals and roots: what every other room stands on.
+//! Points, rays, boxes, frames, intervals and roots: what every other module stands on.
 //!
-//! Lengths are millimetres, angles radians, all numbers `f64`. The vector types are glam's; the room adds
+//! Lengths are millimetres, angles radians, all numbers `f64`. The vector types are glam's; the module adds
 //! nothing to them but names that say what a triple means.
 
 mod aabb;

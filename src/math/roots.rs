@@ -14,10 +14,12 @@ pub fn quadratic_roots(a: f64, b: f64, c: f64) -> (Option<f64>, Option<f64>) {
         return if b == 0.0 { (None, None) } else { (Some(-c / b), None) };
     }
     let p = 4.0 * a * c;
+    // The second difference is what rounding took from 4ac (Kahan).
     let discriminant = f64::mul_add(b, b, -p) - f64::mul_add(4.0 * a, c, -p);
     if discriminant < 0.0 || discriminant.is_nan() {
         return (None, None);
     }
+    // Both terms have one sign, so that nothing cancels; the other root is c/q by Vieta.
     let q = -0.5 * (b + discriminant.sqrt().copysign(b));
     let (x, y) = (q / a, if q == 0.0 { 0.0 } else { c / q });
     (Some(x.min(y)), Some(x.max(y)))

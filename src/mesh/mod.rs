@@ -100,6 +100,7 @@ impl FacetMesh {
 
     /// Volume enclosed by the facets as traced, mm³, positive when normals point outward; meaningful only for a closed mesh.
     pub fn volume(&self) -> f64 {
+        // About the middle of the mesh: far from the origin the terms would cancel to nothing.
         let origin = self.bounds().center();
         let signed = |a: Point, b: Point, c: Point| (a - origin).dot((b - origin).cross(c - origin)) / 6.0;
         (0..self.facets.len())

@@ -30,6 +30,7 @@ impl FacetMesh {
         let (indices, normals, uvs) = (from.array::<u32>()?, from.array::<Vector>()?, from.array::<Uv>()?);
         let facets: Vec<[u32; 5]> = from.array()?;
         let sag: Vec<f64> = from.array()?;
+        // Told here once for all who index by these numbers later.
         let is_whole = normals.len() == indices.len()
             && uvs.len() == indices.len()
             && (sag.is_empty() || sag.len() == facets.len())

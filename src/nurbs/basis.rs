@@ -27,6 +27,7 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
     let last = knots.len() - degree - 2;
     let mut k = knots[degree..=last].partition_point(|&x| x <= t) + degree;
     k = k.saturating_sub(1).clamp(degree, last);
+    // A span without length holds no parameter: back to the last one that has, or on to the first.
     while k > degree && knots[k] == knots[k + 1] {
         k -= 1;
     }
@@ -49,6 +50,7 @@ pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span
         right[j] = knots[span + j] - t;
         let mut saved = 0.0;
         for r in 0..j {
+            // Never zero: between the two knots lies the span, which is not empty.
             let term = value[r] / (right[r + 1] + left[j - r]);
             value[r] = saved + right[r + 1] * term;
             saved = left[j - r] * term;
@@ -84,11 +86,13 @@ pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t
     for r in 0..=p {
         value[0][r] = table[r][p];
     }
+    // Derivatives beyond the degree vanish, as the table already says.
     let order = order.min(p);
     if order == 0 {
         return Basis { value };
     }
     for r in 0..=p {
+        // Two rows of the coefficients a(k, j) of A2.3, each of which needs the one before alone.
         let mut a = [[0.0; W]; 2];
         let (mut s1, mut s2) = (0, 1);
         a[0][0] = 1.0;
@@ -99,6 +103,7 @@ pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t
                 a[s2][0] = a[s1][0] / table[pk + 1][r - k];
                 d = a[s2][0] * table[r - k][pk];
             }
+            // At the ends of the table fewer functions of lower degree overlap.
             let j1 = if r + 1 >= k { 1 } else { k - r };
             let j2 = if r <= pk + 1 { k - 1 } else { p - r };
             for j in j1..=j2 {

@@ -20,6 +20,8 @@ impl<P: ControlPoint> Spline<P> {
         let p = self.degree;
         let mut d = [P::ZERO; W];
         d[..=p].copy_from_slice(&self.points[span - p..=span]);
+        // De Boor's algorithm with an argument of its own in each round: with equal ones it gives the point of the
+        // curve.
         for (r, &u) in arguments.iter().enumerate() {
             for j in 0..p - r {
                 let (lo, hi) = (self.knots[span - p + j + r + 1], self.knots[span + j + 1]);
@@ -38,6 +40,8 @@ impl<P: ControlPoint> Spline<P> {
         let (p, n) = (self.degree, knots.len() - self.degree - 1);
         let points = (0..n)
             .map(|i| {
+                // Any span that the new point's knots enclose will do: pieces that meet smoothly agree on blossoms
+                // that hold the knots between them (Ramshaw).
                 let middle = 0.5 * (knots[i] + knots[i + p + 1]);
                 self.blossom(find_span(&self.knots, p, middle), &knots[i + 1..=i + p])
             })
@@ -59,6 +63,7 @@ impl<P: ControlPoint> Spline<P> {
     /// Control points of [`Spline::restricted`], which hull the curve over `[a, b]`; within one knot span, without the rest of it.
     pub fn restricted_points(&self, a: f64, b: f64) -> SmallVec<[P; 8]> {
         let p = self.degree;
+        // The common case by itself: cutting the whole curve would make points of every span.
         let span = find_span(&self.knots, p, a);
         if !(self.knots[span] <= a && a < b && b <= self.knots[span + 1]) {
             return self.restricted_across(span, a, b);
@@ -109,6 +114,8 @@ impl Curve {
         let scale = self.points[self.points.len() - 1].w / tail.points[0].w;
         let mut points = self.points.clone();
         points.extend(tail.points[1..].iter().map(|&q| q * scale));
+        // The knot of the joint stays as often as the degree: the curve is continuous there, and no more is
+        // promised.
         let mut knots = self.knots[..self.knots.len() - 1].to_vec();
         knots.extend(tail.knots[p + 1..].iter().map(|k| end + (k - start)));
         Self { degree: p, knots, points }

@@ -40,6 +40,8 @@ pub(super) fn unit_arc(range: [f64; 2]) -> (Vec<f64>, Vec<(f64, f64, f64)>) {
     let mut points = vec![(breaks[0].cos(), breaks[0].sin(), 1.0)];
     for (k, pair) in breaks.windows(2).enumerate() {
         let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
+        // The middle control point lies where the tangents cross, 1/cos out from the centre, with weight cos (*The
+        // NURBS Book*, chapter 7).
         let w = half.cos();
         points.push((middle.cos() / w, middle.sin() / w, w));
         points.push((pair[1].cos(), pair[1].sin(), 1.0));
@@ -61,6 +63,7 @@ pub fn angle_of_parameter(range: [f64; 2], parameter: f64) -> f64 {
 /// Applies a map of the offset from the middle of the piece that holds `x`.
 fn in_piece(range: [f64; 2], x: f64, map: impl Fn(f64, f64) -> f64) -> f64 {
     let breaks = breakpoints(range);
+    // Inner breakpoints alone: angles beyond the ends belong to the first and last piece.
     let piece = breaks[1..breaks.len() - 1].partition_point(|&b| b <= x);
     let (a, b) = (breaks[piece], breaks[piece + 1]);
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));

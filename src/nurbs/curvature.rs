@@ -45,6 +45,7 @@ impl FundamentalForms {
         let det = e * g - f * f;
         let mean = (e * n - 2.0 * f * m + g * l) / (2.0 * det);
         let gauss = (l * n - m * m) / det;
+        // Rounding may make it negative where both curvatures are equal.
         let root = (mean * mean - gauss).max(0.0).sqrt();
         [mean + root, mean - root]
     }

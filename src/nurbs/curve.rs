@@ -128,6 +128,7 @@ impl<P: ControlPoint> Spline<P> {
 
     /// Position and derivatives at `t`, which is clamped to the domain.
     pub fn derivatives(&self, t: f64) -> CurveDerivatives<P::Position> {
+        // The quotient rule for S = A/w: S′ = (A′ − S·w′)/w and S″ = (A″ − 2·S′·w′ − S·w″)/w.
         let [a, a1, a2] = self.homogeneous(t, 2);
         let inv = 1.0 / a.weight();
         let point = a.numerator() * inv;

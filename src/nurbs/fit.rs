@@ -15,6 +15,8 @@ pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), t
         let ts: Vec<f64> = (0..=n).map(|i| t(f64::from(i))).collect();
         let (points, slopes): (Vec<Point>, Vec<Vector>) = ts.iter().map(|&t| at(t)).unzip();
         let curve = Curve::hermite(&ts, &points, &slopes);
+        // The error of a cubic with the right ends and slopes goes as s²(1 − s)² over a piece: it is greatest in
+        // the middle.
         let middles = (0..n).map(|i| t(f64::from(i) + 0.5));
         let error = middles.fold(0f64, |e, t| e.max((curve.evaluate(t) - at(t).0).length()));
         if error < tolerance || n >= MAX_PIECES {

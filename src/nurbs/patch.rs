@@ -223,6 +223,7 @@ fn bernstein_to_second<const W: usize>(n: usize, t: f64) -> [[f64; W]; 3] {
     if n > 1 {
         let c = bernstein::<W>(n - 2, t);
         let at = |i: usize, back: usize| if i >= back && i - back + 2 <= n { c[i - back] } else { 0.0 };
+        // n(n − 1) times the second differences of the polynomials two degrees lower.
         for i in 0..=n {
             dd[i] = (n * (n - 1)) as f64 * (at(i, 2) - 2.0 * at(i, 1) + at(i, 0));
         }

@@ -34,6 +34,8 @@ pub fn nearest_from(curve: &Curve, p: Point, start: f64, expected: f64) -> (f64,
 
 /// The parameter that minimises the length of `offset(curve(t))`, and that length. `offset` must be affine.
 pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<(f64, f64)>) -> (f64, f64) {
+    // Followed along a curve, the nearest point is mostly near the last one; only where it is not are all pieces
+    // sampled.
     if let Some((t, expected)) = start {
         let found = descend_from(curve, &offset, t);
         if found.1 <= expected {

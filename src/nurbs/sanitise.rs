@@ -79,6 +79,7 @@ pub fn expand_knots(distinct: &[f64], multiplicities: &[usize]) -> Option<Vec<f6
     if distinct.len() != multiplicities.len() {
         return None;
     }
+    // Counted before anything is made: a file of a few bytes may ask for any number of knots.
     let total = multiplicities.iter().try_fold(0usize, |s, &m| s.checked_add(m))?;
     if total > MAX_POINTS + 2 * MAX_DEGREE {
         return None;
@@ -174,6 +175,7 @@ fn check_knots(degree: usize, mut knots: Vec<f64>, points: usize) -> Result<(Vec
     let magnitude = knots[0].abs().max(knots[knots.len() - 1].abs());
     let same = (SAME_KNOT * extent).max(4.0 * f64::EPSILON * magnitude);
     for i in 1..knots.len() {
+        // A small step back is the rounding of equal knots.
         let step = knots[i] - knots[i - 1];
         if step < -same {
             return Err(Defect::Knots);

@@ -165,6 +165,8 @@ impl Surface {
                     row[k] += c * bv.value[k][j];
                 }
             }
+            // `row` holds the sums over v of all orders, so that each of the mixed derivatives costs p + 1 products
+            // more.
             for (sum, (a, b)) in sums.iter_mut().zip(DERIVATIVE) {
                 *sum += row[b] * bu.value[a][i];
             }

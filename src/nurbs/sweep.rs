@@ -34,6 +34,8 @@ pub fn revolution(curve: &Curve, axis: &Frame, angles: [f64; 2]) -> Surface {
         .iter()
         .flat_map(|&(c, s, w)| {
             meridian.iter().map(move |&(m, weight)| {
+                // The control points of the arc stand for cosine and sine: turning is linear in the two, so that
+                // the product of both nets is exact.
                 let turned = Point::new(c * m.x - s * m.y, s * m.x + c * m.y, m.z);
                 Homogeneous::weighted(axis.point(turned), w * weight)
             })

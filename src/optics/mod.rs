@@ -1,6 +1,6 @@
 //! The laws of light at surfaces and inside media: pure functions and small enums, no scene and no ray tracing.
 //!
-//! Conventions, the same everywhere in the room: `d` is the unit direction light travels in, *towards* the surface;
+//! Conventions, the same everywhere in the module: `d` is the unit direction light travels in, *towards* the surface;
 //! `n` is a unit normal that may point to either side; `cos_i = |d·n|`; `eta = n1/n2`, the refractive index of the
 //! side the light comes from over that of the other side. Wavelengths are vacuum wavelengths in nm.
 //!

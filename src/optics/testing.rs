@@ -1,4 +1,4 @@
-//! Random numbers and statistics shared by the room's tests.
+//! Random numbers and statistics shared by the module's tests.
 
 /// Weyl-sequence counter through the finaliser of Steele et al. (SplitMix, OOPSLA 2014).
 fn number(i: u64) -> f64 {

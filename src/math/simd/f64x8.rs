@@ -101,6 +101,7 @@ impl F64x8 for Array {
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
+        // As the instruction has it: the second where one of them is not a number.
         self.zip(other, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
