@@ -51,6 +51,8 @@ pub(super) static ORDERS: Orders = {
     while octant < 8 {
         let mut k = 0;
         while k < 8 {
+            // The child in slot `p ^ octant` is mostly met as the p-th (see `octant_slots` in `flatten`): counted
+            // down, for the last one pushed is the first one popped.
             orders[octant][k] = (7 ^ k ^ octant) as u32;
             k += 1;
         }
@@ -83,6 +85,8 @@ impl Lanes for Avx2 {
     fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.
         unsafe {
+            // Bounds are eight-bit steps from the node's corner: crossing = (corner − origin)·inverse +
+            // bound·(step·inverse), so that one fused operation a bound is left for the eight children.
             let [x, y, z] = [0, 1, 2];
             let inverse_x = _mm256_load_ps(ray.inverse[0].as_ptr());
             let inverse_y = _mm256_load_ps(ray.inverse[1].as_ptr());
@@ -96,7 +100,11 @@ impl Lanes for Avx2 {
             let slack_x = _mm256_set1_ps(ray.slack[x]);
             let slack_y = _mm256_set1_ps(ray.slack[y]);
             let slack_z = _mm256_set1_ps(ray.slack[z]);
+            // Which of the two rows of an axis is met first depends on the ray's sign alone, so that no minimum and
+            // maximum of both is needed.
             let [nx, ny, nz] = [ray.entry_row(0), ray.entry_row(1), ray.entry_row(2)];
+            // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
+            // but never missed.
             let enter_x = _mm256_fmadd_ps(row(node, nx), sx, _mm256_sub_ps(base_x, slack_x));
             let enter_y = _mm256_fmadd_ps(row(node, ny), sy, _mm256_sub_ps(base_y, slack_y));
             let enter_z = _mm256_fmadd_ps(row(node, nz), sz, _mm256_sub_ps(base_z, slack_z));
@@ -107,15 +115,19 @@ impl Lanes for Avx2 {
                 _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
             let leave =
                 _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
+            // Beside the slack the last few roundings scale with the distance itself.
             let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
             // Farthest first.
             let order = _mm256_load_si256(ORDERS.0.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
             let enter = _mm256_permutevar8x32_ps(enter, order);
             let leave = _mm256_permutevar8x32_ps(leave, order);
             let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(node.children.as_ptr().cast()), order);
+            // An unused child has link zero. Its box is empty, but where the slack is wider than the node even that
+            // is met.
             let unused = _mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_setzero_si256()));
             let met = _mm256_andnot_ps(unused, _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
             let met = _mm256_movemask_ps(met) as u32;
+            // Met children are packed to the front, so that they are written above the stack in one store each.
             let packed = _mm_loadl_epi64(COMPRESSIONS.get_unchecked(met as usize & 255).as_ptr().cast());
             let packed = _mm256_cvtepu8_epi32(packed);
             _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_permutevar8x32_ps(enter, packed));
@@ -128,6 +140,8 @@ impl Lanes for Avx2 {
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
         // SAFETY: see the head of the file; `axes` are 0..3 by construction.
         unsafe {
+            // The origin in two parts: of a start far from the block one `f32` would lose the digits that tell the
+            // corners apart.
             let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
             let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
             let corner = corner_error(block.step, far, ray.slack);
@@ -137,12 +151,16 @@ impl Lanes for Avx2 {
             let [sx, sy, sz] = ray.shear;
             let (sx, sy, sz) = (_mm256_set1_ps(sx), _mm256_set1_ps(sy), _mm256_set1_ps(sz));
             let (tx, ty, tz) = (broadcast_axis(&to, kx), broadcast_axis(&to, ky), broadcast_axis(&to, kz));
+            // Corners 0 and 2 lie in one half, 1 and 3 in the other: as triangle (0, 1, 2) uses a, b and the
+            // swapped a, triangle (2, 3, 0) is the same with its lanes four on.
             let (az, bz) = (sieve_row(block, kz, 0, step, tz), sieve_row(block, kz, 8, step, tz));
             let ax = _mm256_fnmadd_ps(sx, az, sieve_row(block, kx, 0, step, tx));
             let ay = _mm256_fnmadd_ps(sy, az, sieve_row(block, ky, 0, step, ty));
             let bx = _mm256_fnmadd_ps(sx, bz, sieve_row(block, kx, 8, step, tx));
             let by = _mm256_fnmadd_ps(sy, bz, sieve_row(block, ky, 8, step, ty));
             let (cx, cy) = (_mm256_permute2f128_ps::<1>(ax, ax), _mm256_permute2f128_ps::<1>(ay, ay));
+            // Woop, Benthin and Wald (2013): a ray meets a triangle where its three sheared edge functions have one
+            // sign. Here they may be wrong by `error`, so that only clearly opposite signs exclude it.
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
             let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));
@@ -150,6 +168,7 @@ impl Lanes for Avx2 {
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
             let below = _mm256_cmp_ps::<_CMP_LT_OQ>(least, _mm256_sub_ps(_mm256_setzero_ps(), error));
             let above = _mm256_cmp_ps::<_CMP_GT_OQ>(most, error);
+            // Nor can a triangle be met that lies wholly behind the range or before it.
             let (at, bt) = (_mm256_mul_ps(az, sz), _mm256_mul_ps(bz, sz));
             let ct = _mm256_permute2f128_ps::<1>(at, at);
             let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
@@ -157,6 +176,7 @@ impl Lanes for Avx2 {
             let late = _mm256_cmp_ps::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
             let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
             let outside = _mm256_or_ps(_mm256_and_ps(below, above), _mm256_or_ps(late, early));
+            // Negated, so that NaN keeps a facet rather than drops it.
             !(_mm256_movemask_ps(outside) as u32) & 255
         }
     }
@@ -174,6 +194,7 @@ impl Lanes for Avx2 {
             let high = _mm256_max_pd(_mm256_max_pd(a, b), _mm256_max_pd(c, d));
             let start = _mm256_load_pd(ray.origin.as_ptr());
             let reach = _mm256_set1_pd(ray.reach);
+            // Whether the start may lie on this facet: such a facet is tested with care.
             let near = _mm256_and_pd(
                 _mm256_cmp_pd::<_CMP_GE_OQ>(start, _mm256_sub_pd(low, reach)),
                 _mm256_cmp_pd::<_CMP_LE_OQ>(start, _mm256_add_pd(high, reach)),
@@ -192,9 +213,11 @@ impl Lanes for Avx2 {
             // Not fused, to have the bits of plain Rust.
             let x = _mm256_sub_pd(x, _mm256_mul_pd(_mm256_set1_pd(ray.shear[0]), z));
             let y = _mm256_sub_pd(y, _mm256_mul_pd(_mm256_set1_pd(ray.shear[1]), z));
+            // Each corner beside the next: lane k then has the edge function from corner k + 1 to k.
             let next_x = _mm256_permute4x64_pd::<0x39>(x);
             let next_y = _mm256_permute4x64_pd::<0x39>(y);
             let outline = _mm256_sub_pd(_mm256_mul_pd(next_x, y), _mm256_mul_pd(next_y, x));
+            // The diagonal alone is left, from corner 2 to corner 0.
             let third_x = _mm256_extractf128_pd::<1>(x);
             let third_y = _mm256_extractf128_pd::<1>(y);
             let forth = _mm_mul_sd(_mm256_castpd256_pd128(x), third_y);

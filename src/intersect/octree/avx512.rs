@@ -90,17 +90,21 @@ impl Lanes for Avx512 {
         unsafe {
             // Leaving is computed negated, so that the greatest is wanted of both.
             let octant = usize::from(ray.octant);
+            // One permutation of bytes puts, for each axis, the eight bounds of entry before the eight of exit, all
+            // in order of octant.
             let order = _mm512_load_si512(BOUNDS.0.get_unchecked(octant).as_ptr().cast());
             let bytes = _mm512_permutexvar_epi8(order, _mm512_load_si512((node as *const Node).cast()));
             let x = crossings(_mm512_castsi512_si128(bytes), node, ray, 0);
             let y = crossings(_mm512_extracti32x4_epi32::<1>(bytes), node, ray, 1);
             let z = crossings(_mm512_extracti32x4_epi32::<2>(bytes), node, ray, 2);
+            // The range takes part as a fourth axis: near as it is, far negated like every exit.
             let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(ray.negated_t_max));
             let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
             let enter = _mm512_castps512_ps256(most);
             let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-LEAVE_STRETCH));
             let order = _mm256_load_si256(ORDERS.0.get_unchecked(octant).as_ptr().cast());
             let children = _mm256_permutexvar_epi32(order, _mm256_loadu_si256(node.children.as_ptr().cast()));
+            // An unused child has link zero, and its empty box is met where the slack is wider than the node.
             let used = _mm256_test_epi32_mask(children, children);
             let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
             _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_maskz_compress_ps(met, enter));
@@ -113,6 +117,8 @@ impl Lanes for Avx512 {
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
         // SAFETY: see the head of the file.
         unsafe {
+            // The origin in two parts: of a start far from the block one `f32` would lose the digits that tell the
+            // corners apart.
             let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
             let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
             let corner = corner_error(block.step, far, ray.slack);
@@ -128,6 +134,7 @@ impl Lanes for Avx512 {
             let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
             let (at, bt) = (_mm512_castps512_ps256(t), _mm512_extractf32x8_ps::<1>(t));
             let (cx, cy, ct) = (swap_halves(ax), swap_halves(ay), swap_halves(at));
+            // The edge functions of [`Avx2::sift`], with its bounds of error.
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
             let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));

@@ -62,6 +62,7 @@ impl Polygon {
     fn cut(&mut self, axis: usize, position: f64, sign: f64) {
         let height = |p: &[f64; 3]| (p[axis] - position) * sign;
         let points = &self.points[..self.count];
+        // Most facets of a cell lie on one side: they are neither copied nor rounded.
         if points.iter().all(|p| height(p) >= 0.0) {
             return;
         }
@@ -75,6 +76,8 @@ impl Polygon {
             if (hp > 0.0 && hq < 0.0) || (hp < 0.0 && hq > 0.0) {
                 let s = hp / (hp - hq);
                 let mut between: [f64; 3] = std::array::from_fn(|a| p[a] + (q[a] - p[a]) * s);
+                // On the plane to the last bit, which interpolation would not hit: both cells that share it then
+                // see one corner.
                 between[axis] = position;
                 kept.push(between);
             }
@@ -99,6 +102,7 @@ pub(super) fn clip(corners: &[Point; 4], cell: &Box32, pad: f64) -> Option<Box32
     let mut high = [f64::NEG_INFINITY; 3];
     let [a, b, c, d] = corners.map(|p| p.to_array());
     let triangles = [[a, b, c], [a, c, d]];
+    // Of a triangle the second half has no area.
     for triangle in &triangles[..if c == d { 1 } else { 2 }] {
         let mut polygon = Polygon { points: [[0.0; 3]; 10], count: 3 };
         polygon.points[..3].copy_from_slice(triangle);
@@ -117,6 +121,7 @@ pub(super) fn clip(corners: &[Point; 4], cell: &Box32, pad: f64) -> Option<Box32
         return None;
     }
     Some(Box32 {
+        // Never beyond the cell: what `pad` adds would make a facet's parts overlap where the cell cuts them.
         low: std::array::from_fn(|a| round_down(low[a] - pad).max(cell.low[a])),
         high: std::array::from_fn(|a| round_up(high[a] + pad).min(cell.high[a])),
     })

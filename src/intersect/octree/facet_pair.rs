@@ -29,6 +29,8 @@ impl Edges {
         for (facet, c) in corners.into_iter().enumerate() {
             let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
             for k in 0..4 {
+                // Sheared so that the ray is the main axis: what is left is a test in two dimensions (Woop, Benthin
+                // and Wald 2013).
                 let z = c[2][k] - oz;
                 x[k] = (c[0][k] - ox) - sx * z;
                 y[k] = (c[1][k] - oy) - sy * z;

@@ -42,6 +42,7 @@ pub(super) fn flatten(
         .collect_into_vec(&mut blocks);
     let mut nodes = huge_pages::with_capacity(draft.nodes.len());
     nodes.extend_from_slice(&draft.nodes);
+    // What was left out is counted while cells grow; the draft knows of nodes and blocks alone.
     let left_out = stats.left_out;
     *stats = draft.stats;
     stats.left_out = left_out;
@@ -60,6 +61,8 @@ impl Draft {
             Content::Cells(cells) => {
                 let me = reserved.unwrap_or_else(|| self.reserve(1));
                 self.stats.nodes += 1;
+                // Cells have eight octants of which a surface meets four or so; grandchildren fill the empty
+                // places.
                 let children = if collapse { merge(cells) } else { cells };
                 let mut node = Node::bounding(&cell.bounds);
                 let boxes: Vec<_> = children.iter().map(|c| c.bounds).collect();
@@ -84,6 +87,7 @@ impl Draft {
 
     /// Sibling nodes and sibling blocks lie next to each other.
     fn add_in_turn(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
+        // Room for the nodes first, so that siblings lie side by side while whatever hangs below them goes behind.
         let inner = children.iter().filter(|c| matches!(c.content, Content::Cells(_))).count();
         let mut place = self.reserve(inner);
         let mut links = vec![Link::node(0); children.len()];
@@ -103,6 +107,8 @@ impl Draft {
     }
 
     fn add_parallel(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
+        // Each child into arrays of its own, put together in the order of the children: the tree is the same for
+        // any number of threads.
         let drafts: Vec<(Draft, Link)> = children
             .into_par_iter()
             .map(|child| {
@@ -137,8 +143,10 @@ fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
         for (i, child) in children.iter().enumerate() {
             if let Content::Cells(inner) = &child.content
                 && children.len() - 1 + inner.len() <= 8
+            // Opening a child takes one place away and adds as many as it has.
             {
                 let area = child.bounds.half_area();
+                // Of equal ones the last, so that the result does not depend on how children were swapped before.
                 if best.is_none_or(|(a, _)| area >= a) {
                     best = Some((area, i));
                 }

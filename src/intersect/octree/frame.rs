@@ -53,6 +53,7 @@ impl Frame {
             let high = (self.high[a] - origin[a]) * inverse[a];
             let first = ordered_min(low, high);
             let last = ordered_max(low, high);
+            // Outward by the rounding of both crossings.
             enter[a] = first - first.abs() * CROSSING_ERROR;
             leave[a] = last + last.abs() * CROSSING_ERROR;
         }

@@ -21,6 +21,7 @@ pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
 #[cfg(target_os = "linux")]
 fn advise(start: usize, bytes: usize) {
     const PAGE: usize = 4096;
+    // Whole pages inside of the allocation: its ends share theirs with other memory.
     let first = start.next_multiple_of(PAGE);
     let end = (start + bytes) / PAGE * PAGE;
     if first < end {

@@ -28,6 +28,7 @@ pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Op
         [Some((first, [a, b, c, c])), None]
     } else {
         let second = Base::new([a, c, d], tree.surroundings.reach)?;
+        // A ray may leave either triangle, and the other one may stand in its way where the facet is folded.
         [Some((first, [a, c, d, d])), Some((second, [a, b, c, c]))]
     };
     let mut limit = Limit::new(axis, widest);
@@ -40,6 +41,7 @@ pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Op
         base.search(tree, facet, &mut limit);
     }
     let angle = limit.sine.clamp(0.0, 1.0).asin();
+    // Too narrow a cone would catch next to no ray, and its test costs each.
     (angle > LEAST_HALF_ANGLE).then(|| (angle - ANGLE_ROOM).cos())
 }
 
@@ -90,6 +92,7 @@ impl Base {
         let mesh = tree.surroundings.mesh;
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
+            // Narrower than of use: whatever else stands there does not matter.
             if limit.sine < LEAST_HALF_ANGLE {
                 return;
             }
@@ -105,6 +108,7 @@ impl Base {
                 }
                 Target::Block(index, count) => {
                     let block = &tree.blocks[index];
+                    // Its own facet is asked separately, triangle by triangle.
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
                         self.meet(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
                     }
@@ -134,6 +138,7 @@ impl Base {
     fn meet(&self, corners: &[Point; 4], limit: &mut Limit) {
         if !self.is_off(corners, limit) {
             let [a, b, c, d] = *corners;
+            // The hull of a folded quad is more than the quad: its triangles may be off where the hull is not.
             for triangle in [[a, b, c], [a, c, d]] {
                 if !self.is_off(&triangle, limit) {
                     limit.lower(self.sine_to(&triangle, limit.axis));
@@ -165,6 +170,8 @@ impl Base {
                 if height > self.reach {
                     least = least.max(height / beyond.max(0.0));
                 } else if beyond < -self.reach {
+                    // The plane must pass above all points beyond the line and below none behind it: between the
+                    // two slopes there must be one.
                     most = most.min(height.min(0.0) / beyond);
                 }
             }
@@ -179,8 +186,11 @@ impl Base {
         let mut ways = [Vector::ZERO; 9];
         let mut count = 0;
         for q in points {
+            // Of two hulls all separating directions come from differences of their corners.
             for t in &self.corners {
                 let way = *q - *t;
+                // A difference within the reach of a start is the same point, as at a shared edge: no normal is
+                // asked to keep off that.
                 if way.length_squared() > self.reach * self.reach && count < ways.len() {
                     ways[count] = way;
                     count += 1;
@@ -198,6 +208,7 @@ impl Base {
             }
         };
         offer(axis);
+        // The nearest normal to the axis is the axis itself, its part across one difference, or the normal of two.
         for (k, v) in ways.iter().enumerate() {
             offer(axis * v.length_squared() - *v * v.dot(axis));
             for w in &ways[..k] {

@@ -17,7 +17,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
-/// Rays of a run for each facet below which no facet is record.
+/// Rays of a run for each facet below which no facet is watched.
 const LEAST_RAYS_PER_FACET: u64 = 64;
 /// Rays that leave a facet before its free cone is found: to find one takes some 3 µs, and it saves a ray that leaves 0.1 µs.
 const RAYS_BEFORE_CONE: u32 = 8;
@@ -87,6 +87,7 @@ impl Cone {
         for (own, x) in self.axis.iter().zip(axis.to_array()) {
             own.store((x as f32).to_bits(), Ordering::Relaxed);
         }
+        // Released after the axis: whoever reads the new cosine reads the new axis too.
         // Whoever sees it sees the axis.
         self.cosine.store((cosine as f32 + COSINE_ROOM).to_bits(), Ordering::Release);
     }
@@ -95,6 +96,7 @@ impl Cone {
     #[inline(always)]
     fn cosines(&self, direction: Vector) -> (f32, f32) {
         let cosine = f32::from_bits(self.cosine.load(Ordering::Acquire));
+        // An old axis beside an old cosine, which no ray has, is no harm.
         let [x, y, z] = [0, 1, 2].map(|k| f32::from_bits(self.axis[k].load(Ordering::Relaxed)));
         let d = direction.as_vec3();
         (x * d.x + y * d.y + z * d.z, cosine)
@@ -139,6 +141,7 @@ impl RayRecord {
         if slope.is_nan() || slope <= 0.0 {
             return;
         }
+        // The first few rays lay the cone, and those beside it the horizon.
         if self.left.load(Ordering::Relaxed) <= RAYS_BEFORE_CONE {
             return self.gather(tree, facet, cone, normal, direction);
         }
@@ -146,6 +149,7 @@ impl RayRecord {
         // The bits of positive numbers are in their order.
         self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
         self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
+        // Equal, not above: of all threads one alone counts to this number, and that one searches.
         if self.beside.fetch_add(1, Ordering::Relaxed) == rays_before_search {
             let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
             let sectors = self.sectors.load(Ordering::Relaxed);
@@ -163,6 +167,7 @@ impl RayRecord {
             self.low[axis].fetch_min(place, Ordering::Relaxed);
             self.high[axis].fetch_max(place, Ordering::Relaxed);
         }
+        // As below: the thread that counts to this number lays the cone.
         if self.left.fetch_add(1, Ordering::Relaxed) != RAYS_BEFORE_CONE {
             return;
         }
@@ -177,7 +182,7 @@ impl RayRecord {
             let widest = widest.min(FRAC_PI_2);
             match cone::cosine(tree, facet, axis, widest) {
                 Some(cosine) => cone.set(axis, cosine),
-                // Something stands right ahead: what leaves is met, and the facet no longer record.
+                // Something stands right ahead: what leaves is met. An axis of zero ends the watch of this facet.
                 None => cone.axis.iter().for_each(|x| x.store(0, Ordering::Relaxed)),
             }
         }

@@ -61,6 +61,7 @@ impl Skyline {
         let (up, x, y) = (dot(self.normal), dot(self.x), dot(self.y));
         let flat2 = x * x + y * y;
         // Nearly upright the sector is a matter of rounding.
+        // A sector told wrongly would be another's slope; the steepest of all is right for any.
         let upright = flat2 < UPRIGHT;
         let slope2 = if upright { self.steepest } else { self.slope2[sector(x, y)] };
         up > 0.0 && up * up > slope2 * flat2 && slope2 < f32::INFINITY
@@ -80,6 +81,7 @@ pub(super) fn of_facet(tree: &Tree, facet: usize, floor: &[f64; SECTORS]) -> Hor
     let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
     let [first, second] = [[a, b, c], [a, c, d]];
+    // What stands highest may be the other triangle of a folded facet, so its rise is where the search begins.
     let skyline_from = |own: [Point; 3], other: [Point; 3]| {
         let base = Base::new(own, tree.surroundings.reach)?;
         let rise = base.rise(&other);
@@ -132,6 +134,7 @@ impl Base {
         };
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
+            // Once no sector is of use nothing more is looked for.
             if slopes.iter().all(|s| *s > STEEPEST_OF_USE) {
                 return Skyline::UNKNOWN;
             }
@@ -150,6 +153,7 @@ impl Base {
                     let block = &tree.blocks[index];
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
                         let corners = block.positions[k].map(|p| mesh.positions[p as usize]);
+                        // The box first: it is cheaper than the corners, and rises no less.
                         if higher(&slopes, &self.rise_of_box(&Aabb::from_points(corners))) {
                             let rise = self.rise(&corners);
                             slopes = std::array::from_fn(|k| slopes[k].max(rise[k]));
@@ -164,6 +168,7 @@ impl Base {
             if s <= STEEPEST_OF_USE { (s * s * (1.0 + SLOPE_ROOM) + UPRIGHT_ROOM) as f32 } else { f32::INFINITY }
         });
         let [normal, x, y] = [self.normal, self.x, self.y].map(|v| v.to_array().map(|x| x as f32));
+        // The squares of slopes are compared, since that saves each ray a root.
         Skyline { normal, x, y, slope2, steepest: slope2.into_iter().fold(0.0, f32::max) }
     }
 
@@ -171,6 +176,7 @@ impl Base {
     fn rise_of_box(&self, b: &Aabb) -> [f64; SECTORS] {
         let (middle, half) = (b.center() - self.origin, 0.5 * b.size());
         let room = BOX_ROOM * half.max_element();
+        // No higher than the start may be off: what touches the facet's plane stands in no ray's way.
         let height = middle.dot(self.normal) + half.dot(self.normal.abs()) + room;
         if height <= self.reach {
             return [0.0; SECTORS];

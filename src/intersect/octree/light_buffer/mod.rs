@@ -82,7 +82,7 @@ pub(super) struct LightBuffer {
     facets: Vec<BufferFacet>,
 }
 
-/// Where a ray lookups.
+/// Where a ray looks.
 #[derive(Clone, Copy)]
 struct Lookup {
     index: u16,
@@ -118,11 +118,14 @@ impl View {
             Beam::Collimated { origin, direction } => {
                 let (x, y) = orthonormal_pair(*direction);
                 let span = |axis: Vector| {
+                    // The grid must hold the shadow of the whole mesh, which lies between those of its box's
+                    // corners.
                     let along = tree.surroundings.bounds.corners().map(|p| p.dot(axis));
                     let (low, high) =
                         along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), a| (l.min(*a), h.max(*a)));
                     (0.5 * (low + high), 0.5 * (high - low) * (1.0 + SPAN_ROOM))
                 };
+                // A little wider, so that a place on the border is not rounded out of the grid.
                 let ((a, width), (b, height)) = (span(x), span(y));
                 let half = width.max(height);
                 // Rounding must stay small against a square.
@@ -171,6 +174,7 @@ pub(super) fn draw_expected(
     let views =
         expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::from_beam(beam, tree));
     for view in views {
+        // Two beams from one place share their buffer; drawing costs too much to do it twice.
         if buffers.len() < MOST_BUFFERS && buffers.iter().all(|m| m.view != view) {
             let drawn = kept.iter().position(|m| m.view == view).map(|k| kept.swap_remove(k));
             buffers.push(drawn.unwrap_or_else(|| raster::draw(tree.surroundings.mesh, view, expected.threads)));
@@ -180,7 +184,7 @@ pub(super) fn draw_expected(
 }
 
 impl LightBuffer {
-    /// Where a ray lookups first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
+    /// Where a ray looks first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
     /// instruction set.
     #[inline(always)]
     fn locate(&self, ray: &Ray, lookup: &mut Lookup) -> bool {
@@ -189,7 +193,7 @@ impl LightBuffer {
         let (side, [x, y], scale, shift) = match &self.view {
             View::Point(_) => {
                 let [sx, sy, sz] = lookup.line.shear;
-                // Slopes are against the main axis as it points; the sides of the cube lookup outward.
+                // Slopes are against the main axis as it points; the sides of the cube look outward.
                 let sign = 1f64.copysign(sz);
                 let main = prepared.axes()[2];
                 (2 * main + usize::from(sz < 0.0), [sx * sign, sy * sign], ray.direction[main].abs(), 0.0)
@@ -204,6 +208,8 @@ impl LightBuffer {
         // False for NaN too.
         let inside = (x >= 0.0) & (x <= n) & (y >= 0.0) & (y <= n);
         let (i, j) = ((x as usize).min(self.side - 1), (y as usize).min(self.side - 1));
+        // An index is always formed, if only to be thrown away: a branch on whether rays pass by cannot be
+        // foretold.
         lookup.square = select_unpredictable(inside, (side * self.side + j) * self.side + i, 0) as u32;
         lookup.rest = [x - i as f64, y - j as f64];
         lookup.scale = scale;
@@ -216,6 +222,7 @@ impl LightBuffer {
     fn entries(&self, lookup: &Lookup) -> &[Entry] {
         let mut square = self.squares[lookup.square as usize];
         let [mut x, mut y] = lookup.rest;
+        // Four or so levels at most, and none for most squares.
         while square.count & DIVIDED != 0 {
             (x, y) = (x * DIVISIONS as f64, y * DIVISIONS as f64);
             let (i, j) = ((x as usize).min(DIVISIONS - 1), (y as usize).min(DIVISIONS - 1));
@@ -229,12 +236,15 @@ impl LightBuffer {
 /// The buffer that shows a ray; `last` is tried first.
 #[inline(always)]
 fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usize> {
+    // A ray that leaves a face starts elsewhere, and one whose range begins later must not be told of facets
+    // before.
     if ray.departure.is_some() | (ray.t_min != 0.0) {
         return None;
     }
     if buffers[last].view.shows(ray) {
         return Some(last);
     }
+    // The rays of a batch mostly come from one source, so that this loop is rare.
     let mut k = 0;
     while k < buffers.len() {
         if buffers[k].view.shows(ray) {
@@ -261,6 +271,8 @@ pub(super) fn answer<L: Lanes>(
     let mut edges = Edges::default();
     let mut found: [(&[Entry], u8); LOOKUP_BATCH] = [(&[], 0); LOOKUP_BATCH];
     while next < rays.len() {
+        // In rounds, each of which asks for the memory that the next one needs: first squares, then entries,
+        // facets, and at last the tests.
         let mut n = 0;
         while n < LOOKUP_BATCH && next < rays.len() {
             let ray = &rays[next];
@@ -298,6 +310,7 @@ pub(super) fn answer<L: Lanes>(
             let mut best = Nearest::up_to(rays[index].t_max);
             let mut first = 0;
             while first < entries.len() {
+                // Entries are in order of depth: from here on all lie behind the hit.
                 if f64::from(entries[first].near) > best.t * lookup.scale + lookup.shift {
                     break;
                 }

@@ -19,13 +19,16 @@ pub(super) fn test<L: Lanes>(
     edges: &mut Edges,
     best: &mut Nearest,
 ) {
+    // A missing other repeats the first, and its bits are not present.
     let second = other.unwrap_or(first);
     let present = first.triangle_bits() | select_unpredictable(other.is_some(), second.triangle_bits() << 4, 0);
     L::edges([&first.corners, &second.corners], line, edges);
+    // Of each triangle: two edges of the outline, and the diagonal from this side or from the other.
     let sides = |outline: u8, diagonal: u8, against: u8| {
         (outline | outline >> 1) & 0x55 | (diagonal & 0x11) | (against & 0x44)
     };
     let ([below, left], [above, right]) = (edges.below, edges.above);
+    // An edge function of zero decides nothing by its sign; the careful test breaks the tie as the walk does.
     if sides(!(below | above), !(left | right), !(left | right)) & present != 0 {
         first.test(line, best);
         if let Some(second) = other {
@@ -33,6 +36,7 @@ pub(super) fn test<L: Lanes>(
         }
         return;
     }
+    // A triangle is missed where edge functions of both signs occur.
     let mut met = !(sides(below, left, right) & sides(above, right, left)) & present;
     while met != 0 {
         let bit = met.trailing_zeros() as usize;

@@ -51,6 +51,7 @@ impl Window {
     fn part(&self, n: usize, [i, j]: [usize; 2]) -> Self {
         let edge = |a: usize, k: usize| {
             let (low, high) = (self.low[a] + ROOM, self.high[a] - ROOM);
+            // Parts share their border to the bit, and each gets its own room.
             low + (high - low) * (k as f64 / n as f64)
         };
         Self { low: [edge(0, i) - ROOM, edge(1, j) - ROOM], high: [edge(0, i + 1) + ROOM, edge(1, j + 1) + ROOM] }
@@ -77,6 +78,8 @@ struct Projection {
 impl Projection {
     fn new(facet: u32, corners: [Point; 4], view: &View, side: usize) -> Option<Self> {
         let mut depths = [0.0; 4];
+        // Homogeneous: a corner beside the source or behind it has no place to divide for, but still lies on one
+        // side of a pyramid.
         let corners: [[f64; 3]; 4] = std::array::from_fn(|k| {
             let p = corners[k];
             match view {
@@ -95,6 +98,8 @@ impl Projection {
                 }
             }
         });
+        // Too near to the plane of the source a place is more rounding than place; such a facet is judged by the
+        // pyramid's sides.
         let size = corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let front = corners.iter().all(|c| c[2] > LEAST_DEPTH * size);
         let places = front.then(|| corners.map(|[x, y, w]| [x / w, y / w]));
@@ -111,6 +116,7 @@ impl Projection {
         // Room for the rounding of depths.
         let (near, far) = (near - 2.0 * stray, far + 2.0 * stray);
         let projection = Self { facet, corners, places, bounds, near, far, whole: near > start };
+        // Behind all starts, or beside the whole side of the cube: no ray of this side meets it.
         (far >= start && projection.overlaps(&Window::WHOLE)).then_some(projection)
     }
 
@@ -125,6 +131,7 @@ impl Projection {
 
     /// Whether its corners do not all lie beyond one side of the window, nor behind.
     fn is_around(&self, window: &Window) -> bool {
+        // What rounds is relative to the farthest corner, and one of them decides for all.
         let size = self.corners.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let beyond = |value: &dyn Fn(&[f64; 3]) -> f64| self.corners.iter().all(|c| value(c) < -BEHIND * size);
         let out = |a: usize| beyond(&|c| c[a] - window.low[a] * c[2]) || beyond(&|c| window.high[a] * c[2] - c[a]);
@@ -140,6 +147,7 @@ impl Projection {
         let (first, second) = (turn([0, 1, 2]), turn([0, 2, 3]));
         let triangle = p[2] == p[3];
         // Both triangles must lie side by side: then the half-planes of the outline share only what the facet fills.
+        // A triangle seen edge on fills nothing.
         if first == 0.0 || (!triangle && first * second <= 0.0) {
             return false;
         }
@@ -152,6 +160,7 @@ impl Projection {
 /// The least of the edge function of a line over the window, times `sign`.
 fn least_edge(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
     let [dx, dy] = [sign * (q[0] - p[0]), sign * (q[1] - p[1])];
+    // A linear function is least at the corner that lies farthest against its gradient.
     let x = if dy > 0.0 { window.high[0] } else { window.low[0] };
     let y = if dx > 0.0 { window.low[1] } else { window.high[1] };
     dx * (y - p[1]) - dy * (x - p[0])
@@ -164,6 +173,7 @@ fn triangle_overlaps(t: [[f64; 2]; 3], window: &Window) -> bool {
             return false;
         }
     }
+    // Seen edge on it has no inside, but a line may still cross the window.
     let turn = (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0]);
     // The greatest of an edge function is the least of its negative.
     turn == 0.0
@@ -174,6 +184,7 @@ fn triangle_overlaps(t: [[f64; 2]; 3], window: &Window) -> bool {
 pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> LightBuffer {
     let facets = mesh.facets.len();
     let squares = (SQUARES * facets) as f64 / view.sides() as f64;
+    // A power of two, so that tiles and halvings end on squares.
     let side = (squares.sqrt() as usize).next_power_of_two().clamp(8, 1024);
     let projections = in_parallel(view.sides(), threads, |face| projections(mesh, &view, face));
     let room = MOST_PER_FACET * facets.max(64) / 8;
@@ -198,6 +209,8 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
     let values: Vec<OnceLock<T>> = (0..n).map(|_| OnceLock::new()).collect();
     let next = AtomicUsize::new(0);
     let work = || {
+        // Threads take the next place that is free, so that a slow side of the cube holds up no other; values stay
+        // in their places.
         while let Some((k, place)) = values.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) {
             place.get_or_init(|| value(k));
         }
@@ -209,6 +222,7 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
     values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
+// Sorted by depth once: all lists below are taken from this one and keep its order.
 /// All facets that a buffer shows, the nearest first.
 fn projections(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Projection> {
     let projection = |f: usize| {
@@ -241,6 +255,7 @@ impl Tile {
         let (face, i, j) = (k / (TILES * TILES), k % TILES, k / TILES % TILES);
         let own = self.side * self.side;
         let (squares, entries) = (buffer.squares.len(), buffer.entries.len());
+        // Within the tile's own arrays; now shifted to where they come to stand in the buffer.
         let moved = |s: &Square| {
             let first = s.first as usize;
             let first = if s.count & DIVIDED != 0 { first - own + squares } else { first + entries };
@@ -272,6 +287,7 @@ impl Rasterizer<'_> {
         let mut end = f64::INFINITY;
         for &k in list {
             let projection = &self.projections[k as usize];
+            // In order of depth: all that follow begin behind a facet that fills the window.
             if projection.near > end {
                 break;
             }
@@ -282,6 +298,7 @@ impl Rasterizer<'_> {
                 }
             }
         }
+        // A facet that fills may come after some that begin nearer, and ends those that were taken between.
         visible.retain(|&k| self.projections[k as usize].near <= end);
         visible
     }
@@ -313,10 +330,12 @@ impl Rasterizer<'_> {
             || tile.squares.len() + tile.entries.len() > self.room
         {
             let count = list.len() as u32;
+            // Neighbouring squares mostly see the same facets, so that many share one list.
             let first = *self.written.entry(list).or_insert_with_key(|list| {
                 let first = tile.entries.len() as u32;
                 tile.entries.extend(list.iter().map(|&k| {
                     let projection = &self.projections[k as usize];
+                    // Downward, so that rounding to `f32` never skips an entry.
                     Entry { near: (projection.near as f32).next_down(), facet: k }
                 }));
                 first
