@@ -4,7 +4,7 @@
 //! Compressed Wide BVHs*, HPG 2017), built on the triangles of the facets. As shipped they work in f32: a hit is wrong by
 //! about 1e-5 mm, one ray in eight aimed at an edge slips through, and some rays miss everything. `cured` mends what
 //! can be mended from outside, so that answers are those of the octree:
-//! 1. hits come from the f64 test of this module, the nearest one is kept in f64;
+//! 1. hits come from the f64 test of `intersect::facet`, the nearest one is kept in f64;
 //! 2. boxes are taken about the middle of the mesh, rounded outward and padded for the rounding of node tests;
 //! 3. +0.0 is added to directions, for CwBvh orders children wrongly for −0.0;
 //! 4. inverse directions near zero are ±1e30 instead of ±1/f32::EPSILON;
@@ -198,6 +198,7 @@ impl<'m> Bvh<'m> {
 
     fn nearest_shipped(&self, triangles: &[RtTriangle], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         let own = ray.departure.map(|d| d.primitive);
+        // Beyond what `f32` holds a range is as good as endless.
         let t_max = if ray.t_max < f64::from(f32::MAX) { ray.t_max as f32 } else { f32::INFINITY };
         let (origin, direction) = (ray.origin.as_vec3a(), ray.direction.as_vec3a());
         if !(origin.is_finite() && direction.is_finite()) {
@@ -205,6 +206,8 @@ impl<'m> Bvh<'m> {
         }
         let ray32 = Ray32::new(origin, direction, ray.t_min as f32, t_max);
         let (found, t) = self.walk(ray32, cost, |ray, id| {
+            // As shipped there are no departures; the facet that is left is passed over, or each such ray would hit
+            // its own start.
             if own == Some(self.codes[id] >> 1) { f32::INFINITY } else { triangles[id].intersect(ray) }
         });
         let found = found?;
@@ -216,6 +219,7 @@ impl<'m> Bvh<'m> {
     }
 
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
+        // Lifted as for the octree: grazing rays would else be told differently.
         let ray = &self.surroundings.lifted(ray);
         let facet_ray = FacetRay::new(ray);
         let mut best = Nearest::up_to(ray.t_max);
@@ -223,6 +227,7 @@ impl<'m> Bvh<'m> {
         // In units of the tree from here on; `begin` is the distance along the ray at which it starts there.
         let begin = enter - EARLIER / self.scale;
         let origin = ((ray.origin - self.center + ray.direction * begin) * self.scale).as_vec3a();
+        // Adding zero turns −0.0 into 0.0: cure 3.
         let direction = ray.direction.as_vec3a() + Vec3A::ZERO;
         if !(origin.is_finite() && direction.is_finite()) {
             return None;
@@ -233,6 +238,7 @@ impl<'m> Bvh<'m> {
             if t.is_finite() { t } else { f32::MAX }
         };
         let mut ray32 = Ray32::new(origin, direction, 0.0, far(leave) + EARLIER as f32);
+        // Cure 4, for directions along an axis.
         ray32.inv_direction = Vec3A::from_array(
             direction
                 .to_array()
@@ -247,6 +253,7 @@ impl<'m> Bvh<'m> {
                 &self.surroundings,
                 &mut best,
             );
+            // Only a nearer hit may shorten the ray; infinity leaves it as it is.
             if best.t < before { far(best.t) } else { f32::INFINITY }
         });
         best.hit()

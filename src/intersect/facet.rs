@@ -109,6 +109,8 @@ impl FacetRay {
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
         let a = ray.direction.abs();
+        // The main axis is the longest of the direction: no slope against it is above one, and shearing magnifies
+        // nothing.
         let of_yz = select_unpredictable(a.y > a.z, 1, 2);
         let of_xz = select_unpredictable(a.x > a.z, 0, 2);
         let kz: usize = select_unpredictable(a.x > a.y, of_xz, of_yz);
@@ -153,6 +155,7 @@ impl FacetRay {
         around: &Surroundings,
         best: &mut Nearest,
     ) {
+        // A ray that leaves nothing needs none of the care below.
         let Some(own) = self.from else { return self.quad(facet, triangles, corners, self.origin, best) };
         let [first, second] = if own == facet {
             self.tests_of_own(&corners.map(|p| *p), around)
@@ -194,6 +197,7 @@ impl FacetRay {
     fn tests_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [TriangleTest; 2] {
         let [a, b, c, d] = *corners;
         let (first, second) = ((b - a).cross(c - a), (c - a).cross(d - a));
+        // Over both triangles to one side: a ray that rises clear of both planes meets neither.
         let over = |n: Vector, side: f64| side * n.dot(self.direction) > LEAST_SINE * n.length();
         let goes = |side: f64| over(first, side) && (c == d || over(second, side));
         if goes(1.0) || goes(-1.0) {
@@ -202,10 +206,14 @@ impl FacetRay {
         let start = Point::from_array(self.origin);
         let own = StartTriangle::new(corners, start, self.triangle);
         let apex = corners[if own.second { 1 } else { 3 }];
+        // Heights are compared as squares, each times the square of the normal's length: no root is taken and
+        // nothing divided.
         let thick = around.reach * around.reach * own.normal.length_squared();
         let height = own.normal.dot(apex - corners[0]);
         let off_plane = own.normal.dot(start - corners[0]);
+        // The other triangle can be ahead only where the fold closes on the side that the ray goes to.
         let closes = height * own.normal.dot(self.direction) > 0.0 && height * height > thick;
+        // A start off the plane of its triangle does not lie on the facet, whatever its departure says.
         let other = if !closes || off_plane * off_plane > thick {
             TriangleTest::Never
         } else if own.is_at_diagonal(corners, start, around.reach) {
@@ -242,9 +250,11 @@ impl FacetRay {
         around: &Surroundings,
     ) -> [TriangleTest; 2] {
         let mesh = around.mesh;
+        // A departure that names no facet of this mesh says nothing of neighbours.
         let Some(_) = mesh.facets.get(own as usize) else { return [TriangleTest::Plain; 2] };
         let ours = mesh.corner_positions(own as usize);
         let theirs = mesh.corner_positions(facet as usize);
+        // Without a vertex in common they have no border on which a start could lie.
         if !ours.iter().any(|p| theirs.contains(p)) {
             return [TriangleTest::Plain; 2];
         }
@@ -301,6 +311,8 @@ impl Line {
         let diagonal = x[0] * y[2] - y[0] * x[2];
         let first = [outline[1], diagonal, outline[0]];
         let second = [outline[2], outline[3], -diagonal];
+        // Where an edge function is zero, the sign it has been rounded from decides, in exact arithmetic: of two
+        // facets at an edge one is hit.
         let zero = |e: [f64; 3]| (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
         if triangles & (u32::from(zero(first)) | u32::from(zero(second)) << 1) != 0 {
             return self.on_an_edge((facet, triangles), [first, second], [x, y, z], best);
@@ -370,6 +382,7 @@ fn one_sided(e: [f64; 3]) -> bool {
 #[cold]
 fn exact_edges(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
     let zero = Coord { x: 0.0, y: 0.0 };
+    // The shear has rounded already, but alike for all facets at the edge; from there on the signs are exact.
     let edge = |p: [f64; 3], q: [f64; 3]| orient2d(Coord { x: p[0], y: p[1] }, Coord { x: q[0], y: q[1] }, zero);
     [edge(c, b), edge(a, c), edge(b, a)]
 }

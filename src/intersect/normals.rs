@@ -151,6 +151,7 @@ fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: V
         }
         local = patch(p);
     }
+    // A normal against the facet's belongs to a part of the patch that folds over.
     let n = local.du.cross(local.dv);
     if n.dot(flat) > 0.0 { n } else { normal }
 }
@@ -163,6 +164,8 @@ impl QuadNet {
         // net[i][j]: i along u, j along v; corners 0..3 at (0,0), (3,0), (3,3), (0,3).
         let mut net = [[Point::ZERO; 4]; 4];
         let places = [(0, 0), (3, 0), (3, 3), (0, 3)];
+        // The mixed difference of the corners, as a bilinear patch has it: it stands for the twist, which corners
+        // and normals leave open.
         let twist = (corners[0] - corners[1] + corners[2] - corners[3]) / 9.0;
         let toward = |i: usize, at: usize| if i == 0 { at } else { 3 - at };
         for (k, (i, j)) in places.into_iter().enumerate() {
@@ -171,6 +174,7 @@ impl QuadNet {
             let (own, normal) = (corners[k], vertices[k].normal);
             let (u_point, v_point) =
                 (tangent_point(own, normal, corners[along_u]), tangent_point(own, normal, corners[along_v]));
+            // Along one diagonal the twist lifts the inner points, along the other it lowers them.
             let sign = if (i == 0) == (j == 0) { 1.0 } else { -1.0 };
             net[i][j] = own;
             net[toward(i, 1)][j] = u_point;
@@ -214,6 +218,8 @@ impl TriangleNet {
         let point = |i: usize, j: usize| tangent_point(corners[i], vertices[i].normal, corners[j]);
         let sides = [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2)].map(|(i, j)| point(i, j));
         let corners = [corners[0], corners[1], corners[2]];
+        // Beyond the mean of the sides by half of its distance from that of the corners, after Vlachos et al.:
+        // quadratic surfaces are met exactly.
         let edges = sides.into_iter().sum::<Point>() / 6.0;
         let middle = edges + (edges - corners.into_iter().sum::<Point>() / 3.0) * 0.5;
         Self { corners, sides, middle }

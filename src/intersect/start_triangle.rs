@@ -48,5 +48,6 @@ fn is_over_second([a, b, c, d]: &[Point; 4], start: Point) -> bool {
 pub(super) fn distance_to_segment(p: Point, a: Point, b: Point) -> f64 {
     let (ab, ap) = (b - a, p - a);
     let along = ap.dot(ab) / ab.length_squared();
+    // False as well where the segment is a point and `along` is no number.
     if along > 0.0 { (ap - ab * along.min(1.0)).length() } else { ap.length() }
 }

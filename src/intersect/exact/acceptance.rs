@@ -29,10 +29,13 @@ impl Exact {
             return;
         }
         let leaf = &self.leaves[index as usize];
+        // A ray that leaves a seam or a pole meets its own point again under other parameters: searches by leaf
+        // exclude it by parameters alone.
         if query.departure.is_some_and(|own| own.is_same_point(leaf, local, t, &self.geometry)) {
             return;
         }
         let mut near_trim = false;
+        // A leaf that no trim passes has nothing to ask: there every root in range is on the face.
         if !self.linearizations[index as usize].whole {
             let (inside, near) = self.trim_side(query, leaf, local);
             near_trim = near;
@@ -53,6 +56,7 @@ impl Exact {
         let trim = &self.geometry.trims[face.trim as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
         let uv = patch.uv(leaf.patch_parameters(local));
+        // Cells keep so far off every trim that a decided one needs no distance (`trim::cell_margin`).
         match trim.cell_at(uv) {
             Region::Border => {}
             decided => return (decided == Region::Inside, false),
@@ -64,10 +68,13 @@ impl Exact {
         let scale = |d: usize| (leaf.rect[d][1] - leaf.rect[d][0]) * (patch.domain[d][1] - patch.domain[d][0]);
         let across = |a: Vector, d: usize| (a - query.d * a.dot(query.d)) / scale(d);
         let (su, sv) = (across(du, 0), across(dv, 1));
+        // The first fundamental form of the surface as the ray sees it: trims live in (u, v), bands are in mm.
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
         let mut place = trim.locate(uv, metric, face.flagged);
         let owner = |n: u32| -> &EdgeUse { &trim.uses[n as usize] };
         place.near.retain(|n| n.distance <= self.geometry.flagged(owner(n.owner).gap, &face.placement));
+        // Two radii: within the wider one, which grows with the file's gaps, a root is only flagged; within the
+        // band the shared edge decides.
         let flagged = !place.near.is_empty();
         place.near.retain(|n| n.distance <= face.band);
         if place.near.is_empty() {

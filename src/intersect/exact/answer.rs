@@ -65,6 +65,7 @@ impl Exact {
     pub fn passage(&self, ray: &Ray, cost: &mut Cost) -> Passage {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget.saturating_mul(BUDGET_OF_ALL));
+        // Else the first root would end the search.
         query.collects_all = true;
         traversal::search(self, &mut query);
         cost.rays += 1;
@@ -76,8 +77,12 @@ impl Exact {
         near_trims.extend(roots.iter().filter(|r| r.near_trim).map(|r| r.t));
         near_trims.sort_by(f64::total_cmp);
         let mut hits: Vec<Hit> = Vec::new();
+        // In order of t, so that the two crossings of a border between patches, one from either side, are found by
+        // looking back.
         for root in roots {
             let mut hit = self.hit(&query, &root);
+            // From where the budget ended on crossings may be missing: none behind that is known to be the next
+            // one.
             if hit.t >= query.undecided_from {
                 hit.certainty = Certainty::Uncertified;
             }
@@ -92,6 +97,7 @@ impl Exact {
     #[inline(always)]
     pub(super) fn restart(&self, query: &mut Query, ray: &Ray, budget: u32) {
         query.restart(ray, &self.geometry, &self.tree, budget);
+        // NaN falls through every test of a box: an unsound ray is not searched, and its miss is no certified one.
         if !is_sound(ray) {
             query.slabs.misses = true;
             query.undecided_from = f64::NEG_INFINITY;
@@ -127,6 +133,8 @@ impl Exact {
         let mut t = root.t;
         let mut local = root.local;
         let mut jet = net::evaluate(control, leaf.degree, local[0], local[1]);
+        // Certified roots alone: at a contact the Jacobian is singular and a step could go anywhere, and what 32
+        // digits have settled gains nothing.
         if root.certainty == Certainty::Certified && root.settled.is_none() {
             let oc = query.o - leaf.center;
             let mut last = f64::INFINITY;
@@ -145,10 +153,14 @@ impl Exact {
                 last = size;
                 jet = net::evaluate(control, leaf.degree, local[0], local[1]);
             }
+            // Into the ray's own range; `t_max` has come down to the root by now.
             t = t.clamp(query.t_min, query.limit);
         }
+        // A root may lie beyond its leaf by the margin of Newton's method, but the parameters of a hit are in the
+        // domain.
         let inside = local.map(|x| x.clamp(0.0, 1.0));
         let uv = root.settled.unwrap_or_else(|| label.uv(inside));
+        // On an ill-scaled patch the derivatives of the net have lost the digits that a normal needs.
         let regular = if label.ill_scaled { None } else { patch::regular_normal(&jet, label.rounding) };
         let normal = label.sign * regular.unwrap_or_else(|| self.delicate_normal(root.leaf, uv, inside));
         let (face, primitive, certainty) = (label.face, label.patch, root.certainty);

@@ -92,6 +92,7 @@ impl Exact {
         let oc = query.o - leaf.center;
         let (mut net, size) = seen_along(query, leaf.net(&self.pool), oc);
         let mut rect = [[0.0, 1.0]; 2];
+        // Only where a trim may run along the border of the surface do roots count beyond the unit square.
         for d in 0..2 {
             let [lo, hi] = leaf.reach[d];
             let (below, above) = (lo < -BEYOND_UNIT, hi > 1.0 + BEYOND_UNIT);
@@ -115,6 +116,7 @@ impl Exact {
             if node.near >= query.t_max && query.best.is_some() {
                 continue;
             }
+            // What the budget cuts off is not dropped: from its nearest point on nothing is decided.
             if query.budget == 0 {
                 query.undecided_from = query.undecided_from.min(node.near);
                 continue;
@@ -136,6 +138,7 @@ impl Exact {
         let mut keep = [[0.0, 1.0]; 2];
         let slopes = net::slopes(&node.net, degree);
         if let Some(y) = precondition(&slopes, clipping.margin) {
+            // Wider by what rounding may move a root, so that no cut parts a root from its box.
             keep = linear_hull(&node.net, degree, &y.inverse);
             for k in 0..2 {
                 keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];
@@ -176,8 +179,11 @@ impl Exact {
     ) -> bool {
         let degree = clipping.leaf.degree;
         let start = keep.map(|[a, b]| 0.5 * (a + b));
+        // The method may run off although a root is there; the box is then cut or halved like any other.
         let Some([u, v]) = newton(&node.net, degree, start) else { return false };
         let e = ROOT_ROUNDING + 2.0 * y.slack[0].max(y.slack[1]);
+        // Beside the box: if it is a root of the leaf, another box holds it, and this one is cut until its hull
+        // misses the ray.
         if [u, v].iter().any(|x| !(-e..=1.0 + e).contains(x)) {
             return false;
         }
@@ -189,6 +195,8 @@ impl Exact {
         // An origin a little off its surface point moves the root by that much across the ray.
         let moved =
             query.departure.map_or(0.0, |own| own.off) * y.inverse.iter().flatten().map(|x| x.abs()).sum::<f64>();
+        // With one root at most in the box, a departure in it is that root. Near the box counts too, for neighbours
+        // find a root on their border both.
         let is_departure = |p: [f64; 2]| {
             let close = (p[0] - local[0]).abs() <= size_u * (e + moved) + SAME_PARAMETER
                 && (p[1] - local[1]).abs() <= size_v * (e + moved) + SAME_PARAMETER;
@@ -201,6 +209,8 @@ impl Exact {
             let margin = [0, 1].map(|k: usize| (ROOT_ROUNDING + 2.0 * y.slack[k]) * [size_u, size_v][k]);
             let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
             if ill_scaled || settlement::is_open(local, margin) {
+                // Where its margin reaches over the leaf's border, or the patch has few digits, `f64` cannot say
+                // whose root it is.
                 self.settle(query, clipping.index, found, margin);
             } else {
                 self.offer(query, clipping.index, found);
@@ -216,6 +226,8 @@ impl Exact {
         let [size_u, size_v] = size(&node.rect);
         let local = [node.rect[0][0] + 0.5 * size_u, node.rect[1][0] + 0.5 * size_v];
         let t = s[2] / s[3];
+        // A contact is known only to the size of its box: a departure within that is the contact, or a tangent ray
+        // would hit where it starts.
         let reach = POINT_BOX + size_u.max(size_v);
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
             && query.departure.is_some_and(|own| own.is_unique_root(t.abs() - CONTACT_LENGTH * TANGENT));
@@ -248,6 +260,7 @@ fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
     let Node { mut net, mut rect, .. } = node;
     for d in 0..2 {
         let [low, high] = keep[d];
+        // A side that keeps its length is left alone: de Casteljau would only round it.
         if high - low < 1.0 {
             let range = [low, high.max(low + LEAST_CUT)];
             net::restrict(&mut net, degree, d, range);
@@ -265,6 +278,7 @@ fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
     let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
     let [size_u, size_v] = size(&node.rect);
+    // A side of the finest size stays: its two halves could no longer be told apart.
     let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };
     let halves = net::halves(&node.net, degree, direction);
     let middle = 0.5 * (node.rect[direction][0] + node.rect[direction][1]);

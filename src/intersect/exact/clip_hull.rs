@@ -61,6 +61,7 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
         return None;
     }
     let (near, far) = range_along(net);
+    // A coordinate is the homogeneous one over a weight, and so no larger than the largest over the least.
     let largest = lo.iter().chain(&hi).fold(0f64, |a, x| a.max(x.abs()));
     Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
 }
@@ -68,6 +69,8 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
 /// A net in the ray's frame (across, across, along, weight), and the largest coordinates across.
 #[inline(always)]
 pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net, [f64; 2]) {
+    // The origin is taken off in homogeneous form, A − o·W, which stays linear in the control points: no division,
+    // no further rounding.
     let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
     let mut size = [0f64; 2];
     let net = control
@@ -86,6 +89,7 @@ pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net
 #[inline(always)]
 pub(super) fn precondition(s: &Slopes, margin: [f64; 2]) -> Option<Preconditioner> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
+    // The determinant is rounded relative to these products: when it is much smaller, its digits are noise.
     let size = (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
     if !(det.abs() > SINGULAR * size) {
         return None;

@@ -57,6 +57,8 @@ impl Add for DoubleDouble {
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
+        // The accurate sum (as in Hida, Li and Bailey's QD library): the shorter one, which adds the low parts in
+        // plain `f64`, has no bound where the high parts cancel, and residuals cancel.
         let high = two_sum(self.high, other.high);
         let low = two_sum(self.low, other.low);
         let sum = quick_two_sum(high.high, high.low + low.high);
@@ -78,6 +80,7 @@ impl Mul for DoubleDouble {
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
+        // The product of the low parts, 2⁻¹⁰⁶ of the whole, is below what is kept.
         let high = self.high * other.high;
         let low = self.high.mul_add(other.high, -high);
         quick_two_sum(high, low + (self.high * other.low + self.low * other.high))
@@ -89,6 +92,7 @@ impl Div for DoubleDouble {
 
     #[inline(always)]
     fn div(self, other: Self) -> Self {
+        // Long division: two quotients make 32 digits, and the third corrects the last.
         let first = self.high / other.high;
         let rest = self - other * first.into();
         let second = rest.high / other.high;

@@ -51,6 +51,8 @@ pub(super) fn edge_uses(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Edg
     for trim in &face.loops {
         let (first, n) = (uses.len() as u32, trim.uses.len() as u32);
         for (k, u) in (0u32..).zip(&trim.uses) {
+            // Used twice by one face, an edge is a seam or a slit; only where the surface closes on itself does the
+            // face go on beyond it.
             let twin = u.edge.and_then(|e| match by_edge[&e].as_slice() {
                 &[a, b] => Some(if a == first + k { b } else { a }),
                 _ => None,

@@ -77,6 +77,7 @@ impl Geometry {
         };
         let gaps: Vec<Vec<f64>> = model.parts.iter().map(edge_gaps).collect();
         // Instances share the trims and break lines of their part.
+        // By address, which names a face for as long as the model is borrowed.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
         for placed in model.placed_faces() {
             match placed.face {
@@ -147,6 +148,7 @@ impl Geometry {
         let sides = self.pole_sides(patch);
         (0..2).any(|d| {
             (0..2).any(|end| {
+                // All points of a collapsed side are one, so any of them will do.
                 let mut local = [0.5; 2];
                 local[d] = end as f64;
                 sides[d][end] && project(&patch.jet(local)).0.distance(point - patch.center) <= distance
@@ -170,6 +172,7 @@ impl Geometry {
 
     /// The patch of a face that holds the parameters.
     pub(super) fn patch_at(&self, face: &FaceRecord, uv: Uv) -> u32 {
+        // Inner breaks alone: parameters on an end, or beyond it by rounding, belong to the outermost patch.
         let grid = &self.grids[face.grid as usize];
         let span = |d: usize, x: f64| {
             let inner = &grid.breaks[d][1..grid.breaks[d].len() - 1];
@@ -182,6 +185,8 @@ impl Geometry {
 /// The vertices at the ends of a part's edges, with the radii within which their sectors decide.
 fn edge_ends(part: &Part) -> Vec<[(Point, f64); 2]> {
     let end = |e: &Edge, k: usize| e.curve.evaluate(e.curve.domain()[k]);
+    // One radius a vertex, not one an edge: the faces around it must agree on when its sectors decide, or two would
+    // claim a ray.
     let mut radii = vec![VERTEX_RADIUS; part.vertices.len()];
     for (e, k) in part.edges.iter().flat_map(|e| [(e, 0), (e, 1)]) {
         let vertex = e.vertices[k].0 as usize;

@@ -91,6 +91,7 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
     let center = patch.center + xyz(&middle) / middle[3];
     // The offset as the rounded centre has it, so that the net and the centre agree.
     let offset = center - patch.center;
+    // Weight 1 in the middle, so that derivatives of the homogeneous net are about millimetres, as its bounds are.
     let centred: Net = piece
         .iter()
         .map(|p| {
@@ -126,6 +127,7 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
         let along = Vector::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
         (olo, ohi) = (olo.min(along), ohi.max(along));
     }
+    // Adding the centre rounds the corners once more.
     let pad = slop + PLACED_ROUNDING * ROUND * (center.abs().max_element() + radius);
     let leaf = Leaf {
         center,
@@ -162,6 +164,7 @@ pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2])
 /// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
 /// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
 pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
+    // No farther than half of the extension: beyond the extension the derivative boxes prove nothing.
     let far = BANDS_BEYOND * band;
     for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
         let beyond = (far / xyz(slope).length().max(f64::MIN_POSITIVE)).clamp(NEWTON_STEP, 0.5 * EXTENSION);
@@ -172,6 +175,7 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
             leaf.reach[d][1] = 1.0 + beyond;
         }
     }
+    // The hierarchy must lead rays to what counts beyond the border.
     if border.iter().flatten().any(|&b| b) {
         leaf.lo -= far;
         leaf.hi += far;
@@ -183,6 +187,8 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
 fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
     let longer = if sv.length() > su.length() { sv } else { su };
     let x = longer.try_normalize().unwrap_or(Vector::X);
+    // At a pole one derivative vanishes; any normal to the other serves, since the box needs a frame and not the
+    // surface's normal.
     let n = su.cross(sv);
     let z = if n.length() > PARALLEL * su.length() * sv.length() { n.try_normalize() } else { None }
         .unwrap_or_else(|| x.any_orthonormal_vector());
@@ -217,6 +223,7 @@ pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
 pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;
+    // Bounds of the second derivatives: the first ones stray by half of these over the leaf.
     let (mut uu, mut uv, mut vv) = ([0f64; 4], [0f64; 4], [0f64; 4]);
     let fp = p as f64;
     let fq = q as f64;
@@ -241,7 +248,9 @@ pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> u
     }
     let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
+    // Ties alternate, or a leaf of equal sides would be cut into strips.
     let alternate = depth as usize % 2;
+    // Near a pole the inverse says nothing: the direction that bends more is halved.
     if !(det.abs() > UNTOLD * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
         let square = |x: &V4| x.iter().map(|c| c * c).sum::<f64>();
         let nu = square(&uu);
@@ -253,6 +262,8 @@ pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> u
         inverse[row][0].abs() * measure(x, leaf.axes[0], leaf.radius)
             + inverse[row][1].abs() * measure(x, leaf.axes[1], leaf.radius)
     };
+    // Halving u quarters Suu, halves Suv, and doubles u's row of the inverse. Su strays by Suu + Suv and Sv by Suv
+    // + Svv, so the two halves of Suv make one.
     let after_u = 2.0 * (g(&uu, 0) / 4.0 + g(&uv, 0) + g(&vv, 0)) + g(&uu, 1) / 4.0 + g(&uv, 1) + g(&vv, 1);
     let after_v = 2.0 * (g(&vv, 1) / 4.0 + g(&uv, 1) + g(&uu, 1)) + g(&vv, 0) / 4.0 + g(&uv, 0) + g(&uu, 0);
     if after_u == after_v { alternate } else { usize::from(after_u > after_v) }

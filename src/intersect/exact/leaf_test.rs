@@ -67,6 +67,8 @@ impl Exact {
         // Krawczyk's operator, about the middle: does it miss the leaf?
         let du = -(y00 * f1 + y01 * f2);
         let dv = -(y10 * f1 + y11 * f2);
+        // What rounding may move the operator's image by, then the leaf's half width with what the Jacobian's
+        // spread adds to it.
         let margin = PARAMETER_ROUNDING + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
         let reach_u = f64::from(leaf.half[0]) * (1.0 + row_u + INVERSE_ROUNDING) + margin;
         let reach_v = f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin;
@@ -92,6 +94,7 @@ impl Exact {
         [k1, k2]: [f64; 2],
     ) -> Option<([f64; 2], V4)> {
         let clamp = |x: f64| x.clamp(-EXTENSION, 1.0 + EXTENSION);
+        // Krawczyk's step is Newton's first. It is held within the extension, outside of which nothing is proved.
         let (mut u, mut v) = (clamp(0.5 + du), clamp(0.5 + dv));
         let control = leaf.net(&self.pool);
         let mut last = du.abs().max(dv.abs());
@@ -112,6 +115,7 @@ impl Exact {
                 return (within(u, EXTENSION) && within(v, EXTENSION)).then_some(([u, v], s));
             }
             last = step;
+            // Gone astray: the root, if there is one, is left to clipping.
             if !(within(u, 1.0) && within(v, 1.0)) {
                 break;
             }
@@ -138,10 +142,12 @@ impl Exact {
         }
         let p = Vector::new(s[0], s[1], s[2]) / s[3];
         let t = query.d.dot(p - oc);
+        // While its place is open its t is as well: whether it is in range is asked of the settled root.
         let open = leaf.ill_scaled || settlement::is_open([u, v], margins);
         if !open && !query.is_in_range(t) {
             return;
         }
+        // One root at most lies in the enlarged domain: if the departure does, this is it.
         if let Some(own) = query.departure
             && let Some(left) = own.local_to(&self.leaves[index as usize], &self.geometry)
             && within(left[0], EXTENSION)
@@ -163,6 +169,7 @@ impl Exact {
     fn clip_touched(&self, query: &mut Query, index: u32) {
         let leaf = &self.leaves[index as usize];
         let oc = query.o - leaf.center;
+        // The axis-parallel box that led here is loose, and a clipping costs as much as dozens of tests.
         if touches_oriented_box(query, leaf, oc, self.noise(leaf, oc)) {
             clip::clip(self, query, index);
         }

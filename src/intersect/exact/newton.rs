@@ -43,9 +43,12 @@ impl Exact {
     pub fn converge(&self, ray: &Ray, face: FaceId, uv: Uv, steps: u32) -> Option<SurfacePoint> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let grid = &self.geometry.grids[record.grid as usize];
+        // Two equations in two unknowns: the distances of the surface point from the ray along two directions
+        // across it.
         let (n1, n2) = orthonormal_pair(ray.direction);
         let bounds = [0, 1].map(|d| [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]]);
         let mut uv = Uv::new(uv.x.clamp(bounds[0][0], bounds[0][1]), uv.y.clamp(bounds[1][0], bounds[1][1]));
+        // Clamping keeps NaN, and a NaN would find no patch.
         if !uv.is_finite() {
             return None;
         }
@@ -56,6 +59,7 @@ impl Exact {
             let local = patch.local(uv);
             let jet = patch.jet(local);
             let (p, du, dv) = project(&jet);
+            // About the patch's centre: far from the origin only the shift is rounded, not the whole evaluation.
             let oc = ray.origin - patch.center;
             let off = p - oc;
             let (f1, f2) = (n1.dot(off), n2.dot(off));
@@ -75,6 +79,7 @@ impl Exact {
             let settled = across <= SETTLED * rounding || stalled;
             if moves || settled || step == steps {
                 let (uv, off) = if moves { (next, off - du * xu - dv * xv) } else { (uv, off) };
+                // After the step in first order: what is left of the second is the square of [`LAST_STEP`].
                 let residual = n1.dot(off).hypot(n2.dot(off));
                 if residual > near + rounding {
                     return None;
@@ -83,6 +88,8 @@ impl Exact {
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
                 let inside = match trim.cell_at(uv) {
+                    // With a band of nothing the parity decides alone: no certificate hangs on it, so no edge is
+                    // asked.
                     Region::Border => {
                         let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
                         let (su, sv) = (du / widths[0], dv / widths[1]);
@@ -93,6 +100,7 @@ impl Exact {
                 return Some(SurfacePoint { t, uv, normal, residual, inside, patch: index });
             }
             last = across;
+            // A singular Jacobian gives no direction to go on in.
             if !(xu.is_finite() && xv.is_finite()) {
                 return None;
             }

@@ -92,13 +92,16 @@ impl Convergence<'_> {
         for index in 0..self.seeds.len() {
             self.points[index] = None;
             let degree = self.geometry.patches[self.seeds[index].patch as usize].degree;
+            // The array of nets side by side has no room for these; rays on them are asked one by one.
             if usize::from(degree[0].max(degree[1])) > LARGEST_DEGREE {
                 continue;
             }
+            // A seed waits in the group of its degree until the register is full.
             let mut k = 0;
             while k < GROUPS && !(groups[k].count > 0 && groups[k].degree == degree) {
                 k += 1;
             }
+            // No group has this degree: it takes over the next in turn, whose seeds are worked off half full.
             if k == GROUPS {
                 k = next;
                 next = (next + 1) % GROUPS;
@@ -113,6 +116,7 @@ impl Convergence<'_> {
                 group.count = 0;
             }
         }
+        // What is left in part-filled groups.
         for k in 0..GROUPS {
             settle::<V>(&mut net, self.geometry, self.rays, self.seeds, &groups[k], self.points);
         }
@@ -142,6 +146,7 @@ fn settle<V: F64x8>(
     let first = &geometry.patches[seeds[group.seeds[0] as usize].patch as usize];
     let mut patches = [first; LANES];
     for lane in 0..LANES {
+        // Idle lanes repeat the first, so that they end when it does and divide by nothing that it does not.
         // Idle lanes repeat the first.
         let index = if lane < group.count { group.seeds[lane] } else { group.seeds[0] };
         let seed = &seeds[index as usize];

@@ -103,6 +103,8 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
         let step_v = dot(&g, &du).div(slope);
         let across = dot(&g, &g).sqrt();
         let rounding = V::splat(ROUNDING * f64::EPSILON).mul(largest(&origin).add(largest(&p)));
+        // A lane ends where its next step is too short to matter, where steps no longer help, or where the distance
+        // is rounding; and only near the ray.
         let moves = step_u.abs().max(step_v.abs()).mask_less(V::splat(LAST_STEP));
         let stalled = across.mask_less(near) & last.mul(V::splat(0.5)).mask_at_most(across);
         let settled = across.mask_at_most(rounding.mul(V::splat(SETTLED))) | stalled;
@@ -120,6 +122,8 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
             end_u = u.add(moved_u).select(ends, end_u);
             end_v = v.add(moved_v).select(ends, end_v);
             residual = across.select(ends, residual);
+            // Where a derivative is next to nothing, or both are parallel, the limit of the normal takes more than
+            // a register: such a lane has no answer.
             let (square, square_u, square_v) = (dot(&n, &n), dot(&du, &du), dot(&dv, &dv));
             let trusted = V::load(&starts.trusted);
             let clear = square_u.mul(square_v).mul(V::splat(LEAST_SINE_SQUARED)).mask_less(square);
@@ -129,6 +133,7 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
             normal = select(ends, &unit, &normal);
             ended |= ends;
         }
+        // Lanes that have ended step on with the others; the mask keeps what they ended with.
         last = across;
         u = u.add(step_u);
         v = v.add(step_v);
@@ -196,6 +201,7 @@ fn bernstein<V: F64x8, const N: usize>(n: usize, t: V) -> ([V; N], [V; N]) {
     let (mut b, mut d) = ([zero; N], [zero; N]);
     b[0] = V::splat(1.0);
     for k in 1..=n {
+        // Before the last round `b` holds the values of one degree less, of which the derivatives are differences.
         if k == n {
             let degree = V::splat(n as f64);
             d[0] = zero.sub(b[0]).mul(degree);

@@ -57,6 +57,7 @@ impl PatchGrid {
             })
         };
         let same = |a: &Point, b: &Point| a.distance(*b) <= tolerance;
+        // Corresponding points of opposite sides: equal corners alone would take a folded strip for a tube.
         let closed = [0, 1].map(|d| side(d, 0).iter().zip(&side(d, 1)).all(|(a, b)| same(a, b)));
         let poles = [0, 1].map(|d| [0, 1].map(|end| side(d, end).iter().all(|p| same(p, &side(d, end)[0]))));
         Self { breaks, closed, poles }

@@ -167,6 +167,7 @@ impl DeparturePoint {
     }
 
     /// The departure in the leaf's parameters; on a neighbouring patch only when it lies on the common border.
+    // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
     pub(super) fn local_to(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
         if leaf.face != self.face {
             return None;
@@ -181,7 +182,7 @@ impl DeparturePoint {
         Some(leaf.leaf_parameters(local))
     }
 
-    /// Whether the only root near the departure, `distance` along the ray, is the departure itself.
+    /// Whether the only root near the departure, at `t` along the ray, is the departure itself.
     pub(super) fn is_unique_root(&self, t: f64) -> bool {
         // An origin that is not where the departure says can be a facet's; its own root is then as near as it is off.
         self.off <= self.tolerance || t.abs() <= NEAR_DEPARTURE * self.off

@@ -92,8 +92,8 @@ impl ReferencePatch<'_> {
 
     #[inline(always)]
     fn newton(&self, [o, d]: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
-        // The largest component of the direction, and the two others.
-        // Two planes through the ray, made of components: the largest of the direction is the one that both are divided by.
+        // Two planes that hold the ray, each from the largest component of the direction and one of the others: with a small
+        // one in its place their normals would be nearly parallel.
         let main = d.abs().max_position();
         let others = [(main + 1) % 3, (main + 2) % 3];
         let widths = [0, 1].map(|k| self.width(k));
@@ -111,10 +111,12 @@ impl ReferencePatch<'_> {
             let step = [(b[1] * f[0] - b[0] * f[1]) / determinant, (a[0] * f[1] - a[1] * f[0]) / determinant];
             let size = [0, 1].map(|k| (step[k] / widths[k]).to_f64().abs());
             uv = [uv[0] - step[0], uv[1] - step[1]];
+            // A step as long as the patch leads away from the root that `f64` has found.
             if !(size[0].max(size[1]) < 1.0) {
                 return None;
             }
             if size[0].max(size[1]) < LAST_STEP {
+                // Of the point after the step, in first order: the second is the square of [`LAST_STEP`].
                 let t = (r[main] - du[main] * step[0] - dv[main] * step[1]) / d[main].into();
                 let local = [0, 1].map(|k| ((uv[k] - self.domain[k][0].into()) / widths[k]).to_f64());
                 return Some(SettledRoot { t: t.to_f64(), local, uv: Uv::new(uv[0].to_f64(), uv[1].to_f64()) });
@@ -127,6 +129,8 @@ impl ReferencePatch<'_> {
     #[inline(always)]
     fn derivatives(&self, [u, v]: [Number; 2]) -> (Point3, Point3, Point3) {
         let s = self.surface;
+        // By the middle of the patch: parameters of a root on its border, or beyond by rounding, belong to the
+        // patch they came from.
         let spans =
             [0, 1].map(|d| find_span(&s.knots[d], s.degree[d], 0.5 * (self.domain[d][0] + self.domain[d][1])));
         let [p, q] = s.degree;

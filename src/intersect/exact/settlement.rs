@@ -32,6 +32,8 @@ impl Exact {
     /// Offers a root at its place in 32 digits, if that lies on the leaf; flags what stays open.
     #[cold]
     pub(super) fn settle(&self, query: &mut Query, index: u32, found: Candidate, margin: [f64; 2]) {
+        // Charged to the ray's budget, so that a ray along a border, of which every root is open, ends as others
+        // do.
         query.budget = query.budget.saturating_sub(WORK);
         let leaf = &self.leaves[index as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
@@ -64,6 +66,7 @@ impl Exact {
     /// Flags a root that nothing tells, from where on it may lie along the ray: anywhere in the leaf's extent.
     fn leave_open(&self, query: &mut Query, index: u32, found: Candidate) {
         let leaf = &self.leaves[index as usize];
+        // Two radii before the root: no point of the leaf lies nearer.
         query.undecided_from = query.undecided_from.min(found.t - 2.0 * leaf.radius);
         self.offer(query, index, Candidate { certainty: Certainty::Uncertified, ..found });
     }

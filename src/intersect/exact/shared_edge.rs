@@ -54,6 +54,8 @@ fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option
     let mut s = seed / SEEDS;
     let at = |s: f64| {
         let c = curve.derivatives(if s == 1.0 { t1 } else { t0 + (t1 - t0) * s });
+        // The end itself: t0 + (t1 − t0) may miss it by an ulp, and edges that end in one vertex would then not
+        // meet there.
         let off = c.point - o;
         let x = [n1.dot(off), n2.dot(off)];
         let d = [n1.dot(c.first), n2.dot(c.first)];
@@ -70,6 +72,8 @@ fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option
             break;
         }
     }
+    // Rounded to a fixed station: the faces on both sides start from different seeds, and must come to the same
+    // bits.
     s = (s * STATIONS).round() / STATIONS;
     let (x, along, _) = at(s)?;
     let left = along[1] * x[0] - along[0] * x[1] > 0.0;
@@ -100,6 +104,7 @@ impl Geometry {
         };
         // The side on which the face lies, and the edge's direction in the loop, with the face to its left.
         let mirrored = facing < 0.0;
+        // Vertices first: there several edges are equally near, and rounding would choose among them.
         if let Some(inside) = self.in_sector(face, trim, near, mirrored, frame) {
             return Some(inside);
         }
@@ -113,6 +118,8 @@ impl Geometry {
         let (owner, first) = best?;
         let inside = |owner: u32, p: &EdgePassage| p.left ^ trim.uses[owner as usize].reversed ^ mirrored;
         let by_nearest = inside(owner, &first);
+        // Passed at its inside an edge decides by itself; passed at its end, together with the next edge of the
+        // loop.
         let Some(at_end) = first.end else { return Some(by_nearest) };
         let forward = at_end != trim.uses[owner as usize].reversed;
         let Some(other) = edge_use::next_bounding_use(&trim.uses, owner, forward) else { return Some(by_nearest) };
@@ -175,9 +182,12 @@ impl Geometry {
                     (d[0].hypot(d[1]) > LEAST_SINE * chord.length()).then(|| angle(d))
                 };
                 let (from, to) = (away(outgoing, true)?, away(incoming, false)?);
+                // Seen from behind, the loop runs the other way.
                 let (from, to) = if mirrored { (to, from) } else { (from, to) };
                 let at = angle(vertex.map(|x| -x));
+                // Half open, so that a ray along a direction falls into one sector and not into two or none.
                 let inside = if from < to { from <= at && at < to } else { from <= at || at < to };
+                // A face may touch one vertex with several corners: any of them may hold the ray.
                 found = Some(inside || found == Some(true));
             }
         }

@@ -96,6 +96,7 @@ impl Exact {
             linearizations.extend(patch.linearizations.into_iter().map(|l| l.moved_in_pool(offset)));
             pool.extend(patch.pool);
         }
+        // One more start, so that the end of the last leaf is the start of the one behind it.
         let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
         starts.push(pool.len() as u32);
         let labels = leaves.iter().map(|l| HitLabel::new(l, &geometry)).collect();

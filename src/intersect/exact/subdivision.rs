@@ -77,6 +77,7 @@ pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> Vec<Patc
     let whole = |p: &Patch| SubPatch { net: p.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0 };
     let parts: Vec<Option<SubPatch>> =
         geometry.patches.par_iter().map(|p| crop(geometry.trim_of(p), p, whole(p))).collect();
+    // Only now, from what the trims leave: a small face on a large surface must not make the scene look large.
     let corners = geometry.patches.iter().zip(&parts).filter_map(|(patch, part)| {
         let (lo, hi) = extent(&part.as_ref()?.net);
         Some([patch.center + lo, patch.center + hi])
@@ -104,6 +105,7 @@ fn crop(trim: &Trim, patch: &Patch, mut part: SubPatch) -> Option<SubPatch> {
         let [a, b] = part.rect[d];
         let low = (from[d] - a) / (b - a);
         let high = (to[d] - a) / (b - a);
+        // Little gain is not worth the rounding of a restriction, which the leaf must answer for.
         let low = if low > WORTH_CROPPING { low } else { 0.0 };
         let high = if high < 1.0 - WORTH_CROPPING { high } else { 1.0 };
         if (low, high) != (0.0, 1.0) && high > LEAST_CROP && low < high {
@@ -124,6 +126,7 @@ impl Subdivision<'_> {
         let mut out = PatchLeaves::default();
         let mut stack = vec![whole];
         while let Some(part) = stack.pop() {
+            // Cropped anew at each level: halves of a part may lie outside the trims where the part does not.
             let Some(part) = crop(self.trim, self.patch, part) else { continue };
             let region = self.trim.region(in_surface(self.patch, part.rect));
             if region == Region::Outside {
@@ -143,6 +146,8 @@ impl Subdivision<'_> {
                     self.keep(described, region, rect, &mut out);
                     continue;
                 }
+                // Flatness asks for nothing more: it is halved for its box alone, in the direction that tightens
+                // it.
                 Some(direction) if flat || deepest => direction,
                 _ => steeper(&described.leaf, &described.slopes, &described.net, depth),
             };
@@ -152,6 +157,8 @@ impl Subdivision<'_> {
             let mut high_rect = rect;
             low_rect[direction][1] = middle;
             high_rect[direction][0] = middle;
+            // The low half comes off the stack first, so that leaves that follow each other in memory follow each
+            // other on the patch.
             stack.push(SubPatch { net: high, rect: high_rect, depth: depth + 1, crop_roundings });
             stack.push(SubPatch { net: low, rect: low_rect, depth: depth + 1, crop_roundings });
         }

@@ -98,6 +98,7 @@ impl<'a> Traditional<'a> {
 
     fn candidates(&self, ray: &Ray, surface: &SampledSurface, found: &mut Vec<(FaceId, SurfacePoint)>) {
         let distances: Vec<f64> =
+            // Squared distances suffice to find the minima.
             surface.samples.iter().map(|(_, p)| (*p - ray.origin).cross(ray.direction).length_squared()).collect();
         let [nu, nv] = surface.counts;
         for i in 0..nu {

@@ -98,6 +98,7 @@ impl Exact {
     #[inline(always)]
     fn next_leaf<I: Instructions>(&self, query: &mut Query, stack: &mut Stack) -> Option<u32> {
         while let Some((index, near)) = stack.pop() {
+            // A root found since this was pushed may have ended the ray before it.
             if near > query.slabs.end {
                 continue;
             }
@@ -147,6 +148,7 @@ impl Exact {
                     hits[lane.ray] = self.answer(&lane.query, cost).hit;
                     let Some((ray, r)) = waiting.next() else {
                         lanes.swap_remove(k);
+                        // No ray waits: the last lane takes this place and is looked at next, so `k` stays.
                         continue;
                     };
                     lane.ray = ray;
@@ -168,6 +170,7 @@ impl Exact {
     #[inline(always)]
     fn walk_to_leaf<I: Instructions>(&self, lane: &mut Lane) {
         lane.leaf = self.next_leaf::<I>(&mut lane.query, &mut lane.stack);
+        // Asked for now and read when the other lanes have had their turn.
         if let Some(leaf) = lane.leaf {
             prefetch(&self.linearizations, leaf as usize);
             let [from, to] = [0, 1].map(|k| self.starts[leaf as usize + k] as usize);

@@ -107,6 +107,8 @@ impl Trim {
             trim.whole = true;
             return trim;
         }
+        // Outer loops run counterclockwise and holes clockwise: a negative sum says that there are holes alone, and
+        // the face goes on to the ends of the domain.
         trim.outside_is_inside = trim.signed_area() < 0.0;
         if trim.outside_is_inside {
             // Holes alone: what lies around them counts too.
@@ -124,6 +126,7 @@ impl Trim {
     }
 
     fn signed_area(&self) -> f64 {
+        // Chords will do: pieces are so short beside their loop that the sign is that of the curves.
         let from_origin = |q: &glam::DVec3| q.truncate() / q.z - self.origin;
         self.pieces
             .iter()
@@ -143,6 +146,7 @@ impl Trim {
     fn fill_cells(&mut self, reach: Uv) {
         for (k, piece) in self.pieces.iter().enumerate() {
             let (lo, hi) = (piece.min - reach, piece.max + reach);
+            // Flat pieces cross no half-line towards +u.
             for j in self.cell_range(lo.y, hi.y, 1) {
                 if piece.v[0] != piece.v[1] {
                     self.rows[j].push(k as u32);
@@ -163,6 +167,7 @@ impl Trim {
             crossings.sort_by(f64::total_cmp);
             for i in 0..self.count[0] {
                 let cell = j * self.count[0] + i;
+                // A cell that no trim comes near has one answer for all its points: that of its middle.
                 if self.cells[cell] != Region::Border {
                     // Even–odd: what the half-line towards +u crosses an odd number of times is inside.
                     let right = crossings.len() - crossings.partition_point(|&u| u <= middle(i).x);
@@ -224,6 +229,7 @@ impl Trim {
         if self.whole {
             return Region::Inside;
         }
+        // A rectangle that reaches beyond the grid holds something that is outside.
         let beyond = [[u[0], v[0]], [u[1], v[1]]].map(|[u, v]| self.is_beyond(Uv::new(u, v)));
         let mut found = beyond.contains(&true).then_some(Region::Outside);
         for j in self.cell_range(v[0], v[1], 1) {
@@ -257,6 +263,7 @@ impl Trim {
         let determinant = (metric[0] * metric[2] - metric[1] * metric[1]).max(f64::MIN_POSITIVE);
         let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
         let mut near: SmallVec<[Near; 2]> = SmallVec::new();
+        // A box test first: the nearest point takes iterations.
         for &k in self.near.get(&(cell as u32)).into_iter().flatten() {
             let piece = &self.pieces[k as usize];
             let outside = q.x < piece.min.x - reach.x
@@ -272,6 +279,7 @@ impl Trim {
             }
             let parameter = piece.range[0] + (piece.range[1] - piece.range[0]) * t;
             let found = Near { owner: piece.owner, parameter, distance };
+            // An edge comes in several pieces; its nearest one is where the search on the edge itself begins.
             match near.iter_mut().find(|n| n.owner == piece.owner) {
                 Some(n) if distance < n.distance => *n = found,
                 Some(_) => {}
@@ -295,6 +303,7 @@ fn grid_bounds(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
     }
     let margin = reach + GRID_MARGIN * (hi - lo);
     let (lo, hi) = ((lo - margin).max(whole[0]), (hi + margin).min(whole[1]));
+    // Loops without extent leave no rectangle to divide: cells are laid over the whole domain.
     if !(lo.x < hi.x && lo.y < hi.y) {
         return (whole, Default::default());
     }
@@ -312,6 +321,8 @@ fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     };
     let along_u = longest(nv, nu, &|j, i| point(i, j));
     let along_v = longest(nu, nv, &|i, j| point(i, j));
+    // Clamped: of a face of no length the margin would be infinite, of a huge one below the digits of its
+    // parameters.
     let relative = |length: f64| (REACH_OF_BAND * band / length).clamp(LEAST_REACH, LARGEST_REACH);
     Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
 }

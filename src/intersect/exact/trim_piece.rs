@@ -23,6 +23,7 @@ const DEEPEST: u32 = 24;
 /// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
 #[derive(Clone, Debug)]
 pub(super) struct TrimPiece {
+    /// Homogeneous control points `(w·u, w·v, w)`, weights positive.
     pub(super) points: SmallVec<[DVec3; 4]>,
     /// v at the two ends in order of the curve's parameter; bit-equal with the neighbours of the loop.
     pub(super) v: [f64; 2],
@@ -37,8 +38,19 @@ pub(super) struct TrimPiece {
     pub(super) range: [f64; 2],
 }
 
+/// The use of an edge in a loop that a piece comes from.
+#[derive(Clone, Copy, Debug)]
+struct LoopSide {
+    /// Index of the use, in the order of the face's loops.
+    owner: u32,
+    /// Whether the loop runs against the edge.
+    reversed: bool,
+}
+
 impl TrimPiece {
-    fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], (owner, reversed): (u32, bool)) -> Self {
+    /// The piece of these homogeneous control points, `(w·u, w·v, w)`, over the parameters `range` of the edge of `side`.
+    fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], side: LoopSide) -> Self {
+        let LoopSide { owner, reversed } = side;
         let at = |p: &DVec3| p.truncate() / p.z;
         let v = [at(&points[0]).y, at(&points[points.len() - 1]).y];
         let (min, max) = (Uv::INFINITY, Uv::NEG_INFINITY);
@@ -74,6 +86,7 @@ impl TrimPiece {
 
     /// u where the piece crosses height `v`, which must lie in its range.
     pub(super) fn u_at(&self, v: f64) -> f64 {
+        // Newton's method inside of a bracket, which a monotone piece allows: it ends whatever the slope.
         let (mut lo, mut hi) = (0.0, 1.0);
         let rising = self.v[1] > self.v[0];
         let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
@@ -124,6 +137,7 @@ impl TrimPiece {
         let n = self.points.len() - 1;
         let at = |k: usize| self.points[k].truncate() / self.points[k].z;
         let chord = at(n) - at(0);
+        // From the foot on the chord, which is exact for lines and near for pieces as short as a cell.
         let mut t = (inner(q - at(0), chord) / inner(chord, chord).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         if n > 1 {
             for _ in 0..NEAREST_STEPS {
@@ -152,10 +166,11 @@ pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
             let breaks = edge_use.uv.breakpoints();
             for (points, range) in edge_use.uv.bezier_pieces().into_iter().zip(breaks.windows(2)) {
                 if points.iter().all(|p| p.is_finite() && p.z > 0.0) {
-                    let whole = (points.into(), [range[0], range[1]], 0);
-                    split(&mut all, whole, longest, (owner, edge_use.reversed));
+                    let whole = CurvePart { points: points.into(), range: [range[0], range[1]], depth: 0 };
+                    split(&mut all, whole, longest, LoopSide { owner, reversed: edge_use.reversed });
                 }
             }
+            // Pieces follow the loop, so that the end of one is the start of the next.
             if edge_use.reversed {
                 all[start..].reverse();
             }
@@ -179,13 +194,21 @@ pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
 /// Most pieces that one Bézier piece of a trim is split into.
 const MOST: usize = 4096;
 
-/// Control points, parameters at the ends, and how often it was halved.
-type CurvePart = (SmallVec<[DVec3; 4]>, [f64; 2], u32);
+/// A part of a Bézier piece of a trim.
+struct CurvePart {
+    /// As [`TrimPiece::points`].
+    points: SmallVec<[DVec3; 4]>,
+    /// The edge's parameters at the ends.
+    range: [f64; 2],
+    /// How often it was halved.
+    depth: u32,
+}
 
-fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, bool)) {
+/// Halves a Bézier piece until its parts are monotone in v and no longer than `longest` in u and v.
+fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, side: LoopSide) {
     let first = out.len();
     let mut stack = vec![whole];
-    while let Some((points, range, depth)) = stack.pop() {
+    while let Some(CurvePart { points, range, depth }) = stack.pop() {
         let at = |k: usize| points[k].truncate() / points[k].z;
         let n = points.len() - 1;
         let rising = at(n).y >= at(0).y;
@@ -199,7 +222,7 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, b
         // more than this.
         let short = (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED;
         if ((monotone || flat) && short) || depth >= DEEPEST || out.len() > first + MOST {
-            out.push(TrimPiece::new(points, range, owner));
+            out.push(TrimPiece::new(points, range, side));
             continue;
         }
         let (mut low, mut high) = (points.clone(), points.clone());
@@ -213,7 +236,8 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, owner: (u32, b
         }
         high.copy_from_slice(&w);
         let middle = 0.5 * (range[0] + range[1]);
-        stack.push((high, [middle, range[1]], depth + 1));
-        stack.push((low, [range[0], middle], depth + 1));
+        // The low part comes off the stack first, so that parts come out in the order of the curve.
+        stack.push(CurvePart { points: high, range: [middle, range[1]], depth: depth + 1 });
+        stack.push(CurvePart { points: low, range: [range[0], middle], depth: depth + 1 });
     }
 }

@@ -51,6 +51,8 @@ impl Polished<'_> {
     /// The nearest roots of many rays.
     pub(super) fn polish_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let clear = self.clear_starts.read().unwrap_or_else(PoisonError::into_inner);
+        // Taken, not borrowed: a call that came back here on this thread would find an empty workspace, not a
+        // panic.
         let mut space = WORKSPACE.take();
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
             self.start(rays, &clear, hits, &mut space, cost);
@@ -84,6 +86,8 @@ impl Polished<'_> {
                 prefetch(&self.records, ahead.primitive as usize);
             }
             if let Some([back, ahead]) = self.slack(ray, clear) {
+                // A facet may lie before the range and its root in it: they are up to a sag apart across the facet,
+                // and more along a flat ray.
                 space.asked.push(ray.with_range(ray.t_min - back, ray.t_max + ahead));
                 space.places.push(i as u32);
             } else {
@@ -99,6 +103,7 @@ impl Polished<'_> {
         facet_hits.resize(asked.len(), None);
         let mut own = Cost::default();
         self.facets.intersect_batch(asked, facet_hits, &mut own);
+        // A ray counts once, where it is answered, and not each time that facets are asked.
         *cost += Cost { rays: 0, ..own };
         seeds.clear();
         for (k, hit) in facet_hits.iter().enumerate() {
@@ -130,6 +135,7 @@ impl Polished<'_> {
                     hits[place as usize] = answer;
                 }
                 (Decision::Behind, Some(passed)) => {
+                    // Just past the facet, or it would be found again.
                     again.push((place, asked[k].with_range(passed.t.next_up(), asked[k].t_max)));
                 }
                 _ => hits[place as usize] = self.intersect_alone(ray, cost),
@@ -148,9 +154,13 @@ impl Polished<'_> {
     fn slack(&self, ray: &Ray, clear: &[ClearStart]) -> Option<[f64; 2]> {
         let slack = 2.0 * self.sag;
         let Some(from) = &ray.departure else {
+            // Where nothing can lie behind the start no look back is needed, and the ray stays one that light
+            // buffers know.
             let is_clear = ray.t_min == 0.0 && clear.iter().any(|start| start.holds(ray));
             return Some(if is_clear { [0.0, slack] } else { [slack; 2] });
         };
+        // A departure from the spline alone names no facet, and one that names another face's tells nothing of the
+        // side that is left.
         let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
         let sine = f64::from(record.decisive_sine(ray)?.abs()).max(LEAST_SLACK_SINE);
         (ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag).then(|| [slack / sine; 2])
@@ -176,6 +186,7 @@ impl Polished<'_> {
             && ray
                 .departure
                 .is_some_and(|from| from.face == facet_hit.face && is_own(self.exact, &from, ray, point));
+        // Crossed the other way, it is the other one of two roots close by.
         if !is_near || !(is_own || rising * facing > 0.0) {
             return Decision::Alone;
         }
@@ -183,6 +194,8 @@ impl Polished<'_> {
             return Decision::Behind;
         }
         let out = rising > 0.0;
+        // A ray enters and leaves a closed solid in turn. An answer out of turn may be a facet that hides another
+        // beside an edge.
         let is_doubtful = record.is_of_solid()
             && match left {
                 None => out,

@@ -40,11 +40,13 @@ impl ClearStart {
     /// Whether no ray comes from within `reach` mm before its start through the facet of these corners.
     fn is_clear_of(&self, corners: [Point; 4], reach: f64) -> bool {
         match self {
+            // To the facet's box, which is no farther than the facet: an error here costs a look back, never a hit.
             Self::Point(origin) => {
                 let bounds = Aabb::from_points(corners);
                 (origin.clamp(bounds.min, bounds.max) - *origin).length() > reach
             }
             Self::Plane { direction, depth, stray } => {
+                // Wholly ahead of the plane, or farther behind it than any ray looks back.
                 let along = corners.map(|p| p.dot(*direction) - depth);
                 along.iter().all(|&x| x > *stray) || along.iter().all(|&x| x < -(reach + stray))
             }

@@ -43,6 +43,7 @@ impl FacetRecord {
                 let facet = &mesh.facets[f];
                 let [a, b, c, d] = mesh.corners(f);
                 let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
+                // A facet without area gets a normal of zero, and with it a sine that never decides.
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(super::NO_SAG);
                 let least_sine = (CLEAR_OF_SAGS * sag / length).max(LEAST_CLEAR_SINE);

@@ -183,6 +183,7 @@ impl<'a> Polished<'a> {
         }
         let answer = self.exact.first(&around, &mut Cost::default());
         match answer.hit {
+            // It keeps the facet, by which a ray that leaves from here is known.
             Some(hit) => {
                 let Hit { primitive, triangle, .. } = *facet_hit;
                 Polishing::Hit(Hit { primitive, triangle, certainty: Certainty::Polished, ..hit })
@@ -203,6 +204,7 @@ impl<'a> Polished<'a> {
         let Some(solid) = self.exact.solid_of(from.face) else { return false };
         let inward = normal.dot(ray.direction) < 0.0;
         match answer {
+            // In a range that ends it may just not have come out yet.
             None => inward && ray.t_max == f64::INFINITY,
             Some(hit) if self.exact.solid_of(hit.face) == Some(solid) => {
                 inward != (hit.geometric_normal.dot(ray.direction) > 0.0)
@@ -233,6 +235,7 @@ impl<'a> Polished<'a> {
         }
         // A facet where the spline is not; ready meshes may stand behind it.
         for _ in 0..MOST_OUTSIDE {
+            // Just past the facet, or it would be found again.
             let behind = ray.with_range(answer?.t.next_up(), ray.t_max);
             answer = self.search(&behind, None, cost);
             if !self.comes_out(ray, answer.as_ref()) {
@@ -306,6 +309,7 @@ impl<'a> Polished<'a> {
             }
             start = facet_hit.t.next_up();
         }
+        // However many facets were asked, it was one ray.
         cost.rays += rays.min(1);
         answer
     }
@@ -342,6 +346,7 @@ impl Polished<'_> {
 
 impl Intersector for Polished<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        // As a batch of one: a ray alone and among others has the same bits.
         let mut hit = [None];
         self.polish_batch(std::slice::from_ref(ray), &mut hit, cost);
         hit[0]

@@ -38,6 +38,8 @@ impl Boxes {
     /// Depth is the logarithm of the number of boxes, since each split is in the middle.
     fn add(&mut self, boxes: &[Aabb], order: &mut [u32]) {
         let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        // The place in the list is taken before the children's: the first child is then the next node and needs no
+        // index.
         let me = self.nodes.len();
         self.nodes.push(Node {
             bounds: bounds.grown(GROWN * (1.0 + bounds.diagonal())),

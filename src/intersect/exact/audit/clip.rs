@@ -21,6 +21,8 @@ pub(super) struct View {
 
 impl View {
     /// From the axes that the ray's direction avoids most.
+    // The shortest component's axis is the farthest from parallel, so that the cross product is not a difference of
+    // near equals.
     pub(super) fn new(ray: &Ray) -> Self {
         let d = ray.direction;
         let axis = if d.x.abs() <= d.y.abs() && d.x.abs() <= d.z.abs() {
@@ -112,6 +114,7 @@ impl<'a> PatchClipping<'a> {
                 continue;
             }
             let size = piece.net.domain.map(|[lo, hi]| hi - lo).into_iter().fold(0.0, f64::max);
+            // Large boxes seldom hold a single root provably, and asking costs as much as a few cuts.
             if size < SMALL && self.take_single_root(&piece.net, out) {
                 continue;
             }
@@ -136,6 +139,7 @@ impl<'a> PatchClipping<'a> {
         let at = [0, 1].map(|k: usize| {
             let [a, b] = around[k];
             a + (b - a) * root[k]
+            // Rounded by the root's own condition: a unit across the ray moves it by `moves`.
         });
         // Boxes that share a border both take a root on it; at the end of the surface rounding decides nothing.
         let slop = around.map(|[a, b]| BESIDE + BESIDE_ROUNDING * self.rounding * moves * (b - a));
@@ -161,6 +165,8 @@ impl<'a> PatchClipping<'a> {
             return false;
         }
         let doubtful = !tiny || across > DOUBTFUL;
+        // Near enough to the ray to be a contact of rounding, too far for a crossing: a tiny box far from the ray
+        // held none.
         if !doubtful || across < BESIDE_RAY {
             let middle = net.domain.map(|[lo, hi]| lo + 0.5 * (hi - lo));
             self.push(net.point(Uv::splat(0.5)), middle, doubtful, out);
@@ -177,11 +183,14 @@ impl<'a> PatchClipping<'a> {
         let mut longest = (0, 0.0);
         let mut shrunk = false;
         for k in 0..2 {
+            // Nothing of the hull is left on this axis: no root.
             let Some([lo, hi]) = net.range(k, self.rounding) else { return };
             if hi - lo < WORTH_CUTTING {
                 net = net.cut(k, [lo, hi]);
                 shrunk = true;
             }
+            // What is halved is the side that looks longest along the ray, which may be neither the longer in u nor
+            // in v.
             let side = net.edge_length(k);
             if side > longest.1 {
                 longest = (k, side);

@@ -103,6 +103,8 @@ impl Audit {
         let mut found: Vec<(u32, SmallVec<[AuditHit; 8]>)> = Vec::new();
         let mut first: Option<AuditHit> = None;
         let mut exhausted = f64::INFINITY;
+        // Boxes come in the order in which they are entered: once one begins behind the first crossing, all others
+        // do.
         for (near, piece) in met {
             // Nothing beyond is a crossing before the first, nor one with it.
             if first.is_some_and(|f| near > f.t + 2.0 * CLUSTER) {
@@ -139,6 +141,7 @@ impl Audit {
 fn split(patch: BezierPatch, face: u32, out: &mut Vec<(u32, BezierPatch)>) {
     let mut stack = vec![(patch, 0)];
     while let Some((patch, depth)) = stack.pop() {
+        // Looser boxes are met by more rays, and clipping costs far more than one more level.
         let whole = patch.bounds().half_area();
         let smaller = |halves: &[BezierPatch; 2]| halves.iter().map(|h| h.bounds().half_area()).sum::<f64>();
         let best = (depth < DEPTH)
@@ -181,6 +184,7 @@ fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
     out
 }
 
+// Independent of the tracer's own rule on purpose, which adds up chords of Bézier pieces.
 /// Area within the loops, positive where they run counterclockwise, from points along each curve.
 fn area(loops: &[TrimLoop]) -> f64 {
     let uses = loops.iter().flat_map(|l| &l.uses);
@@ -226,6 +230,7 @@ impl AuditFace {
     }
 
     /// Whether a point of the domain lies inside: an odd number of crossings above it.
+    // Towards +v, where the tracer looks towards +u: a fault in one of the two does not hide in the other.
     fn holds(&self, q: Uv) -> bool {
         if self.trims.is_empty() {
             return true;

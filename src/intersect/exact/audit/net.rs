@@ -111,7 +111,8 @@ impl Net {
         for line in 0..=self.degree[1 - direction] {
             let index = |k: usize| if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k };
             for k in 0..=n {
-                // The blossom at n − k times lo and k times hi.
+                // The blossom of a Bézier curve at n − k times `lo` and k times `hi` is control point k of the part between
+                // (Ramshaw).
                 let points = (0..=n).map(|i| self.points[index(i)]).collect();
                 out.points[index(k)] = blossom(points, |step| if step < k { hi } else { lo });
             }
