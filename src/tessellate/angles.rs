@@ -34,6 +34,7 @@ pub(super) fn steep_faces(mesh: &FacetMesh, model: &Model, settings: &Settings) 
         }
         let (p, normal) = (mesh.corners(f), facet.vertices.map(|v| mesh.vertices[v as usize].normal));
         let cuts: &[[usize; 3]] = if facet.is_triangle() { &[[0, 1, 2]] } else { &[[0, 1, 2], [0, 2, 3]] };
+        // A quad is traced as two triangles, and either may be the steep one.
         let steepest = |t: &[usize; 3]| {
             let flat = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).try_normalize()?;
             Some(t.iter().map(|&k| flat.angle_between(normal[k]).to_degrees()).fold(0.0, f64::max))
@@ -42,6 +43,7 @@ pub(super) fn steep_faces(mesh: &FacetMesh, model: &Model, settings: &Settings) 
         if angle <= most * (1.0 + ROUNDING) {
             continue;
         }
+        // Facets of a face stand together, so that the last entry is the one to count in.
         match out.last_mut().filter(|s| s.face == facet.face.0) {
             Some(last) => {
                 last.facets += 1;

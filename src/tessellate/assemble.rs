@@ -37,6 +37,8 @@ pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartM
     for (i, instance) in model.instances.iter().enumerate() {
         let part = &mut placed[instance.part.0 as usize];
         part.firsts.push(model.first_face(i).0);
+        // A part is meshed once for all of its places: for the largest of them, or its facets there would be too
+        // coarse.
         part.scale = part.scale.max(instance.placement.scale.abs());
     }
     let mesh = |part: &PlacedPart<'_>| (!part.firsts.is_empty()).then(|| mesh_part(part, settings));
@@ -94,6 +96,7 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
         faces.into_par_iter().enumerate().map(with_surface).collect();
     let known: Vec<(&Face, &FaceSurface<'_>)> =
         faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
+    // Only sides on faces with a usable surface have a say in how an edge is divided.
     // The sides of each edge on its faces.
     let mut sides: Vec<Vec<EdgeSide<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
     for &(face, surface) in &known {
@@ -104,6 +107,7 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
         }
     }
     let mut denser = vec![0u32; part.edges.len()];
+    // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
     let mut round = 0;
@@ -131,6 +135,7 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
             }
         };
         let coarse = coarse_edges(&faces, &meshes, &divisions, round);
+        // A last round that asks for more is taken as it is; what does not hold is counted.
         if coarse.is_empty() || round == MAX_ROUNDS_OF_REPAIRED {
             break (divisions, shared, meshes);
         }
@@ -141,6 +146,7 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };
     // Chords that two faces have inside are taken from one of them.
+    // A further look after each, for a face meshed anew may have chosen another diagonal that is taken.
     let mut taken: Vec<TakenChords> = vec![TakenChords::default(); faces.len()];
     for _ in 0..MAX_ROUNDS {
         for (k, chords) in doubled_chords(part, &meshes, &taken) {
@@ -166,6 +172,7 @@ fn coarse_edges(
         let repaired = mesh.as_ref().map(|m| m.repaired);
         let came_to_little = match repaired {
             None => surface.is_some(),
+            // Of the other repairs shorter chords would mend nothing.
             Some(how) => matches!(how, Some(Repair::BorderOnly | Repair::TriangulationFailed)),
         };
         if came_to_little {
@@ -187,6 +194,7 @@ pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
     if pairs.is_empty() {
         return mesh;
     }
+    // The least member names a set, so that the numbers do not depend on the order of the pairs.
     // Union of sets, each named by its least member.
     let mut parent: Vec<u32> = (0..mesh.shared.len() as u32).collect();
     let root = |parent: &[u32], mut p: u32| {
@@ -228,6 +236,7 @@ impl Renumbering {
         let mut changed = Vec::with_capacity(part.edges.len());
         for (old, new) in before.iter().zip(now) {
             changed.push(old.t != new.t);
+            // Inner samples alone move: vertices come first in any division.
             if old.t == new.t {
                 (0..old.t.len() as u32 - 2).for_each(|k| to[(old.first + k) as usize] = new.first + k);
             }
@@ -290,6 +299,7 @@ fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -
         FaceSelector::Entity(id) => face.entity == Some(*id),
         FaceSelector::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
     };
+    // The last override that matches counts, as with rules in a style sheet.
     let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
     last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
 }

@@ -67,6 +67,7 @@ impl BorderNodes {
         for (polygon, ids) in polygons.polygons.iter().zip(&ids) {
             for (k, v) in polygon.iter().enumerate() {
                 let nodes = [ids[k], ids[(k + 1) % ids.len()]];
+                // Uses without length have no segment.
                 if nodes[0] == nodes[1] {
                     continue;
                 }
@@ -94,6 +95,7 @@ impl BorderNodes {
         };
         let chords: Vec<BorderChord> =
             along_edges.par_iter().with_min_len(32).map_init(DeviationBounds::default, chord).collect();
+        // A side is known by its two nodes, whichever way it runs.
         let names = along_edges.iter().map(|s| edge_key(s.nodes[0], s.nodes[1]));
         out.chords.extend(names.clone().zip(chords));
         out.followed.extend(names.zip(along_edges.iter().map(|s| s.edge)));
@@ -111,12 +113,14 @@ impl BorderNodes {
                 Position::Shared(p) => shared[p as usize],
                 Position::Own(p) => polygons.own[p as usize],
             };
+            // Points of its own are one already: only the file's vertices can stand twice in one place.
             let Position::Shared(here) = position else {
                 return self.nodes.push(Node { uv, place, position });
             };
             if (here as usize) < part.vertices.len() {
                 let next = self.nodes.len();
                 let first = *vertices.entry(place.to_array().map(f64::to_bits)).or_insert(next);
+                // In one place in space and in parameters: on either side of a seam they are two corners.
                 if first < next && (self.nodes[first].uv - uv).abs().cmple(near).all() {
                     if let Position::Shared(there) = self.nodes[first].position
                         && there != here
@@ -135,6 +139,7 @@ impl BorderNodes {
     /// Adds the segments of an imprint, and tells which node stands for each of its vertices. Nodes that are there already are taken.
     pub(super) fn add_imprint(&mut self, surface: &FaceSurface<'_>, imprint: &Imprint) -> Vec<(u32, usize)> {
         let mut vertex_nodes = Vec::new();
+        // Lines that follow the border already bound the facets there as they are.
         let known: FxHashSet<[u32; 2]> = self.segments.iter().map(|s| edge_key(s[0], s[1])).collect();
         for segment in &imprint.segments {
             let nodes = segment.ends.map(|end| {
@@ -173,12 +178,15 @@ impl BorderNodes {
     pub(super) fn divide_poles(&mut self, cells: &Subdivision) {
         for [from, to] in std::mem::take(&mut self.poles) {
             let (a, b) = (self.nodes[from].uv, self.nodes[to].uv);
+            // Along the pole the one parameter runs, across it the other stands still.
             let d = if (b - a).x.abs() > (b - a).y.abs() { 0 } else { 1 };
             let (lo, hi) = (a[d].min(b[d]), a[d].max(b[d]));
             let touching = cells.border.iter().filter(|c| {
                 let slack = AT_POLE * (c.hi[1 - d] - c.lo[1 - d]);
                 c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
             });
+            // Cells reach the pole at their corners: there its side must be divided, or a facet's side would end on
+            // another's middle.
             // Where cells end, and where an imprint has a node already.
             let place = self.nodes[from].position;
             let imprinted = self.imprinted.iter().flatten().filter(|&&n| self.nodes[n].position == place);
@@ -190,6 +198,7 @@ impl BorderNodes {
             at.dedup_by(|y, x| {
                 let same = y.0 - x.0 < SAME_AT_POLE * (hi - lo);
                 if same && x.1.is_none() {
+                    // A node that is there already stays, in place of a number.
                     *x = *y;
                 }
                 same

@@ -37,12 +37,14 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         let nodes = facet.nodes;
         let uv = nodes.map(|n| self.nodes[n].uv);
         let inside = 0.25 * (uv[0] + uv[1] + uv[2] + uv[3]);
+        // At a pole every facet has a corner of its own, for normals there differ from facet to facet.
         let mut corner = |k: usize| match pole {
             Some((at, uv)) if k == at => self.new_corner(nodes[at], uv, inside),
             _ => self.shared_corner(nodes[k], inside),
         };
         let [a, b, c] = [0, 1, 2].map(&mut corner);
         let d = if nodes[3] == nodes[2] { c } else { corner(3) };
+        // On a flipped surface what runs counterclockwise in parameters runs clockwise seen from outside.
         let corners = if !self.surface.is_flipped() {
             [a, b, c, d]
         } else if c == d {
@@ -77,6 +79,8 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         if corners.iter().all(|&n| self.made.corners[n as usize].normal != NO_NORMAL) {
             return;
         }
+        // From the corners' places on the surface, not from those of the border, which may be off by the file's
+        // gap.
         let p = corners.map(|n| self.surface.point(self.made.corners[n as usize].uv));
         let n = (p[1] - p[0]).cross(p[2] - p[0]) + (p[2] - p[0]).cross(p[3] - p[0]);
         // A facet without area shades nothing: any normal will do.

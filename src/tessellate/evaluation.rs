@@ -26,6 +26,7 @@ pub(super) fn fill_report(
     report.vertices = mesh.positions.len();
     let [a, b] = settings.tolerance;
     report.tolerance_mm = ToleranceRange { min: a.min(b), max: a.max(b) };
+    // Bounds of facets that are not certified may be anything: only the others have a largest one.
     report.certified = made.quality.iter().filter(|q| q.certified).count();
     report.sag_mm.bound_max = made.quality.iter().filter(|q| q.certified).map(|q| q.bound).fold(0.0, f64::max);
     let areas: Vec<f64> = (0..mesh.facets.len()).map(|f| mesh.facet_area(f)).collect();
@@ -48,6 +49,7 @@ pub(super) fn fill_report(
 }
 
 fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
+    // Looked up only where there is something to name: models may have thousands of faces.
     if failed.is_empty() {
         return Vec::new();
     }
@@ -91,6 +93,7 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
                 all = false;
                 continue;
             }
+            // What bounds no volume by the file's own word is not counted as broken.
             let Topology { open_edges, nonmanifold_edges, turned_edges } = made.mesh.topology(start..end);
             report.open_edges += open_edges;
             report.nonmanifold_edges += nonmanifold_edges + turned_edges;
@@ -101,6 +104,7 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
                 all = false;
             }
         }
+        // A ready mesh has no shell that says whether it is closed.
         all &= part.tessellated.is_empty();
     }
     all
@@ -110,6 +114,7 @@ fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64
     let sampled = sample::sample_mesh(&made.mesh, model);
     let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
     let mean =
+        // By area: many small facets would else outweigh a few large ones.
         sampled.iter().zip(areas).map(|(s, a)| s.mean * a).sum::<f64>() / report.area_mm2.max(f64::MIN_POSITIVE);
     report.sag_mm.sampled_max = Some(max);
     report.sag_mm.sampled_mean = Some(mean);

@@ -79,6 +79,7 @@ pub(super) fn mesh_with_imprint(
     let loops = polygons::loops(face);
     let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
     let polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
+    // Loops of one chord or none enclose nothing in the parameter plane.
     if polygons.polygons.iter().all(|p| p.len() < 3) {
         return Err(Unmeshed::Empty);
     }
@@ -86,9 +87,11 @@ pub(super) fn mesh_with_imprint(
     let vertex_nodes = border.add_imprint(surface, imprint);
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let angle = settings.angle_deg.map(f64::to_radians);
+    // The tree is asked for imprinted lines too, which no cell may lie across.
     let cells = tree::split(surface, settings.acceptance, &polygons, &lines, settings.budget, angle);
     // Whole cells become facets.
     let mut prover = Prover::new(surface, settings.acceptance);
+    // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);
     let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
     let (lo, hi) = polygons.bounds();
@@ -103,9 +106,11 @@ pub(super) fn mesh_with_imprint(
     // What is left between them and the border is triangulated. Where cells reach the border, both are done.
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let all = border.segments.iter().chain(&grid.outline);
+    // A segment of the border that cells already meet is used twice, and nothing of it is left to the transition.
     all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
     let segments: Vec<[u32; 2]> = all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect();
     let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
+    // Without a transition its scale is of no interest, and it costs curvatures.
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
@@ -139,6 +144,7 @@ pub(super) fn mesh_with_imprint(
         emission.facet(&f.facet, f.pole);
         facets.push(f.facet.nodes);
     }
+    // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
     let made = emission.finish();
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
     let (nodes, own) = transition.nodes.into_parts();
@@ -152,6 +158,7 @@ pub(super) fn mesh_with_imprint(
 /// Whether facets cover as much of the parameter plane as the border bounds: more where they lie over each other or beyond a border that
 /// crosses itself, less where something is left out.
 fn covers_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
+    // Only ratios and signs are compared: halving each would change none.
     let doubled_area = |corners: &[Uv]| -> f64 {
         let o = corners[0];
         corners.windows(2).map(|w| (w[0] - o).perp_dot(w[1] - o)).sum()
@@ -176,6 +183,7 @@ fn covers_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &B
         others.filter(|side| crosses_ray_from(point, **side)).count() % 2 == 1
     };
     let is_hole = |k: usize| {
+        // A few sides are enough for a vote; a loop that touches another in a corner misleads one or two.
         let asked: Vec<bool> = (sides[k].iter().step_by(1 + sides[k].len() / VOTES))
             .map(|[a, b]| is_inside_odd(k, (*a + *b) / 2.0))
             .collect();
@@ -191,6 +199,7 @@ fn covers_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &B
 fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: &Subdivision) -> Uv {
     let (lo, hi) = polygons.bounds();
     let n = if surface.affine { 1 } else { SCALE_PLACES };
+    // Middles of a regular grid: none lies on the border, where creases and poles are.
     let grid = |k: usize| lo + (Uv::new((k / n) as f64, (k % n) as f64) + 0.5) / n as f64 * (hi - lo);
     // Cells at the border are where the transition will be.
     let step = cells.border.len() / SCALE_CELLS + 1;
@@ -212,5 +221,6 @@ fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: 
         count += 1.0;
     }
     let s = sum / count;
+    // The larger one stays as it is: no parameter may overflow.
     if s.is_finite() && s.min_element() > 0.0 { s / s.max_element() } else { Uv::ONE }
 }

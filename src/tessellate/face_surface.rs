@@ -64,11 +64,13 @@ impl<'a> FaceSurface<'a> {
         let breaks = [0, 1].map(|d| {
             let n = surface.counts()[d];
             let mut b = surface.knots[d][surface.degree[d]..=n].to_vec();
+            // Knots of any multiplicity are one break.
             b.dedup();
             b
         });
         let sharper = |least: f64| [0, 1].map(|d| creases(surface, d, &breaks, least));
         let creases = sharper(BENT);
+        // Most surfaces have no creases at all, and need not be looked at twice.
         let sharp = if creases.iter().all(|c| c.is_empty()) { creases.clone() } else { sharper(SHARP) };
         let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
         let curving = SecondDerivativeBounds::new(surface, &patches, &breaks);
@@ -80,6 +82,8 @@ impl<'a> FaceSurface<'a> {
         let most = CLOSED_TOLERANCE * size;
         let closed = [0, 1].map(|d| is_closed(surface, d, least));
         let ends = |d: usize| poles[d] == [true; 2] || closed[d];
+        // Closed in both directions, or from pole to pole: only then can a large tolerance leave nothing of the
+        // surface.
         let small = field.loosest() > most && (poles.contains(&[true; 2]) || ends(0) && ends(1));
         let field = if small { field.at_most(most) } else { field };
         Self {
@@ -125,6 +129,7 @@ impl<'a> FaceSurface<'a> {
     /// First and last knot interval that `[x, y]` meets.
     pub(super) fn range(&self, d: usize, x: f64, y: f64) -> [usize; 2] {
         let (a, mut b) = (self.interval(d, x), self.interval(d, y));
+        // An interval that is met in its first parameter alone belongs to the one before.
         if b > a && self.breaks[d][b] >= y {
             b -= 1;
         }
@@ -143,6 +148,7 @@ impl<'a> FaceSurface<'a> {
     /// Points at three parameters of each direction; the same bits as [`FaceSurface::point`].
     pub(super) fn lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Point; 3]; 3] {
         let (a, b) = (self.interval(0, u[0]), self.interval(1, v[0]));
+        // Corners of a cell mostly lie on one patch; where they do, nine evaluations share their basis functions.
         let one = a == self.interval(0, u[2]) && b == self.interval(1, v[2]);
         if !one {
             return u.map(|x| v.map(|y| self.point(Uv::new(x, y))));
@@ -192,6 +198,7 @@ impl<'a> FaceSurface<'a> {
             return self.normal(uv);
         }
         let [a, b] = [0, 1].map(|d| match on[d] {
+            // The patch on the facet's own side of the crease has the normal that the facet must show.
             Some(crease) => self.interval(d, crease) - usize::from(inside[d] < crease),
             None => self.interval(d, uv[d]),
         });
@@ -215,6 +222,7 @@ impl<'a> FaceSurface<'a> {
 
     /// The tolerance at a place.
     pub(super) fn tolerance(&self, uv: Uv) -> f64 {
+        // With one tolerance everywhere no curvature is asked for, which would cost second derivatives.
         if self.affine || self.field.tightest() == self.field.loosest() {
             return self.field.loosest();
         }
@@ -244,6 +252,7 @@ fn is_closed(s: &Surface, d: usize, least: f64) -> bool {
     let counts = s.counts();
     let at = |i: usize, j: usize| s.points[i * counts[1] + j].project();
     let last = counts[d] - 1;
+    // Control points suffice: ends with one net are one curve.
     let pair = |k: usize| if d == 0 { [at(0, k), at(last, k)] } else { [at(k, 0), at(k, last)] };
     (0..counts[1 - d]).map(pair).all(|[a, b]| (a - b).length() <= least)
 }
@@ -282,6 +291,7 @@ fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64
     inner
         // Below the degree's multiplicity the surface has one tangent across the knot.
         .filter(|(_, k)| knots.iter().filter(|x| x == k).count() >= s.degree[d])
+        // Close to the knot, but far enough that parameters differ by more than their rounding.
         .filter(|&(i, &k)| {
             let step = CREASE_STEP * (b[i + 2] - k).min(k - b[i]);
             let across = &breaks[1 - d];

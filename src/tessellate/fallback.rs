@@ -56,6 +56,7 @@ pub(super) fn border_alone(
         };
         place.is_finite().then(corner)
     };
+    // Corners that fall together would be sides of no length, which the triangulation refuses.
     let mut loops: Vec<Vec<BorderCorner>> =
         border.polygons.iter().map(|r| r.iter().filter_map(corner).collect()).collect();
     for ring in &mut loops {
@@ -65,6 +66,7 @@ pub(super) fn border_alone(
         }
     }
     loops.retain(|r| r.len() > 2);
+    // By the surface's own normals, for the mean normal of the loops alone does not tell outside from inside.
     let up = loops.iter().flatten().filter_map(|c| surface.normal(c.uv)).sum::<Vector>();
     let triangles = match planar_triangulation(&mut loops, up).or_else(|| zigzag(&loops)) {
         Some(triangles) if !triangles.is_empty() => triangles,
@@ -72,6 +74,7 @@ pub(super) fn border_alone(
     };
     let mut out = FaceMesh { own: border.own, ..FaceMesh::default() };
     for t in triangles {
+        // Corners are not shared: each triangle may be the only one that knows its normal.
         // Where the surface has no normal the triangle's does; one without area shades nothing.
         let flat = (t[1].place - t[0].place).cross(t[2].place - t[0].place).try_normalize().unwrap_or(Vector::Z);
         let first = out.corners.len() as u32;

@@ -73,6 +73,7 @@ pub use triangulator::is_panic_guarded;
 /// ```
 pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
+    // Parts first, each once; then faces that touch, which need the placed model; then copies for all instances.
     let parts = assemble::mesh_parts(model, settings);
     let joined = contact::join(model, settings, &parts);
     let placement::Placed { mut made, failed, repairs } = placement::place_instances(model, &parts, &joined);

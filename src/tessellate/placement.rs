@@ -30,6 +30,7 @@ pub(super) fn place_instances(
         let first = model.first_face(i);
         let part = model.part(instance.part);
         let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
+        // All shared positions of the instance come first, so that faces refer to them by their number in the part.
         let shared = out.made.mesh.positions.len() as u32;
         out.made.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));
         for (k, face) in mesh.faces.iter().enumerate() {
@@ -69,6 +70,7 @@ fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &F
         let vertices = turned(facet.corners.map(|c| c + first), frame);
         out.mesh.facets.push(Facet { vertices, face: id });
         let (bound, tolerance) = (facet.bound * frame.scale, facet.tolerance * frame.scale);
+        // Compared after scaling, as whoever reads both numbers compares them.
         let certified = bound <= tolerance;
         out.mesh.sag.push(if certified { bound } else { f64::INFINITY });
         out.quality.push(FacetQuality { tolerance, bound, certified });
@@ -97,6 +99,7 @@ fn place_ready(out: &mut Tessellation, frame: &Frame, ready: &TessellatedFace, i
     }));
     for f in &ready.mesh.facets {
         out.mesh.facets.push(Facet { vertices: turned(f.vertices.map(|c| c + v), frame), face: id });
+        // The file has nothing else to be measured against.
         out.mesh.sag.push(0.0);
         out.quality.push(FacetQuality { tolerance: 0.0, bound: 0.0, certified: true });
     }

@@ -18,6 +18,7 @@ pub(super) fn repaired_faces(
     let entities: Vec<Option<u64>> = model.placed_faces().map(|f| f.entity()).collect();
     let reached = |id: FaceId| {
         let facets = &made.mesh.facets;
+        // Facets stand in the order of their faces.
         let range = facets.partition_point(|f| f.face < id)..facets.partition_point(|f| f.face <= id);
         let (proved, open): (Vec<usize>, Vec<usize>) = range.partition(|&f| made.quality[f].certified);
         // What is proved needs no samples.

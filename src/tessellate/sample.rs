@@ -1,5 +1,5 @@
 //! Sag and normal error by dense sampling: evaluates splines by their definition and measures distances its own way, so
-//! that it can acceptance the bound.
+//! that it can judge the bound.
 
 use crate::math::{Point, Uv, Vector};
 use crate::mesh::FacetMesh;
@@ -66,6 +66,7 @@ pub(super) fn sample_facets(mesh: &FacetMesh, model: &Model, facets: &[usize]) -
             let scale = placed.placement.scale;
             let corners = mesh.corners(f).map(|p| placed.placement.local_point(p));
             let sign = if face.reversed { -1.0 } else { 1.0 };
+            // The normals of a reversed face are turned back: errors are measured against Su × Sv.
             let normals = mesh.facets[f]
                 .vertices
                 .map(|v| sign * placed.placement.local_direction(mesh.vertices[v as usize].normal));
@@ -96,6 +97,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             }
         }
     }
+    // The proof counts that gap too.
     // Corners lie on the surface, but not where the file's own edges do not.
     for (&x, &at) in p.iter().zip(&uv) {
         if (surface.evaluate(at) - x).length() > out.sag {
@@ -126,6 +128,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             sum += share * weight * away;
             let bilinear = interpolated(triangles.len() == 1, t, b, n);
             if let (Some(a), Some(e)) = (bilinear.try_normalize(), surface.normal(foot)) {
+                // The arctangent keeps its digits at small angles, where a cosine has none.
                 out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
             }
         }
@@ -154,6 +157,7 @@ fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     let off = |p: &[(Uv, Point); 3]| distance_to_triangle(x, p.map(|q| q.1));
     let mut best = (f64::INFINITY, over[0][0]);
     let mut pieces: Vec<[(Uv, Point); 3]> = over.iter().map(|uv| uv.map(at)).collect();
+    // As many levels as halve the domain down to the spacing of numbers, unless the pieces are small before.
     for _ in 0..LEVELS {
         let mut parts = Vec::with_capacity(4 * pieces.len());
         for [a, b, c] in pieces {
@@ -184,6 +188,7 @@ fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
 pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let [a, b, c, d] = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v));
+    // Both halves of the domain, since a path of nearest triangles may run into a dead end in one.
     let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search(surface, x, &[half])));
     let away = found.map(|u| (surface.evaluate(u) - x).length());
     if away[1] < away[0] { found[1] } else { found[0] }
@@ -198,6 +203,7 @@ pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
         let e = x - d.point;
         let (a, b, c) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
         let det = a * c - b * b;
+        // At a pole or cusp one derivative is nothing, and steps along it would be anywhere.
         if det <= SINGULAR * a * c {
             break;
         }

@@ -47,6 +47,7 @@ impl SecondDerivativeBounds {
     /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
     /// `b` (first and last); `None` where it does not hold or costs too much.
     pub(super) fn linear_deviation(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
+        // Across a kink no Taylor's theorem holds, and many patches make a bound worse than hulls do.
         if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MAX_PATCHES || !self.is_smooth(a, b) {
             return None;
         }

@@ -105,6 +105,7 @@ impl Settings {
     /// The largest tolerance anywhere, mm.
     pub fn loosest(&self) -> f64 {
         let all = self.overrides.iter().map(|o| o.tolerance).chain([self.tolerance]);
+        // All places' own tolerances too: one may be looser than the model's.
         all.flatten().fold(0.0, f64::max)
     }
 }
@@ -122,6 +123,7 @@ pub(super) struct ToleranceField {
 impl ToleranceField {
     /// `scale` is that of the placement: tolerances hold for the placed part.
     pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: ToleranceLaw, scale: f64) -> Self {
+        // A length that is no number becomes the least there is, so that nothing is ever looser than was asked.
         let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { LEAST_LENGTH };
         let [a, b] = tolerance.map(clean);
         let [r, s] = radii.map(clean);
@@ -131,6 +133,8 @@ impl ToleranceField {
     /// Tolerance where the sharpest normal curvature is `k`.
     pub(super) fn tolerance_at(&self, k: f64) -> f64 {
         let ([tight, loose], [sharp, flat]) = (self.range, self.radii);
+        // Flatter than the flattest radius, and sharper than the sharpest: the ends hold as they are, and no
+        // logarithm of zero is taken.
         if tight == loose || k * flat <= 1.0 {
             return loose;
         }
@@ -139,6 +143,7 @@ impl ToleranceField {
         }
         let x = (1.0 / (k * sharp)).ln() / (flat / sharp).ln();
         match self.law {
+            // The cubic 3x² − 2x³ has no kinks at the ends, where sizes of neighbouring facets would jump.
             ToleranceLaw::Smooth => tight + (loose - tight) * x * x * (3.0 - 2.0 * x),
             ToleranceLaw::Power => tight * (loose / tight).powf(x),
         }

@@ -52,6 +52,7 @@ pub(super) fn doubled_chords(
             let asked_before = taken[k].0.contains(&chord);
             // Where only diagonals are, one of them stays.
             let Some(left) = uses.get_mut(&chord).filter(|left| **left > 2 && !asked_before) else { continue };
+            // A diagonal is two sides: with it gone the chord has two facets less.
             *left -= 2;
             match doubled.last_mut() {
                 Some((last, chords)) if *last == k => chords.push(chord),
@@ -81,12 +82,14 @@ impl Chords {
                 let at = facet.corners.map(|c| mesh.corners[c as usize].position);
                 for i in 0..4 {
                     if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
+                        // A triangle repeats a corner: that side is none.
                         && a != b
                     {
                         *own.entry([a.min(b), a.max(b)]).or_default() += 1;
                     }
                 }
             }
+            // Counted by face first: a face that has a chord twice has it as a diagonal.
             for (chord, count) in own {
                 *uses.entry(chord).or_default() += count;
                 if count > 1 {

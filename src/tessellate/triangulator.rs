@@ -21,6 +21,7 @@ pub(super) struct GaveUp;
 ///
 /// The panic hook of the process still runs; it learns from [`is_panic_guarded`] that nothing is lost.
 pub(super) fn guarded<T>(work: impl FnOnce() -> T) -> Result<T, GaveUp> {
+    // Guarded work may be inside of guarded work: what was before comes back.
     let outer = GUARDED.replace(true);
     let result = catch_unwind(AssertUnwindSafe(work)).map_err(|_| GaveUp);
     GUARDED.set(outer);

@@ -36,6 +36,7 @@ const KINK_STEP: f64 = 1e-6;
 pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     let b = curve.breakpoints();
     let n = b.len();
+    // Of the knots of full multiplicity few are kinks: arcs of a circle meet at such knots, and are smooth there.
     let is_kink = |i: usize| {
         let k = b[i];
         // A knot of lower multiplicity leaves the curve smooth.
@@ -44,6 +45,7 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
         }
         let step = KINK_STEP * (b[i + 1] - k).min(k - b[i - 1]);
         let tangent = |t: f64| curve.derivatives(t).first.try_normalize();
+        // Tangents just before and behind: at the knot itself the derivative is one of the two.
         match (tangent(k - step), tangent(k + step)) {
             (Some(x), Some(y)) => x.cross(y).length() > KINK || x.dot(y) < 0.0,
             _ => false,
@@ -59,6 +61,7 @@ pub(in crate::tessellate) fn parameters(
     at: impl Fn(f64) -> Point,
     tolerance: impl Fn(f64, Vector) -> f64,
 ) -> Vec<f64> {
+    // Many pieces are short, and need not be looked at as closely as one.
     let steps = if breaks.len() > MANY_PIECES { STEPS_OF_MANY } else { STEPS };
     let mut t = vec![breaks[0]];
     for pair in breaks.windows(2) {
@@ -92,9 +95,11 @@ impl Piece {
         let samples: Vec<f64> = (0..=steps).map(|i| a + (b - a) * i as f64 / steps as f64).collect();
         let p: Vec<Point> = samples.iter().map(|&t| at(t)).collect();
         let chord = [p[0], p[steps]];
+        // A straight piece has no curvature to spread chords by.
         if p.iter().all(|&q| distance_to_chord(q, &chord) <= STRAIGHT * (p[steps] - p[0]).length()) {
             return None;
         }
+        // From the samples on both sides, since the tolerance depends on the direction of the chord.
         let own = |i: usize| tolerance(samples[i], p[(i + 1).min(steps)] - p[i.saturating_sub(1)]);
         let last = steps / TOLERANCE_EVERY;
         let tolerances: Vec<f64> = (0..=last).map(|k| own(TOLERANCE_EVERY * k)).collect();
@@ -116,6 +121,7 @@ impl Piece {
     /// Inner parameters of as few chords as hold, spread evenly.
     fn spread_within_tolerance(&self, at: &impl Fn(f64) -> Point) -> Vec<f64> {
         let total = self.chords[self.chords.len() - 1];
+        // Samples without length make the sum no number; one chord, and halving, is what is left then.
         let mut n =
             if total.is_finite() { (total - CHORD_ROUNDING).ceil().clamp(1.0, MAX_CHORDS as f64) } else { 1.0 };
         let mut inner = self.spread(n);
@@ -125,6 +131,7 @@ impl Piece {
             if worst <= SPREAD_EXCESS[0] || worst > SPREAD_EXCESS[1] {
                 break;
             }
+            // The sag goes as the square of a chord's length: their number as the root of the excess.
             n = (n * worst.sqrt()).ceil().max(n + 1.0);
             inner = self.spread(n);
         }
@@ -147,6 +154,7 @@ impl Piece {
     fn worst_excess(&self, inner: &[f64], at: &impl Fn(f64) -> Point) -> f64 {
         let [a, b] = self.ends;
         let last = self.tolerances.len() - 1;
+        // The ends of chord k.
         let end = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
         let excess = |k: usize| {
             let (x, y) = (end(k), end(k + 1));
@@ -159,6 +167,7 @@ impl Piece {
 
 /// Curvature at a sample from the circle through three points; ends take their neighbour's.
 fn curvature(p: &[Point], i: usize) -> f64 {
+    // Ends have a neighbour on one side only.
     let i = i.clamp(1, p.len() - 2);
     let (x, y) = (p[i] - p[i - 1], p[i + 1] - p[i]);
     let scale = x.length() * y.length() * (p[i + 1] - p[i - 1]).length();
@@ -182,6 +191,7 @@ pub(super) fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
         let mut stack = vec![(pair[0], pair[1], 0)];
         while let Some((a, b, depth)) = stack.pop() {
             let m = 0.5 * (a + b);
+            // Held to a number of chords and of halvings, so that no curve of a file, however wild, costs more.
             if depth < MAX_HALVINGS && a < m && m < b && out.len() < MAX_CHORDS && coarse(a, b) {
                 // The first half on top: parameters come out in order.
                 stack.push((m, b, depth + 1));

@@ -37,13 +37,16 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
     }
     let xi = surface.tolerance(uv);
     let d = surface.second_derivatives(uv);
+    // At poles and cusps no curvature tells; half of it is what a surface that bends across is given at least.
     let Some(forms) = FundamentalForms::new(&d) else { return 0.5 * xi };
     // The direction across, in parameters: orthogonal to `along` in the tangent plane.
     let across = forms.normal.cross(along);
     let ([e, f, g], det) = (forms.first, forms.first[0] * forms.first[2] - forms.first[1] * forms.first[1]);
     let (x, y) = (across.dot(d.du), across.dot(d.dv));
+    // The inverse of the first fundamental form takes a tangent vector to its parameters.
     let direction = Uv::new((g * x - f * y) / det, (e * y - f * x) / det);
     let sag = forms.normal_curvature(direction).abs() * (FACET_REACH * surface.size).powi(2) / 8.0;
+    // Where normals must not turn far, that limits the chord as a sag would.
     let xi = xi.min(surface.field.turning(forms.largest_curvature()));
     xi * (1.0 - (sag / xi).min(0.5))
 }
@@ -52,6 +55,7 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
 fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
     let each =
         sides.iter().map(|s| chord_tolerance(s.surface, s.surface.spline.clamp(s.edge_use.uv.evaluate(t)), along));
+    // Half the length is a quarter of the sag: each denser round asks for chords half as long.
     EDGE_SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
 }
 
@@ -69,6 +73,7 @@ pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser:
     let mut t = follow_in_parameters(curve, sides, denser, t);
     let (first, last) = (curve.evaluate(t[0]), curve.evaluate(t[t.len() - 1]));
     let closed = (first - last).length() <= CLOSED_CURVE + CLOSED_CURVE * curve.bounds().diagonal();
+    // A closed curve of two chords would enclose nothing.
     let fewest = if closed { 3 } else { 1 };
     while t.len() <= fewest {
         bisect_all(&mut t);
@@ -100,6 +105,8 @@ fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, 
                 }
                 let near = nearest_on(&at, a, b, on);
                 let off = (on - near).length();
+                // Chords in the parameter plane need not be closer than that as long as nothing fails for it; in
+                // denser rounds they must.
                 if off <= slack(s) || denser == 0 && off <= UV_SHARE * (chord[1] - chord[0]).length() {
                     return false;
                 }
@@ -117,6 +124,7 @@ fn cross_creases(curve: &Curve, sides: &[EdgeSide<'_, '_>], t: &mut Vec<f64>) {
     let mut found: Vec<f64> = Vec::new();
     for s in sides.iter().filter(|s| s.surface.is_sharp()) {
         for (d, creases) in s.surface.sharp.iter().enumerate() {
+            // Ends that lie on the crease already are corners enough.
             let near = CREASE * s.surface.extent()[d];
             let at = |t: f64| s.edge_use.uv.evaluate(t)[d];
             for (pair, &crease) in t.windows(2).flat_map(|pair| creases.iter().map(move |c| (pair, c))) {

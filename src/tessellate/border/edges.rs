@@ -39,6 +39,7 @@ pub(in crate::tessellate) fn divide(
     denser: &[u32],
     own: &mut Vec<OwnDivision>,
 ) -> (Vec<Division>, Vec<Point>) {
+    // Most edges are as before in a further round, and dividing is the dearest part of it.
     let divide_alone = |(i, (edge, sides)): (usize, (&Edge, &Vec<EdgeSide<'_, '_>>))| match own.get(i) {
         Some(before) if before.denser == denser[i] => before.clone(),
         _ if sides.is_empty() => OwnDivision { denser: denser[i], t: edge.curve.domain().to_vec() },
@@ -47,6 +48,7 @@ pub(in crate::tessellate) fn divide(
     *own = part.edges.par_iter().zip(sides).enumerate().map(divide_alone).collect();
     // Then edges that others have a say in.
     let mut times: Vec<Vec<f64>> = own.iter().map(|o| o.t.clone()).collect();
+    // Each on what the one before has left: twins are told apart when all else is done.
     opposite_sides::equalise(part, faces, sides, denser, &mut times);
     open_lenses(part, faces, &mut times);
     separate_twins(part, sides, &mut times);
@@ -74,6 +76,7 @@ fn positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };
+    // In chunks: most edges have few points, and a task each would cost more than they do.
     let inner: Vec<Vec<Point>> = part.edges.par_iter().zip(&times).with_min_len(16).map(inner).collect();
     let mut divisions = Vec::with_capacity(times.len());
     let mut positions = part.vertices.clone();
@@ -96,6 +99,7 @@ fn open_lenses(part: &Part, faces: &[(&Face, &FaceSurface<'_>)], times: &mut [Ve
             let [a, b] = part.edges[e].vertices;
             [a.0.min(b.0), a.0.max(b.0)]
         };
+        // Different vertices leave a triangle at least.
         if edges.iter().any(|&e| chord(e) != chord(edges[0])) {
             continue;
         }
@@ -104,6 +108,7 @@ fn open_lenses(part: &Part, faces: &[(&Face, &FaceSurface<'_>)], times: &mut [Ve
             distance_to_chord(curve.evaluate(0.5 * (t[0] + t[1])), &[curve.evaluate(t[0]), curve.evaluate(t[1])])
         };
         let most = edges.iter().rev().map(|&e| (off(e), e)).max_by(|x, y| x.0.total_cmp(&y.0));
+        // With all of them straight there is no face between, and a corner would change nothing.
         if let Some((_, e)) = most.filter(|x| x.0 > 0.0) {
             bisect_all(&mut times[e]);
         }
@@ -119,6 +124,7 @@ fn separate_twins(part: &Part, sides: &[Vec<EdgeSide<'_, '_>>], times: &mut [Vec
     };
     let mut single: Vec<usize> =
         (0..times.len()).filter(|&e| times[e].len() == 2 && !sides[e].is_empty()).collect();
+    // In order of edges too, so that the same file always gives the same corner to the same edge.
     single.sort_unstable_by_key(|&e| (chord(e), e));
     for twins in single.chunk_by(|&a, &b| chord(a) == chord(b)).filter(|t| t.len() > 1) {
         let middle = |e: usize| part.edges[e].curve.evaluate(0.5 * (times[e][0] + times[e][1]));

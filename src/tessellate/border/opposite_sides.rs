@@ -48,6 +48,7 @@ pub(in crate::tessellate) fn equalise<'f>(
     denser: &[u32],
     times: &mut [Vec<f64>],
 ) {
+    // On a plane there are no rows of cells to line up.
     let bent: Vec<&(&Face, &FaceSurface<'_>)> = faces.iter().filter(|(_, s)| !s.affine).collect();
     let of_face = |&&(face, surface): &&(&'f Face, &FaceSurface<'_>)| pairs_of(face, surface, times.len());
     let each: Vec<Vec<(Pair<'_>, usize)>> = bent.par_iter().with_min_len(8).map(of_face).collect();
@@ -106,6 +107,7 @@ impl Equaliser<'_, '_, '_, '_> {
 
     /// What the edges of one group take over.
     fn equalise_group(&self, group: &[usize]) -> Vec<(usize, Vec<f64>)> {
+        // From the densest, so that samples are only ever handed to sides that would have had fewer.
         // The side with most samples starts.
         let mut order = group.to_vec();
         order.sort_by_key(|&e| (std::cmp::Reverse(self.times[e].len()), e));
@@ -124,6 +126,8 @@ impl Equaliser<'_, '_, '_, '_> {
                     let ([a, b], direction) = &self.pairs[k];
                     let (from, to) = if a.0 == e { (a, b) } else { (b, a) };
                     let (curve, own) = (&self.part.edges[to.0].curve, &self.times[to.0]);
+                    // Sides that already took samples keep them; those far coarser would grow by what they have no
+                    // need for; kinks are corners of their own.
                     if done.contains(&to.0) || 2 * own.len() < most || breaks(curve).len() > 2 {
                         continue;
                     }
@@ -136,6 +140,8 @@ impl Equaliser<'_, '_, '_, '_> {
                         handed
                     } else {
                         let kept = divide_further(curve, &self.sides[to.0], self.denser[to.0], handed.clone());
+                        // Where the samples handed over do not suffice by far the shapes are too unlike to share
+                        // them.
                         if kept.len() as f64 > GROWTH * handed.len() as f64 {
                             continue;
                         }
@@ -168,6 +174,7 @@ fn pairs_of<'f>(face: &'f Face, surface: &FaceSurface<'_>, edges: usize) -> Vec<
         uses.iter().filter_map(|u| parameter_run(u, surface)).filter(|a| a.edge < edges).collect();
     for (i, a) in runs.iter().enumerate() {
         for b in &runs[i + 1..] {
+            // Ranges must agree at both ends, or rows of cells would run out at the side.
             let near = |x: f64, y: f64| (x - y).abs() <= SAME_RANGE;
             let same = a.direction == b.direction && near(a.range[0], b.range[0]) && near(a.range[1], b.range[1]);
             if same && a.edge != b.edge && !near(a.level, b.level) {
@@ -187,6 +194,7 @@ fn parameter_run<'f>(edge_use: &'f EdgeUse, surface: &FaceSurface<'_>) -> Option
         let uv = edge_use.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(STEPS));
         [0, 1].map(|d| (uv[d] - domain[d][0]) / (domain[d][1] - domain[d][0]))
     };
+    // Two evaluations turn most uses away before nine are made.
     // Most that do not run along a line show it at both ends.
     let (from, to) = (at(0), at(STEPS));
     if (0..2).all(|d| (from[d] - to[d]).abs() > LEVEL) {
@@ -226,10 +234,12 @@ fn transfer_samples(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, 
         }
         0.5 * (lo + hi)
     };
+    // Ends stay to the bit: they are vertices, which are not the edge's own to move.
     let mut out: Vec<f64> = times[1..times.len() - 1].iter().map(|&t| invert(from.uv.evaluate(t)[d])).collect();
     out.sort_by(f64::total_cmp);
     out.insert(0, t0);
     out.push(t1);
     let least = SAME_SAMPLE * (t1 - t0);
+    // Samples that coincide or turn back tell that the uv curve does not run one way.
     out.windows(2).all(|w| w[1] - w[0] > least).then_some(out)
 }

@@ -82,6 +82,7 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
         }
         let chords: Vec<Uv> = polygon.iter().map(|v| v.uv).collect();
         let (chords, curves) = (doubled_area(&chords), doubled_area(&curves));
+        // Opposite signs or nearly nothing: the chords' polygon is another region than the loop's.
         if chords * curves < KEPT_AREA * curves * curves {
             found.extend(trim.uses.iter().filter_map(|u| u.edge));
         }
@@ -117,6 +118,8 @@ pub(in crate::tessellate) fn build(
     imprinted: &ImprintedPoints<'_>,
 ) -> BorderPolygons {
     let mut out = BorderPolygons::default();
+    // Trims of neighbouring uses end where the file's rounding lets them, and a corner of the face must still be
+    // one.
     let near = COINCIDENT_CORNERS[1] * surface.size + COINCIDENT_CORNERS[0];
     let mut own = OwnPoints { points: Vec::new(), near };
     let mut seams: Vec<SeamSide> = Vec::new();
@@ -140,6 +143,7 @@ pub(in crate::tessellate) fn build(
                 Some(edge) => polygon.extend(edge_side(u, &divisions[edge.0 as usize], edge_use, from)),
                 None => polygon.extend(free_side(u, surface, [from, to], &mut own, &mut seams, imprinted)),
             }
+            // The use's own start, which the curve of an edge shared with other faces may miss by a digit.
             if let Some(v) = polygon.get_mut(first) {
                 v.uv = u.start();
             }
@@ -205,15 +209,19 @@ fn free_side(
     let at = |f: f64| surface.point(uv(f));
     let shape: Vec<Point> = (0..=SHAPE_STEPS).map(|i| at(f64::from(i) / f64::from(SHAPE_STEPS))).collect();
     let near = CLOSED_SIDE * surface.size;
+    // All of it in one place, and the vertices at its ends the same: nothing of the border lies here in space.
     if shape.iter().all(|p| (*p - shape[0]).length() <= near) && from == to {
         return vec![PolygonVertex { uv: uv(0.0), position: from, side: BorderSide::Pole }];
     }
+    // The other side of a seam runs back through the same points.
     let runs_back = |s: &&SeamSide| s.shape.iter().rev().zip(&shape).all(|(a, b)| (*a - *b).length() <= near);
     let samples: Vec<(f64, Position)> = match seams.iter().find(runs_back) {
+        // The second side takes the first one's samples, so that cells on both sides meet.
         Some(s) => s.samples.iter().rev().map(|&(f, position)| (1.0 - f, position)).collect(),
         None => {
             // Seen from its first use: ascending in the curve's own parameter on both sides.
             let inner: Vec<f64> = u.uv.breakpoints()[1..].iter().map(|t| (t - t0) / (t1 - t0)).collect();
+            // Straight pieces with many kinks are a sampled curve, of which the kinks are no corners.
             let kinks: Vec<f64> = if inner.len() < MAX_KINKS && u.uv.degree == 1 { inner } else { vec![1.0] };
             let mut breaks = vec![0.0];
             breaks.extend(
@@ -246,6 +254,7 @@ impl OwnPoints {
     }
 
     fn find_or_add(&mut self, p: Point) -> Position {
+        // By place, not by parameters: both ends of a seam are one corner.
         match self.points.iter().position(|q| (*q - p).length() <= self.near) {
             Some(k) => Position::Own(k as u32),
             None => self.add(p),
@@ -286,6 +295,7 @@ impl ImprintedPoints<'_> {
             let best = all.min_by(|a, b| a.0.total_cmp(&b.0));
             if let Some((away, t)) = best
                 && away <= self.near
+                // A point that a sample stands for already would leave a side without length.
                 && samples.iter().all(|&s| (at(s) - p).length() > self.near)
             {
                 samples.insert(samples.partition_point(|&s| s < t), t);

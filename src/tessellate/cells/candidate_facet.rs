@@ -38,6 +38,7 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
     }
     for (i, j) in open.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]) {
         // Both triangles hold the diagonal.
+        // It is a side of both; once is enough.
         if (i, j) == (0, 2) && open.len() == 2 {
             continue;
         }
@@ -70,6 +71,8 @@ impl CandidateFacet {
         let [u, v] = self.sag;
         let p = &self.p;
         let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
+        // Only where one sag is clearly larger: on a ball both are alike, and rounding would make a different tree
+        // at every tolerance.
         if (u - v).abs() > SAG_DIFFERENCE * u.max(v) {
             return if u > v { 0 } else { 1 };
         }
@@ -92,12 +95,14 @@ impl CandidateFacet {
     fn diagonal(&self) -> (usize, f64) {
         let (p, m) = (self.places(), self.p[1][1]);
         let (a, b) = (distance_to_chord(m, &[p[0], p[2]]), distance_to_chord(m, &[p[1], p[3]]));
+        // Near ties go to the first diagonal, or rounding would decide and mirror-symmetric faces come out unlike.
         if b < a * (1.0 - NEARER) { (1, b) } else { (0, a) }
     }
 
     /// Bound of the cell as a facet, cut along the better diagonal.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> f64 {
         let (r, off) = self.diagonal();
+        // Cells with hanging vertices are cut along this diagonal after all, and must not be far from it.
         if off <= FARTHEST * limit
             && let Some(bound) = prover.quad_bound([cell.lo, cell.hi], &self.places(), r, limit)
         {

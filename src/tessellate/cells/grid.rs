@@ -51,6 +51,8 @@ pub(in crate::tessellate) struct GridInput<'g> {
 /// Makes facets of the cells inside; those that cannot be resolved within their tolerance are left to the transition.
 pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivision, input: GridInput<'_>) -> Grid {
     let border = input.nodes.len();
+    // Nodes of the border and corners of cells come onto the lines first, bridges then: what hangs on a side is
+    // known only when all are there.
     let mut lines = GridLines::new(cells, input.resolution);
     let corners = corners_of_cells(cells, &mut lines, input.nodes);
     lines.sort();
@@ -61,6 +63,7 @@ pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivis
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let mut order: Vec<[u32; 2]> = Vec::new();
     for (proved, corners) in cells.inside.iter().zip(&corners) {
+        // A node on a side that belongs to the neighbours alone would be a crack; the cell must be cut from it.
         let hanging = lines.hanging_nodes(&proved.cell);
         let polygon: Vec<u32> =
             (0..4).flat_map(|k| std::iter::once(corners[k]).chain(hanging[k].iter().copied())).collect();
@@ -68,12 +71,14 @@ pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivis
         let made = if polygon.len() > 4 {
             builder.with_hanging_nodes(proved, corners, &hanging, &polygon, &mut grid)
         } else if at_border {
+            // The border's points are not quite where the cell's corners were proved to be.
             builder.at_border(proved, corners).map(|quad| grid.quads.push(quad))
         } else {
             let nodes = std::array::from_fn(|k| corners[(k + proved.first) % 4]);
             grid.quads.push(ProvedFacet { nodes, bound: proved.bound, tolerance: proved.tolerance });
             Some(())
         };
+        // Not made: its place is left open, and the outline lets the transition fill it.
         if made.is_none() {
             continue;
         }
@@ -96,6 +101,7 @@ fn corners_of_cells(cells: &Subdivision, lines: &mut GridLines, nodes: &mut Node
     let mut at_crossing: FxHashMap<[usize; 2], u32> = FxHashMap::default();
     for (id, n) in (0..).zip(nodes.iter()) {
         let crossing = match [lines.find(0, n.uv.x), lines.find(1, n.uv.y)] {
+            // Where the border passes through a corner of cells its node is taken, so that both meet in one point.
             [Some(i), Some(j)] => {
                 // The first one stands for all in its place.
                 if at_crossing.contains_key(&[i, j]) {
@@ -141,6 +147,7 @@ fn add_bridges(
 ) {
     let named: Vec<(Cell, [u32; 4])> = cells.inside.iter().map(|l| l.cell).zip(corners.iter().copied()).collect();
     for bridge in lines.bridges(&named, nodes) {
+        // The line's own parameter, to the bit, so that the line is found by it.
         let (cell, _) = named[bridge.cell];
         let d = bridge.side % 2;
         let e = 1 - d;
@@ -150,6 +157,7 @@ fn add_bridges(
         let id = nodes.push_own(uv, prover.surface.point(uv));
         let line = lines.side_line(e, level);
         let on = &mut lines.nodes[e][line];
+        // Lines are in order already; the new node keeps them so.
         on.insert(on.partition_point(|n| n.0 < bridge.at), (bridge.at, id));
     }
 }
@@ -184,6 +192,7 @@ impl CellFacets<'_, '_, '_, '_> {
     /// The facet of a cell with corners on the border.
     fn at_border(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
         let at = corners.map(|c| self.input.nodes[c].position);
+        // Another face has this chord already: with a side on it the edge would have more than two facets.
         if (0..4).any(|k| self.input.taken.has([at[k], at[(k + 1) % 4]])) {
             return None;
         }
@@ -197,6 +206,7 @@ impl CellFacets<'_, '_, '_, '_> {
         if (0..4).any(|i| is_taken(i) || (0..i).any(|j| n[i].position == n[j].position)) {
             return None;
         }
+        // Two diagonals, of which the nearer one is tried first and the other only where it fails.
         let middle = self.prover.surface.point(0.25 * (n[0].uv + n[1].uv + n[2].uv + n[3].uv));
         let off = |i: usize, j: usize| distance_to_chord(middle, &[n[i].place, n[j].place]);
         // The diagonal that passes nearer to the surface's middle is tried first.
@@ -224,6 +234,7 @@ impl CellFacets<'_, '_, '_, '_> {
             }
             moved = moved.max((n[k].place - proved.places[k]).length());
         }
+        // Four times: each of the two triangles and each of its sides moves by no more than a corner does.
         // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
         let limit = tolerance * proved.slack;
         if moved > SAME_CORNER[1] * tolerance {
@@ -250,6 +261,7 @@ impl CellFacets<'_, '_, '_, '_> {
         hanging: &[Vec<u32>; 4],
     ) -> Option<Vec<ProvedFacet<4>>> {
         let (nx, ny) = (hanging[0].len() + 1, hanging[1].len() + 1);
+        // Opposite sides must have as many nodes, and not more pieces come of it than are worth it.
         if hanging[2].len() + 1 != nx || hanging[3].len() + 1 != ny || nx * ny > MAX_PIECES {
             return None;
         }
@@ -268,6 +280,7 @@ impl CellFacets<'_, '_, '_, '_> {
             return None;
         }
         // The nodes of the pieces, row by row; inner ones are new.
+        // Inner nodes are taken back when a piece does not hold.
         let mark = nodes.mark();
         let mut at = vec![vec![0u32; ny + 1]; nx + 1];
         for i in 0..=nx {
@@ -298,6 +311,8 @@ impl CellFacets<'_, '_, '_, '_> {
 
     /// Cuts a cell with hanging vertices into the triangles whose diagonals lie nearest to the surface; `None` when one does not hold.
     fn triangulate(&mut self, slack: f64, polygon: &[u32]) -> Option<Vec<ProvedFacet<3>>> {
+        // Among triangulations the one whose diagonals lie nearest to the surface is most likely to hold; only that
+        // one is tried.
         let triangles = self.best_triangulation(polygon)?;
         let mut made = Vec::with_capacity(triangles.len());
         for t in triangles {
@@ -334,12 +349,14 @@ impl CellFacets<'_, '_, '_, '_> {
         for gap in 2..n {
             for i in 0..n - gap {
                 let j = i + gap;
+                // Sides of the polygon are given, so that only diagonals cost.
                 // The side that closes the polygon is no diagonal.
                 let chord = if i == 0 && j == n - 1 { 0.0 } else { off(i, j).powi(2) };
                 cost[i][j] = f64::INFINITY;
                 for k in i + 1..j {
                     let x = (node(k).uv - node(i).uv) / self.input.resolution;
                     let y = (node(j).uv - node(i).uv) / self.input.resolution;
+                    // Corners on one side of the cell stand in a line: a triangle of three of them has no area.
                     if x.perp_dot(y) <= SHARPEST * x.length() * y.length() {
                         continue;
                     }

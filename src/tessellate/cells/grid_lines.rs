@@ -32,6 +32,7 @@ impl GridLines {
     pub(in crate::tessellate) fn new(cells: &Subdivision, resolution: Uv) -> Self {
         let parameters = [0, 1].map(|d| {
             let mut x: Vec<f64> = cells.inside.iter().flat_map(|l| [l.cell.lo[d], l.cell.hi[d]]).collect();
+            // Cuts of the tree are the same numbers on both sides, so that equal lines are equal to the bit.
             x.sort_unstable_by(f64::total_cmp);
             x.dedup();
             x
@@ -68,6 +69,7 @@ impl GridLines {
     /// Nodes on the line at `level` of direction `d` strictly between two parameters, in that order.
     fn nodes_between(&self, d: usize, level: f64, a: f64, b: f64) -> Vec<u32> {
         let Some(line) = self.find(d, level).map(|i| &self.nodes[d][i]) else { return Vec::new() };
+        // Without the ends, which are the cell's own corners, or as good as these.
         let (lo, hi) = (a.min(b) + self.resolution[1 - d], a.max(b) - self.resolution[1 - d]);
         let (i, j) = (line.partition_point(|x| x.0 <= lo), line.partition_point(|x| x.0 < hi));
         let mut inner: Vec<u32> = line[i..j.max(i)].iter().map(|x| x.1).collect();
@@ -112,9 +114,13 @@ impl GridLines {
                         let size = cells[i].0.hi[d] - cells[i].0.lo[d];
                         break !between.is_empty() && (nodes[*facing].uv[d] - x).abs() <= FACING * size;
                     }
+                    // The other cell that has this side to the bit; none where the grid ends or changes its width.
                     let next = sides_at[&name(cell, far)].iter().find(|n| n.0 != cell);
                     let Some(&(next, t)) = next.filter(|_| inner[cell][far].is_empty()) else { break false };
+                    // A cell with hanging vertices of its own ends the way.
                     between.push((cell, far));
+                    // Long ways cut cells that had no need to be, and two that cross would meet in a cell with
+                    // both.
                     if between.len() >= MAX_BRIDGE || bridged.contains(&name(cell, far)) {
                         break false;
                     }

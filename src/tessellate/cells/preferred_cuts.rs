@@ -43,6 +43,7 @@ pub(in crate::tessellate) fn preferred_cuts(
         covered.push([run[0], run[run.len() - 1]]);
     }
     let length: f64 = covered.iter().map(|c| c[1] - c[0]).sum();
+    // Samples of the border that say little of the length are no guide: then the curvature is.
     if length < COVERED * (hi - lo) {
         cuts = even_cuts(surface, root, d);
     }
@@ -60,6 +61,7 @@ fn sample_runs(border: &BorderPolygons, root: Cell, d: usize) -> Vec<Vec<f64>> {
     for polygon in &border.polygons {
         let n = polygon.len();
         let is_level = |i: usize| {
+            // Sides at a pole have samples in parameters that are one point in space.
             let (a, b) = (polygon[i % n], polygon[(i + 1) % n]);
             a.side != BorderSide::Pole && (a.uv[other] - b.uv[other]).abs() <= flat
         };
@@ -74,6 +76,7 @@ fn sample_runs(border: &BorderPolygons, root: Cell, d: usize) -> Vec<Vec<f64>> {
                 run.push(polygon[(i + 1) % n].uv[d]);
             }
             if !is_level(i) || i + 1 == start + n {
+                // Two samples are a straight side, which asks for no cuts.
                 if run.len() > 2 {
                     run.sort_by(f64::total_cmp);
                     runs.push(std::mem::take(&mut run));
@@ -96,16 +99,20 @@ fn even_cuts(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
     let step = (root.hi[d] - root.lo[d]) / n as f64;
     let mut sum = vec![0.0];
     for i in 0..n {
+        // Chords up to each place, by the trapezoidal rule.
         sum.push(sum[i] + 0.5 * (density[i] + density[i + 1]) * step);
     }
     let total = sum[n];
+    // One chord will do.
     if !total.is_finite() || total <= 1.0 {
         return Vec::new();
     }
+    // A few more than asked for, so that no cell just fails.
     let count = (total * SPARE).ceil().min(MAX_CUTS) as usize;
     (1..count)
         .map(|k| {
             let goal = total * k as f64 / count as f64;
+            // Where the sum passes the goal, linearly between places.
             let i = sum.partition_point(|&s| s <= goal).clamp(1, n) - 1;
             root.lo[d] + step * (i as f64 + ((goal - sum[i]) / (sum[i + 1] - sum[i])).clamp(0.0, 1.0))
         })

@@ -101,6 +101,7 @@ pub(in crate::tessellate) fn split(
         .flat_map(|p| (0..p.len()).map(move |i| [p[i].uv, p[(i + 1) % p.len()].uv]))
         .collect();
     let (lo, hi) = border.bounds();
+    // On a plane the border alone makes the facets.
     if !(lo.x < hi.x && lo.y < hi.y) || surface.affine {
         return Subdivision::default();
     }
@@ -136,9 +137,12 @@ impl Tree<'_, '_> {
         }
         let candidate = CandidateFacet::new(self.surface, cell);
         let crease = self.crease(cell);
+        // A crease is cut along before anything is proved: no facet may lie across it.
         if crease.is_none()
             && let Some((bound, tolerance)) = self.fit(branch, cell, &candidate)
         {
+            // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
+            // one only told the size.
             if inside || self.is_aligned(cell, &near) && self.contains(cell.center()) {
                 let (first, places) = (candidate.first_corner(), candidate.places());
                 let slack = branch.slack;
@@ -152,6 +156,7 @@ impl Tree<'_, '_> {
             let d = candidate.cut_direction();
             (d, self.cut_parameter(cell, d))
         });
+        // Parameters have no more digits between the two.
         if !(at > cell.lo[direction] && at < cell.hi[direction]) {
             branch.cells.border.push(cell);
             return;
@@ -187,12 +192,14 @@ impl Tree<'_, '_> {
         let (lo, hi) = (cell.lo - grow, cell.hi + grow);
         let touching = |s: &u32| touches(self.segments[*s as usize], lo, hi);
         let near: Vec<u32> = visit.near.iter().copied().filter(touching).collect();
+        // Free of the border all of it is inside or outside, as its middle is.
         let clear = near.is_empty();
         (!clear || self.contains(cell.center())).then_some((near, clear))
     }
 
     /// Bound and tolerance of a cell that fits.
     fn fit(&self, branch: &mut Branch<'_, '_>, cell: Cell, candidate: &CandidateFacet) -> Option<(f64, f64)> {
+        // Nine samples first: they turn most cells away before any bound is made.
         let tolerance = self.sampled_fit(cell, candidate, branch.slack)?;
         let limit = tolerance * branch.slack;
         // A cell at the border is only a measure of size, but samples alone leave them larger: 6 % more facets on a lens.
@@ -203,6 +210,7 @@ impl Tree<'_, '_> {
 
     /// Whether the segments near a cell leave it whole: they run along its sides, or beyond and along them, and no
     /// corner stands between two samples.
+    // What the border's segments do not cross, and no sample of theirs divides, meets neighbours corner to corner.
     fn is_aligned(&self, cell: Cell, near: &[u32]) -> bool {
         near.iter().all(|&s| {
             // No cell's side may be divided that another solid's border runs along.
@@ -212,6 +220,7 @@ impl Tree<'_, '_> {
             let [a, b] = self.segments[s as usize];
             (0..2).any(|d| {
                 let (e, eps) = (1 - d, self.resolution);
+                // A pole is one point, whatever its parameters.
                 if (a[d] - b[d]).abs() > eps[d] || self.poles[s as usize] {
                     return false;
                 }
@@ -231,6 +240,7 @@ impl Tree<'_, '_> {
             let (lo, hi) = (cell.lo[d] + self.resolution[d], cell.hi[d] - self.resolution[d]);
             let (i, j) = (c.partition_point(|&x| x <= lo), c.partition_point(|&x| x < hi));
             (i < j).then(|| (d, c[(i + j) / 2]))
+            // The middle one of several, so that the halves are left with as many each.
         })
     }
 
@@ -240,6 +250,7 @@ impl Tree<'_, '_> {
         let l = &self.preferred[d];
         let slack = CUT_CLEARANCE * (hi - lo);
         let (i, j) = (l.partition_point(|&x| x <= lo + slack), l.partition_point(|&x| x < hi - slack));
+        // Preferred cuts near a side would leave slivers.
         if i < j { l[(i + j) / 2] } else { 0.5 * (lo + hi) }
     }
 
@@ -252,6 +263,7 @@ impl Tree<'_, '_> {
         if candidate.sag[0].max(candidate.sag[1]) > xi * slack {
             return None;
         }
+        // Once tolerances have grown, angles do not matter any more.
         if let Some(max) = self.max_angle.filter(|_| slack == 1.0) {
             let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.surface.normal(c)).collect();
             // Normals within the angle of one facet differ by twice as much at most.
@@ -265,6 +277,7 @@ impl Tree<'_, '_> {
 
     /// Whether a point lies inside the border: parity of crossings along u.
     fn contains(&self, p: Uv) -> bool {
+        // Half-open crossings, as in `crosses_ray_from`: a corner on the line counts once.
         self.segments[..self.border].iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
     }
 }
@@ -273,6 +286,7 @@ impl Tree<'_, '_> {
 fn pole_bound(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64> {
     let c = cell.corners();
     let polar = c.map(|x| prover.surface.pole(x).is_some());
+    // Two corners off the pole and two on it: the triangle between them is what is traced.
     let k = (0..4).find(|&k| !polar[k] && !polar[(k + 1) % 4] && polar[(k + 2) % 4] && polar[(k + 3) % 4])?;
     let uv = [0, 1, 2].map(|i| c[(k + i) % 4]);
     let xyz = uv.map(|x| prover.surface.point(x));

@@ -37,6 +37,7 @@ pub(super) fn contacts<'m>(
     let glue = settings.glue_mm;
     let faces = curved_faces(model, parts, glue);
     let mut pairs: Vec<[FaceKey; 2]> = Vec::new();
+    // Sorted along x: from the first box that begins behind this one on, none meets it.
     for (i, a) in faces.iter().enumerate() {
         for b in faces[i + 1..].iter().take_while(|b| b.bounds.min.x <= a.bounds.max.x) {
             let other_solid = a.key.instance != b.key.instance || a.shell != b.shell;
@@ -55,6 +56,7 @@ pub(super) fn contacts<'m>(
     };
     let mut trimmed: FxHashMap<FaceKey, TrimmedFace<'m>> = keys.par_iter().filter_map(trimmed).collect();
     let carried = |&[a, b]: &[FaceKey; 2]| {
+        // The face with the lower key is asked first, so that the carrier does not depend on chance.
         let (x, y) = (trimmed.get(&a)?, trimmed.get(&b)?);
         if x.carries(y, glue) {
             Some(Contact { carrier: a, guest: b })
@@ -63,6 +65,7 @@ pub(super) fn contacts<'m>(
         }
     };
     let all: Vec<Contact> = pairs.par_iter().filter_map(carried).collect();
+    // One role a face: a guest that carried another would hand on facets that are not its own.
     let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
     let mut guests: FxHashSet<FaceKey> = FxHashSet::default();
     let mut out = Vec::new();
@@ -73,6 +76,7 @@ pub(super) fn contacts<'m>(
         }
     }
     out.sort_unstable();
+    // Tighter than asked, so that the guest's own proof, over other parameters, has a share left.
     for c in &out {
         // Guests prove the carrier's facets over parameters of their own.
         if let Some(field) = trimmed.get(&c.guest).map(|guest| guest.surface.field)
@@ -94,10 +98,13 @@ fn curved_faces(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Vec<Box
         let faces = shells.flat_map(|(s, shell)| shell.faces.iter().map(move |face| (s, face)));
         for (k, (shell, face)) in faces.enumerate() {
             let plain = mesh.faces[k].as_ref().is_some_and(|m| m.repaired.is_none());
+            // Planes have one triangulation in space whatever their parameters; repaired faces have no facets that
+            // could be shared.
             if matches!(face.analytic, Analytic::Plane { .. }) || !plain {
                 continue;
             }
             let corners = face.surface.bounds().corners().map(|p| instance.placement.point(p));
+            // By half of the glue distance each, two boxes meet when the faces may.
             let bounds = Aabb::from_points(corners).grown(0.5 * glue);
             out.push(BoxedFace { key: FaceKey { instance: i, face: k }, shell, bounds });
         }

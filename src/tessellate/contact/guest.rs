@@ -57,6 +57,7 @@ impl<'f, 'm> Guest<'f, 'm> {
     fn middle(&self, part: &Part, uses: &[&EdgeUse], a: &PolygonVertex, b: &PolygonVertex) -> Point {
         match a.side {
             BorderSide::Edge { edge_use, t } => match uses[edge_use as usize].edge {
+                // Without an edge, or on a seam, the side follows the surface.
                 Some(edge) => part.edges[edge.0 as usize].curve.evaluate(0.5 * (t[0] + t[1])),
                 None => self.face.surface.point(0.5 * (a.uv + b.uv)),
             },
@@ -70,6 +71,7 @@ impl<'f, 'm> Guest<'f, 'm> {
         let local = |p: Point| carrier.frame.local_point(self.face.frame.point(p));
         for (i, j, a, b) in self.sides() {
             let places = [self.places[i], self.places[j]].map(local);
+            // What is one point in space has no line to imprint.
             if a.side == BorderSide::Pole || places[0] == places[1] {
                 continue;
             }
@@ -96,6 +98,7 @@ const ON_SEAM: f64 = 1e-6;
 fn beside(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     let surface = &face.surface;
     if let Some(across) = surface.pole(uv) {
+        // The nearest end: a projected place is only near the pole.
         // All along the pole is one place.
         let [a, b] = surface.spline.domain()[across];
         uv[across] = if uv[across] - a < b - uv[across] { a } else { b };
@@ -130,6 +133,7 @@ pub(super) fn facets(
     for &corners in &facets.facets {
         let Some(mut q) = builder.facet_inside(corners) else { continue };
         let triangle = q[2] == q[3];
+        // A facet of three corners may begin anywhere; the proof wants the pole last.
         if triangle {
             // A pole is the third corner.
             let polar = (0..3).find(|&k| surface.pole(builder.border.nodes[q[k]].uv).is_some());
@@ -149,6 +153,7 @@ pub(super) fn facets(
     };
     let sides = made.iter().flat_map(|(f, _)| (0..4).map(|k| key(f.nodes[k], f.nodes[(k + 1) % 4])));
     let sides: FxHashSet<[Position; 2]> = sides.collect();
+    // A side without a facet is a gap to the neighbour: the guest keeps facets of its own then.
     if made.is_empty() || border.segments.iter().any(|s| !sides.contains(&key(s[0], s[1]))) {
         return None;
     }
@@ -192,6 +197,7 @@ fn prove_cell(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4], li
     let moved = at.iter().zip(places).map(|(n, p)| (n.place - p).length()).fold(0.0, f64::max);
     // Lines and triangles through moved points move no farther.
     let Some(bound) = prover.quad_bound([lo, hi], &places, start % 2, limit) else { return f64::INFINITY };
+    // Four times: the diagonal and the sides of both triangles move by no more than a corner each.
     let mut worst = bound + 4.0 * moved;
     let xyz = [0, 1, 2].map(|k| nodes[k].place);
     for k in 0..4 {
@@ -225,6 +231,7 @@ struct Builder<'b, 'f, 'm, 'c> {
 }
 
 fn name(position: Position, uv: Uv) -> (Position, [u64; 2]) {
+    // Adding zero turns −0.0 into 0.0: as bits the two would be different names.
     (position, [(uv.x + 0.0).to_bits(), (uv.y + 0.0).to_bits()])
 }
 
@@ -262,6 +269,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         let count = if triangle { 3 } else { 4 };
         let middle = places[..count].iter().sum::<Point>() / count as f64;
         let (uv, away) = self.guest.face.projector.project(middle);
+        // Both the facet's own sag and the glue distance lie between its middle and the guest.
         // Beside the guest the nearest place is on its border, farther than the facet lies from its own surface.
         let frame = self.guest.face.frame;
         let (_, sag) = self.carrier.project(frame.point(middle));
@@ -272,6 +280,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         let [a, b, c] = [0, 1, 2].map(|k| self.node(corners[k], places[k], middle));
         let d = if triangle { c } else { self.node(corners[3], places[3], middle) };
         let normal = (places[1] - places[0]).cross(places[2] - places[0]);
+        // Two faces that touch look at each other: the carrier's facets are turned around for the guest.
         let turned = self.guest.face.surface.spline.normal(middle).is_some_and(|n| n.dot(normal) < 0.0);
         Some(match (turned, triangle) {
             (false, _) => [a, b, c, d],
@@ -287,6 +296,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
             let mut corners = self.guest.polygons.polygons.iter().flatten();
             if let Some(v) = corners.nth(vertex) {
                 let extent = face.surface.extent();
+                // A position on a seam or at a pole has several parameters; those nearest to the facet are its own.
                 let off = |uv: &Uv| ((*uv - middle) / extent).length_squared();
                 let all = &self.parameters[&v.position];
                 let uv = all.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(v.uv);

@@ -73,6 +73,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let (Some(carrier), Some(guest)) = (self.edge_samples(c.carrier), self.edge_samples(c.guest)) else {
                 continue;
             };
+            // Both ways: after this both edges have the samples of either.
             guest.cross_seams(carrier.face, glue, &mut further);
             carrier.take_over(&guest, glue, &mut further);
             guest.take_over(&carrier, glue, &mut further);
@@ -89,6 +90,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         let divide = |&i: &usize| {
             let part = self.model.part(self.model.instances[i].part);
             let before = self.mesh_of(i)?;
+            // Edges that nobody asks of keep their division.
             let none = vec![Vec::new(); part.edges.len()];
             let (divisions, shared) = edges::divide_more(part, &before.divisions, further.get(&i).unwrap_or(&none));
             let renumbering = Renumbering::new(part, (&before.divisions, before.shared.len()), &divisions);
@@ -115,6 +117,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
             Some((i, PartMesh { divisions, shared, faces: meshes }))
         };
+        // Instances, not parts: another instance of the same part may touch nothing.
         instances.par_iter().filter_map(divide).collect()
     }
 
@@ -164,6 +167,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         let made = mesh_with_imprint(&self.input(carrier, carrier_mesh), &imprint);
         let (mesh, facets) = match made {
             Ok((mut mesh, facets)) if facets.holds_imprint => {
+                // The facets were made tighter for the guests' sake; what was asked of this face is what they are
+                // measured by.
                 // What was asked, not what the guests are left a share of.
                 mesh.facets.iter_mut().for_each(|f| f.tolerance /= CARRIER_SHARE);
                 (Some(mesh), facets)
@@ -187,6 +192,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let imprinted = ImprintedPoints { points, near };
             polygons::build(face.part, &face.loops, &face.surface, &mesh.divisions, &imprinted)
         };
+        // First without: only the border's corners tell where its seams run.
         let polygons = build(&[]);
         let mut points = Vec::new();
         for p in &polygons.polygons {

@@ -33,6 +33,7 @@ impl<'s> Projector<'s> {
             let uv = Uv::new(u0 + (u1 - u0) * i as f64 / nu as f64, v0 + (v1 - v0) * j as f64 / nv as f64);
             (uv, spline.evaluate(uv))
         };
+        // What area a unit square of parameters would have if the surface ran evenly over its domain.
         let size = spline.bounds().diagonal() / Uv::new(u1 - u0, v1 - v0).max_element();
         let is_regular = |&(uv, _): &(Uv, Point)| {
             let d = spline.derivatives(uv);
@@ -52,6 +53,7 @@ impl<'s> Projector<'s> {
                 best.sort_by(|a, b| a.0.total_cmp(&b.0));
             }
         }
+        // The nearest seed may lie on a local minimum of its own, as beside a seam.
         let feet = best.map(|(_, start)| {
             let uv = sample::project(self.spline, p, start);
             (uv, (self.spline.evaluate(uv) - p).length())

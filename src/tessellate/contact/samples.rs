@@ -51,6 +51,7 @@ impl EdgeSamples<'_, '_> {
         for theirs in other.face.edges() {
             let places: Vec<Point> =
                 other.parameters(theirs, further).into_iter().map(|t| other.place(theirs, t)).collect();
+            // Every edge of either: two faces may touch along edges that are divided quite differently.
             for ours in self.face.edges() {
                 for &p in &places {
                     let (t, away) = self.face.nearest_on_edge(ours, p);
@@ -90,6 +91,7 @@ pub(super) fn crossing(
     let (from, to) = (share(lo), share(hi));
     // Across a seam the share of the period jumps by nearly one; a point on it may count on either side.
     let on_seam = |x: f64| x.min(1.0 - x) <= ON_SEAM;
+    // A jump of less than half a period is the curve's own way.
     if on_seam(from) || on_seam(to) || (from - to).abs() <= 0.5 {
         return None;
     }

@@ -111,6 +111,7 @@ impl<'m> TrimmedFace<'m> {
     pub(super) fn carries(&self, other: &Self, glue: f64) -> bool {
         let edges = self.edges();
         !other.samples.is_empty()
+            // Near the border, parameters may fall outside by rounding; distance in space decides there.
             && other.samples.iter().all(|&p| {
                 let (uv, away) = self.project(p);
                 away <= glue && (self.contains(uv) || self.is_at_border(&edges, p, glue))

@@ -53,20 +53,25 @@ impl BorderChord {
         let (a, b) = (t[0].min(t[1]), t[0].max(t[1]));
         // The file's own gap between edge and face, as measured at the ends and at places between; not where it is known to be small.
         let gap = |f: f64| {
+            // Only as good as these places: the gap is the file's own, and no formula for it is known.
             let at = a + (b - a) * f;
             (surface.point(surface.spline.clamp(side.uv.evaluate(at))) - curve.evaluate(at)).length()
         };
         let ends = [0, 1].map(|i| (surface.point(uv[i]) - xyz[i]).length());
         let known = surface.gap.filter(|&g| g <= NEGLIGIBLE * surface.field.tightest());
+        // Probing costs four evaluations a chord, and most files have a gap far below any tolerance: there the
+        // face's largest is taken.
         let offset = match known {
             Some(gap) => ends[0].max(ends[1]).max(gap),
             None => GAP_PROBES.map(gap).into_iter().fold(ends[0].max(ends[1]), f64::max),
         };
+        // Parameters in one place leave no curve, only its offset.
         if a >= b || a.is_nan() || b.is_nan() {
             return Self { deviation: offset, gap: offset, between: Vec::new(), sliver: None };
         }
         let deviation = curve_deviation(curve, [a, b], &xyz, SMALL_SHARE * surface.field.tightest() - offset);
         let mut chord = Self { deviation: deviation + offset, gap: offset, between: Vec::new(), sliver: None };
+        // On a plane the piece between curve and chord lies in the plane of the facet.
         if !surface.affine {
             chord.between = parameter_hull(surface, side, [a, b], uv);
         }
@@ -81,11 +86,15 @@ impl BorderChord {
         uv: [Uv; 2],
         xyz: [Point; 2],
     ) {
+        // Without a hull there is nothing between curve and chord.
         if self.between.len() < 3 {
             return;
         }
         let at = uv.map(|x| surface.point(x));
+        // The chord runs between the edge's own points, the surface through its: both ends may be off by the gap.
         let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + ROUNDING * surface.size;
+        // In the middle of the chord: facets on either side have tolerances of their own, and what does not fit
+        // theirs is bounded anew.
         let limit = surface.tolerance(0.5 * (uv[0] + uv[1]));
         self.sliver = deviation.sliver(surface, &self.between, uv, at, limit - off).map(|x| x + off);
     }
@@ -111,6 +120,7 @@ fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f
     let away =
         |points: &[Homogeneous]| points.iter().map(|p| distance_to_chord(p.project(), chord)).fold(0.0, f64::max);
     let n = curve.degree;
+    // A line is its own control polygon.
     if n == 1 {
         return away(&piece);
     }
@@ -130,6 +140,7 @@ fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f
     while let Some(depth) = depths.pop() {
         let start = piece.len() - n - 1;
         let off = away(&piece[start..]);
+        // A coarse hull that is no worse than the worst so far needs no finer one.
         if depth == MAX_HALVINGS || depth > 0 && off <= small || off <= worst {
             worst = worst.max(off);
             piece.truncate(start);
@@ -156,6 +167,7 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
     let extent = Uv::new(u1 - u0, v1 - v0);
     let [s0, s1] = side.uv.domain();
     let (a, b) = (a.clamp(s0, s1), b.clamp(s0, s1));
+    // Reparametrised uv curves may end a digit before the edge does.
     if a >= b || a.is_nan() || b.is_nan() {
         return Vec::new();
     }
@@ -165,10 +177,12 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
         if d.length() > 0.0 { x.perp_dot(d).abs() / d.length() } else { x.length() }
     };
     let line = side.uv.degree == 1 && side.uv.points.len() == 2;
+    // The straight line of its own chord encloses nothing: most edges along parameter lines are of this kind.
     if line && [a, b].iter().all(|&t| off(surface.spline.clamp(side.uv.evaluate(t))) < STRAIGHT) {
         return Vec::new();
     }
     let m = 0.5 * (a + b);
+    // Two halves hull a curve four times as closely as one, and a line as well as one.
     let pieces = if side.uv.degree == 1 { vec![[a, b]] } else { vec![[a, m], [m, b]] };
     let mut points: Vec<Uv> = pieces
         .iter()
@@ -179,6 +193,7 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
     if points.iter().all(|&p| off(p) < STRAIGHT) {
         return Vec::new();
     }
+    // With the chord's own ends, which the clamped curve may miss by a digit.
     points.extend(chord);
     convex_hull(points)
 }

@@ -66,6 +66,7 @@ impl CubicReduction {
 /// Appends the line's Hermite cubic, or the line itself where its degree is no higher; adds the difference of positions and weights.
 fn reduce_line(line: &[Homogeneous], out: &mut Vec<Homogeneous>, off: &mut [f64; 2]) {
     let n = line.len() - 1;
+    // Already a cubic or less: it is exact as it is.
     if n <= REDUCED_DEGREE {
         out.extend_from_slice(line);
         return;
@@ -74,6 +75,7 @@ fn reduce_line(line: &[Homogeneous], out: &mut Vec<Homogeneous>, off: &mut [f64;
     let c = [line[0], line[0] + (line[1] - line[0]) * third, line[n] - (line[n] - line[n - 1]) * third, line[n]];
     out.extend_from_slice(&c);
     // Raised again: coefficient k is the sum of C(3, i) C(n − 3, k − i) / C(n, k) cᵢ, a hypergeometric distribution.
+    // The first and last two coefficients agree by construction: Hermite's conditions are those.
     let (nf, mut worst) = (n as f64, [0f64; 2]);
     let all = nf * (nf - 1.0) * (nf - 2.0);
     for (k, &x) in line.iter().enumerate().take(n - 1).skip(2) {

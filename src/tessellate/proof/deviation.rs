@@ -27,7 +27,7 @@ pub(in crate::tessellate) struct DeviationBounds {
     net: Vec<Homogeneous>,
     deviation: Vec<Point>,
     line: Vec<Homogeneous>,
-    /// SimplexNets that wait for halving, one after another.
+    /// Nets that wait for halving, one after another.
     stack: Vec<Point>,
     /// What `net` holds: which patch (by address), over which rectangle, seen from where.
     cached: Option<(usize, Uv, Uv, Point)>,
@@ -55,6 +55,7 @@ impl DeviationBounds {
             }
             self.restrict(patch, local(patch, a), local(patch, b), at[0]);
             let [w_min, w_max] = self.weight_range();
+            // The lightest weight anywhere bounds the division for all patches.
             lightest = lightest.min(w_min);
             let [p, q] = patch.degree;
             let second = if are_equal([w_min, w_max]) {
@@ -71,6 +72,8 @@ impl DeviationBounds {
                 self.subtract_raising_degree([p, q], linear.corner_values(from, share));
                 second_derivative_bounds(&self.deviation, [p + 1, q + 1])
             };
+            // From the parameters of the patch's part to those of the whole rectangle, in which the parts are
+            // compared.
             let scale = [share.x * share.x, share.x * share.y, share.y * share.y];
             most = std::array::from_fn(|k| most[k].max(second[k] / scale[k]));
         }
@@ -118,12 +121,14 @@ impl DeviationBounds {
         for patch in patches {
             let [a, b] = linear.overlap(patch);
             let [from, share] = linear.as_shares([a, b]);
+            // Its rectangle may meet the patch where the region does not.
             if !linear.meets_region(from, share) {
                 continue;
             }
             self.restrict(patch, local(patch, a), local(patch, b), origin);
             let weights = self.weight_range();
             let mut degree = patch.degree;
+            // Equal weights leave A − W·L of the patch's own degree, a smaller net.
             if are_equal(weights) {
                 self.subtract_keeping_degree(degree, linear.corner_values(from, share));
             } else {
@@ -159,12 +164,15 @@ impl DeviationBounds {
             let start = self.stack.len() - size;
             let net = &self.stack[start..];
             let worst = linear.bound(net, lightest);
+            // Parts beside the region bound nothing that is asked for.
             if worst <= limit || !linear.meets_region(from, share) {
                 most = if worst <= limit { most.max(worst) } else { most };
                 self.stack.truncate(start);
                 continue;
             }
+            // The budget of the whole facet, not of a part: one hard corner may use it all.
             *halvings = halvings.checked_sub(1)?;
+            // Across the direction in which the net bends more, halving brings the hull closer.
             let [along_u, _, along_v] = second_derivative_bounds(net, [p, q]);
             let d = if along_u >= along_v { 0 } else { 1 };
             self.stack.extend_from_within(start..);
@@ -201,6 +209,7 @@ impl DeviationBounds {
         self.cached = name;
         self.seconds = None;
         self.net.clear();
+        // Seen from the facet, so that its size and not its place decides what is rounded.
         self.net.extend(patch.points.iter().map(|c| (c.truncate() - origin * c.w).extend(c.w)));
         for row in self.net.chunks_exact_mut(q + 1) {
             restrict_line(row, lo.y, hi.y);

@@ -21,6 +21,8 @@ pub(in crate::tessellate) fn prove_triangle(
     let uv = n.map(|x| x.uv);
     let xyz = n.map(|x| x.place);
     let tolerance = if surface.affine {
+        // A flat face has one tolerance. On others it varies from place to place: the tightest of four places is
+        // asked for.
         surface.field.loosest()
     } else {
         uv.iter().fold(surface.tolerance((uv[0] + uv[1] + uv[2]) / 3.0), |x, &p| x.min(surface.tolerance(p)))
@@ -28,6 +30,8 @@ pub(in crate::tessellate) fn prove_triangle(
     let proved = |bound: f64| ProvedFacet { nodes: t, bound, tolerance };
     let limit = tolerance * slack;
     let sides = [0, 1, 2].map(|k| chords.get(&edge_key(t[k], t[(k + 1) % 3])));
+    // Poles first: what stands for a facet there is no parameter triangle, so that what follows would be about
+    // another piece.
     if let Some(bound) = pole::sector_bound(prover, uv, xyz, sides, limit) {
         return proved(bound);
     }
@@ -38,6 +42,7 @@ pub(in crate::tessellate) fn prove_triangle(
     // and must be divided.
     let collapsed = (0..3).any(|k| n[k].position == n[(k + 1) % 3].position);
     let mut worst = 0f64;
+    // The border's own deviation, which no smaller facet beside it can mend.
     for chord in sides.iter().flatten() {
         worst = worst.max(chord.bound(prover, xyz, limit));
         if worst > limit {
@@ -45,6 +50,7 @@ pub(in crate::tessellate) fn prove_triangle(
         }
     }
     // Inside and sides by one quick look, else each by its own hull.
+    // With two corners in one place the linear map has no inverse, and the quick look none to give.
     if !collapsed && let Some(bound) = prover.facet_bound(uv, xyz, false, limit) {
         return proved(worst.max(bound));
     }

@@ -57,6 +57,8 @@ impl FlatQuad {
         });
         let at = |k: usize| c[(k + first) % 4];
         let cosines = [[0, 1, 2], [0, 2, 3]].map(|[i, j, k]| {
+            // The traced triangles are steeper than the quad where corners stand above it: distances across it are
+            // longer by the inverse.
             let n = (at(j) - at(i)).cross(at(k) - at(i));
             n.dot(normal) / n.length()
         });
@@ -67,6 +69,7 @@ impl FlatQuad {
     /// Distance of a point.
     fn distance(&self, p: Point) -> f64 {
         let c = &self.corners;
+        // Over the inside the distance is that of the plane; beside it, that of the nearest side.
         if (0..4).all(|k| self.inward[k].dot(p - c[k]) >= 0.0) {
             return (p - c[0]).dot(self.normal).abs();
         }
@@ -86,10 +89,12 @@ impl Prover<'_, '_> {
     ) -> Option<f64> {
         let surface = self.surface;
         let (a, b) = (surface.range(0, lo.x, hi.x), surface.range(1, lo.y, hi.y));
+        // A plane has nothing to gain, and samples prove nothing.
         if surface.affine || self.acceptance == Acceptance::Sampled {
             return None;
         }
         let bent = surface.curving.linear_deviation(a, b, hi - lo).map(|x| x + self.margin);
+        // Where second derivatives settle it no net is made.
         if let Some(bound) = bent.filter(|&x| x <= limit) {
             return Some(bound);
         }
@@ -99,6 +104,7 @@ impl Prover<'_, '_> {
         let origin = corners[first];
         let c = corners.map(|x| x - origin);
         let quad = FlatQuad::new(&c, first)?;
+        // What is left of the limit once heights and slopes have taken theirs.
         let sides = limit * quad.cosine - self.margin;
         let flat = sides - quad.height;
         if flat <= 0.0 {
@@ -122,6 +128,7 @@ impl Prover<'_, '_> {
                     (i == a[1], last, 1, q, [1, 2]),
                     (j == b[1], q, q + 1, p, [3, 2]),
                     (i == a[0], 0, 1, q, [0, 3]),
+                    // Inner rows are no boundary: each patch gives those of its rows that lie on the cell's sides.
                 ];
                 for (outer, start, step, n, ends) in rows {
                     if outer {
@@ -133,6 +140,8 @@ impl Prover<'_, '_> {
                 }
             }
         }
+        // By the two parts of the argument above: the surface to the quad and its height, or a side's curve to its
+        // chord, over the cosine.
         Some(((away + quad.height).max(aside) + self.margin) / quad.cosine)
     }
 }

@@ -1,4 +1,4 @@
-//! FlatTriangle shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
+//! Flat shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
 
 use crate::math::{Point, Uv, Vector};
 use smallvec::SmallVec;
@@ -20,6 +20,7 @@ pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygo
                 if inside(p) {
                     next.push(p);
                 }
+                // A segment does not come back from its last point to its first.
                 if !closed && i + 1 == n {
                     break;
                 }
@@ -46,6 +47,7 @@ pub(in crate::tessellate) fn is_rectangle(polygon: &[Uv], [[u0, u1], [v0, v1]]: 
 /// last bit, and the line through them can lie anywhere.
 pub(in crate::tessellate) fn distance_to_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (b - a, p - a);
+    // Ends in one place: the distance to that place.
     let l = d.length_squared();
     let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
     (x - d * t).length()
@@ -63,6 +65,7 @@ impl FlatTriangle {
         let [a, b, c] = *corners;
         let n = (b - a).cross(c - a);
         let frame =
+            // Of three corners in a line no plane is meant, and the distance to its sides is all there is.
             (n.length_squared() > 0.0).then(|| (n / n.length(), [n.cross(b - a), n.cross(c - b), n.cross(a - c)]));
         Self { corners: *corners, frame }
     }

@@ -43,6 +43,7 @@ impl LinearMap {
         let x = corners.map(|c| (c - lo) / (hi - lo));
         let (d1, d2) = (x[1] - x[0], x[2] - x[0]);
         let det = d1.perp_dot(d2);
+        // A thin triangle makes L run far outside of it, where the surface does not follow.
         if det.abs() < THINNEST || det.is_nan() {
             return None;
         }
@@ -71,6 +72,7 @@ impl LinearMap {
         let along = at[1] - at[0];
         let der = surface.second_derivatives(0.5 * (chord[0] + chord[1]));
         let across = der.dv * (d.x * size.y) - der.du * (d.y * size.x);
+        // In L's plane lie the chord and the way that the surface goes beside it, so that D is what bending leaves.
         let normal = along.cross(across).try_normalize()?;
         let (ls, lt) =
             ((along * d.x - across * d.y) / d.length_squared(), (along * d.y + across * d.x) / d.length_squared());
@@ -79,6 +81,7 @@ impl LinearMap {
         let off = |x: &Uv| distance_to_chord(l00 + ls * x.x + lt * x.y, &[Point::ZERO, along]);
         let reach = region.iter().map(off).fold(0.0, f64::max);
         let measure = Measure::Sliver { normal, reach };
+        // A chord of no length has no such map.
         reach.is_finite().then_some(Self { lo, hi, region, values: [l00, ls, lt], sign: 1.0, measure })
     }
 
@@ -125,6 +128,8 @@ impl LinearMap {
                     up = up.max(h.abs());
                     flat = flat.max((*x - normal * h).length_squared());
                 }
+                // The point's height over L's plane, and how far beside the chord it is in that plane, L's own part
+                // included.
                 (up / lightest).hypot(reach + flat.sqrt() / lightest)
             }
         }

@@ -11,7 +11,7 @@
 //! between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole (or the
 //! poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P each
 //! boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its place onto
-//! its chord, and the side along the pole onto the one point that it is, which it cells by no more than the size of the pole. A border that
+//! its chord, and the side along the pole onto the one point that it is, which it leaves by no more than the size of the pole. A border that
 //! runs aslant into the pole ends the piece in place of the parameter line: its chord's deviation and the hull around what lies between chord and
 //! curve are in its own bound, and its foot is the pole's corner itself. Corners stay where they are while curves shrink, the file's gap between
 //! corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners lie in one direction from
@@ -37,6 +37,7 @@ fn pole_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)
     let mut found = None;
     for (k, &x) in uv.iter().enumerate() {
         if let Some(across) = surface.pole(x)
+            // A second corner at the pole: no sector, but a triangle that has come to nothing.
             && found.replace((k, across)).is_some()
         {
             return None;
@@ -47,6 +48,7 @@ fn pole_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)
 
 /// Whether two corners at poles, at which this parameter is constant, are not at the same one.
 fn at_opposite_poles(surface: &FaceSurface<'_>, a: Uv, b: Uv, across: usize) -> bool {
+    // Poles lie at the ends of the domain: half of it apart is the other one.
     (a[across] - b[across]).abs() > 0.5 * surface.extent()[across]
 }
 
@@ -163,8 +165,10 @@ fn quadrilateral<const N: usize>(
     for (trim, uv, ends) in lines {
         worst = worst.max(match trim {
             Some(trim) => trim.bound(prover, xyz, limit),
+            // Each line is measured from its own edge, or from the trim that stands in its place.
             None => prover.side_bound(uv, ends, limit),
         });
+        // A line above the limit decides already, and is cheaper than the inside.
         if worst > limit {
             return worst;
         }
@@ -194,6 +198,7 @@ pub(in crate::tessellate) fn collapsed_bound(
     // The side from `k` to `a` is the one that starts at `k`; that from `b` to `k` starts at `b`.
     let aslant = [(a, sides[k]), (b, sides[b])].into_iter().any(|(j, side)| {
         let off = (uv[j][1 - across] - uv[k][1 - across]).abs();
+        // The two ends of the side are one point in space, up to the size of the pole.
         side.is_some() && off > ASLANT * extent
     });
     (!aslant).then_some(surface.pole_size)

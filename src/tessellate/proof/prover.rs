@@ -23,7 +23,7 @@ use super::flat_triangle::{FlatTriangle, clip, distance_to_chord, is_rectangle};
 use super::refine::{LEVELS, refine};
 use super::scalar_bezier::ScalarBezier;
 use super::scalar_patch::ScalarPatch;
-use super::simplex_net::{MAX_HALVED, RightAngle, SimplexNets};
+use super::simplex_net::{MAX_HALVED, SimplexNets, right_angle};
 use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
 use crate::tessellate::face_surface::{FaceSurface, local};
@@ -74,11 +74,13 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// Stops refining as soon as the answer is at most `limit`, or clearly is not: above `limit` the value says only that nothing nearer was
     /// shown, and may be a sample. With [`Acceptance::Sampled`] it is an estimate where the surface is not affine.
     pub(in crate::tessellate) fn triangle_bound(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
+        // A flat piece is as far off as its corners are, the distance being convex.
         if self.surface.affine {
             let off = [0, 1, 2].map(|i| FlatTriangle::new(&xyz).distance(self.surface.point(uv[i])));
             return off[0].max(off[1]).max(off[2]) + self.margin;
         }
         let flat = FlatTriangle::new(&xyz);
+        // Samples are no proof, and a proof by second derivatives costs less than they do.
         if self.acceptance == Acceptance::Proved
             && let Some(quick) = self.taylor_bound(&uv, limit, |p| flat.distance(p))
         {
@@ -113,6 +115,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             let patch = this.surface.patch(a, b);
             let mut worst = 0f64;
             // Over a whole patch its own net is the hull, without any cutting.
+            // Of the triangle's own hull it is the coarsest; where it does, all others are spared.
             if is_rectangle(polygon, patch.domain) {
                 let hull = patch.points.iter().map(|p| flat.distance(p.project())).fold(0.0, f64::max);
                 if hull <= limit {
@@ -132,6 +135,7 @@ impl<'s, 'a> Prover<'s, 'a> {
 
     /// Bound of the distance from the surface over a convex parameter polygon to a triangle in space.
     pub(in crate::tessellate) fn polygon_bound(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
+        // As for a triangle: one look at the whole polygon before it is cut into triangles.
         let flat = FlatTriangle::new(&xyz);
         let bounded = !self.surface.affine && self.acceptance == Acceptance::Proved;
         if bounded && let Some(quick) = self.taylor_bound(uv, limit, |p| flat.distance(p)) {
@@ -167,18 +171,23 @@ impl<'s, 'a> Prover<'s, 'a> {
         if self.surface.affine || self.acceptance == Acceptance::Sampled {
             return None;
         }
+        // Where corners are the border's points they may be off the surface, and the difference is added in the
+        // end.
         let at = if exact { xyz } else { uv.map(|x| self.surface.point(x)) };
         let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
         let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
         let fits = |x: &f64| x + off <= limit;
         let quick = self.surface.curving.linear_deviation(a, b, hi - lo).filter(fits);
+        // From cheap to dear: second derivatives of whole regions, of the patches under the facet, samples, and
+        // nets at last.
         if let Some(bound) = quick {
             return Some(bound + off);
         }
         let surface = self.surface;
         let count = (a[1] - a[0] + 1) * (b[1] - b[0] + 1);
         let patches = || (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| surface.patch(i, j)));
+        // Taylor's theorem needs continuous first derivatives from patch to patch; on one patch there is no seam.
         if count == 1 || count <= MAX_PATCHES_TAYLOR && surface.curving.is_smooth(a, b) {
             let taylor = self.deviation.taylor(patches(), uv, at).filter(fits);
             if let Some(bound) = taylor {
@@ -191,6 +200,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         if probed > limit {
             return Some(probed);
         }
+        // Of several patches the deviation's hull is taken, which needs no smoothness between them.
         if count > 1 {
             let hull =
                 if count <= MAX_PATCHES_HULL { self.deviation.hull(patches(), uv, at, limit - off) } else { None };
@@ -213,6 +223,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         // Half of a rectangle, as most facets are, has coefficients with fixed weights; any other triangle is expanded.
         let (net, xyz) = match right_angle(&at).filter(|_| low) {
             Some((r, corner)) => {
+                // Turned so that the right angle comes second, as the table has it.
                 let turned = [0, 1, 2].map(|k| xyz[(k + r) % 3]);
                 if small.is_some() {
                     (self.nets.half_of_rectangle(&patch.points, patch.degree, corner), turned)
@@ -261,6 +272,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             return self.margin;
         }
         if self.acceptance == Acceptance::Sampled {
+            // Sixteen chords of the curve, as the estimate of a mode that does not prove.
             let at = |k: i32| distance_to_chord(self.surface.point(uv[0].lerp(uv[1], k as f64 / 16.0)), &xyz);
             return (1..16).map(at).fold(0.0, f64::max);
         }
@@ -286,6 +298,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         levels: u32,
         f: &impl Fn(Point) -> f64,
     ) -> f64 {
+        // A patch of high degree first as a cubic: the net of degree p + q costs its fourth power.
         if let Some((x, off)) = self.reduced(patch, &at, limit) {
             let bound =
                 off + refine((&mut self.nets, &mut self.scalar), &self.reduction.patch, x, limit - off, levels, f);
@@ -302,6 +315,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     fn taylor_bound(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
+        // The limit is asked for before the corners are evaluated, which costs more.
         let bound = self.surface.curving.linear_deviation(a, b, hi - lo).filter(|&x| x <= limit)?;
         let off = uv.iter().map(|&x| away(self.surface.point(x))).fold(0.0, f64::max);
         Some(bound + off + self.margin).filter(|&x| x <= limit)
@@ -315,6 +329,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             a..=b
         };
         let (ra, rb) = (range(0, lo.x, hi.x), range(1, lo.y, hi.y));
+        // More rectangles than this are a face of noise; nothing is shown of it, and it counts as not proved.
         // More patches than are worth a look: not proved.
         if ra.clone().count() * rb.clone().count() > MAX_PIECES {
             return f64::INFINITY;
@@ -327,6 +342,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             for b in rb.clone() {
                 let rectangle = self.surface.patch(a, b).domain;
                 let polygon = clip(uv, rectangle);
+                // A polygon that only touches the rectangle, at a side or corner, is its neighbour's.
                 if polygon.len() >= 2.max(uv.len().min(3)) {
                     worst = worst.max(each(self, a, b, &polygon));
                 }
@@ -348,21 +364,6 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         worst
     }
-}
-
-/// Whether a triangle is half of the rectangle around it: the corner before its right angle, and which half it is.
-fn right_angle(at: &[Uv; 3]) -> Option<(usize, RightAngle)> {
-    (0..3).find_map(|r| {
-        let [a, b, c] = [0, 1, 2].map(|k| at[(k + r) % 3]);
-        let d = if a.y == b.y && b.x == c.x {
-            0
-        } else if a.x == b.x && b.y == c.y {
-            1
-        } else {
-            return None;
-        };
-        Some((r, RightAngle { direction: d, upper: [a[d] > b[d], b[1 - d] > c[1 - d]] }))
-    })
 }
 
 /// Where in `[lo, hi]` a parameter lies, as a share.

@@ -58,6 +58,7 @@ pub(super) fn refine<const N: usize>(
         return bound;
     }
     let mut worst = 0f64;
+    // One part above the limit decides for all: the others are not looked at.
     let mut take = |sub: [Uv; N]| {
         worst = worst.max(refine((nets, scalar), patch, sub, limit, levels - 1, f));
         worst > limit

@@ -16,7 +16,7 @@ pub(in crate::tessellate) struct ScalarBezier {
     degree: usize,
     /// Distance and weight of each control point, in the order of `simplex_net.rs`.
     control: Vec<(f64, f64)>,
-    /// SimplexNets that wait for halving, one after another.
+    /// Nets that wait for halving, one after another.
     stack: Vec<f64>,
     line: Vec<f64>,
 }
@@ -53,12 +53,13 @@ impl ScalarBezier {
         let n = self.degree;
         let heaviest = self.control.iter().fold(0.0, |a: f64, x| a.max(x.1));
         self.stack.clear();
+        // The sign of these answers the question without a division, and halving keeps them as polynomials.
         // Coefficients of W·(d − limit): a piece is within the limit where none is positive.
         let e = |x: usize| self.control[x].1 * (self.control[x].0 - limit);
         if N == 2 {
             self.stack.extend((0..=n).map(e));
         } else {
-            // GridLines along the side from the first corner to the last, which is halved first.
+            // Lines along the side from the first corner to the last, which is halved first.
             for j in 0..=n {
                 self.stack.extend((0..=n - j).map(|k| (j + k) * (j + k + 1) / 2 + k).map(e));
             }
@@ -84,6 +85,7 @@ impl ScalarBezier {
             } else {
                 self.halve_triangle(start, n)
             }
+            // Depth first: as many nets wait as there are levels, not as there are parts.
             depths.extend([depth - 1, depth - 1]);
         }
         // From W·(d − limit) ≤ most ≤ 0 follows d ≤ limit + most/W, and W is at most its largest coefficient.

@@ -5,7 +5,7 @@ use super::refine::halve_net;
 /// Buffers reused from cell to cell.
 #[derive(Default)]
 pub(in crate::tessellate) struct ScalarPatch {
-    /// SimplexNets of W·(d − limit) that wait for halving, one after another.
+    /// Nets of W·(d − limit) that wait for halving, one after another.
     stack: Vec<f64>,
 }
 
@@ -39,6 +39,7 @@ impl ScalarPatch {
             if [0, q, p * (q + 1), size - 1].iter().any(|&k| net[k] > 0.0) {
                 return None;
             }
+            // Of the whole cell's budget: a patch that needs more than its share takes it from the others.
             *left = left.checked_sub(1)?;
             // Halving helps most across the direction in which the coefficients bend most.
             let bend = |i: usize, step: usize| (net[i + 2 * step] - 2.0 * net[i + step] + net[i]).abs();

@@ -16,9 +16,9 @@ use std::sync::OnceLock;
 /// Buffers reused from piece to piece.
 #[derive(Default)]
 pub(in crate::tessellate) struct SimplexNets {
-    /// SimplexNets of one step and of the next, one after another.
+    /// Nets of one step and of the next, one after another.
     work: [Vec<Homogeneous>; 2],
-    /// What the first direction cells.
+    /// What the first direction leaves.
     columns: Vec<Homogeneous>,
     out: Vec<Homogeneous>,
     /// One over the multinomials of a degree, for segments or triangles.
@@ -46,6 +46,21 @@ pub(in crate::tessellate) struct RightAngle {
     pub(in crate::tessellate) direction: usize,
     /// Whether A in that direction, and B in the other, lie at the rectangle's upper end.
     pub(in crate::tessellate) upper: [bool; 2],
+}
+
+/// Whether a triangle is half of the rectangle around it: the corner before its right angle, and which half it is.
+pub(super) fn right_angle(at: &[Uv; 3]) -> Option<(usize, RightAngle)> {
+    (0..3).find_map(|r| {
+        let [a, b, c] = [0, 1, 2].map(|k| at[(k + r) % 3]);
+        let d = if a.y == b.y && b.x == c.x {
+            0
+        } else if a.x == b.x && b.y == c.y {
+            1
+        } else {
+            return None;
+        };
+        Some((r, RightAngle { direction: d, upper: [a[d] > b[d], b[1 - d] > c[1 - d]] }))
+    })
 }
 
 /// Coefficients of degree `d` over a simplex with `corners` corners.
@@ -77,6 +92,7 @@ impl SimplexNets {
         corners: [Uv; N],
     ) -> &[Homogeneous] {
         let degree = patch.degree[0] + patch.degree[1];
+        // Multinomials are the same for all pieces of a degree, and faces have few degrees.
         if self.shares_for != (N, degree) {
             self.shares_for = (N, degree);
             multinomials::<N>(degree, &mut self.shares);
@@ -124,6 +140,7 @@ impl SimplexNets {
         }
         let (one, all) = (size(N, p), size(N, p + q));
         let most = ((p + 1) * one).max((q + 1) * all);
+        // Buffers only grow, so that no piece allocates once the largest has come.
         for work in &mut self.work {
             if work.len() < most {
                 work.resize(most, Homogeneous::ZERO);
@@ -144,6 +161,7 @@ impl SimplexNets {
         }
         let last = de_casteljau::<N>(&mut self.work, q, p, v, all);
         self.out.clear();
+        // Back from plain powers to Bernstein coefficients.
         self.out.extend(self.work[last][..all].iter().zip(&self.shares).map(|(&c, &s)| c * s));
     }
 }
@@ -187,6 +205,7 @@ fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f6
         out[d + 1] = carry;
         return;
     }
+    // Row m gets terms of row m and of row m − 1 of the degree before: they are added up as they come.
     out[0] = Homogeneous::ZERO;
     let mut row = 0;
     for m in 0..=d {
@@ -208,6 +227,7 @@ impl Half {
     /// With s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is
     /// multiplied out.
     fn new([p, q]: [usize; 2]) -> Self {
+        // Divided by the multinomials here once, and not for each net.
         let mut shares = Vec::new();
         multinomials::<3>(p + q, &mut shares);
         let mut of: Vec<Vec<([isize; 2], f64)>> = vec![Vec::new(); shares.len()];

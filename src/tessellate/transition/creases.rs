@@ -29,6 +29,7 @@ pub(in crate::tessellate) fn crease_lines(
                 used.iter().copied().filter(|&n| surface.on_creases(uv(n))[d] == Some(crease)).collect();
             on.sort_by(|&a, &b| uv(a)[1 - d].total_cmp(&uv(b)[1 - d]));
             on.dedup_by(|b, a| uv(*a) == uv(*b));
+            // Neighbours along the crease; a line between others would run through the nodes between.
             let pairs = on.windows(2).map(|w| [w[0], w[1]]);
             out.extend(
                 pairs.filter(|&[a, b]| !known.contains(&edge_key(a, b)) && is_inside(0.5 * (uv(a) + uv(b)))),

@@ -62,6 +62,7 @@ impl Transition {
         if at_border.is_empty() {
             return Vec::new();
         }
+        // By edge of the file, whose gap is the same whichever of its chords fails.
         let mut gaps: FxHashMap<EdgeId, f64> = FxHashMap::default();
         for (side, edge) in followed {
             if let Some(chord) = chords.get(side) {
@@ -70,6 +71,7 @@ impl Transition {
             }
         }
         let gap = |side: &[u32; 2]| followed.get(side).and_then(|e| gaps.get(e)).copied().unwrap_or(f64::INFINITY);
+        // A gap near the tolerance cannot be mended by shorter chords, which follow the edge and not the surface.
         at_border.into_iter().filter(|(side, xi)| gap(side) < WIDEST_GAP * xi).map(|(side, _)| side).collect()
     }
 }
@@ -115,6 +117,7 @@ struct Limits {
 impl Limits {
     fn new(corners: usize, budget: usize) -> Self {
         let budget = budget.max(corners);
+        // Six times the corners and some for small faces: that is what transitions which end well take.
         Self { usual: (corners * 6 + 4000).min(budget), budget }
     }
 
@@ -140,14 +143,18 @@ pub(in crate::tessellate) fn triangulate(
         border: FxHashMap::default(),
         handles: Vec::new(),
     };
+    // All points first: constraints between points that come later would have to be split.
     mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_all(&segments);
     // Crossed twice, a line bounds nothing.
+    // Twice, so that what the flood fill counts is even.
     let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) && mesh.constrain(a, b));
     for &[a, b] in &creases {
         mesh.keep_crease(a, b);
     }
+    // Where constraints are missing, the flood fill would leak through the gap.
     let by_centre = if conflicts.is_empty() { None } else { Some(segments.as_slice()) };
+    // By corners in order, however a triangle is turned.
     let mut known: FxHashMap<[u32; 3], ProvedFacet<3>> = FxHashMap::default();
     let limits = Limits::new(mesh.cdt.num_vertices(), budget);
     let mut unproved_before = 0;
@@ -176,6 +183,7 @@ pub(in crate::tessellate) fn triangulate(
             let worst = failing.iter().map(excess).fold(0.0, f64::max);
             failing.retain(|f| excess(f) >= WORST * worst);
         }
+        // Also when the work of all rounds is used up: what then does not hold is counted as not proved.
         let ended = failing.is_empty()
             || round == MAX_ROUNDS
             || (round + 1) * triangles.len() > MAX_WORK
@@ -207,6 +215,8 @@ pub(super) struct Refinement<'s, 'a> {
 
 impl Refinement<'_, '_> {
     fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
+        // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it
+        // crosses.
         let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
         segments.iter().chain(imprinted).flatten().for_each(|&n| used[n as usize] = true);
         for (n, used) in (0..).zip(used) {
@@ -220,6 +230,7 @@ impl Refinement<'_, '_> {
         let at = self.scaled(self.nodes[n].uv)?;
         let before = self.cdt.num_vertices();
         let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
+        // Two nodes in one place of the parameter plane, as where a trim touches itself.
         if self.cdt.num_vertices() == before {
             // The place was taken: its first owner keeps it.
             let first = self.handles.iter().position(|&h| h == Some(handle)).map_or(n, |first| first as u32);
@@ -229,6 +240,7 @@ impl Refinement<'_, '_> {
     }
 
     fn scaled(&self, uv: Uv) -> Option<Point2<f64>> {
+        // Spade refuses numbers so small that its exact predicates underflow.
         let clean = |x: f64| if x.abs() < COORDINATES[0] { 0.0 } else { x };
         let p = uv * self.scale;
         (p.is_finite() && p.abs().max_element() < COORDINATES[1]).then(|| Point2::new(clean(p.x), clean(p.y)))
@@ -267,12 +279,14 @@ impl Refinement<'_, '_> {
 
     fn constrain(&mut self, a: u32, b: u32) -> bool {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
+        // Both nodes stand in one place; a constraint of no length holds as it is.
         if from == to {
             return true;
         }
         let made = self.cdt.try_add_constraint(from, to);
         for edge in &made {
             let e = self.cdt.directed_edge(*edge);
+            // The library may lead it over vertices on the way: each part counts.
             *self.border.entry(edge_key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
         }
         !made.is_empty()
@@ -314,6 +328,7 @@ impl Refinement<'_, '_> {
 
     /// For each face of the triangulation whether it lies inside.
     fn sides_of_border(&self) -> Vec<Option<bool>> {
+        // From outside inward; each crossing of the border turns the state.
         let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];
         let mut queue = std::collections::VecDeque::from([self.cdt.outer_face().fix()]);
         state[self.cdt.outer_face().index()] = Some(false);

@@ -57,6 +57,7 @@ struct Matching<'c> {
 
 /// The pairs after all such exchanges; pairs that take in a triangle without area stay.
 pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usize]) -> Vec<usize> {
+    // Triangles that swallow one without area cannot give it up for another.
     let mut matching = Matching {
         candidates,
         of: CandidatesOf::new(candidates, triangles, |c| c.cosine.is_some()),
@@ -95,9 +96,12 @@ impl Matching<'_> {
     /// Searches a path to another triangle without a mate; the last triangle but one, and the candidate that leads from it to the end.
     fn path_from(&mut self, start: usize) -> Option<(usize, usize)> {
         let mut queue = VecDeque::from([(start, 0)]);
+        // Itself as a mark, for each start searches once.
         self.reached[start] = Some(start);
         while let Some((t, depth)) = queue.pop_front() {
             let open: Vec<usize> = self.of.of(t).collect();
+            // Along a free candidate first, back along the chosen pair then: such a path has one free pair more
+            // than chosen ones.
             for c in open {
                 let a = self.other(c, t);
                 // Marked by the start, so that nothing has to be cleared between searches.

@@ -42,6 +42,7 @@ pub(in crate::tessellate) fn pair_triangles(
     let node = |n: u32| nodes[n];
     let collapsed: Vec<bool> = t.iter().map(|t| is_collapsed(t.nodes.map(node))).collect();
     let candidates = candidates(transition, fixed, &collapsed, prover.surface);
+    // First without: what pairs a triangle may lose again in `augment`.
     let mut taken = vec![false; t.len()];
     let mut facets = Vec::new();
     let chosen = choose_pairs(&candidates, &mut taken);
@@ -56,6 +57,7 @@ pub(in crate::tessellate) fn pair_triangles(
             facets.push(TransitionFacet { facet: ProvedFacet { nodes: corners, bound, tolerance }, pole });
             continue;
         }
+        // One with area takes in the one without; both have two corners in one place otherwise.
         let (full, empty) = if collapsed[i] { (t[j].nodes, t[i].nodes) } else { (t[i].nodes, t[j].nodes) };
         // The collapsed triangle's piece of the surface is not empty: the facet must cover it too.
         let (uv, xyz) = (empty.map(|n| node(n).uv), full.map(|n| node(n).place));
@@ -86,6 +88,7 @@ fn candidates(
     for (i, tri) in t.iter().enumerate() {
         for k in 0..3 {
             let (c, a) = (tri.nodes[k], tri.nodes[(k + 1) % 3]);
+            // A side is met twice, once from either triangle: the second time makes the candidate.
             let name = edge_key(a, c);
             if fixed.contains(&name) || runs_along_crease(surface, node(a).uv, node(c).uv) {
                 continue;
@@ -107,6 +110,7 @@ fn candidates(
             }
         }
     }
+    // By number among equals, so that the same mesh comes of the same file.
     out.sort_by(|x, y| x.rank().total_cmp(&y.rank()).then(x.triangles.cmp(&y.triangles)));
     out
 }
@@ -153,6 +157,7 @@ fn join_sectors(
     let mut joined = vec![false; facets.len()];
     // Sectors all around a pole follow each other for ever.
     let mut seen = vec![false; facets.len()];
+    // Two by two from the head on, so that rows of even length leave none over.
     for head in heads {
         let mut at = Some(head);
         while let Some(i) = at {
@@ -224,6 +229,7 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
         let [i, j] = candidate.triangles;
         if candidate.rank() < GOOD && !taken[i] && !taken[j] {
             (taken[i], taken[j]) = (true, true);
+            // Good quads first in any case: to save a lonely triangle is not worth a bad one there.
             chosen.push(c);
         }
     }
@@ -250,6 +256,7 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
         let pair = candidates[c].triangles;
         pair.iter().for_each(|&t| taken[t] = true);
         chosen.push(c);
+        // Neighbours of a pair just made may have lost all mates but one.
         for c in pair.iter().flat_map(|&t| of.of(t)) {
             lonely.extend(candidates[c].triangles.into_iter().filter(|&x| !taken[x]));
         }
@@ -275,6 +282,7 @@ fn pole_triangle(
         let k = t.iter().position(|&f| f != n && position(f) == position(n) && !t.contains(&n))?;
         Some((k, n))
     });
+    // Without the other node of the pole there is no middle to see it from, and a sector is proved as it is.
     let Some((k, n)) = twin.filter(|_| !pole::is_sector(prover.surface, t.map(|n| nodes[n].uv))) else {
         return single_triangle(nodes, prover.surface, full);
     };

@@ -43,6 +43,7 @@ impl Refinement<'_, '_> {
         let n = t.map(|i| self.nodes[i]);
         let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
         let normals = n.map(|x| self.surface.spline.normal(x.uv));
+        // Either side of the triangle may be meant: which way it is turned is decided later.
         let steep = normals.iter().flatten().any(|x| flat.angle_between(*x).min((-flat).angle_between(*x)) > most);
         let turn = |k: usize| match (normals[k], normals[(k + 1) % 3]) {
             (Some(a), Some(b)) => a.angle_between(b),
@@ -60,6 +61,7 @@ impl Refinement<'_, '_> {
 
     /// Puts a point on the worst free edge of each failing triangle; `false` when nothing can be done.
     pub(super) fn refine(&mut self, failing: &[ProvedFacet<3>], chords: &BorderChords) -> bool {
+        // Sides are shared by two triangles, which both may ask: one point a side and round is enough.
         let mut divided: FxHashSet<[u32; 2]> = FxHashSet::default();
         let wishes: Vec<Wish> = failing
             .iter()
@@ -121,6 +123,7 @@ impl Refinement<'_, '_> {
         let worst = free.map(|k| (k, sag(k))).max_by(|a, b| a.1.total_cmp(&b.1));
         let uv = t.map(|n| self.nodes[n].uv);
         let center = (uv[0] + uv[1] + uv[2]) / 3.0;
+        // Little sag on all sides means that the inside is to blame.
         match worst {
             Some((k, sag)) if sag > SAGGING * f.tolerance => divided
                 .insert(edge_key(t[k], end(k)))
