@@ -63,6 +63,7 @@ impl Abg {
         let (s, c) = (2.0 * PI * u[1]).sin_cos();
         let (a, b) = crate::math::orthonormal_pair(n);
         let beta = specular - n * specular.dot(n) + (a * c + b * s) * r;
+        // A step out of the unit disk belongs to no direction: that light stays specular.
         let up2 = 1.0 - beta.length_squared();
         (up2 > 0.0).then(|| (beta + n * up2.sqrt()).normalize())
     }
@@ -88,11 +89,13 @@ impl Abg {
             return None;
         }
         if self.radii.is_empty() {
+            // With g = 2 the share within r is πA·ln(1 + r²/B), which has an inverse.
             return Some((self.b * (share / (PI * self.a)).exp_m1()).sqrt());
         }
         let i = self.shares.partition_point(|&s| s <= share).max(1) - 1;
         let (low, high) = (self.radii[i], self.radii[(i + 1).min(RINGS)]);
         let missing = |r: f64| (self.shares[i] + self.ring(low, r) - share, self.weight(r));
+        // Without a change of sign in the ring the share lies on its border, but for rounding.
         crate::math::safe_newton(missing, low, high, RADIUS_TOLERANCE).or(Some(low))
     }
 

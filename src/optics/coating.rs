@@ -68,6 +68,7 @@ impl Coating {
         require("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
         let sum = reflectance + transmittance;
         require("reflectance plus transmittance", sum, sum <= 1.0 + SUM_ROUNDING, "at most 1")?;
+        // Shares written as decimals may be a rounding above the whole, and light must not become more.
         Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
     }
 
@@ -79,6 +80,7 @@ impl Coating {
         let split = match self {
             Self::Bare => {
                 let reflected = fresnel::dielectric(cos_i, eta);
+                // What bare glass does not reflect it lets through, in each polarisation by itself.
                 let transmitted = Power { rs: 1.0 - reflected.rs, rp: 1.0 - reflected.rp };
                 return Split { reflected, transmitted };
             }

@@ -69,6 +69,7 @@ impl Index {
         match self {
             Self::Constant(n) => *n,
             Self::Sellmeier(terms) => terms.iter().fold(1.0, |n2, [b, c]| n2 + b * l2 / (l2 - c)).sqrt(),
+            // By Horner's rule from the last term, in powers of 1/λ².
             Self::Cauchy(terms) => terms.iter().rev().fold(0.0, |n, a| n / l2 + a),
             Self::Schott([a0, a1, rest @ ..]) => {
                 (a0 + a1 * l2 + rest.iter().rev().fold(0.0, |n, a| (n + a) / l2)).sqrt()
@@ -165,6 +166,7 @@ impl Absorption {
         require("a thickness", thickness_mm, thickness_mm > 0.0, "positive")?;
         let rows = points.into_iter().map(|(nm, t)| {
             require("an internal transmittance", t, t > 0.0 && t <= 1.0, "above 0 and at most 1")?;
+            // The law of Beer and Lambert, solved for its coefficient.
             Ok((nm, -t.ln() / thickness_mm))
         });
         Self::table(rows.collect::<Result<Vec<_>, Error>>()?)

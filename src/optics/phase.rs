@@ -51,6 +51,7 @@ impl BulkScatter {
         let cos = if g.abs() < ISOTROPIC {
             // The limit of the formula below, which would divide by zero; its next term is of order g.
             2.0 * u[0] - 1.0 + 1.5 * g * (1.0 - (2.0 * u[0] - 1.0).powi(2))
+        // The cumulative distribution of the cosine has this closed inverse.
         } else {
             let q = (1.0 - g * g) / (1.0 - g + 2.0 * g * u[0]);
             (1.0 + g * g - q * q) / (2.0 * g)

@@ -158,6 +158,8 @@ pub fn metal(cos_i: f64, outside: f64, n: f64, k: f64) -> Mueller {
 fn amplitudes(cos_i: f64, eta: f64) -> [Complex; 2] {
     let cos_t = match cos_transmitted(cos_i, eta) {
         Some(c) => Complex::real(c),
+        // Total reflection: the cosine beyond is imaginary, and positive, so that the field decays away from the
+        // surface.
         None => Complex { re: 0.0, im: (eta * eta * (1.0 - cos_i) * (1.0 + cos_i) - 1.0).max(0.0).sqrt() },
     };
     let (c, e) = (Complex::real(cos_i), Complex::real(eta));
@@ -217,6 +219,7 @@ impl Div for Complex {
     type Output = Self;
     fn div(self, o: Self) -> Self {
         let (n, d) = (self * o.conjugate(), o.square());
+        // 0/0 comes up at grazing incidence alone, where all light is reflected.
         if d > 0.0 { Self { re: n.re / d, im: n.im / d } } else { Self::real(1.0) }
     }
 }

@@ -48,6 +48,7 @@ const fn inverse_factorials(first: u32) -> [f64; 8] {
 /// A uniform point of the unit disk; neighbouring pairs stay neighbours.
 pub fn disk([u, v]: [f64; 2]) -> Uv {
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    // The centre has no azimuth, and the formula below would divide by zero.
     if x == 0.0 && y == 0.0 {
         return Uv::ZERO;
     }
@@ -80,6 +81,8 @@ pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
 
 /// A direction with density `(m + 1)/2π · cosᵐ θ` per steradian about `axis`.
 pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
+    // The inverse of the cumulative 1 − cosᵐ⁺¹; 1 − u is never zero, so that no direction grazes by the number
+    // drawn.
     let cos = (1.0 - u).powf(1.0 / (exponent + 1.0));
     direction_about(axis, cos, ((1.0 - cos) * (1.0 + cos)).sqrt(), v)
 }

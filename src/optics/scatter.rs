@@ -84,6 +84,7 @@ impl Lobe {
         match self {
             Self::Lambertian => Some(lambertian(n, u)),
             Self::Gaussian { sigma } => {
+                // The inverse of the flat Gaussian's cumulative, cut where an angle of π ends it.
                 let angle = sigma * (-2.0 * (-u[0] * share_below_pi(*sigma)).ln_1p()).sqrt();
                 Some(fold_to_side(direction_about(specular, angle.cos(), angle.sin(), u[1]), n))
             }
@@ -98,6 +99,7 @@ impl Lobe {
         if cos <= 0.0 {
             return 0.0;
         }
+        // A direction is reached by itself, and from its mirror image by folding.
         let both = |lobe: &dyn Fn(f64) -> f64| lobe(specular.dot(out)) + lobe(specular.dot(mirror_image(out, n)));
         match self {
             Self::Lambertian => cos / PI,

@@ -120,6 +120,7 @@ fn planck(nm: f64, kelvin: f64) -> f64 {
 
 /// A peak of area 1 with a full width at half height.
 fn gaussian(x: f64, width: f64) -> f64 {
+    // The full width at half height is √(8 ln 2) deviations.
     let sigma = width / (8.0 * 2f64.ln()).sqrt();
     (-x * x / (2.0 * sigma * sigma)).exp() / (sigma * (2.0 * std::f64::consts::PI).sqrt())
 }
@@ -157,6 +158,7 @@ impl Wavelengths {
         require("the first wavelength", points[0][0], points[0][0] > 0.0, "positive, in nm")?;
         let mut sums = vec![0.0];
         for p in points.windows(2) {
+            // Linear between its points, so that trapezia are exact.
             sums.push(sums[sums.len() - 1] + 0.5 * (p[1][0] - p[0][0]) * (p[0][1] + p[1][1]));
         }
         Self::with_power(Kind::Continuous(points), sums)
