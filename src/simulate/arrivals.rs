@@ -24,6 +24,8 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             let [a, b] = [&pair[0], &pair[1]];
             // Vertices may coincide, as where a path splits.
             let Some(direction) = (b.point - a.point).try_normalize() else { continue };
+            // The filters of the receiver itself: bounces that it counts, and, where it ends light, segments that
+            // end on it.
             if receiver.interactions.is_some_and(|n| n != b.bounce)
                 || receiver.absorbs && b.event != Event::Received
             {
@@ -31,6 +33,7 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             }
             let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
             let mut after = 0.0;
+            // A sphere may be crossed twice by one segment.
             while let Some(t) = receiver.crossing(&ray, after, end) {
                 rays.push(LightRay {
                     origin: ray.point_at(t),

@@ -41,6 +41,7 @@ impl Scene {
                 there.len() >= model.parts.len() && there.iter().zip(&model.parts).all(like)
             };
             let first = alike.filter(known).unwrap_or(whole.parts.len() as u32);
+            // Parts that are there already are not added again: their instances refer to the first.
             if first as usize == whole.parts.len() {
                 whole.parts.append(&mut model.parts);
             }

@@ -13,6 +13,7 @@ impl Fnv {
     pub(crate) fn hash(pieces: &[&[u8]]) -> u128 {
         let mut h = Self(Self::START);
         for piece in pieces {
+            // With its length, so that two pieces cannot be divided otherwise and hash alike.
             h.absorb(&(piece.len() as u64).to_le_bytes());
             h.absorb(piece);
         }
@@ -27,6 +28,7 @@ impl Fnv {
 
     fn sums(&mut self, sums: &[Sum]) {
         self.absorb(&(sums.len() as u64).to_le_bytes());
+        // Empty cells are most, and are told by the indices of the others.
         for (i, s) in sums.iter().enumerate().filter(|(_, s)| **s != Sum::default()) {
             self.absorb(&(i as u64).to_le_bytes());
             self.absorb(&s.total.to_le_bytes());
@@ -35,7 +37,8 @@ impl Fnv {
     }
 }
 
-/// The hash of all sums and counts, as 32 hexadecimal digits.
+/// The hash of all sums, and of the counts of rays, segments, corrected normals, losses and cuts, as 32 hexadecimal digits. What instances
+/// absorbed is a sum of faces, and needs no place in it.
 pub(crate) fn digest(t: &Tallies) -> String {
     let mut h = Fnv(Fnv::START);
     t.cells.iter().for_each(|c| h.sums(c));

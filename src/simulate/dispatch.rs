@@ -15,6 +15,8 @@ pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
 pub(crate) fn kernel_kind(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
     let required = Required::new(bound).kernel;
     match settings.kernel {
+        // The pruned kernel is enough; a larger one must give the same bits, which is what the other choices are
+        // for.
         KernelChoice::Pruned => required,
         KernelChoice::With(effects) => required.max(KernelKind::for_effects(effects)),
         KernelChoice::Full => KernelKind::Full,
@@ -30,6 +32,8 @@ pub(super) fn trace(
 ) -> Cost {
     use payload::{Clear, Coloured, EndsOnly, Full, Mirror, Nested, Opaque};
     match kind {
+        // The smaller kernels have a variant that asks nothing on the way: the plain scenes that they serve gain
+        // most by it.
         KernelKind::Mirror if context.asks_ends_only() => kernel::trace::<EndsOnly<Mirror>>(context, rays, tally),
         KernelKind::Mirror => kernel::trace::<Mirror>(context, rays, tally),
         KernelKind::Opaque if context.asks_ends_only() => kernel::trace::<EndsOnly<Opaque>>(context, rays, tally),

@@ -34,13 +34,13 @@ pub(crate) enum KernelKind {
     Mirror,
     /// Power alone, at faces of any kind.
     Opaque,
-    /// And the body it is in.
+    /// Power and the one body that the ray is in.
     Clear,
-    /// And a stack of bodies.
+    /// Power and a stack of bodies.
     Nested,
-    /// And a wavelength.
+    /// Power, a stack of bodies and a wavelength.
     Coloured,
-    /// And a state of polarisation.
+    /// All of these and a state of polarisation.
     Full,
 }
 
@@ -97,6 +97,7 @@ fn required(bound: &BoundScene) -> Required {
     let mirrors = used(&|s| matches!(s, Surface::Mirror(_)));
     let lets_in = |f: &&FaceOptics| f.body != AMBIENT && !bound.surfaces[f.surface as usize].is_opaque();
     let interfaces = bound.faces.iter().filter(lets_in).count();
+    // A bare face counts where it bounds a medium: without one it is not there for light.
     let bare = used(&|s| matches!(s, Surface::Interface)).min(interfaces) + coated(&|c| c.coating == Coating::Bare);
     let metals = coated(&|c| matches!(c.coating, Coating::Metal { .. }));
     let in_medium =
@@ -150,6 +151,7 @@ fn required(bound: &BoundScene) -> Required {
         }
     }
     let nested = bound.nested || bound.emitters.iter().any(|e| e.inside.len() > 1);
+    // Without media only the faces decide; nested bodies need a stack, whatever the effects.
     let media = match (bound.has_media(), nested) {
         (false, _) if coated(&|_| true) == 0 => KernelKind::Mirror,
         (false, _) => KernelKind::Opaque,

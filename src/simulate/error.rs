@@ -85,6 +85,7 @@ impl Error {
         let (text, span) = (self.text.as_deref()?, self.span.as_ref()?);
         let before = text.get(..span.start)?;
         let line = before.matches('\n').count() + 1;
+        // Columns in characters, as editors count them.
         Some((line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1))
     }
 

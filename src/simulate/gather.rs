@@ -30,6 +30,8 @@ impl<'a> Gathering<'a> {
     }
 
     fn lock(&self) -> MutexGuard<'_, (PartialRun, Cost)> {
+        // A thread that panicked while it held the lock has left whole sums or none: they are added under it in one
+        // go.
         self.total.lock().unwrap_or_else(|e| e.into_inner())
     }
 
@@ -47,6 +49,7 @@ impl<'a> Gathering<'a> {
     /// All of it.
     pub(super) fn into_partial_run(self) -> (PartialRun, Cost) {
         let (mut partial, cost) = self.total.into_inner().unwrap_or_else(|e| e.into_inner());
+        // Only here: paths come from all threads as they end, and are kept in order of their rays.
         partial.tallies.sort_paths();
         partial.seconds = self.spent + self.start.elapsed().as_secs_f64();
         (partial, cost)
@@ -83,6 +86,7 @@ impl<'a, 'g> ThreadSums<'a, 'g> {
                     self.partial = Some(PartialRun::empty(self.bound, self.replicates));
                 }
             }
+            // Large sums are kept once for all, and each replicate is added under the lock.
             None => self.all.add(|total| total.take(replicate, tally, self.bound), cost),
         }
     }

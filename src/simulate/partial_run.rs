@@ -36,6 +36,7 @@ impl PartialRun {
     }
 
     pub(crate) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, bound: &BoundScene) {
+        // In order, so that looking for a replicate is a search by halves.
         let place = self.done.binary_search(&replicate).unwrap_or_else(|place| place);
         self.done.insert(place, replicate);
         self.tallies.take(tally, bound);
@@ -51,6 +52,7 @@ impl PartialRun {
     /// # Errors
     /// When both have a replicate in common, or are parts of different runs.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+        // Parts of a run that grows may come from different totals; what they must share is that it grows.
         let same_run = self.grows == other.grows && (self.grows || self.replicates == other.replicates);
         if !same_run || !same_shape(&self.tallies, &other.tallies) {
             return Err("it is part of another run".into());
@@ -140,6 +142,7 @@ impl PartialRun {
         if r.u32()? as usize != t.cells.len() {
             return Err("it has other receivers than the scene".into());
         }
+        // Empty cells are not in the file: the sums of the scene are filled where it has something.
         for cells in &mut t.cells {
             r.sums(cells)?;
         }
@@ -200,6 +203,8 @@ impl Fingerprint {
 }
 
 fn same_shape(a: &Tallies, b: &Tallies) -> bool {
+    // The number of cells of each receiver tells scenes apart; that it is the same scene is told by the header's
+    // fingerprint.
     let cells = a.cells.len() == b.cells.len() && a.cells.iter().zip(&b.cells).all(|(a, b)| a.len() == b.len());
     cells
         && a.receivers.len() == b.receivers.len()

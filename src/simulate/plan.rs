@@ -77,6 +77,8 @@ impl Plan {
         let replicates = if grows {
             settings.rays.div_ceil(GROWING_REPLICATE) as u32
         } else {
+            // At least two, for an error; at most as many as leave each some rays; and enough for the words that
+            // count quanta.
             let replicates = settings.replicates.clamp(2, (divided / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
             replicates.max((divided >> MOST_RAYS_LOG2) as u32)
         };
@@ -178,6 +180,7 @@ impl Plan {
     /// The source and the replicate of a ray; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
         let holds = |source: usize, replicate: u32| {
+            // Ranges of sources and replicates follow each other, so that a ray's number tells both.
             let [from, to] = self.range(source, replicate);
             (from..to).contains(&ray)
         };
@@ -214,6 +217,7 @@ fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
     for e in &bound.emitters {
         share += e.power / emitted;
         let upto = (rays as f64 * share).round() as u64;
+        // A source has one ray at least, or its light would be missing altogether.
         counts.push(e.rays.unwrap_or(upto.saturating_sub(given)).max(1));
         given = upto;
     }

@@ -182,6 +182,7 @@ impl Receiver {
             Shape::Plane { frame, .. } => {
                 let apart = |box_corners: [Point; 8]| {
                     let sides = box_corners.map(|c| (c - frame.origin).dot(frame.z));
+                    // All corners on one side of the plane: the box lies before it or behind.
                     sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0)
                 };
                 !(self.bounds().intersection(*region).is_empty() || apart(region.corners()))
@@ -207,6 +208,7 @@ impl Receiver {
                     return None;
                 }
                 let t = (frame.origin - ray.origin).dot(frame.z) / along;
+                // Refuses NaN too, as of a ray without direction.
                 if !(t > after && t < before) {
                     return None;
                 }
@@ -271,6 +273,7 @@ impl Receiver {
     }
 
     fn counted(&self, at: [f64; 2], radius2: f64) -> Spot {
+        // The upper border belongs to the last cell.
         let index = |x: f64, n: u32| ((0.5 * (x + 1.0) * f64::from(n)) as u32).min(n - 1) as usize;
         let cell = index(at[1], self.cells[1]) * self.cells[0] as usize + index(at[0], self.cells[0]);
         Spot { cell, at, radius2 }

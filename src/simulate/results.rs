@@ -223,6 +223,8 @@ impl Results {
         };
         let Counts { rays, segments, corrected_normals, lost, cut_off, caught, .. } = tallies.counts;
         let bodies = bound.overlap_note(&tallies.counts).into_iter();
+        // In this order notes are read: what the scene says of itself, what the run found, what the errors are
+        // worth.
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
@@ -282,6 +284,8 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
         error: s.error(tallies.replicates) * quantum,
     };
     let faces = bound.instances.iter().zip(&tallies.instances).map(|(name, s)| result(name, "faces", s));
+    // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the
+    // other.
     let bulk = bound.bodies.iter().zip(&tallies.bulk).map(|(b, s)| result(&b.name, &b.medium, s));
     faces.chain(bulk).filter(|a| a.power > 0.0).collect()
 }
@@ -336,6 +340,7 @@ impl ReceiverResult {
         let total = &tallies.receivers[i];
         let means = tallies.moments[i].means(total.total);
         let of_means = tallies.spreads[i].errors(total, &tallies.moments[i], tallies.replicates);
+        // Distances are counted in units of the longer half side, in which a circle stays one.
         let largest = half[0].max(half[1]);
         Self {
             name: r.name.clone(),

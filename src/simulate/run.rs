@@ -68,6 +68,7 @@ pub fn trace(
         kind: kernel_kind(bound, settings),
         hooks,
         start,
+        // Of a shard, its share of the rays: progress is told of what this run traces.
         total: context.plan.rays * u64::from(shard.end.saturating_sub(shard.start))
             / u64::from(context.plan.replicates),
         next: AtomicUsize::new(0),
@@ -77,6 +78,7 @@ pub fn trace(
     };
     let gathering = Gathering::new(before, hooks, start);
     std::thread::scope(|scope| {
+        // No more threads than replicates, and this one is among them.
         for _ in 1..threads.min(work.todo.len()) {
             scope.spawn(|| work.run(&gathering));
         }
@@ -141,6 +143,7 @@ impl Work<'_, '_> {
 
 /// Tells the intersector which rays a run is going to ask.
 fn announce(context: &Context<'_>, threads: usize) {
+    // A shard traces its share alone, and what is worked out beforehand must pay for that.
     let of_shard = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
     let beam = |(k, e): (usize, &Emitter)| Some((e.beam()?, of_shard(context.plan.rays_of_source(k))));
     let beams: Vec<_> = context.bound.emitters.iter().enumerate().filter_map(beam).collect();
@@ -162,6 +165,7 @@ fn thread_count(settings: &RunSettings) -> usize {
 /// Traces some rays of a run once more, by their number, and records their whole paths; `paths` and `ledger` of the results
 /// are theirs.
 pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings, rays: &[u64]) -> Results {
+    // A ray that is traced alone would leave the rest of a wave idle.
     let start = Instant::now();
     // Of each ray alone a wave has one place.
     let single = RunSettings { batch: 1, ..settings.clone() };

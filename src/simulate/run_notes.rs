@@ -14,6 +14,7 @@ impl BoundScene {
     pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
         let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
         let times = counts.overlaps;
+        // Rare meetings are the rounding of edges, and not worth alarming anybody.
         (times > counts.segments / OVERLAP_SEGMENTS).then(|| {
             format!(
                 "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {times} times by light; there it is \

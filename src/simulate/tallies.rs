@@ -56,6 +56,7 @@ impl ReplicateTally {
 
     /// Empties it without adding it to any sums: after a trace whose counts are not wanted.
     pub(crate) fn discard(&mut self) {
+        // Grids know their touched cells: clearing costs what was counted, not what there is.
         self.receivers.iter_mut().chain([&mut self.absorbed, &mut self.bulk]).for_each(Grid::clear);
         self.receiver_totals.fill(0);
         self.moments.fill(Moments::default());
@@ -111,6 +112,7 @@ impl ReplicateTally {
         self.ends.lost += lost.quanta;
         self.counts.lost += 1;
         self.ledger.push(lost);
+        // Cut at twice what is kept, so that sorting happens seldom however many rays are lost.
         if self.ledger.len() >= 2 * LEDGER {
             trim_ledger(&mut self.ledger);
         }
@@ -172,6 +174,8 @@ impl Tallies {
     /// Takes in what a whole replicate gathered, once it is [finished](ReplicateTally::finish), and empties it.
     pub(crate) fn take(&mut self, replicate: &mut ReplicateTally, bound: &BoundScene) {
         self.replicates += 1;
+        // One replicate is one sample of each figure: squares are added once a replicate, or the errors would be
+        // those of something else.
         for (i, receiver) in bound.receivers.iter().enumerate() {
             let mut channels = vec![0; self.channels[i].len()];
             if !channels.is_empty() {
@@ -187,6 +191,7 @@ impl Tallies {
             self.moments[i].merge(&moments);
         }
         let mut instances = vec![0; self.instances.len()];
+        // Faces of an instance are added up first, since their errors are not independent.
         replicate.absorbed.touched().for_each(|(face, quanta)| {
             instances[bound.instance_of_face[face] as usize] += quanta;
         });

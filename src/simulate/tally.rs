@@ -24,6 +24,7 @@ const SHIFT: f64 = 6_755_399_441_055_744.0;
 /// path that is received.
 #[inline(always)]
 pub(crate) fn round_quanta(x: f64) -> f64 {
+    // Adding and taking away 1.5·2⁵² leaves the whole number, rounded to even.
     if x.abs() < 2_251_799_813_685_248.0 { (x + SHIFT) - SHIFT } else { x.round() }
 }
 
@@ -60,6 +61,7 @@ impl Sum {
     /// Adds what one whole replicate gathered.
     pub fn add_replicate(&mut self, quanta: u64) {
         self.total += u128::from(quanta);
+        // Saturating: of a replicate that overflows the error is wrong, not the run.
         self.squares = self.squares.saturating_add(u128::from(quanta >> CUT).pow(2));
     }
 
@@ -74,6 +76,8 @@ impl Sum {
         let k = f64::from(replicates.max(2));
         let squares = self.squares as f64 * f64::from(1u32 << (2 * CUT));
         let total = self.total as f64;
+        // The spread of replicates about their mean, and from it the error of the sum of all: k/(k − 1) for the
+        // mean that was taken from the same numbers.
         ((squares - total * total / k).max(0.0) * k / (k - 1.0)).sqrt()
     }
 }
@@ -103,6 +107,7 @@ impl Grid {
         let quanta = quanta_as_integer(quanta);
         let c = &mut self.cells[cell];
         self.touched[self.count] = cell as u32;
+        // The place is written in any case and kept by the count, so that no branch has to be foretold.
         self.count += usize::from((*c == 0) & (quanta > 0));
         *c += quanta;
     }
@@ -258,6 +263,8 @@ impl MomentSpread {
         std::array::from_fn(|i| {
             let mean = moments[i] as f64 / GRAIN / total;
             let [with_power, with_self] = self.products[i].map(|x| x as f64 * unit[1]);
+            // First order in the fluctuations of a ratio (the delta method): the moment less the mean times the
+            // power.
             let spread = with_self * unit[1] - 2.0 * mean * with_power * unit[0] + mean * mean * squares;
             (spread.max(0.0) * k / (k - 1.0)).sqrt() / total
         })

@@ -27,6 +27,7 @@ pub(crate) fn is_inside(loops: &[Vec<Uv>], p: Uv) -> bool {
     let crossings = loops
         .iter()
         .flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])))
+        // Even–odd along u, half open in v, so that a corner counts once.
         .filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x))
         .count();
     loops.is_empty() || crossings % 2 == 1

@@ -32,6 +32,7 @@ pub fn verify_pruning(
     settings: &RunSettings,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> (Results, Verification) {
+    // Prepared first, so that both runs find the intersector in the same state and their times compare.
     prepare(bound, intersector, settings);
     let with = |kernel| simulate(bound, intersector, &RunSettings { kernel, ..settings.clone() }, progress);
     let (pruned, full) = (with(KernelChoice::Pruned), with(KernelChoice::Full));
@@ -56,6 +57,7 @@ fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     );
     for (r, (x, y)) in bound.receivers.iter().zip(a.cells.iter().zip(&b.cells)) {
         let cells = (0..x.len()).filter(|&i| x[i] != y[i]);
+        // A few of each kind: one fault mostly shows in many cells.
         found.extend(cells.take(5).map(|i| format!("receiver '{}', cell {i}", r.name)));
     }
     let faces = (0..a.faces.len()).filter(|&i| a.faces[i] != b.faces[i]);

@@ -30,11 +30,13 @@ pub(super) fn find_bodies(
     let mut places: HashMap<(usize, &str), usize> = HashMap::new();
     let mut of_face = vec![AMBIENT; chosen.len()];
     for (f, &(_, rule)) in model.placed_faces().zip(chosen) {
+        // Faces without a medium belong to the surroundings.
         let Some((rule, name)) = rule.and_then(|r| Some((r, scene.materials[r].medium.as_deref()?))) else {
             continue;
         };
         let body = match places.get(&(f.instance, name)) {
             Some(&body) => body,
+            // Looked up once a body, not once a face.
             None => {
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
                 let instance = model.label(f.instance);
@@ -52,6 +54,7 @@ pub(super) fn find_bodies(
         bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
         of_face[f.id.index()] = body as u16;
     }
+    // The highest number stands for nothing else, but leaves the type no room.
     if bodies.len() > usize::from(u16::MAX) {
         let message = format!("{} bodies with media; at most 65534 are possible", bodies.len());
         return Err(scene.error(ErrorKind::Model, &[Key::Name("material")], message));
@@ -70,6 +73,7 @@ pub(super) fn find_bodies(
 /// body to light, and as long as the box around them all.
 pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
     // Union–find with halved paths (Tarjan & van Leeuwen 1984); the lowest number stands for its group.
+    // Union–find, since touching goes on from body to body.
     let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
     fn first(united: &mut [u16], mut body: u16) -> u16 {
         while united[body as usize] != body {

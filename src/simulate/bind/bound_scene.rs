@@ -75,6 +75,8 @@ impl BoundScene {
 
     /// Whether any face lets light into a medium.
     pub(crate) fn has_media(&self) -> bool {
+        // Any of these needs a medium on the ray: faces that let light in, sources inside of bodies, surroundings
+        // that do something to light.
         let lets_in = |f: &FaceOptics| f.body != AMBIENT && !self.surfaces[f.surface as usize].is_opaque();
         let ambient = &self.bodies[AMBIENT as usize];
         self.faces.iter().any(lets_in)

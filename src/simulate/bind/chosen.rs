@@ -37,6 +37,7 @@ fn spread_media_over_solids(scene: &Scene, model: &Model, chosen: &mut ChosenRul
     for (f, (_, rule)) in model.placed_faces().zip(chosen.iter()) {
         let (Some(key), Some(rule)) = (key(&f), *rule) else { continue };
         let one = solids.entry(key).or_insert(Some(rule));
+        // Two media on one solid: which of its other faces has which is not for us to guess.
         if medium(*one) != medium(Some(rule)) {
             *one = None;
         }

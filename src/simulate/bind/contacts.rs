@@ -9,18 +9,21 @@ use crate::simulate::trim_loops::{is_inside, trim_polygons};
 
 /// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
 pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u16]) -> (Vec<bool>, Vec<[u16; 2]>) {
+    // Each box is grown by half of the glue, so that two within its whole meet.
     let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));
     let mut faces: Vec<(usize, Aabb)> =
         model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
     faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
     let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
     for (i, (a, box_a)) in faces.iter().enumerate() {
+        // Sorted along x: from the first box that begins behind this one on, none meets it.
         for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
             if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
                 (touching[*a], touching[*b]) = (true, true);
                 pairs.push([of_face[*a], of_face[*b]]);
             }
         }
+        // Neighbouring faces of the same two bodies come one after another; others twice do no harm.
         pairs.dedup();
     }
     (touching, pairs)
@@ -30,6 +33,7 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u16]) -> 
 pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
     let mut siblings = vec![false; of_face.len()];
     let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
+        // Parts of one shell have no siblings.
         .filter(|f| of_face[f.id.index()] != AMBIENT && model.part(f.part).shells.len() > 1)
         .map(|f| (f.id.index(), f.shell, f))
         .collect();
@@ -58,6 +62,7 @@ const SAMPLES: usize = 5;
 /// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
 pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
+    // Nothing to find: no bodies, or nothing opaque.
     if of_face.iter().all(|b| *b == AMBIENT) || !opaque.contains(&true) {
         return on_opaque;
     }
@@ -106,6 +111,7 @@ fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
     let Some(face) = f.face else { return Vec::new() };
     let loops = trim_polygons(face);
     let [[u0, u1], [v0, v1]] = face.surface.domain();
+    // Middles of a grid: corners and borders of a face touch its neighbours in any case.
     let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
     (0..SAMPLES * SAMPLES)
         .map(|k| Uv::new(at(k / SAMPLES, u0, u1), at(k % SAMPLES, v0, v1)))

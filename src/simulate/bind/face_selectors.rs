@@ -57,6 +57,7 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
         if chosen.iter().all(Option::is_some) {
             break;
         }
+        // A selector tells a face apart when no other face of these has the same text.
         let selectors: Vec<Option<FaceSelector>> = faces.iter().map(|f| combined(keys, f, model)).collect();
         let texts: Vec<Option<String>> = selectors.iter().map(|s| Some(s.as_ref()?.to_string())).collect();
         let mut uses: HashMap<&str, u32> = HashMap::new();
@@ -75,6 +76,7 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
 /// A selector by a point on the face, with all else that it has.
 fn by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
     let name = |name: &str| usable(name).map(|name| OneOrMany::One(name.to_owned()));
+    // A point inside of the trims, which no other face is as near to.
     let on_surface = face.face.map(|f| f.surface.evaluate(f.inner_parameters()));
     let on_mesh = || {
         let mesh = &face.tessellated?.mesh;

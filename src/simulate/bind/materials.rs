@@ -30,6 +30,7 @@ pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> 
 
 /// The index of a surface in the table, to which it is added where it is not in it.
 pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u16 {
+    // Few surfaces are used by many faces: the table stays so short that a linear look is fastest.
     let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
         surfaces.push(surface);
         surfaces.len() - 1

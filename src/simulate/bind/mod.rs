@@ -62,6 +62,7 @@ impl Scene {
         let mut emitters = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
             let area = select::luminous_area(self, i, model)?;
+            // Emitters need bodies: a source says by name what it lies in.
             emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?);
         }
         let receivers = bind_receivers(self, model)?;
@@ -72,6 +73,7 @@ impl Scene {
         let region = if region.is_empty() { region } else { region.grown(REGION_MARGIN * region.diagonal()) };
         let mut bound = BoundScene {
             scene: self.clone(),
+            // Solids of one body that touch need a stack too, for both are entered before one is left.
             nested: nested || faces.iter().any(|f| f.touches_sibling),
             faces,
             surfaces,
@@ -115,10 +117,13 @@ fn bind_faces(
     };
     let siblings = contacts::touching_siblings(scene, model, body_of_face);
     let default = Material { surface: Some(scene.default_surface), ..Material::default() };
+    // These two come first, in places that nothing else takes: most scenes use them.
     let mut surfaces = vec![Surface::Absorber, Surface::Interface];
     let mut faces = Vec::with_capacity(chosen.len());
     let mut opaque_outside = Vec::with_capacity(chosen.len());
     for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(body_of_face) {
+        // A face with a medium and no surface is the bare boundary of that medium; one with neither has the scene's
+        // default.
         let surface = match rule.map(|r| &scene.materials[r]) {
             Some(rule) => materials::surface(scene, rule)?,
             None if body != AMBIENT => Surface::Interface,

@@ -43,6 +43,7 @@ impl<'a> Nearest<'a> {
 
     /// Index of the nearest of the candidate faces; the first of equals.
     pub(super) fn face(&mut self, p: Point, candidates: &[usize]) -> Option<usize> {
+        // Distance to the box, 0 inside: no face is nearer than its box.
         let away = |b: &Aabb| (b.min - p).max(p - b.max).max(Point::ZERO).length();
         let mut order: Vec<(f64, usize)> = candidates.iter().map(|&c| (away(&self.bounds[c]), c)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -117,6 +118,7 @@ fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
             break;
         }
         let (g, h) = (d.du.dot(r), d.dv.dot(r));
+        // A foot beyond the domain is held at its border, where the next step may still move along.
         let next = s.clamp(uv + Uv::new(c * g - b * h, a * h - b * g) / det);
         if next == uv {
             break;

@@ -44,6 +44,7 @@ pub(super) fn beyond_tables(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 
 fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<String> {
     let [from, to] = known.range;
     let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
+    // One sentence a table: the first source that is beyond it stands for all.
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
     let whose = source_label(scene, source);
     let light = if a == b { format!("{a} nm") } else { format!("{a} to {b} nm") };
@@ -136,6 +137,7 @@ pub(super) fn films(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u16| bound.bodies[usize::from(k)].bounds.size().min_element();
     let touching: BTreeSet<u16> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
+    // Twice the glue: a body as thin as that has both of its faces within the glue of one place.
     let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
     let [name, medium] = bound.body(film)?;

@@ -23,6 +23,7 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
     let mut unnamed = Vec::new();
     for (face, (surface, medium)) in chosen.iter().enumerate() {
         let rules = [*surface, medium.filter(|m| Some(*m) != *surface)];
+        // A rule that gives both surface and medium lists its face once.
         for rule in rules.into_iter().flatten() {
             table[rule].faces.push(face as u32);
         }

@@ -86,6 +86,7 @@ pub(super) fn faces(
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
     let candidates: Vec<usize> =
         model.placed_faces().filter(|f| has_all(rule, f, model)).map(|f| f.id.index()).collect();
+    // Before the count: a name that nothing has is the better message than that nothing matches.
     each_name_means_something(scene, base, rule, model)?;
     if candidates.is_empty() {
         let message = "this matches no face of the model";
@@ -100,6 +101,7 @@ pub(super) fn faces(
         };
         let bounds = nearest.bounds(&candidates);
         let distance = nearest.distance(face, Point::from_array(*p));
+        // A point that far off is a slip of unit or sign, and not meant for any face.
         if distance > bounds.diagonal() {
             let message =
                 format!("{p:?} is {distance:.4} mm from the nearest face, farther away than the model is large");

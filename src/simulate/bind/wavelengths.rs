@@ -80,6 +80,7 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
         };
         wavelengths.sort_by(f64::total_cmp);
         wavelengths.dedup();
+        // A dispersion formula may fail in the middle of a spectrum, so that its ends do not tell.
         for nm in wavelengths {
             let wrong = bodies.iter().find(|b| !INDICES.contains(&b.index(Some(nm))));
             if let Some(body) = wrong {

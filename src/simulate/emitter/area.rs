@@ -55,6 +55,7 @@ impl Area {
         let mut sums = Vec::new();
         let mut sum = 0.0;
         for f in model.placed_faces().filter(|f| chosen.contains(&f.id.index())) {
+            // Ready meshes have no spline to draw points on.
             let Some(face) = f.face else { continue };
             let (id, placement, loops) = (f.id, *f.placement, trim_polygons(face));
             let mut luminous = LuminousFace { id, face: face.clone(), placement, loops, bounds: Vec::new() };
@@ -80,6 +81,7 @@ impl Area {
         for attempt in 0..MOST_ATTEMPTS {
             // The first try takes the pair of the low-discrepancy sequence, which then covers the area evenly; further ones are
             // independent.
+            // Pairs from 10 on are the area's alone; the lower ones belong to the net and to lists.
             let [u, v] = if attempt == 0 { stream.pair(index, 0) } else { stream.random(index, 2 * attempt + 10) };
             let at = u * whole;
             let cell = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);

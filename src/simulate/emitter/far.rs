@@ -25,6 +25,7 @@ struct TwoFold {
 
 impl TwoFold {
     fn sum(a: f64, b: f64) -> Self {
+        // Knuth's sum without a condition on which is larger; what is rounded off is exact.
         let high = a + b;
         let b_share = high - a;
         Self { high, low: (a - (high - b_share)) + (b - b_share) }
@@ -80,6 +81,7 @@ impl NearStart {
     #[inline(always)]
     pub(super) fn bring_near(&self, ray: &mut Ray) {
         let to_centre = self.centre - ray.origin;
+        // Squares, as most rays start near and need no root.
         if to_centre.length_squared() > self.far * self.far {
             let t = to_centre.dot(ray.direction) - self.before;
             if t > 0.0 {
@@ -109,6 +111,7 @@ impl Emitter {
             return Err("it lies farther away than numbers reach".into());
         }
         if distance <= far {
+            // Nearer, a start is known to the last digits that matter.
             return Ok(());
         }
         let collimated = matches!(self.lobe, Lobe::Collimated)

@@ -85,6 +85,7 @@ impl Emitter {
             SourceKind::Cone => Lobe::Cone(s.half_angle_deg.unwrap_or(180.0).to_radians().cos()),
             SourceKind::Collimated => Lobe::Collimated,
             SourceKind::Lambertian => Lobe::Cosine(LAMBERTIAN),
+            // The power that inverts cosⁿ is kept in place of n: one root or power a ray.
             SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
             _ => Lobe::Cone(-1.0),
         };
@@ -150,6 +151,7 @@ impl Emitter {
     }
 
     /// What its rays have in common.
+    // A beam is promised only where all rays have the very point or direction: who is told relies on it to the bit.
     pub(crate) fn beam(&self) -> Option<Beam> {
         let (origin, direction) = (self.frame.origin, self.frame.z);
         match (&self.shape, &self.lobe) {
@@ -222,6 +224,7 @@ impl Emitter {
                 axes = [x, y, normal];
             }
             // Systematic sampling: shares evenly spaced over the list take from every part what it has.
+            // A measured ray has a place and a direction of its own, and perhaps a wavelength.
             Shape::List(list) => {
                 let r = list.ray_at_share(stream.systematic(index));
                 *ray = Ray::new(f.point(r.origin), f.direction(r.direction));

@@ -38,6 +38,7 @@ impl RayList {
         let table = file_spectrum(&set)?;
         match (set.flux, unit) {
             (Some(Flux::Radiant), PowerUnit::Lumen) => notes.extend(to_lumens(&mut set, table.as_ref(), source)?),
+            // Relative powers will do where the scene says how much the source emits.
             (Some(Flux::Luminous), PowerUnit::Watt) if source.power.is_none() => {
                 return Err(Fault::new(
                     "this file gives lumens, but the run counts watts",
@@ -75,6 +76,7 @@ impl RayList {
 
     /// The ray at a share of the summed power.
     pub(crate) fn ray_at_share(&self, share: f64) -> &LightRay {
+        // The running sum is searched: each ray is drawn in proportion to its power.
         let at = share * self.power();
         &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
     }
@@ -114,6 +116,7 @@ fn to_lumens(set: &mut RaySet, table: Option<&Wavelengths>, source: &Source) -> 
         }
         return Ok(Some("its watts were made lumens, each ray by its wavelength".into()));
     }
+    // Nothing tells how bright the light of a watt is; the scene's own power makes that a matter of proportion.
     if source.power.is_some() {
         return Ok(None);
     }

@@ -20,6 +20,7 @@ impl RaySampler {
     /// For the numbers of a stream; the first of its rays has the number `first` in the run.
     pub(crate) fn new(emitter: &Emitter, stream: Stream, first: u64) -> Self {
         let stream = stream.with_pairs(emitter.needed_pairs());
+        // Packets need the net's numbers, a plain source, and enough rays to pay for one.
         let packed = stream.sampling() == Sampling::Sobol
             && stream.needs_numbers()
             && emitter.fits_packets()

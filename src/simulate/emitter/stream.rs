@@ -37,6 +37,7 @@ const STEP: f64 = 1.0 / 4_294_967_296.0;
 /// The middle of a step of the unit interval.
 #[inline(always)]
 fn unit(number: u32) -> f64 {
+    // The middle of a step, which is neither 0 nor 1: inversions have no end to fall off.
     (f64::from(number) + 0.5) * STEP
 }
 
@@ -154,6 +155,7 @@ impl Stream {
 
     /// Makes ready the numbers of one ray alone.
     pub(super) fn prepare_single(&mut self, index: u32) {
+        // The same number as in a chunk, made for this index alone.
         if self.sampling == Sampling::Sobol {
             for d in (0..random::DIMENSIONS).filter(|d| self.pairs[d / 2]) {
                 self.numbers[d] = vec![random::scrambled(index, d, self.scrambles[d])];
@@ -226,6 +228,7 @@ impl Stream {
     /// The first of the two dimensions along which rays are put in order: those of the direction, or of the place where all have one.
     #[inline(always)]
     fn sorted_dimension(&self) -> usize {
+        // The direction decides most of what a ray meets; where all have one, the place does.
         if self.pairs[1] { 2 } else { 0 }
     }
 

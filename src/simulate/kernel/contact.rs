@@ -43,6 +43,8 @@ pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) ->
 /// entered or left at once, wherever rounding puts the second face.
 #[inline(never)]
 pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u16> {
+    // The direction of the ray against the outward normal tells whether it goes in or out, whichever of the two
+    // faces is met first.
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
     let mut faces = faces_along(context, probe_at(context, ray, at));
     let (_, other) = faces.find(|(found, other)| {
@@ -75,6 +77,7 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
     (0..2 * MOST_FACES)
         .map_while(move |_| {
             let found = context.intersector.intersect(&probe, &mut Cost::default())?;
+            // The same face no farther than rounding: it is the root that was just passed.
             let repeated = last.is_some_and(|(face, t)| face == found.face && found.t <= t + rounding);
             probe.t_min = if repeated { found.t + rounding } else { found.t.next_up() };
             last = Some((found.face, found.t));
@@ -92,6 +95,7 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
 pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
     let mut passed = 0.0;
     for (found, _) in faces_along(context, next.with_range(0.0, reach)) {
+        // A face across ends the contact: beyond it the ray is beside the pair.
         if found.geometric_normal.dot(normal).abs() <= ALIGNED {
             return passed;
         }
@@ -128,6 +132,7 @@ pub(super) enum ContactSurface {
 #[inline(never)]
 pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> ContactSurface {
     let Some(partner) = touching_face(context, ray, at) else { return ContactSurface::Bare };
+    // Bare: what happens follows from the two media alone, and from whichever face it is told the same.
     let is_bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;
     match [is_bare(&at.face), is_bare(&partner.face)] {
@@ -143,6 +148,7 @@ pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) ->
 /// die, not against it. `None` where there is no such body.
 #[inline(never)]
 pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> Option<Ray> {
+    // Only a source that lies on an opaque solid can have a body glued over it.
     let optics = context.bound.faces.get(face.index()).filter(|f| f.medium_on_opaque && f.body == AMBIENT)?;
     let reach = way_through_glue(context.glue_mm(), ray.direction.dot(normal));
     let back = ray.origin - ray.direction * reach;
@@ -172,6 +178,7 @@ pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> 
     } else {
         probe_at(context, ray, at)
     };
+    // The nearest alone: behind it the ray would be inside of the solid.
     let hit = context.intersector.intersect(&probe, &mut Cost::default())?;
     let face = *context.bound.faces.get(hit.face.index())?;
     let entering = ray.direction.dot(hit.geometric_normal) < 0.0;

@@ -57,6 +57,7 @@ impl<'a> Context<'a> {
     ) -> Self {
         // Receivers are sorted once by how a segment must ask them, so that the hot loop walks four short lists and tests no kind.
         let all = &bound.receivers[..];
+        // A far field counts directions; it cuts no segment.
         let far = |&i: &usize| matches!(all[i].shape, Shape::FarField { .. });
         let region = bound.region;
         // A far field has no place, and faces that receive are found by the hit itself: only planes and spheres cut segments.

@@ -24,6 +24,7 @@ pub(super) fn cross<C: RayPayload>(
     at: &mut SurfaceInteraction<'_>,
 ) -> Result<Crossing<C>, LostCause> {
     // Two solids of one part have one medium: the boundary between them is drawn in the file and absent in the glass.
+    // Only when the ray is in that body: from outside the other solid is entered as usual.
     let leaves_sibling = at.face.touches_sibling && payload.cross(at.face.body, false).is_some();
     if leaves_sibling && touches_sibling(context, ray, &at.face_hit()) {
         // From one solid of a part into the next.
@@ -69,6 +70,8 @@ fn cross_contact<C: RayPayload>(
         *across = match *across {
             // Through both faces at once, whichever the ray met first.
             Some(first) if !(at.entering && here.body() == at.face.body) => {
+                // A first face that is met from outside of its own body leads into it, and the other one is left
+                // behind it.
                 let both = first.cross(other, !at.entering).or_else(|| {
                     // The other body is not where the light should be: it has passed an edge of three or more unseen.
                     let recovered = recover_media(context, here, ray, at.hit.t, true)?;
@@ -81,6 +84,7 @@ fn cross_contact<C: RayPayload>(
             // The second face of an interface that was crossed at the first.
             _ => Some(*here),
         };
+    // Numbered alike from both sides, so that the order of crossing does not depend on which face came first.
     } else if let Some(other) = aligned_body(context, ray, &place) {
         let [first, second] = [at.face.body.min(other), at.face.body.max(other)];
         let both = here.cross(first, at.entering).and_then(|c| c.cross(second, at.entering));

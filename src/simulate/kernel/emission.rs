@@ -61,6 +61,8 @@ impl SourceQueue {
         let rays = self.range[1] - self.range[0];
         let stream = Stream::new(s.seed, s.sampling, self.replicate, source as u32, rays)
             .with_lattice(context.plan.lattice(self.replicate));
+        // The memory of the last source's stream is taken over: replicates have many sources, and each would
+        // allocate anew.
         let stream = match self.sampler.take() {
             Some(sampler) => stream.in_place_of(sampler.into_stream()),
             None => stream,
@@ -78,6 +80,7 @@ impl SourceQueue {
     ) -> bool {
         let context = tracer.context;
         loop {
+            // A source may have no ray in this replicate.
             while self.next >= self.range[1] {
                 if self.source >= self.last {
                     return false;
@@ -111,6 +114,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // Luminous faces emit from the spline; the ray starts from the intersector's own idea of that face.
         if let Some((face, normal)) = emission.from {
             self.tally.counts.corrected_normals += u64::from(start_on_face(context, face, normal, ray));
+            // Light into what is glued on the face starts behind the glue; only then is it known to lie in that
+            // body.
             into_contact = if C::MEDIA { emit_into_contact(context, face, normal, ray) } else { None };
         }
         // Booked before anything can go wrong, so that a ray which cannot start is in both sums, emitted and lost.

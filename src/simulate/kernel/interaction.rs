@@ -72,6 +72,7 @@ impl SurfaceInteraction<'_> {
     pub(super) fn shading_normal(&mut self, direction: Vector) -> (Vector, f64) {
         let shaded = direction.dot(self.hit.normal);
         let flat = direction.dot(self.hit.geometric_normal);
+        // Both normals must see the ray from one side: interpolated ones may tip over at grazing incidence.
         if shaded * flat > 0.0 {
             (self.hit.normal, shaded.abs().min(1.0))
         } else {
@@ -85,6 +86,7 @@ impl SurfaceInteraction<'_> {
     pub(super) fn mirrored(&mut self, direction: Vector, normal: Vector) -> Vector {
         let flat = self.hit.geometric_normal;
         let r = reflect(direction, normal);
+        // A reflection that points into the facet would meet it again from inside.
         if r.dot(flat) * direction.dot(flat) < 0.0 {
             return r;
         }
@@ -115,7 +117,10 @@ pub(super) fn turn_polarisation<C: RayPayload>(
 ) {
     if let Some(stokes) = payload.stokes_mut() {
         let after = stokes.through(m, d, n);
+        // Power is kept apart, in quanta: the Stokes vector holds the state alone.
         let unit = if after.i > 0.0 { after.scaled(1.0 / after.i) } else { Stokes::unpolarised(1.0, d) };
+        // Where polarisation is not followed the vector still turns with the frame, but each surface sees
+        // unpolarised light.
         *stokes = if context.polarised() { unit } else { Stokes { i: 1.0, ..unit.depolarised() } };
     }
 }

@@ -22,6 +22,7 @@ const LONGEST_LOOK: f64 = 1.0;
 ///
 /// Where solids touch, a way out that comes near an edge of three of them may miss one; then two ways of three decide.
 pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
+    // Away from edges of touching solids the first way out is beyond doubt, and it is nearly always enough.
     let (first, certain) = bodies_left(context, ray);
     if certain {
         return first;
@@ -36,6 +37,7 @@ pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
         return first;
     }
     let third = tilted(TILTS[1]);
+    // Two of three: an edge that is missed on one way is not missed on another some degrees off.
     if third == second { second } else { first }
 }
 
@@ -50,6 +52,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let point = segment.point_at(hit.t);
         let d = segment.direction;
         segment = Ray::new(point, d).with_departure(hit.departure());
+        // A face that the scene does not know bounds no body.
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         // Against the outward normal the ray goes in, along it out.
@@ -75,6 +78,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let other = context.bound.faces.get(second.face.index()).filter(may_touch);
         if let Some(other) = other.filter(|_| opposite || aligned) {
             crossings.cross(other.body, entering);
+            // Past both faces, or the second would be crossed once more on its own.
             segment.t_min = reach;
             certain = false;
         }
@@ -93,9 +97,11 @@ pub(super) fn recover_media<C: RayPayload>(
     end: f64,
     touching: bool,
 ) -> Option<C> {
+    // Without nesting a ray has one body at most, and a crossing that cannot be is a fault of the model.
     if !(context.bound.nested && (touching || ray.t_min > 0.0)) {
         return None;
     }
+    // Half-way to the end, but near the start: far along there may be another body.
     let middle = 0.5 * (ray.t_min + end.min(ray.t_min + LONGEST_LOOK));
     let recovered = payload.moved_inside(&media_at(context, &Ray::new(ray.point_at(middle), ray.direction)))?;
     (recovered.body() != payload.body()).then_some(recovered)
@@ -125,6 +131,7 @@ impl Crossings {
         if body == AMBIENT {
             return;
         }
+        // A body may have been entered on the way out, and is then left as it was entered.
         match self.entered.iter().rposition(|b| *b == body) {
             Some(k) if !entering => drop(self.entered.remove(k)),
             None if !entering => self.left.push(body),

@@ -65,6 +65,7 @@ impl<C: RayPayload> Path<C> {
     /// Notes that it has just met what is no total reflection.
     #[inline(always)]
     pub(super) fn release(&mut self) {
+        // Only in a body can light go round by total reflection.
         if C::MEDIA {
             self.released_at = self.length as f32;
         }
@@ -79,6 +80,8 @@ impl<C: RayPayload> Path<C> {
     /// The number of the path that splits off at its present vertex; it depends on the splits before alone, not on the order of
     /// tracing.
     pub(super) fn split_branch(&self) -> u32 {
+        // Odd constants of good mixing (the golden ratio, and murmur's finaliser), so that branches of neighbouring
+        // splits share no random numbers. Zero is the unsplit path's.
         let mixed = (self.branch ^ self.bounce.wrapping_mul(0x9e37_79b9))
             .wrapping_add(0x7f4a_7c15)
             .wrapping_mul(0x85eb_ca6b);

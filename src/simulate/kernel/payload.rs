@@ -18,7 +18,7 @@ pub(crate) trait RayPayload: Copy + Send {
     const ENDS_ONLY: bool = false;
     /// Whether it carries a wavelength.
     const COLOURED: bool = false;
-    /// A ray in the surroundings.
+    /// The payload of a ray that is in no body.
     fn in_surroundings() -> Self;
     /// A ray that starts inside these bodies, outermost first; `None` when it cannot carry so many.
     fn inside(bodies: &[u16]) -> Option<Self>;
@@ -51,16 +51,16 @@ pub(crate) trait RayPayload: Copy + Send {
     fn set_light(&mut self, _wavelength: Option<f64>, _stokes: impl FnOnce() -> Stokes) {}
 }
 
-/// No media: faces in empty space, of any kind where `COATED`.
+/// What a ray in a scene without media carries: nothing. Known as [`Mirror`] and, with faces of any kind (`COATED`), as [`Opaque`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Empty<const COATED: bool>;
+pub(crate) struct NoMedia<const COATED: bool>;
 
 /// Power alone, of which faces take a constant share.
-pub(crate) type Mirror = Empty<false>;
+pub(crate) type Mirror = NoMedia<false>;
 /// Power alone, at faces of any kind.
-pub(crate) type Opaque = Empty<true>;
+pub(crate) type Opaque = NoMedia<true>;
 
-impl<const COATED: bool> RayPayload for Empty<COATED> {
+impl<const COATED: bool> RayPayload for NoMedia<COATED> {
     const MEDIA: bool = false;
     const COATED: bool = COATED;
     fn in_surroundings() -> Self {
@@ -73,11 +73,12 @@ impl<const COATED: bool> RayPayload for Empty<COATED> {
         AMBIENT
     }
     fn cross(&self, _: u16, _: bool) -> Option<Self> {
+        // There is no body to enter, so that every crossing of one is impossible.
         None
     }
 }
 
-/// The same light where nothing is asked about it but where it ends.
+/// The payload `C` of a run that asks of each ray nothing but where it ends.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EndsOnly<C>(C);
 
@@ -121,7 +122,7 @@ impl<C: RayPayload> RayPayload for EndsOnly<C> {
     }
 }
 
-/// And the body it is in, one at a time: bodies that neither touch nor nest.
+/// The one body that a ray is in, for scenes whose bodies neither touch nor nest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clear(u16);
 
@@ -134,6 +135,7 @@ impl RayPayload for Clear {
         match bodies {
             [] => Some(Self(AMBIENT)),
             [body] => Some(Self(*body)),
+            // Two bodies at once ask for the stack of [`Nested`].
             _ => None,
         }
     }
@@ -143,6 +145,8 @@ impl RayPayload for Clear {
     }
     #[inline]
     fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+        // Into a body from the surroundings alone, and out of the one that it is in: all else is a crossing that
+        // cannot be.
         if entering { (self.0 == AMBIENT).then_some(Self(body)) } else { (self.0 == body).then_some(Self(AMBIENT)) }
     }
 }
@@ -150,7 +154,7 @@ impl RayPayload for Clear {
 /// Deepest nesting of bodies.
 pub(crate) const DEPTH: usize = 7;
 
-/// And a stack of bodies, innermost last. A body may be left from below the top: so overlapping and touching solids hand light over
+/// The bodies that a ray is in, as a stack, the innermost last. A body may be left from below the top: so overlapping and touching solids hand light over
 /// in either order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nested {
@@ -196,7 +200,7 @@ impl RayPayload for Nested {
     }
 }
 
-/// And a wavelength.
+/// The bodies that a ray is in, and its wavelength.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coloured {
     stack: Nested,
@@ -232,7 +236,7 @@ impl RayPayload for Coloured {
     }
 }
 
-/// And a state of polarisation: all there is.
+/// The bodies that a ray is in, its wavelength and its state of polarisation: all that a ray can carry.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Full {
     coloured: Coloured,

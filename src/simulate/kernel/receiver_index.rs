@@ -66,6 +66,7 @@ impl ReceiverIndex {
         let size = Aabb::from_points(leaves.iter().map(|&r| boxes[r as usize].center())).size();
         let axis = if size.x >= size.y.max(size.z) { 0 } else { 1 + usize::from(size.z > size.y) };
         let middle = leaves.len() / 2;
+        // By index among equals: the tree is the same wherever it is built.
         leaves.select_nth_unstable_by(middle, |&a, &b| {
             let center = |r: u32| boxes[r as usize].center()[axis];
             center(a).total_cmp(&center(b)).then(a.cmp(&b))
@@ -100,6 +101,7 @@ impl ReceiverIndex {
         while let Some(node) = open.pop() {
             let node = &self.nodes[node];
             let (a, b) = ((node.bounds.min - ray.origin) * inverse, (node.bounds.max - ray.origin) * inverse);
+            // NaN of 0 · ∞, where a ray runs in a side of the box, fails no comparison below: the box is taken.
             let (near, far) = (a.min(b).max_element(), a.max(b).min_element());
             if near > far || far < 0.0 || near > end {
                 continue;
@@ -110,6 +112,7 @@ impl ReceiverIndex {
                 found.extend_from_slice(&self.leaves[node.first..node.first + node.count]);
             }
         }
+        // In the order of the scene, or the bits of a tally would depend on the tree.
         found.sort_unstable();
     }
 }

@@ -26,6 +26,8 @@ pub(super) fn clip_segment<C: RayPayload>(context: &Context<'_>, path: &mut Path
     if C::MEDIA
         && let Some(scatter) = &context.bound.bodies[path.payload.body() as usize].scatter
     {
+        // The free path is drawn for each segment anew: it has no memory, so that a face in between changes nothing
+        // of its law.
         ray.t_max = scatter.free_path(path.key(context).unit(Purpose::Bulk));
         path.receiver = SCATTERS;
     }
@@ -97,6 +99,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     #[inline(always)]
     pub(super) fn count_at(&mut self, path: &Path<C>, r: u32, point: Point) {
         let receiver = &self.context.bound.receivers[r as usize];
+        // Receivers that count light after so many bounces only.
         if !C::ENDS_ONLY && receiver.interactions.is_some_and(|n| n != path.bounce) {
             return;
         }
@@ -126,6 +129,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     fn deposit(&mut self, receiver: &Receiver, path: &Path<C>, r: u32, spot: &Spot) {
         let r = r as usize;
         let tally = &mut *self.tally;
+        // Cells are added up later, in order; the total is a whole number of quanta, for which order does not
+        // matter.
         tally.receivers[r].add_deferred(spot.cell, path.quanta);
         tally.receiver_totals[r] += quanta_as_integer(path.quanta);
         tally.moments[r].add(path.quanta, spot.at, spot.radius2);

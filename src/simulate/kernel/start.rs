@@ -17,6 +17,7 @@ const REACHES: [f64; 4] = [1.0, 0.1, 0.01, 1e-3];
 /// A ray that would go below the facet is turned to above it; tells whether it was.
 #[inline(never)]
 pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
+    // From the longest: a mesh of coarse facets has its face that far from the spline.
     for reach in REACHES {
         let probe = Ray::new(ray.origin + normal * reach, -normal).with_range(0.0, 2.0 * reach);
         // Where another face is met within a long probe, a shorter one does not reach that far.
@@ -24,6 +25,7 @@ pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector,
         let mut point = probe.point_at(hit.t);
         if hit.face != face {
             // A face of a body that lies on it may come first.
+            // The own face lies behind that of a touching body, within the glue.
             let behind =
                 Ray::new(point, -normal).with_range(0.0, context.glue_mm()).with_departure(hit.departure());
             let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };

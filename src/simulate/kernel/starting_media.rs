@@ -30,6 +30,7 @@ impl<'a> Context<'a> {
 
 /// What the rays of one source start in, from some of its rays.
 fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> StartingMedia {
+    // Stated media are believed; only starts on faces are still looked for.
     let stated = emitter.media_stated || !context.bound.has_media();
     let replicates = context.plan.replicates;
     let probed = PROBED_RAYS.min(u64::from(replicates));
@@ -48,6 +49,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
         let index = ((to - from) * k / PROBED_RAYS) as u32;
         let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);
         // One start on a face decides for all: the rays of such a source must each be asked.
+        // What is asked about here is where the ray starts; luminous faces find their own start.
         if emission.from.is_none() && start_clear_of_faces(context, &ray).is_some() {
             return StartingMedia::OnFace;
         }
@@ -98,6 +100,8 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<R
             enters_opaque |= entering;
             leaves_opaque |= !entering;
         }
+        // Either makes a difference to a start on it: light must not begin inside of an opaque solid, and must know
+        // which body it is in.
         on_solid |= face.opaque_solid || face.body != AMBIENT;
         let rounding = rounding_at(ray.origin);
         probe = Ray::new(probe.point_at(hit.t), d)

@@ -36,6 +36,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             return false;
         };
         let point = ray.point_at(hit.t);
+        // Before the surface has its say: limits of length hold for what has been run.
         path.length += hit.t;
         // An intersector that answers nonsense costs its ray, not the run.
         let face = context.bound.faces.get(hit.face.index());
@@ -75,6 +76,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if !C::ENDS_ONLY && !self.context.passing.is_empty() {
             self.count_passing(path, ray, end);
         }
+        // Endless segments end in the surroundings; of a body they would take all light that only missed a face by
+        // an error.
         if C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT) {
             self.absorb_in_body(path, end);
         }
@@ -86,6 +89,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let context = self.context;
         let FaceOptics { opaque_solid, medium_on_opaque, touches_body, body, .. } = at.face;
         // Light that leaves its body into an opaque face on it meets that face.
+        // From within, since light that comes from outside meets the opaque face in any case.
         if !at.entering && (opaque_solid || medium_on_opaque && body != AMBIENT) {
             let opaque = opaque_contact(context, ray, &at.face_hit());
             if opaque.is_some() {
@@ -242,6 +246,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     #[inline(always)]
     fn start_segment(&mut self, path: &mut Path<C>, ray: &mut Ray, next: Ray) -> bool {
         let s = self.context.settings;
+        // In order of how often they end a path; below one quantum nothing is left that could be counted.
         let exhausted = path.bounce >= s.max_bounces
             || path.length > s.max_length_mm
             || path.quanta <= s.power_floor * path.first_quanta
@@ -278,6 +283,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
     #[inline(always)]
     pub(super) fn finish_escaping(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
+        // Light that scatters on its way is not at its end, however free the way is.
         if path.receiver == SCATTERS {
             return false;
         }

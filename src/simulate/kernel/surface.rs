@@ -43,6 +43,7 @@ fn mirror<'s, C: RayPayload>(
     let (normal, _) = at.shading_normal(direction);
     let mut payload = path.payload;
     turn_polarisation(context, &mut payload, &CONDUCTOR, direction, normal);
+    // In whole quanta, so that what is kept and what is absorbed add up to the last one.
     let kept = round_quanta(path.quanta * share);
     Interaction::Reflect { kept, direction: at.mirrored(direction, normal), payload }
 }
@@ -55,6 +56,7 @@ fn interface<'s, C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
+    // Media first: between two parts of one body there is no surface, whatever its face is made of.
     let Crossing { here: mut payload, across } = match cross(context, path.payload, ray, at) {
         Ok(crossing) => crossing,
         Err(cause) => return Interaction::Lose(cause),
@@ -78,6 +80,7 @@ fn interface<'s, C: RayPayload>(
         }
         return Interaction::ReflectTotally { direction: at.mirrored(d, normal), payload };
     };
+    // From both cosines, which refraction has already worked out: no further root.
     let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
     let mut matrices = None;
     if payload.stokes_mut().is_some() {
@@ -108,6 +111,7 @@ fn overlapping_bodies<C: RayPayload>(
 ) -> Option<[u16; 2]> {
     let here = payload.body();
     let left = at.face.body;
+    // Lights crossing at a contact come below each other by design; only a crossing by itself tells of an overlap.
     let below = !at.entering && left != here && at.skip == 0.0;
     (below && context.index(left, payload) != context.index(here, payload))
         .then(|| [left.min(here), left.max(here)])
@@ -194,6 +198,8 @@ fn refracted(d: Vector, eta: f64, at: &mut SurfaceInteraction<'_>) -> (Vector, f
     let flat = at.hit.geometric_normal;
     let (normal, cos_i) = at.shading_normal(d);
     let transmitted = refract_with_cosine(d, normal, eta);
+    // The interpolated normal would send the transmitted ray back to the side it came from: the facet's own decides
+    // then.
     if transmitted.is_none_or(|(t, _)| t.dot(flat) * d.dot(flat) > 0.0) {
         return (normal, cos_i, transmitted);
     }
@@ -208,6 +214,7 @@ fn mueller(coating: &Coating, split: &Split, cos_i: f64, n1: f64, n2: f64) -> [M
         Coating::Metal { n, k } => [polarised::metal(cos_i, n1, *n, *k), Mueller::without_phase(split.transmitted)],
         _ => {
             let r = Mueller::without_phase(split.reflected);
+            // Reflection turns p, as at a conductor; a table of shares says no more.
             [Mueller { c: -r.c, ..r }, Mueller::without_phase(split.transmitted)]
         }
     }

@@ -20,6 +20,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Notes a vertex of a path that is recorded.
     #[inline(always)]
     pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event) {
+        // Only sampled paths are recorded, and asking costs next to nothing.
         if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
             let Path { ray, branch, bounce, .. } = *path;
             self.tally.paths.push(PathVertex { ray, branch, bounce, point, power: path.quanta / QUANTA, event });
@@ -39,6 +40,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let body = path.payload.body();
         let alpha = self.context.bound.bodies[body as usize].absorption(path.payload.wavelength());
         if alpha > 0.0 {
+            // Rounded to whole quanta: what is kept and what is taken add up.
             let kept = round_quanta(path.quanta * (-alpha * length).exp());
             let taken = path.quanta - kept;
             self.tally.ends.absorbed += quanta_as_integer(taken);
@@ -50,6 +52,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Ends a path at a limit.
     #[cold]
     pub(super) fn cut_off(&mut self, path: &Path<C>, point: Point) {
+        // A path without power has been booked to the last quantum already.
         if path.quanta > 0.0 {
             self.tally.ends.cut_off += quanta_as_integer(path.quanta);
             self.tally.counts.cut_off += 1;

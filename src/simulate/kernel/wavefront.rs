@@ -32,6 +32,8 @@ pub(super) fn trace_rays<C: RayPayload>(
         tracer.tally.counts.segments += wave.rays.len() as u64;
         for (i, (path, ray)) in wave.paths.iter_mut().zip(&mut wave.rays).enumerate() {
             let goes_on = tracer.step(path, ray, wave.hits[i].as_ref())
+                // Most of the light of a reflector escapes by rays that its horizon knows to be free: they are
+                // ended without a walk.
                 && !(context.intersector.escapes(ray) && tracer.finish_escaping(path, ray));
             if !goes_on {
                 wave.ended.push(i as u32);

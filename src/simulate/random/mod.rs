@@ -69,6 +69,7 @@ impl Key {
     /// 128 random bits.
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
+        // 48 bits of the ray and 16 of the purpose share two words of the counter.
         let high = (self.ray >> 32) as u32 & 0xffff | (purpose as u32) << 16;
         philox4x32([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])
     }
@@ -76,6 +77,7 @@ impl Key {
 
 #[inline]
 fn unit(a: u32, b: u32) -> f64 {
+    // 53 bits: all that an `f64` below 1 has.
     ((u64::from(a) << 32 | u64::from(b)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 

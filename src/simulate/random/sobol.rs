@@ -76,6 +76,7 @@ pub const BLOCK: usize = 64;
 pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [u32]) {
     let t = &TABLES[dimension];
     let b = first.to_le_bytes();
+    // Bytes above the lowest are the same for the whole block.
     let common = t[1][b[1] as usize] ^ t[2][b[2] as usize] ^ t[3][b[3] as usize];
     let low = b[0] as usize & !(BLOCK - 1);
     for (n, x) in numbers.iter_mut().zip(&t[0][low..low + BLOCK]) {
