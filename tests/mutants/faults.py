@@ -48,7 +48,7 @@ FAULTS = [
     ("contacts told as certified", EXACT + "clip.rs", "if regular && sine < TANGENT_SINE { «Certainty::Tangent» }", "Certainty::Certified", SPLINE),
     # Settling in 32 digits.
     ("open roots not settled", EXACT + "leaf_test.rs", "let open = leaf.ill_scaled || «settlement::is_open([u, v], margins)»;", "false", SPLINE),
-    ("settled roots count beyond the face", EXACT + "settlement.rs", "«if border[k][end] { 0.0 } else { margin[k].min(LOOSE) }»", "margin[k].min(LOOSE)", SPLINE),
+    ("settled roots count beyond the face", EXACT + "settlement.rs", "if «!sides.iter().any(|&(k, end)| is_over(k, end))» {", "true", SPLINE),
     ("settled roots of another root kept", EXACT + "settlement.rs", "root.filter(|(_, local)| «near(*local)»)", "true", SPLINE),
     ("unsettled roots told as certified", EXACT + "settlement.rs", "Candidate { certainty: «Certainty::Uncertified», ..found }", "Certainty::Certified", SPLINE),
     # Polishing.

@@ -316,6 +316,13 @@ fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
             let newton = Traditional::new(&scene.model, &exact, Seeds::Middle);
             rows.push(scene.ask("plain newton", &newton, Geometry::Spline));
         }
+        for variant in Variant::EXTREME {
+            let scene = case.scene(variant);
+            let octree = Octree::build(&scene.mesh, &octree::Settings::default());
+            rows.push(scene.ask("octree", &octree, Geometry::Facets));
+            let shipped = Bvh::build(&scene.mesh, &bvh::Settings { cured: false, ..Default::default() });
+            rows.push(scene.ask("cwbvh as shipped", &shipped, Geometry::Facets));
+        }
         let done = (k + 1) as f64 / all.len() as f64;
         progress(Progress { stage: case.name.into(), done, remaining_seconds: None });
     }

@@ -5,11 +5,13 @@
 //! are few, and are found again in 32 digits. What these cannot tell either is flagged, never certified.
 
 use super::acceptance::Candidate;
-use super::leaf::border_sides;
+use super::leaf::{Leaf, border_sides};
+use super::patch::Patch;
 use super::query::Query;
 use super::structure::Exact;
 use super::tolerances::TANGENT;
 use crate::intersect::Certainty;
+use crate::math::Uv;
 
 /// Roots with a larger margin are settled wherever they lie, as a share of the leaf: of a leaf of 10 mm, 10 nm along the surface.
 const LOOSE: f64 = 1e-6;
@@ -26,6 +28,15 @@ const WORK: u32 = 40;
 pub(super) fn is_open(local: [f64; 2], margin: [f64; 2]) -> bool {
     let open = |x: f64, margin: f64| margin > LOOSE || margin > AMBIGUOUS && !(x > margin && x < 1.0 - margin);
     open(local[0], margin[0]) || open(local[1], margin[1])
+}
+
+/// Where a root lies to a leaf.
+enum Place {
+    OnLeaf,
+    /// Beyond, where it is not the root of a neighbour's.
+    Beside,
+    /// Beyond the end of a closed surface, within its rounding.
+    InCrack,
 }
 
 impl Exact {
@@ -47,19 +58,60 @@ impl Exact {
             // Singular, or Newton's method ran to another root.
             return self.leave_open(query, index, found);
         };
-        // Over an inner border the face goes on, and over a seam it comes back: there neither side may let a ray pass that rounding
-        // puts on the other. Where the surface ends, it ends.
-        let face = &self.geometry.faces[patch.face as usize];
-        let border = border_sides(&self.geometry.grids[face.grid as usize], patch, leaf.rect);
-        let counts = (0..2).all(|k| {
-            let [low, high] = [0, 1].map(|end| if border[k][end] { 0.0 } else { margin[k].min(LOOSE) });
-            local[k] >= leaf.reach[k][0] - low && local[k] <= leaf.reach[k][1] + high
-        });
-        if counts {
-            self.offer(query, index, Candidate { local, t: root.t, settled: Some(root.uv), ..found });
-        } else if self.geometry.is_pole(patch, query.o + query.d * root.t, TANGENT) {
+        let place = self.place_on_leaf(leaf, patch, margin, (root.uv, local));
+        match place {
+            Place::OnLeaf => {
+                self.offer(query, index, Candidate { local, t: root.t, settled: Some(root.uv), ..found })
+            }
+            Place::InCrack => self.leave_open(query, index, found),
             // The parameters of a pole are any: beside it they say nothing of where the face ends.
-            self.leave_open(query, index, found);
+            Place::Beside if self.geometry.is_pole(patch, query.o + query.d * root.t, TANGENT) => {
+                self.leave_open(query, index, found);
+            }
+            Place::Beside => {}
+        }
+    }
+
+    /// Whether a root in 32 digits lies on the leaf that found it.
+    ///
+    /// Over an inner border the surface goes on, and in its own numbers without a gap: de Boor's points of two spans agree on their knot to
+    /// 30 digits. So a ray that meets the face meets it on a leaf by that leaf's own polynomial, and that leaf's test in `f64`, which
+    /// excludes nothing within its margin, finds it there; a root of the polynomial beyond its leaf need not count, and over a crease it is
+    /// no point of the face. What the change to the leaf's parameters rounds is worth far less than [`TANGENT`] along the surface, and
+    /// within that of a leaf is on the face to the accuracy that a hit promises.
+    ///
+    /// Over a seam the surface comes back with control points of its own, rounded on their own: between both lies a crack as high as their
+    /// rounding, and a ray at a small sine passes it over a way of up to the margin. Whether it is meant to, nothing tells.
+    fn place_on_leaf(&self, leaf: &Leaf, patch: &Patch, margin: [f64; 2], (uv, local): (Uv, [f64; 2])) -> Place {
+        let reach = leaf.reach;
+        let beyond = [0, 1].map(|k: usize| [reach[k][0] - local[k], local[k] - reach[k][1]]);
+        let is_over = |k: usize, end: usize| beyond[k][end] > 0.0;
+        let sides = [(0, 0), (0, 1), (1, 0), (1, 1)];
+        if !sides.iter().any(|&(k, end)| is_over(k, end)) {
+            return Place::OnLeaf;
+        }
+        let face = &self.geometry.faces[patch.face as usize];
+        let grid = &self.geometry.grids[face.grid as usize];
+        let border = border_sides(grid, patch, leaf.rect);
+        if sides.iter().any(|&(k, end)| is_over(k, end) && border[k][end]) {
+            return Place::Beside;
+        }
+        let tangents = self.geometry.reference(patch).tangents(uv);
+        let way = |k: usize| {
+            let width = leaf.rect[k][1] - leaf.rect[k][0];
+            beyond[k][0].max(beyond[k][1]).max(0.0) * width * tangents[k].length()
+        };
+        let is_seam = |k: usize, end: usize| {
+            let ends = [grid.breaks[k][0], grid.breaks[k][grid.breaks[k].len() - 1]];
+            grid.closed[k] && leaf.rect[k][end] == end as f64 && patch.domain[k][end] == ends[end]
+        };
+        let within_margin = sides.iter().all(|&(k, end)| beyond[k][end] <= margin[k].min(LOOSE));
+        if way(0) + way(1) <= TANGENT && within_margin {
+            Place::OnLeaf
+        } else if within_margin && sides.iter().any(|&(k, end)| is_over(k, end) && is_seam(k, end)) {
+            Place::InCrack
+        } else {
+            Place::Beside
         }
     }
 

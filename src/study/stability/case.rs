@@ -2,7 +2,7 @@
 
 use crate::math::{Frame, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
-use crate::model::Model;
+use crate::model::{Model, TrimLoop};
 use crate::nurbs::Surface;
 use crate::study::sample_models;
 use serde::Serialize;
@@ -12,6 +12,8 @@ pub struct Case {
     /// Short name, as in the table.
     pub name: &'static str,
     pub(super) surfaces: Vec<Surface>,
+    /// Loops that trim each surface; a case with loops has no mesh.
+    pub(super) loops: Vec<TrimLoop>,
     /// Facets along each side of a knot rectangle.
     pub(super) divisions: usize,
     /// Error of a facet hit that is right beyond sag and rounding, mm.
@@ -58,6 +60,8 @@ pub(super) enum Question {
     All { ray: Ray, truths: Vec<Truth> },
     /// From the hit of `toward` inside the sphere of this radius about the origin, on in another direction.
     Chord { toward: Ray, direction: Vector, radius: f64 },
+    /// From the hit of `toward` on a wall of the box from the origin to `size`, on in another direction.
+    Onward { toward: Ray, direction: Vector, size: Vector },
     /// Mirrored inside the box from the origin to `size`, so many times.
     Guide { ray: Ray, size: Vector, reflections: usize },
 }
@@ -76,11 +80,17 @@ pub enum Variant {
     Large,
     /// Turned by an odd angle about an odd axis.
     Rotated,
+    /// A million times smaller: tens of nanometres.
+    Tiny,
+    /// A million times larger: tens of kilometres.
+    Huge,
 }
 
 impl Variant {
-    /// All of them.
+    /// Those of lamps and their parts.
     pub const ALL: [Self; 5] = [Self::Home, Self::Shifted, Self::Small, Self::Large, Self::Rotated];
+    /// Sizes at which absolute limits show: for facets, since a nanometre is a contact on the spline.
+    pub const EXTREME: [Self; 2] = [Self::Tiny, Self::Huge];
 
     /// The word used in tables.
     pub fn name(self) -> &'static str {
@@ -90,6 +100,8 @@ impl Variant {
             Self::Small => "small",
             Self::Large => "large",
             Self::Rotated => "rotated",
+            Self::Tiny => "tiny",
+            Self::Huge => "huge",
         }
     }
 
@@ -99,6 +111,8 @@ impl Variant {
             Self::Shifted => Frame::translation(Vector::new(1e6, -1e6, 1e6)),
             Self::Small => Frame { scale: 1e-3, ..Frame::IDENTITY },
             Self::Large => Frame { scale: 1e3, ..Frame::IDENTITY },
+            Self::Tiny => Frame { scale: 1e-6, ..Frame::IDENTITY },
+            Self::Huge => Frame { scale: 1e6, ..Frame::IDENTITY },
             Self::Rotated => {
                 Frame::from_axis(Point::ZERO, Vector::new(0.31, -0.73, 0.52), Some(Vector::new(0.9, 0.27, 0.13)))
             }
@@ -133,8 +147,15 @@ impl Case {
     pub fn scene(&self, variant: Variant) -> Scene<'_> {
         let frame = variant.frame();
         let placed = self.surfaces.iter().map(|s| s.transformed(|p| frame.point(p)));
-        let model = sample_models::model(self.name, placed);
-        let mesh = sample_models::grid_mesh(&model, self.divisions);
+        let mut model = sample_models::model(self.name, placed);
+        let mesh = if self.loops.is_empty() {
+            sample_models::grid_mesh(&model, self.divisions)
+        } else {
+            for face in model.parts.iter_mut().flat_map(|p| &mut p.shells).flat_map(|s| &mut s.faces) {
+                face.loops.clone_from(&self.loops);
+            }
+            FacetMesh::default()
+        };
         Scene { case: self, variant, model, mesh, frame }
     }
 }

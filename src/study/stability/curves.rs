@@ -12,17 +12,17 @@ pub(super) fn cases() -> Vec<Case> {
 }
 
 /// A curve in the x–z plane swept from y = −50 to 50.
-fn swept(points: &[(f64, f64, f64)], degree: usize, knots: Vec<f64>) -> Surface {
+pub(super) fn swept(points: &[(f64, f64, f64)], degree: usize, knots: Vec<f64>) -> Surface {
     let points = points.iter().map(|&(x, z, w)| Homogeneous::weighted(Point::new(x, 0.0, z), w)).collect();
     sweep::extrusion(&Curve { degree, knots, points }, Vector::Y, [-50.0, 50.0])
 }
 
-fn bezier_knots(degree: usize) -> Vec<f64> {
+pub(super) fn bezier_knots(degree: usize) -> Vec<f64> {
     [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat()
 }
 
 /// A ray in a plane of constant x, coming down from z = 100 onto `(x, y, z)`, inclined along y.
-fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
+pub(super) fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
     let slope = random.between(-0.6, 0.6);
     let d = Vector::new(0.0, slope, -1.0).normalize();
     let t = (100.0 - z) / -d.z;
@@ -44,6 +44,7 @@ fn crease() -> Case {
     Case {
         name: "crease inside a face",
         surfaces: vec![swept(&points, 3, knots)],
+        loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
         distance: Box::new(|p| p.z + 0.8 * p.x.abs()),
@@ -76,6 +77,7 @@ fn cusp() -> Case {
     Case {
         name: "cusp",
         surfaces: vec![swept(&points, 3, bezier_knots(3))],
+        loops: Vec::new(),
         divisions: 16,
         slack: 0.0,
         // Along x, which is the shorter way near the cusp's upright flanks.
@@ -123,6 +125,7 @@ fn crossing_sheets() -> Case {
     Case {
         name: "sheets that cross",
         surfaces: vec![swept(&points, 3, bezier_knots(3))],
+        loops: Vec::new(),
         divisions: 24,
         slack: 0.0,
         distance: Box::new(move |p| {
@@ -147,6 +150,7 @@ fn ruling() -> Case {
     Case {
         name: "ray along a ruling",
         surfaces: vec![swept(&[(-50.0, -25.0, 1.0), (50.0, 25.0, 1.0)], 1, bezier_knots(1))],
+        loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
         distance: Box::new(|p| p.z - 0.5 * p.x),
@@ -155,7 +159,7 @@ fn ruling() -> Case {
 }
 
 /// z = a·x² + b·y² over [−50, 50]² as one biquadratic patch.
-fn paraboloid(a: f64, b: f64) -> Surface {
+pub(super) fn paraboloid(a: f64, b: f64) -> Surface {
     // Bernstein coefficients of s² for s = 50(2u − 1), degree 2: 50²·(1, −1, 1).
     let (s1, s2) = ([-50.0, 0.0, 50.0], [2500.0, -2500.0, 2500.0]);
     let at = |i: usize, j: usize| Homogeneous::weighted(Point::new(s1[i], s1[j], a * s2[i] + b * s2[j]), 1.0);
@@ -190,6 +194,7 @@ fn tangent() -> Case {
     Case {
         name: "tangent to a free form",
         surfaces: vec![paraboloid(a, b)],
+        loops: Vec::new(),
         divisions: 48,
         slack: 0.0,
         distance: Box::new(move |p| p.z - a * p.x * p.x - b * p.y * p.y),
@@ -220,6 +225,7 @@ fn collapsed() -> Case {
     Case {
         name: "collapsed edge",
         surfaces: vec![surface],
+        loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
         distance: Box::new(|p| p.z),
@@ -242,6 +248,7 @@ fn apex() -> Case {
     Case {
         name: "apex of a cone",
         surfaces: vec![cone],
+        loops: Vec::new(),
         divisions: 12,
         slack: 0.0,
         distance: Box::new(|p| (p.x.hypot(p.y) + p.z) * std::f64::consts::FRAC_1_SQRT_2),
@@ -266,6 +273,7 @@ fn huge_radius() -> Case {
     Case {
         name: "radius 1e9",
         surfaces: vec![swept(&points, 2, bezier_knots(2))],
+        loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
         distance: Box::new(move |p| p.z - height(p.x)),

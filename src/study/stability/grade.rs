@@ -13,6 +13,9 @@ const NEAR_POLE: f64 = 1e-6;
 const ON_SURFACE: f64 = 1e-9;
 /// A hit nearer to its start than this share of the chord is the start itself.
 const AT_START: f64 = 1e-9;
+/// Along a trim the spline promises no more than this, mm: twice the default of [`crate::intersect::exact::Settings::trim_band`], which
+/// is measured across the ray and not across the edge.
+const TRIM_BAND: f64 = 2e-6;
 /// |cos| of the incidence below which the band is taken as no longer.
 const GRAZING: f64 = 1e-3;
 
@@ -76,6 +79,9 @@ const STEPS: usize = 256;
 impl Scene<'_> {
     /// One grade per question, in order.
     pub fn grades(&self, who: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
+        if geometry == Geometry::Facets && self.mesh.facets.is_empty() {
+            return Vec::new();
+        }
         let grader = Grader { scene: self, who, geometry, band: self.band() };
         self.case.questions.iter().map(|q| grader.grade(q)).collect()
     }
@@ -84,7 +90,7 @@ impl Scene<'_> {
     pub fn rays(&self) -> Vec<Ray> {
         let first = |q: &Question| match q {
             Question::First { ray, .. } | Question::All { ray, .. } | Question::Guide { ray, .. } => *ray,
-            Question::Chord { toward, .. } => *toward,
+            Question::Chord { toward, .. } | Question::Onward { toward, .. } => *toward,
         };
         self.case.questions.iter().map(|q| self.ray(&first(q))).collect()
     }
@@ -130,6 +136,19 @@ impl Grader<'_> {
         self.geometry == Geometry::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
     }
 
+    /// What a miss is worth where there should be a hit.
+    fn missed(&self, ray: &Ray) -> Grade {
+        if self.unsure_miss(ray) { Grade::Flagged } else { Grade::Wrong }
+    }
+
+    /// Whether the truth hangs on less than the intersector promises: the last bits of the input, and on the spline the band along
+    /// trims.
+    fn is_open(&self, truth: &Truth, resolution: f64) -> bool {
+        let trimmed = self.geometry == Geometry::Spline && !self.scene.case.loops.is_empty();
+        let band = if trimmed { TRIM_BAND / self.scene.frame.scale } else { 0.0 };
+        truth.margin <= 8.0 * resolution + band
+    }
+
     fn grade(&self, question: &Question) -> Grade {
         match question {
             Question::First { ray, truth } => {
@@ -138,6 +157,7 @@ impl Grader<'_> {
             }
             Question::All { ray, truths } => self.all(ray, truths),
             Question::Chord { toward, direction, radius } => self.chord(toward, *direction, *radius),
+            Question::Onward { toward, direction, size } => self.onward(toward, *direction, *size),
             Question::Guide { ray, size, reflections } => self.guide(ray, *size, *reflections),
         }
     }
@@ -156,7 +176,7 @@ impl Grader<'_> {
 
     fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());
-        let open = truth.margin <= 8.0 * resolution;
+        let open = self.is_open(truth, resolution);
         let right = match (truth.t, hit) {
             (None, None) => true,
             (Some(_), None) => open,
@@ -209,8 +229,12 @@ impl Grader<'_> {
         let mut next = self.scene.ray(ray);
         let origin = next.origin;
         let mut hits: Vec<Hit> = Vec::new();
+        let mut unsure = false;
         while hits.len() <= truths.len() + 2 {
-            let Some(h) = self.ask(&next) else { break };
+            let Some(h) = self.ask(&next) else {
+                unsure = self.unsure_miss(&next);
+                break;
+            };
             let p = next.point_at(h.t);
             hits.push(Hit { t: (p - origin).dot(next.direction), ..h });
             next = Ray::new(p, next.direction).with_departure(h.departure());
@@ -234,7 +258,7 @@ impl Grader<'_> {
             }
         };
         match right {
-            _ if self.geometry == Geometry::Spline && hits.iter().any(flagged) => Grade::Flagged,
+            _ if self.geometry == Geometry::Spline && (unsure || hits.iter().any(flagged)) => Grade::Flagged,
             true => Grade::Right,
             false => Grade::Wrong,
         }
@@ -243,7 +267,7 @@ impl Grader<'_> {
     fn chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
-        let Some(h) = self.ask(&first) else { return Grade::Wrong };
+        let Some(h) = self.ask(&first) else { return self.missed(&first) };
         let origin = frame.local_point(first.point_at(h.t));
         let local = Ray::new(origin, direction);
         let from = h.departure();
@@ -257,10 +281,12 @@ impl Grader<'_> {
             return if self.geometry == Geometry::Facets && truth.margin <= self.band {
                 Grade::Right
             } else {
-                Grade::Wrong
+                self.missed(&second)
             };
         };
         match self.geometry {
+            // From a hit that is not the one aimed at, a chord may run another way.
+            Geometry::Spline if flagged(&h) => Grade::Flagged,
             Geometry::Spline => self.first_on_spline(&local, &truth, Some(&a)),
             Geometry::Facets => {
                 let t = self.local_t(&a);
@@ -269,6 +295,25 @@ impl Grader<'_> {
                 if right { Grade::Right } else { Grade::Wrong }
             }
         }
+    }
+
+    fn onward(&self, toward: &Ray, direction: Vector, size: Vector) -> Grade {
+        let frame = &self.scene.frame;
+        let first = self.scene.ray(toward);
+        let Some(h) = self.ask(&first) else { return self.missed(&first) };
+        let start = first.point_at(h.t);
+        let local = Ray::new(frame.local_point(start), direction);
+        let next = Ray::new(start, frame.direction(direction).normalize()).with_departure(h.departure());
+        // Where it leaves the box; it runs away from the wall that it starts on.
+        let ways = [0, 1, 2].map(|a: usize| {
+            let wall = if direction[a] > 0.0 { size[a] } else { 0.0 };
+            (wall - local.origin[a]) / direction[a]
+        });
+        let axis = Vector::from_array(ways).min_position();
+        // Over the wall that it leaves the ray has risen by this when it meets the next.
+        let margin = direction.abs().min_element() * ways[axis];
+        let truth = Truth::hit(ways[axis], direction[axis], margin);
+        self.first(&local, &truth, self.ask(&next).as_ref())
     }
 
     /// How far along the ray the sag band stretches behind a hit.

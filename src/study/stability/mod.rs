@@ -13,6 +13,7 @@
 mod case;
 mod curves;
 mod grade;
+mod practice;
 mod solids;
 mod spheres;
 
@@ -45,10 +46,11 @@ pub fn answer(rows: &[Row]) -> String {
     )
 }
 
-/// All cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees.
+/// All cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees, and to what users do.
 pub fn cases() -> Vec<Case> {
     let mut all = spheres::cases();
     all.extend(curves::cases());
     all.extend(solids::cases());
+    all.extend(practice::cases());
     all
 }

@@ -10,7 +10,7 @@ pub(super) fn cases() -> Vec<Case> {
 }
 
 /// The six faces of a box, normals outward.
-fn block(min: Point, max: Point) -> Vec<Surface> {
+pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
     let size = max - min;
     let mut faces = Vec::new();
     for axis in 0..3 {
@@ -31,7 +31,7 @@ fn block(min: Point, max: Point) -> Vec<Surface> {
     faces
 }
 
-fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + Send + Sync + Clone {
+pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + Send + Sync + Clone {
     move |p| {
         let d = (p - 0.5 * (min + max)).abs() - 0.5 * (max - min);
         d.max(Vector::ZERO).length() + d.max_element().min(0.0)
@@ -73,6 +73,7 @@ fn cell_walls() -> Case {
     Case {
         name: "cell wall and corner",
         surfaces: block(min, max),
+        loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
         distance: Box::new(block_distance(min, max)),
@@ -95,6 +96,7 @@ fn coincident() -> Case {
     Case {
         name: "coincident faces",
         surfaces: [block(a.0, a.1), block(b.0, b.1)].concat(),
+        loops: Vec::new(),
         divisions: 3,
         slack: 0.0,
         distance: Box::new(move |p| if da(p).abs() < db(p).abs() { da(p) } else { db(p) }),
@@ -114,6 +116,7 @@ fn slivers() -> Case {
     Case {
         name: "slivers",
         surfaces: block(min, max),
+        loops: Vec::new(),
         divisions: 1,
         // Facets a million times longer than wide: barycentric weights carry 1e-11, and t follows them over 1000 mm:
         // 3e-8 mm was seen. A thousandth of the thickness.
@@ -137,6 +140,7 @@ fn gap() -> Case {
     Case {
         name: "air gap of 1 µm",
         surfaces: [block(a.0, a.1), block(b.0, b.1)].concat(),
+        loops: Vec::new(),
         divisions: 3,
         slack: 0.0,
         distance: Box::new(move |p| if da(p).abs() < db(p).abs() { da(p) } else { db(p) }),
@@ -156,6 +160,7 @@ fn guide() -> Case {
     Case {
         name: "guide of 1e4 reflections",
         surfaces: block(Point::ZERO, size),
+        loops: Vec::new(),
         divisions: 4,
         slack: 0.0,
         distance: Box::new(block_distance(Point::ZERO, size)),

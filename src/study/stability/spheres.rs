@@ -32,6 +32,7 @@ fn ball(name: &'static str, questions: Vec<Question>) -> Case {
     Case {
         name,
         surfaces: vec![sphere(R)],
+        loops: Vec::new(),
         divisions: 12,
         slack: 0.0,
         distance: Box::new(|p| p.length() - R),
@@ -134,6 +135,7 @@ fn knots() -> Case {
     Case {
         name: "knot line, corner, seam",
         surfaces: vec![sweep::torus(&Frame::IDENTITY, major, minor, FULL, FULL)],
+        loops: Vec::new(),
         divisions: 12,
         slack: 0.0,
         distance: torus_distance(major, minor),
@@ -160,6 +162,7 @@ fn thin_torus() -> Case {
     Case {
         name: "torus of radius 0.01",
         surfaces: vec![sweep::torus(&Frame::IDENTITY, major, minor, FULL, FULL)],
+        loops: Vec::new(),
         divisions: 24,
         slack: 0.0,
         distance: torus_distance(major, minor),
