@@ -231,6 +231,7 @@ impl Reader<'_, '_, '_> {
         let note = |r: Refusal| Note { id: r.id, entity: r.entity, reason: r.reason };
         report.refusals.extend(refused.into_iter().map(note));
         report.repairs.extend(repaired.into_iter().map(note));
+        // A face may stand in several shells; by its #id it counts once.
         let mut counted = FxHashSet::default();
         for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e)))
         {
@@ -245,6 +246,7 @@ impl Reader<'_, '_, '_> {
     /// Places a part.
     fn add_instance(&mut self, PartFaces { part, found }: PartFaces, p: PlacedRepresentation) {
         self.report.faces_placed.found += found;
+        // A part of which no face was converted has nothing to place.
         if self.model.part(part).face_count() == 0 {
             return;
         }

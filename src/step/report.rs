@@ -16,7 +16,7 @@ pub struct ImportReport {
     pub units: UnitNames,
     /// Distinct shapes.
     pub parts: usize,
-    /// PlacedRepresentation shapes.
+    /// Placed shapes.
     pub instances: usize,
     /// Shells of distinct shapes.
     pub shells: usize,
@@ -24,7 +24,7 @@ pub struct ImportReport {
     pub faces: FaceCounts,
     /// Faces counted once for every instance.
     pub faces_placed: PlacedCounts,
-    /// ConvertedPart distinct faces by the kind of surface.
+    /// Converted distinct faces by the kind of surface.
     pub by_surface: SurfaceCounts,
     /// Lower and upper corner of the trimmed faces, mm; `None` without any, or when it was not asked for.
     pub bbox_mm: Option<[[f64; 3]; 2]>,

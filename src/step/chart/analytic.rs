@@ -21,6 +21,7 @@ pub(super) fn locate_cone(frame: &Frame, radius: f64, half_angle: f64, p: Point)
     let distance = q.x.hypot(q.y);
     // On the nappe that the height selects; then the perpendicular foot in the half plane.
     let signed = if radius + q.z * slope < 0.0 { -distance } else { distance };
+    // The foot on the line `r = radius + v·slope`: its direction is (slope, 1), hence the 1 + slope².
     let v = (q.z + (signed - radius) * slope) / (1.0 + slope * slope);
     Uv::new(longitude(q, signed), v)
 }
@@ -55,6 +56,7 @@ pub(super) fn locate_torus(frame: &Frame, major: f64, range: [f64; 2], p: Point)
     let q = frame.local_point(p);
     let distance = q.x.hypot(q.y);
     let v = q.z.atan2(distance - major);
+    // The inner part of a lemon ends at its poles; a point beyond belongs to them.
     let v = if range[0].is_finite() { v.clamp(range[0], range[1]) } else { v };
     Uv::new(longitude(q, 1.0), v)
 }

@@ -28,7 +28,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         }
         Kind::Cone { frame, radius, half_angle } => {
             let (frame, half_angle) = (*frame, *half_angle);
-            // Seen across the axis a step along the tilted normal is longer by 1/cos.
+            // Seen across the axis a step along the tilted normal is longer by 1/cos: the moved slant line cuts the radius there.
             let radius = radius + distance / half_angle.cos();
             if !(radius > 0.0) {
                 return None;
@@ -73,8 +73,10 @@ fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Cur
         let piece = base.restricted(span[0], span[1]);
         let moved = |t: f64| {
             let d = piece.derivatives(t);
+            // Where profile and direction are parallel there is no normal; what is no number fails the fit below.
             d.point + distance * d.first.cross(direction).try_normalize().unwrap_or(Vector::NAN)
         };
+        // A central difference of the moved curve: its own derivative would need the curve's second one.
         let step = DIFFERENCE_STEP * (span[1] - span[0]);
         let jet = |t: f64| {
             let lo = (t - step).max(span[0]);
@@ -89,6 +91,7 @@ fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Cur
         whole = match whole {
             None => Some(fitted),
             Some(head) => {
+                // At a corner of the profile the offsets of both sides part: no one curve joins them.
                 let tear = (head.evaluate(span[0]) - fitted.evaluate(span[0])).length();
                 if !(tear <= CLOSED_SHARE * head.bounds().diagonal() + TOLERANCE) {
                     return None;
@@ -103,6 +106,7 @@ fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Cur
 fn basis_domain(basis: &Chart) -> Option<[[f64; 2]; 2]> {
     let mut domain = basis.range;
     for d in 0..2 {
+        // Angles have no ends but a period; that of a chart begins at zero.
         if let (Some(p), true) = (basis.period[d], domain[d][0].is_infinite()) {
             domain[d] = [0.0, p];
         }
@@ -123,6 +127,7 @@ struct Jet {
 fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector, Vector)> {
     let s = basis.second_derivatives(uv);
     let n = s.du.cross(s.dv);
+    // Weingarten: the unit normal's derivative is that of `n`, without its part along `n`, over its length.
     let length = n.length();
     // At a pole one derivative is what rounding left of it, in any direction.
     let [[u0, u1], [v0, v1]] = basis.domain();
@@ -236,6 +241,8 @@ impl GridLines {
         let mut knots = Vec::with_capacity(3 * self.at.len() + 2);
         for (line, &x) in self.at.iter().enumerate() {
             let end = line == 0 || line == last;
+            // Two knots of a cubic leave C¹, which is what values and slopes give; three leave a corner, four an
+            // end.
             let times = if end { 4 } else { 2 + usize::from(self.is_knot[line]) };
             knots.extend(std::iter::repeat_n(x, times));
         }
@@ -266,6 +273,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
             }
         }
         let longest = lines.iter().map(|l| l.at.len()).max()?;
+        // What the largest grid gives is taken with its error, up to WORST_FIT_MM.
         let full = 2 * longest > MAX_CELLS.max(2 * base[0].len().max(base[1].len()));
         if error <= TOLERANCE || full {
             return (error <= WORST_FIT_MM).then_some((surface, error));
@@ -282,6 +290,8 @@ fn hermite(basis: &Surface, distance: f64, lines: &[GridLines; 2]) -> Option<Sur
         for column in &columns {
             let uv = Uv::new(u, lines[1].at[column.line]);
             let jet = jet(basis, distance, uv, [row.side, column.side])?;
+            // Control points of a cubic Hermite patch: a third of the cell along each derivative, and the twist
+            // along both.
             let p = jet.point + row.off * jet.du + column.off * jet.dv + (row.off * column.off) * jet.duv;
             points.push(Homogeneous::new(p.x, p.y, p.z, 1.0));
         }

@@ -33,6 +33,7 @@ pub(in crate::step) struct SplineChart {
 }
 
 impl Clone for SplineChart {
+    // The patches and what the edges showed belong to one use of the surface; a copy starts anew.
     fn clone(&self) -> Self {
         Self::new(self.surface.clone())
     }
@@ -57,6 +58,7 @@ impl SplineChart {
 
     pub(super) fn period(&self) -> [Option<f64>; 2] {
         let domain = self.surface.domain();
+        // Sides that contract to one and the same point are poles, no seam.
         [0, 1].map(|d| (self.closed[d] && self.collapsed[d] == [false; 2]).then(|| domain[d][1] - domain[d][0]))
     }
 
@@ -79,6 +81,7 @@ impl SplineChart {
     pub(super) fn locate(&self, p: Point, hint: Option<Uv>) -> Uv {
         let mut best: Option<(Uv, f64)> = None;
         if let Some(hint) = hint {
+            // Edges are walked along: the point before is almost always the start that Newton wants.
             let found = self.newton(p, self.wrap(hint));
             if found.1 <= self.expected.get() {
                 return found.0;
@@ -109,6 +112,8 @@ impl SplineChart {
         Uv::new(one(0), one(1))
     }
 
+    /// Gauss–Newton (tangents alone, without the surface's curvature), halved while it does not descend, held
+    /// inside the domain.
     /// Gauss–Newton with the curvature of the residual, halved while it does not descend, held inside the domain.
     fn newton(&self, p: Point, start: Uv) -> (Uv, f64) {
         let domain = self.surface.domain();
@@ -124,6 +129,8 @@ impl SplineChart {
             let floor = STANDING_STILL * (e * extent[0] * extent[0]).max(g * extent[1] * extent[1]);
             e = e.max(floor / (extent[0] * extent[0]));
             g = g.max(floor / (extent[1] * extent[1]));
+            // Where descent points out of the domain the foot lies on the border, and the other parameter goes on
+            // alone.
             let held = |d: usize, gradient: f64| {
                 !self.closed[d]
                     && (uv[d] <= domain[d][0] && gradient > 0.0 || uv[d] >= domain[d][1] && gradient < 0.0)
@@ -139,12 +146,15 @@ impl SplineChart {
             } else if det > SINGULAR_METRIC * e * g {
                 Uv::new((-gu * g + gv * f) / det, (-gv * e + gu * f) / det)
             } else {
+                // Where tangents are parallel in rounding each parameter steps by itself, half as far, since both
+                // reach for the same miss.
                 Uv::new(-gu / e, -gv / g) * 0.5
             };
             // At most a quarter of the domain at once.
             let limit = (step.x.abs() / (0.25 * extent[0])).max(step.y.abs() / (0.25 * extent[1])).max(1.0);
             let mut step = step / limit;
             let mut moved = false;
+            // Eight halvings leave 1/256 of the step: one that still does not descend is at the floor of rounding.
             for _ in 0..8 {
                 let next = self.wrap_step(uv, step, domain);
                 let next_d = self.surface.derivatives(next);
@@ -210,6 +220,7 @@ impl SplineChart {
                 }
             }
             seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // The two best seeds: the nearest sample may lie on the wrong side of a fold.
             for &(_, seed) in &seeds[..2] {
                 let found = self.newton(p, seed);
                 if found.1 < best.1 {

@@ -128,6 +128,7 @@ impl Chart {
                         self.poles.push(Pole { fixed: 1, at, point: p });
                     }
                 }
+                // With poles at its ends the meridian closes through the axis, and no period joins them.
                 if self.poles.is_empty() && (ends[0] - ends[1]).length() <= near {
                     self.period[1] = Some(range[1] - range[0]);
                 }
@@ -229,7 +230,7 @@ impl Chart {
         Uv::new(one(0), one(1))
     }
 
-    /// The spline over a rectangle, and the rectangle it really covers.
+    /// The spline that covers a rectangle of the parameters. It may reach beyond: splines and profiles keep their own domain.
     pub(in crate::step) fn surface(&self, domain: [[f64; 2]; 2]) -> Surface {
         use crate::nurbs::sweep;
         match &self.kind {
@@ -263,6 +264,7 @@ impl Chart {
 
     /// Factors from the file's parameters to the chart's; `None` where they are not proportional.
     pub(in crate::step) fn parameter_scale(&self, length: f64, angle: f64) -> Option<[f64; 2]> {
+        // Weights alike leave a curve's parameter proportional to the file's; a rational arc has its own.
         let direct = |c: &Curve| c.points.iter().all(|p| p.w == c.points[0].w);
         match &self.kind {
             Kind::Plane { .. } => Some([length; 2]),

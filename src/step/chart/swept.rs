@@ -25,6 +25,7 @@ pub(super) fn locate_revolution(
     size: f64,
 ) -> Uv {
     let q = frame.local_point(p);
+    // Seen in the half plane of radius and height the surface is its profile.
     let target = Vector::new(q.x.hypot(q.y), 0.0, q.z);
     let expected = EXPECTED_SHARE * size + EXPECTED_MM;
     let Some(Plane { azimuth, crosses }) = plane else {
@@ -47,6 +48,7 @@ pub(super) fn locate_revolution(
     }
     // On the other side of the axis half a turn on; where both fit, near the axis, what is expected decides.
     let behind = foot(-target.x);
+    // How far a turn lies from one of the copies that are expected, as a share of a turn.
     let turn = |u: f64| hint.map_or(0.0, |h| ((u - h.x) / TAU - ((u - h.x) / TAU).round()).abs());
     let both = ahead.1.max(behind.1) <= expected.max(NEAR_AXIS_SHARE * target.x);
     let back = if both { turn(u + PI) < turn(u) } else { behind.1 < ahead.1 };
@@ -63,6 +65,8 @@ fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
     let [a, b] = meridian.domain();
     let n = (PROFILE_SAMPLES_PER_SPAN * meridian.breakpoints().len()).min(PROFILE_SAMPLES);
     let sample = |i: usize| a + (b - a) * i as f64 / n as f64;
+    // The samples find the branch; sections around the best of them need no derivative, which a profile at the axis
+    // has not.
     let best = (0..=n).map(|i| (i, distance(sample(i)))).min_by(|x, y| x.1.total_cmp(&y.1)).map_or(0, |x| x.0);
     let (mut lo, mut hi) = (sample(best.saturating_sub(1)), sample((best + 1).min(n)));
     for _ in 0..GOLDEN_ROUNDS {
@@ -82,6 +86,7 @@ pub(in crate::step) fn profile_distance(frame: &Frame, meridian: &Curve, target:
 /// The plane of a meridian, if it has one with the axis.
 pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
+    // The plane is told best by the point that is farthest from the axis.
     let far = local.iter().copied().max_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))?;
     let r = far.x.hypot(far.y);
     let near = PLANE_SHARE * r * r;
@@ -102,6 +107,7 @@ pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives
 /// u from the projection along the direction, v from what remains.
 pub(super) fn locate_extrusion(base: &Curve, direction: Vector, p: Point, hint: Option<f64>, size: f64) -> Uv {
     let square = direction.length_squared();
+    // Along the direction nothing counts: what is left of the distance is the curve's own.
     let flat = |q: Point| {
         let d = q - p;
         d - direction * (d.dot(direction) / square)

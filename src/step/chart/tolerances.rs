@@ -31,7 +31,7 @@ pub(super) const EXPECTED_SHARE: f64 = 1e-6;
 pub(super) const EXPECTED_MM: f64 = 1e-6;
 /// Feet on both sides of the axis within this share of the radius are as good as each other.
 pub(super) const NEAR_AXIS_SHARE: f64 = 1e-3;
-/// A profile this share of the largest radius squared, times that radius, off a plane through the axis lies in it.
+/// A profile no point of which is farther than this share of the largest radius from a plane through the axis lies in it.
 pub(super) const PLANE_SHARE: f64 = 1e-9;
 /// Samples of a profile that is in no plane, a span; [`PROFILE_SAMPLES`] at most.
 pub(super) const PROFILE_SAMPLES_PER_SPAN: usize = 16;

@@ -22,6 +22,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return self.trimmed_curve(e, trimmed, depth);
         }
         if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
+            // In a complex instance the curve is the first of its own attributes; in a simple one it stands behind
+            // the name.
             let curve = e.attributes("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
             let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
             return self.bounded_curve(basis.id, depth + 1);
@@ -104,6 +106,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let (a, b) = ends(second);
             let to = |p: Point| (p - a).length().min((p - b).length());
             let (start, end) = ends(first);
+            // Only by a clear margin, and with a third segment to tell: two alone may join either way.
             if to(start) < 0.5 * to(end) && curves.len() > 2 {
                 curves[0] = curves[0].reversed();
             }
@@ -148,6 +151,7 @@ fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
             up.push(piece[n - 1]);
             piece = up;
         }
+        // At a joint both pieces have one control point.
         points.extend(&piece[usize::from(!points.is_empty())..]);
     }
     let breaks = curve.breakpoints();

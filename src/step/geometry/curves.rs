@@ -59,6 +59,7 @@ impl CurveShape {
             Self::Line { origin, direction } => (p - *origin).dot(*direction) / direction.length_squared(),
             Self::Ellipse { frame, a, b } => {
                 let q = frame.local_point(p);
+                // A circle's angle is exact; the nearest point of an ellipse takes iterations.
                 if a == b { q.y.atan2(q.x) } else { ellipse_angle(q, *a, *b) }
             }
             Self::Hyperbola { frame, b, .. } => (frame.local_point(p).y / b).asinh(),
@@ -100,6 +101,7 @@ impl CurveShape {
                 let [a, b] = curve.domain();
                 let period = b - a;
                 if *closed && (t1 > b || t0 < a) {
+                    // Into the first period, where the spline is given; the range may run past its end once.
                     let shift = ((t0 - a) / period).floor() * period;
                     let (s0, s1) = ((t0 - shift).clamp(a, b), (t1 - shift).clamp(a, a + 2.0 * period));
                     return segment_over_seam(curve, s0, s1).reparametrised([t0, t1]);
@@ -117,6 +119,7 @@ fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     if s1 <= b {
         return curve.restricted(s0, s1);
     }
+    // A start on the seam: all of the range lies behind it.
     if b - s0 <= SEAM_SHARE * period {
         let end = (s1 - period).max(a + SHORTEST_TAIL * period);
         return curve.restricted(a, end.min(b)).reparametrised([b, b + (end - a)]);

@@ -139,6 +139,7 @@ fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge
     if !(b > a) || curve.points.iter().any(|x| !x.is_finite()) {
         return None;
     }
+    // How far the curve's ends miss the vertices is the file's own gap, which the report tells.
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
     if extent < EMPTY_EDGE_MM {

@@ -118,6 +118,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let e = self.entity(id)?;
         let args = e.attributes("VECTOR", 1);
         let direction = args.and_then(|a| self.direction(a.id(0))).and_then(|d| d.try_normalize());
+        // A magnitude of zero, which files hold, would leave no vector: the direction counts then.
         let magnitude = args.and_then(|a| a.real(1)).filter(|m| *m != 0.0).unwrap_or(1.0);
         match direction {
             Some(d) => Ok(d * (magnitude * self.units.length)),
@@ -181,6 +182,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         // Without its third axis the operator takes what the other two leave; with fewer, the Z of the space.
         let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
         let mut frame = Frame::from_axis(origin, z, axis1);
+        // An operator may mirror; its second axis says so.
         if axis2.is_some_and(|y| y.dot(frame.y) < 0.0) {
             frame.y = -frame.y;
         }

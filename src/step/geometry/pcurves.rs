@@ -24,6 +24,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let across = self.direction(own.id(3)).and_then(|d| d.try_normalize());
         let across = across.ok_or_else(|| Refusal::new(e, "its reference direction is missing"))?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
+        // Run against its basis, the other side is aside.
         let sign = if reversed { -distance } else { distance };
         let shape = match shape {
             CurveShape::Line { origin, direction } => {
@@ -54,6 +55,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
                     d.point + sign * aside
                 };
                 let [a, b] = curve.domain();
+                // The offset's own derivative would need the curve's second one; a quotient is close enough for a
+                // fit.
                 let at = |t: f64| {
                     let h = DIFFERENCE_STEP * (b - a);
                     let (lo, hi) = ((t - h).max(a), (t + h).min(b));

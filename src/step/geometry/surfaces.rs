@@ -80,6 +80,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let rows = base.list(shift + 2);
         let nu = rows.len();
         let nv = rows.list(0).len();
+        // Counts in a file are claims: no more is reserved than a usual surface needs.
         let mut points = Vec::with_capacity(nu.saturating_mul(nv).min(1 << 16));
         for i in 0..nu {
             let row = rows.list(i).ids();

@@ -1,4 +1,4 @@
-//! Surfaces of revolution and of linear extrusion; revolutions of lines and circles in their closed forms.
+//! Surfaces of revolution and of linear extrusion; those of circles, and of lines parallel to the axis, in closed form.
 
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
@@ -146,7 +146,7 @@ fn revolved_circle(frame: &Frame, circle: &Frame, radius: f64) -> Option<Chart> 
     Some(chart)
 }
 
-/// A line turned about an axis in its plane: a plane, cylinder or cone, with the orientation of the revolution.
+/// A line turned about an axis that it is parallel to: a cylinder with the orientation of the revolution; `None` for any other line.
 fn revolved_line(frame: &Frame, origin: Point, direction: Vector) -> Option<Chart> {
     let (o, d) = (frame.local_point(origin), frame.local_direction(direction.try_normalize()?));
     // Only lines that lie in a plane through the axis.

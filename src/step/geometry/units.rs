@@ -96,6 +96,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
     };
     let by_name = || conventional_unit(&name);
     let (kind, factor) = by_measure().or_else(by_name)?;
+    // A definition of another kind than it declares is none.
     (declared.is_none_or(|d| d == kind)).then_some((kind, factor, name))
 }
 

@@ -189,6 +189,8 @@ impl<'f, 'a> Entity<'f, 'a> {
     pub(super) fn attributes(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
         let record = self.records.iter().find(|r| self.file.bytes(r.name) == name.as_bytes())?;
         let args = self.file.args(record.values);
+        // A complex instance has each type's attributes in its own record; a simple one writes those of its
+        // supertypes first.
         let skip = if self.records.len() == 1 { inherited } else { 0 };
         Some(Args { values: args.values.get(skip..).unwrap_or(&[]), ..args })
     }
@@ -232,6 +234,7 @@ impl<'f, 'a> Args<'f, 'a> {
             Value::Real(x) => Some(x),
             Value::Integer(x) => Some(x as f64),
             Value::Typed(_) => self.typed(i)?.1.real(0),
+            // `LENGTH_MEASURE(1.0)` is a number too: selects of measures name their type.
             _ => None,
         }
     }
@@ -240,6 +243,7 @@ impl<'f, 'a> Args<'f, 'a> {
     pub(super) fn count(&self, i: usize) -> Option<usize> {
         match self.value(i)? {
             Value::Integer(x) => usize::try_from(x).ok(),
+            // Some writers give integers with a point.
             Value::Real(x) if x >= 0.0 && x.fract() == 0.0 && x < EXACT_COUNT => Some(x as usize),
             _ => None,
         }
@@ -301,6 +305,7 @@ impl<'f, 'a> Args<'f, 'a> {
     pub(super) fn typed(&self, i: usize) -> Option<(&'a str, Args<'f, 'a>)> {
         match self.value(i)? {
             Value::Typed(t) => {
+                // A typed value is a record without an id: a name and what stands in its brackets.
                 let record = self.file.typed[t as usize];
                 Some((std::str::from_utf8(self.file.bytes(record.name)).ok()?, self.file.args(record.values)))
             }

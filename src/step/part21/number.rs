@@ -1,5 +1,5 @@
-//! Numbers: the exact fast path of Clinger, *How to Read Floating Point Numbers Accurately*, PLDI 1990, for up to 19
-//! digits and powers of ten up to 22; the standard library for the rest.
+//! Numbers: the exact fast path of Clinger, *How to Read Floating Point Numbers Accurately*, PLDI 1990, for digits that make up less
+//! than 2⁵³ and powers of ten up to 22; the standard library for the rest.
 
 use super::Value;
 
@@ -20,6 +20,7 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
         digits += 1;
         match mantissa.checked_mul(10).and_then(|m| m.checked_add(u64::from(c - b'0'))) {
             Some(m) => mantissa = m,
+            // What does not fit 64 bits is read again by the standard library.
             None => exact = false,
         }
     };
@@ -37,6 +38,7 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
             digit(c);
             i += 1;
         }
+        // Each digit behind the point counts a tenth.
         exponent = -i32::try_from(i - start).ok()?;
     }
     if digits == 0 {
@@ -52,9 +54,11 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
         let start = j;
         let mut power = 0i32;
         while let Some(&c) = source.get(j).filter(|c| c.is_ascii_digit()) {
+            // Bounded against overflow; beyond 22 the standard library reads the text anyway.
             power = power.saturating_mul(10).saturating_add(i32::from(c - b'0')).min(100_000);
             j += 1;
         }
+        // An `E` without digits belongs to what follows.
         if j > start {
             exponent = exponent.saturating_add(if minus { -power } else { power });
             real = true;
@@ -76,6 +80,7 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
         slow(&source[at..i])?
     };
     let x = if negative { -magnitude } else { magnitude };
+    // An overflow is refused: no length of a file is infinite.
     x.is_finite().then_some((Value::Real(x), i))
 }
 

@@ -21,6 +21,8 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     let mut p = Parser {
         source,
         at: if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 },
+        // About what CAD systems write, a value in a dozen bytes and an instance in some sixty; a wrong guess costs
+        // a copy of the tables.
         values: Vec::with_capacity(source.len() / 12),
         typed: Vec::new(),
         records: Vec::with_capacity(source.len() / 64),
@@ -33,6 +35,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         rewound: 0,
     };
     let marked = p.statements();
+    // A lost first line is forgiven to a file that goes on with instances.
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
@@ -167,6 +170,7 @@ impl Parser<'_> {
             if matches!(next, None | Some(b'#' | b'E' | b'/' | b'D')) {
                 break;
             }
+            // Behind the place of the fault any ';' will do.
             if i >= self.at {
                 break;
             }
@@ -211,6 +215,7 @@ impl Parser<'_> {
 
     /// The next byte that means something, 0 at the end.
     fn peek(&mut self) -> u8 {
+        // Most bytes are no blanks: the test before the call is what reading costs.
         if let Some(&c) = self.source.get(self.at)
             && c > b' '
             && c != b'/'
@@ -245,6 +250,7 @@ impl Parser<'_> {
         let start = self.at;
         let mut x = 0u64;
         while let Some(c) = self.source.get(self.at).filter(|c| c.is_ascii_digit()) {
+            // Numbers beyond 64 bits are damage; all of them become one.
             x = x.saturating_mul(10).saturating_add(u64::from(c - b'0'));
             self.at += 1;
         }
@@ -321,6 +327,7 @@ impl Parser<'_> {
         self.at += 1;
         let span = Span { start: self.values.len() as u32, len: (self.stack.len() - base) as u32 };
         self.values.extend_from_slice(&self.stack[base..]);
+        // The stack keeps its memory for the next list.
         self.stack.truncate(base);
         Ok(span)
     }
@@ -352,6 +359,7 @@ impl Parser<'_> {
                 Value::Enum(name)
             }
             b'"' => {
+                // Nothing asks for what a binary holds.
                 let rest = &self.source[self.at + 1..];
                 self.at += 2 + rest.iter().position(|&b| b == b'"').ok_or("'\"' is missing behind a binary")?;
                 Value::Binary
@@ -381,6 +389,7 @@ impl Parser<'_> {
             let rest = self.source.get(self.at..).unwrap_or(&[]);
             let end = rest.iter().position(|&b| b == b'\'').ok_or("an apostrophe is missing behind a text")?;
             self.at += end + 1;
+            // Two apostrophes are one inside of the text.
             if self.source.get(self.at) != Some(&b'\'') {
                 break;
             }

@@ -28,6 +28,7 @@ pub(super) fn decode(raw: &[u8]) -> String {
             out.push_str(&text);
             i += used;
         } else {
+            // Line breaks and other controls inside of a text come from folding its lines.
             if raw[i] >= b' ' {
                 plain.push(raw[i]);
             }
@@ -57,8 +58,8 @@ fn escape(rest: &[u8]) -> Option<(String, usize)> {
     if !wide && !rest.starts_with(b"\\X2\\") {
         return None;
     }
-    // Codes hold no backslash: the first one is the end, or there is none. A search for the end itself took 40 s of a name of 1 MB
-    // that only begins such runs.
+    // Codes hold no backslash: the first one is the end, or there is none. To search for `\\X0\\` took 40 s for a name of 1 MB that
+    // only begins such runs.
     let length = rest[4..].iter().position(|&b| b == b'\\')?;
     let end = 4 + length;
     if !rest[end..].starts_with(b"\\X0\\") {
@@ -66,8 +67,10 @@ fn escape(rest: &[u8]) -> Option<(String, usize)> {
     }
     let codes = &rest[4..end];
     let text = if wide {
+        // What is no character is shown as one that says so.
         codes.chunks(8).map(|c| hex(c).and_then(char::from_u32).unwrap_or('\u{fffd}')).collect()
     } else {
+        // Edition 2 calls these codes UCS-2; writers put UTF-16 with its surrogates there.
         let units: Vec<u16> = codes.chunks(4).map(|c| hex(c).unwrap_or(0xfffd) as u16).collect();
         String::from_utf16_lossy(&units)
     };

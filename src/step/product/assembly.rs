@@ -222,6 +222,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     pub(crate) fn walk(mut self, limit: u64) -> Result<(Vec<PlacedRepresentation>, Self), u64> {
         self.limit = limit;
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
+        // Sorted by their ids: tables of hashes have no order, and two runs must number parts alike.
         let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
         products.sort_unstable();
         products.dedup();
@@ -243,6 +244,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Representations with shapes that no product reaches.
     fn place_orphans(&mut self) {
         self.in_orphans = true;
+        // From here on what products reach is closed: an orphan that leads to it would show it twice.
         self.by_products = self.reached.clone();
         let candidates: Vec<u64> = self
             .file

@@ -138,6 +138,7 @@ fn vertices_of_empty_edges(
     keys: &[EdgeKey],
     edges: &[Outcome<TrimmedEdge>],
 ) -> FxHashMap<u64, u64> {
+    // A chain of empty edges joins all of its vertices with the first.
     let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
     for (key, edge) in keys.iter().zip(edges) {
         if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
@@ -155,6 +156,7 @@ fn first_of(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
     while let Some(&before) = joined.get(&vertex) {
         vertex = before;
     }
+    // Later ends at a vertex that was joined itself find the one that is left.
     vertex
 }
 
@@ -193,6 +195,7 @@ fn add_shells(
         // Only a whole shell tells by its volume which way it faces.
         if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
+            // Rays would enter where they should leave: one such file lost 857 of 50,000.
             let reason = "the shell of a solid was inside out";
             out.repaired.extend(plan.owners.first().map(|owner| remark(file, *owner, reason.into())));
         }
@@ -261,7 +264,9 @@ fn face_edges<'e>(
         for (key, reversed) in uses {
             let k = index[key];
             let edge = edges[k].as_ref()?;
+            // The widest gap between an edge and its vertices tells how loosely points of this face hold together.
             found.gap = found.gap.max(edge.gap);
+            // An edge without length leaves no gap in its loop.
             let Some(curve) = &edge.curve else { continue };
             found.bounds = found.bounds.union(curve.bounds());
             found.curves.entry(k).or_insert(curve);
@@ -315,6 +320,7 @@ fn convert_face(
 
     // The surface, as much of it as the edges need.
     geometry.entity(plan.surface)?;
+    // What sizes itself by the edges asks for their points; of others they would be computed for nothing.
     let asked = if is_sized_by_edges(geometry.file, plan.surface) { ASKED_EDGES } else { 0 };
     let along = |curve: &&Curve| {
         let [a, b] = curve.domain();
@@ -345,6 +351,7 @@ fn convert_face(
         let surface = geometry.file.entity_name(plan.surface);
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
     })?;
+    // The chart was in reach; the part of it that the edges need may not be.
     let reach = built.surface.bounds();
     if !(reach.min.abs().max(reach.max.abs()).max_element() <= FARTHEST_MM) {
         return Err(beyond_rounding(geometry, id, plan));

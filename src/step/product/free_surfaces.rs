@@ -50,6 +50,7 @@ pub(crate) fn convert_free_surfaces(
             Err(refusal) => out.refused.push(refusal),
         }
     }
+    // Meshes hang below each other; the leaves alone are faces.
     let mut leaves = TessellatedItems::default();
     for &id in &items.tessellated {
         geometry.tessellated(id, 0, &mut leaves);
@@ -119,6 +120,7 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
 }
 
 fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> FaceTask<'e> {
+    // Boundaries of free surfaces share no edges: each use has one of its own, and runs along it.
     let mut edges = FxHashMap::default();
     let mut loops = Vec::new();
     for boundary in boundaries {

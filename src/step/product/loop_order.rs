@@ -30,6 +30,8 @@ pub(crate) fn put_in_order<T: Copy>(uses: &mut Vec<DirectedUse<T>>, tolerance: f
     if largest_gap(uses) <= tolerance {
         return None;
     }
+    // The lesser change first. Left alone, an edge flag of a real file against its neighbours was bridged by a step
+    // of 3.5 mm.
     for (mut tried, what) in [
         (turn_misfits(uses, tolerance), "an edge of a loop ran against its neighbours"),
         (chain_from_first(uses, tolerance), "the edges of a loop were not in order"),
@@ -56,6 +58,7 @@ fn turn_misfits<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<
             }
         }
     }
+    // A repair counts only if it closes the loop; else the fault is another one.
     (largest_gap(&out) <= tolerance).then_some(out)
 }
 
@@ -70,6 +73,7 @@ fn chain_from_first<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<
     while !left.is_empty() {
         let at = out[out.len() - 1].to;
         let near = |p: Point| (p - at).length() <= tolerance;
+        // A use that fits as it is goes before one that would be turned.
         let next = left.iter().position(|u| near(u.from)).or_else(|| left.iter().position(|u| near(u.to)))?;
         let mut found = left.remove(next);
         if !near(found.from) {

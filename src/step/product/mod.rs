@@ -1,4 +1,4 @@
-//! From records to parts, and to where they stand.
+//! From instances of the file to parts, and to where they stand.
 //!
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly`,
 //! `placed_count`); a representation is shells of faces (`topology`, with

@@ -45,6 +45,7 @@ pub(crate) fn add_face(
         .seams
         .into_iter()
         .map(|seam| {
+            // The nearest vertex: two of them may lie within the tolerance at a sliver.
             let vertices = seam.ends.map(|p| {
                 let distance = |v: &VertexId| (part.vertices[v.0 as usize] - p).length();
                 let found = known.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)));

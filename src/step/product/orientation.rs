@@ -24,6 +24,7 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     for (k, face) in faces.iter().enumerate() {
         for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
             if let Some(edge) = edge_use.edge {
+                // A face that looks the other way runs its loops the other way.
                 uses.entry(edge).or_default().push((k, edge_use.reversed != face.reversed));
             }
         }
@@ -34,12 +35,14 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
         if let [(a, along_a), (b, along_b)] = both[..]
             && a != b
         {
+            // Along one edge two faces that look the same way run against each other.
             neighbours[a].push((b, along_a != along_b));
             neighbours[b].push((a, along_a != along_b));
         }
     }
     let mut turned: Vec<Option<bool>> = vec![None; faces.len()];
     let mut out = Vec::new();
+    // Sides spread from face to face: within a group they are known up to a turn of all.
     for first in 0..faces.len() {
         if turned[first].is_some() {
             continue;
@@ -61,6 +64,7 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
             next += 1;
         }
         let count = group.iter().filter(|(_, turned)| *turned).count();
+        // By majority; that the whole shell may look inwards is told by its volume.
         if is_consistent && 2 * count != group.len() {
             let fewer = 2 * count < group.len();
             out.extend(group.into_iter().filter(|(_, turned)| *turned == fewer).map(|(k, _)| k));
@@ -73,6 +77,7 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
 /// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
 pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
     let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(polygons).collect();
+    // About the middle of the solid the terms are least, and what cancels between faces with them.
     let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(middle(f))));
     if around.is_empty() {
         return false;
@@ -82,6 +87,7 @@ pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
         let parts: Vec<[f64; 2]> = faces.par_iter().zip(&loops).map(of).collect();
         parts.into_iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
     };
+    // Most shells are right: a coarse look is enough to leave them.
     let [volume, _] = flux(GRIDS[0]);
     if volume.is_nan() || volume >= 0.0 {
         return false;
@@ -120,6 +126,7 @@ fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] 
     let (mut low, mut high) = (Uv::new(u0, v0), Uv::new(u1, v1));
     if !loops.is_empty() {
         let points = || loops.iter().flatten();
+        // The grid spans what the loops enclose: the surface of a small trim may be large.
         low = low.max(points().fold(Uv::INFINITY, |m, p| m.min(*p)));
         high = high.min(points().fold(Uv::NEG_INFINITY, |m, p| m.max(*p)));
     }

@@ -23,6 +23,7 @@ impl Assembly<'_, '_> {
             .filter_map(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0)?.attributes("REPRESENTATION_MAP", 0)?.id(1));
         let maps: FxHashSet<u64> = maps.collect();
         let largest = maps.into_iter().map(|id| counter.representation(id, 0)).max();
+        // Without any, a file of one part places that.
         placed.max(largest.unwrap_or(1))
     }
 }
@@ -60,7 +61,7 @@ impl Counter<'_, '_, '_> {
         if let Some(known) = self.shapes.get(&id) {
             return *known;
         }
-        // As for products.
+        // Nothing while it is being counted, as for products.
         self.shapes.insert(id, 0);
         let mut count = 1u64;
         if depth < MAX_DEPTH {

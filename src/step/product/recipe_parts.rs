@@ -28,6 +28,7 @@ pub(super) fn convert_recipes(
     for &id in &items.recipes {
         let solid = geometry.entity(id).and_then(|e| geometry.solid_recipe(e));
         match solid.and_then(|solid| build(geometry, id, solid, settings)) {
+            // A recipe counts by its faces once they are known; one that fails counts as one.
             Ok((edges, built)) => {
                 out.found += built.len();
                 let name = geometry.entity(id).map_or_else(|_| String::new(), |e| e.args().name(0));

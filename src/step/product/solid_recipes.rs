@@ -85,7 +85,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             size.ok_or_else(|| Refusal::new(e, "a size is not positive"))
         };
         let frame = |a: Args<'f, 'a>| self.placement(self.resolve(e, a.id(0), "position")?.id);
-        // Closed surfaces need no edges: no loop means all of it.
+        // Spheres and tori are closed and need no edges: no loop means all of them.
         let whole = |kind: Kind, analytic: Analytic| SolidRecipe {
             edges: Vec::new(),
             faces: vec![RecipeFace { chart: Chart::new(kind, analytic), same_sense: true, loops: Vec::new() }],
@@ -98,6 +98,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         if let Some(a) = e.attributes("TORUS", 1) {
             let (frame, major, minor) = (frame(a)?, size(a, 1)?, size(a, 2)?);
+            // A tube that reaches the axis makes a surface that meets itself: no border of a solid.
             if major <= minor {
                 return Err(Refusal::new(e, "its tube touches its axis"));
             }
@@ -143,6 +144,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let wide = radius + height * angle.tan();
             let place = |r: f64, h: f64| frame.point(Point::new(r, 0.0, h));
             let corners = [place(0.0, 0.0), place(radius, 0.0), place(wide, height), place(0.0, height)];
+            // Corners that coincide, as at the tip of a cone, give no side.
             let sides = (0..4).map(|k| (corners[k], corners[(k + 1) % 4])).filter(|(p, q)| p != q);
             let sides = sides.map(|(p, q)| Curve::line(p, q, [0.0, 1.0])).collect();
             // The half profile in the plane of x and z, turned about z; with a tip at one end its edge there has no length and is left
@@ -192,6 +194,7 @@ impl Profile {
     fn facing(mut self, sweep: Vector) -> Option<Self> {
         let cosine = self.normal.dot(sweep) / sweep.length();
         if !(cosine.abs() > FLAT_SWEEP) {
+            // Written so that it refuses a normal or a sweep that is no number.
             return None;
         }
         if cosine < 0.0 {
@@ -218,6 +221,7 @@ fn signed_area(curves: &[Curve], normal: Vector) -> f64 {
         points.extend((0..SAMPLES).map(|i| curve.evaluate(a + (b - a) * i as f64 / SAMPLES as f64)));
     }
     let n = points.len();
+    // About a point of the loop: far from the origin the products would cancel.
     let origin = points[0];
     let sum = (0..n).map(|i| (points[i] - origin).cross(points[(i + 1) % n] - origin)).sum::<Vector>();
     0.5 * sum.dot(normal)
@@ -257,6 +261,7 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
         let posts: Vec<usize> =
             curves.iter().map(|c| solid.add_edge(Curve::line(start(c), start(c) + by, [0.0, 1.0]))).collect();
         for (k, curve) in curves.iter().enumerate() {
+            // Two control points are a straight line: the side above it is a plane.
             let chart = match &curve.points[..] {
                 [p, q] => {
                     let along = q.project() - p.project();
@@ -265,12 +270,14 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
                 }
                 _ => Chart::new(Kind::Extrusion { base: curve.clone(), direction: by }, Analytic::Extrusion),
             };
+            // Counter-clockwise seen from outside: along the profile, up, back along its copy, down.
             let border = vec![(bottom[k], false), (posts[(k + 1) % n], false), (top[k], true), (posts[k], true)];
             solid.faces.push(RecipeFace { chart, same_sense: true, loops: vec![border] });
         }
         bottoms.push(bottom.iter().map(|&e| (e, false)).collect::<Vec<_>>());
         tops.push(top.iter().map(|&e| (e, false)).collect::<Vec<_>>());
     }
+    // A cap may lie anywhere in its plane: any point of the profile will do.
     let origin = solid.edges[0].evaluate(solid.edges[0].domain()[0]);
     let frame = Frame::from_axis(origin, profile.normal, None);
     solid.add_cap(frame, &bottoms, false);
@@ -280,7 +287,7 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
 
 /// A profile turned about the z axis of a frame.
 fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
-    // Where the profile goes at first, at the middle of its largest loop's samples.
+    // Which way the profile sets out is told by the middle of the curve that is farthest from the axis.
     let points: Vec<Point> =
         profile.loops.iter().flatten().map(|c| c.evaluate(0.5 * (c.domain()[0] + c.domain()[1]))).collect();
     let far = points.into_iter().max_by(|a, b| distance(axis, *a).total_cmp(&distance(axis, *b)))?;
@@ -306,6 +313,7 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
             .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(moved(c, turn)) })
             .collect();
         let mut arcs: Vec<Option<usize>> = Vec::with_capacity(n);
+        // Each corner runs along an arc; two sides share it. A corner on the axis stays a point.
         for c in curves {
             let p = c.evaluate(c.domain()[0]);
             let q = axis.local_point(p);
@@ -322,6 +330,7 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
             border.push((last[k], true));
             border.extend(arcs[k].map(|arc| (arc, true)));
             let chart = Chart::revolution(*axis, curve.clone());
+            // The chart's normal is turn × tangent, against `tangent × sweep`: the sides look outward against it.
             solid.faces.push(RecipeFace { chart, same_sense: false, loops: vec![border] });
         }
         starts.push(first.iter().map(|&e| (e, false)).collect::<Vec<_>>());

@@ -24,9 +24,11 @@ impl Styles {
         for e in file.entities() {
             if let Some(args) = e.attributes("PRESENTATION_LAYER_ASSIGNMENT", 0) {
                 let name: Arc<str> = args.name(0).into();
+                // One name for all items of a layer: files hold thousands.
                 layers.extend(args.list(2).ids().into_iter().map(|item| (item, name.clone())));
                 continue;
             }
+            // In a complex instance the subtype adds its own attribute only; item and styles stand in STYLED_ITEM.
             let (args, overriding) = match e.attributes("OVER_RIDING_STYLED_ITEM", 1) {
                 Some(a) if !e.keyword().is_empty() => (Some(a), true),
                 found => (e.attributes("STYLED_ITEM", 1), found.is_some()),
@@ -62,6 +64,8 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
     while at < queue.len() && at < MAX_STEPS {
         let e = file.entity(queue[at])?;
         at += 1;
+        // Six entities may stand between an item and its colour, and writers differ in which: all that a style
+        // leads to is looked at.
         if let Some(found) = rgb(e) {
             return Some(found);
         }
@@ -83,6 +87,7 @@ fn rgb(e: Entity<'_, '_>) -> Option<Colour> {
     if let Some(a) = e.attributes("COLOUR_RGB", 1) {
         return Some(Colour([a.real(0)?, a.real(1)?, a.real(2)?]));
     }
+    // The eight names that the schemas allow.
     let a = e.attributes("DRAUGHTING_PRE_DEFINED_COLOUR", 0)?;
     Some(Colour(match a.text(0)?.to_ascii_lowercase().as_str() {
         "red" => [1.0, 0.0, 0.0],

@@ -22,6 +22,7 @@ struct Layout {
     strips: bool,
 }
 
+// A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
 fn layout(keyword: &str) -> Option<Layout> {
     Some(match keyword {
         "TRIANGULATED_FACE" => Layout { pnindex: 5, strips: false },
@@ -75,6 +76,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let corners = corner_numbers(args, layout);
         let normals = args.list(3);
         let normal_of = |local: usize| -> Option<Vector> {
+            // One normal for all means a flat face.
             let at = if normals.len() == 1 { 0 } else { local.checked_sub(1)? };
             triple(normals, at)?.try_normalize()
         };
@@ -91,6 +93,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             // A triangle without an area shades nothing and has no normal to give.
             let Some(flat) = (b.1 - a.1).cross(c.1 - a.1).try_normalize() else { continue };
             let first = mesh.vertices.len() as u32;
+            // Positions are shared by the row of the file, vertices are not: each has the normal of its triangle.
             for ((row, p), local) in [a, b, c].into_iter().zip(triangle) {
                 let position = *position_of.entry(row).or_insert_with(|| {
                     mesh.positions.push(p as Point);
@@ -99,6 +102,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 let normal = normal_of(local).unwrap_or(flat);
                 mesh.vertices.push(MeshVertex { position, normal, uv: Uv::ZERO });
             }
+            // A triangle is a facet whose last corner stands twice.
             mesh.facets.push(Facet { vertices: [first, first + 1, first + 2, first + 2], face: FaceId(0) });
         }
         if mesh.facets.is_empty() {

@@ -89,6 +89,8 @@ impl ShapeItems {
         let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).name(0);
         if let Some(a) = e.attributes("MANIFOLD_SOLID_BREP", 1).or_else(|| e.attributes("FACETED_BREP", 1)) {
             self.add_shell(file, a.id(0), &name, &[id], true, e);
+            // Of a complex instance the voids are attributes of their own; of a simple one they stand behind the
+            // shell.
             if let Some(v) = e.attributes("BREP_WITH_VOIDS", 2) {
                 self.add_voids(file, e, v.list(0).ids(), &name);
             }
@@ -140,6 +142,7 @@ impl ShapeItems {
     fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
         for shell in shells {
             let before = self.shells.len();
+            // An oriented shell may become several plans; what was added now bounds the void.
             self.add_shell(file, Some(shell), name, &[e.id], true, e);
             for shell in self.shells.iter_mut().skip(before) {
                 shell.outer = false;
@@ -162,6 +165,7 @@ impl ShapeItems {
             return;
         };
         let mut owners = [&[e.id], owners].concat();
+        // Turned twice is not turned: only the parity of the senses counts.
         let mut flip = false;
         // Oriented shells refer to a shell; a chain of them must end.
         for _ in 0..4 {
@@ -175,6 +179,7 @@ impl ShapeItems {
             e = inner;
             owners.insert(0, e.id);
         }
+        // In a complex instance the faces are the set's only attribute; in a simple one they stand behind the name.
         let own = e
             .attributes("CONNECTED_FACE_SET", 1)
             .or_else(|| Some(e.args()).filter(|_| e.keyword() != ""))
@@ -191,6 +196,7 @@ impl ShapeItems {
             }
             faces.push((face, turned));
         }
+        // A solid is closed whatever its shell calls itself.
         let closed = solid || e.is_a("CLOSED_SHELL");
         self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, void: false, faces, owners });
     }
@@ -228,6 +234,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
             reason: format!("#{id} is referred to but is not in the file"),
         });
     };
+    // A complex instance has no place for inherited names before its attributes.
     let complex = e.keyword().is_empty();
     let bounds = if complex { e.attributes("FACE", 0).map(|a| a.list(0)) } else { Some(e.args().list(1)) };
     // A part of a face has bounds of its own on its parent's surface.
@@ -236,6 +243,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
         let Some(parent) = owner.attributes("SUBFACE", 2).and_then(|a| a.entity(0)) else { break };
         owner = parent;
     }
+    // The sense is told where the surface is named, which for a part of a face is its parent.
     let (surface, sense) = if owner.keyword().is_empty() {
         let own = owner.attributes("FACE_SURFACE", 0);
         (own.and_then(|a| a.id(0)), own.and_then(|a| a.flag(1)))
@@ -264,6 +272,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
         }
     }
     let name = if complex { String::new() } else { e.args().name(0) };
+    // Without a sense, as some writers leave it, the surface's own normal counts.
     Ok(FacePlan { name, surface, same_sense: sense != Some(false), loops })
 }
 
@@ -277,6 +286,7 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
         let n = points.len();
         return Ok((0..n)
             .map(|i| (points[i], points[(i + 1) % n]))
+            // A corner given twice has no edge between.
             .filter(|(a, b)| a != b)
             // Named by its ends in order, so that both faces beside it find the same edge.
             .map(|(a, b)| (EdgeKey::Straight(a.min(b), a.max(b)), a > b))
@@ -305,6 +315,7 @@ pub(crate) fn number_edges<'p>(
     faces: impl Iterator<Item = &'p FacePlan>,
 ) -> (Vec<EdgeKey>, FxHashMap<EdgeKey, usize>) {
     let (mut keys, mut index) = (Vec::new(), FxHashMap::default());
+    // In the order of the file, not of a table: two runs must number edges alike.
     for (key, _) in faces.flat_map(|f| f.loops.iter().flatten()) {
         index.entry(*key).or_insert_with(|| {
             keys.push(*key);

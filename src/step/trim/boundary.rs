@@ -31,6 +31,7 @@ pub(crate) fn bound_region(
     // Loops without extent: a vertex, or an edge run forth and back.
     let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
     plain.retain(|c| signed_area(&c.polygon()).abs() > EMPTY_LOOP_SHARE * scale);
+    // Nothing winds around: without any loop the face is the whole surface, else the loops bound it by themselves.
     if winding.is_empty() {
         if plain.is_empty() {
             out.loops.push(natural_boundary(chart, &[], &mut out.seams)?);
@@ -47,6 +48,7 @@ pub(crate) fn bound_region(
         2 => {
             let mut two = winding.into_iter();
             let (Some(a), Some(b)) = (two.next(), two.next()) else { return Err("no loop") };
+            // One must run each way, or the material would lie on the same side of both.
             if a.winding != b.winding.map(|w| -w) {
                 return Err("two loops wind around the surface in the same sense");
             }
@@ -147,6 +149,7 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
     let mut range = [[0.0; 2]; 2];
     for d in 0..2 {
         range[d] = match chart.period[d] {
+            // A period begins where the seam cuts no hole.
             Some(period) => {
                 let base = if chart.range[d][0].is_finite() { chart.range[d][0] } else { 0.0 };
                 let start = free_start(d, base, period, holes).ok_or("holes leave no place for a seam")?;
@@ -230,6 +233,7 @@ fn extend_to_border(
     let across = 1 - along;
     let upper = if along == 0 { forward } else { !forward };
     let polygon = chain.polygon();
+    // The loop's mean height tells which poles and borders lie on its left.
     let mean = polygon.iter().map(|p| p[across]).sum::<f64>() / polygon.len() as f64;
     let side = |x: f64| if upper { x > mean } else { x < mean };
     let pole = chart.poles.iter().find(|p| p.fixed == across && side(p.at));
@@ -267,6 +271,7 @@ fn extend_to_border(
     let chain = started_at(chain, seam.start, displacement);
     let foot = seam.points[seam.points.len() - 1];
     let up = seam_pieces(&seam.points, seams);
+    // Along a pole there is no edge; along a natural border one is added.
     let border = if pole.is_some() {
         Piece::straight(foot + displacement, foot)
     } else {
@@ -306,6 +311,7 @@ fn join_winding_pair(
     for (i, &p) in starts_a.iter().enumerate() {
         let d = chart.derivatives(p);
         for (j, &q) in starts_b.iter().enumerate() {
+            // The nearest of all copies: a seam never needs to go around the surface.
             let mut q = chart.nearest_representative(q, p);
             // On a torus the second loop is the one on the left of the first.
             if let Some(period) = chart.period[1 - along] {
@@ -326,6 +332,7 @@ fn join_winding_pair(
         }
     }
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0));
+    // Each pair costs a look at all obstacles; the best few thousand will do.
     pairs.truncate(4096);
     let obstacles = Obstacles { holes, borders: &[border_a, border_b], displacement };
     let straight = pairs.iter().find(|(_, i, _, q)| obstacles.leave_free(starts_a[*i], *q));

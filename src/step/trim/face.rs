@@ -147,6 +147,7 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
                     return None;
                 }
                 let base = if natural[0].is_finite() { natural[0] } else { 0.0 };
+                // By whole periods, so that the region begins in the base period.
                 shift[d] = -((a - base) / period + WHOLE_PERIOD_SLACK).floor() * period;
                 a += shift[d];
                 b += shift[d];
@@ -159,6 +160,7 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
             None => {
                 a = a.clamp(natural[0], natural[1]);
                 b = b.clamp(natural[0], natural[1]);
+                // Where the spline has the chart's own parameters it is kept whole.
                 if natural.iter().all(|x| x.is_finite()) && !chart.angular_directions()[d] {
                     [a, b] = natural;
                 }

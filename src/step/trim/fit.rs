@@ -173,6 +173,7 @@ impl Target<'_> {
         if (1..10).any(|k| self.overshoot(hermite(a, b, 0.1 * f64::from(k))) > MAX_OVERSHOOT) {
             return Ok(false);
         }
+        // Not in symmetric places alone: a cubic's error may vanish in the middle.
         for s in [0.5, 0.13, 0.87, 0.32] {
             self.budget.spend()?;
             let t = a.t + s * (b.t - a.t);
@@ -187,6 +188,7 @@ impl Target<'_> {
             // Off the surface by a gap of the file's own, or off the foot point by our fit?
             let foot = (self.locate)(t, p, Some(guess));
             let d = guess - foot;
+            // The difference of parameters as a length on the surface: their own units mean nothing.
             let error = at.du * d.x + at.dv * d.y;
             // Where the file itself leaves a gap, a twentieth of it is accurate enough.
             let own = SHARE_OF_GAP * ((self.derivatives)(foot).point - p).length();
@@ -219,6 +221,7 @@ impl Target<'_> {
                 self.halve(&piece, a, b, 0, &mut nodes, &mut gap)?;
                 a = b;
             }
+            // The end of one span is where the next one is expected to begin.
             hint = Some(a.uv);
         }
         Ok(Fit { curve: assemble(&nodes), gap })
@@ -235,6 +238,7 @@ impl Target<'_> {
     ) -> Result<(), Overrun> {
         let mut seen = *gap;
         let (a, b) = (self.slope_inside(a, 1.0), self.slope_inside(b, -1.0));
+        // At the deepest halving it is taken as it is, with control points held inside the border.
         if depth >= MAX_DEPTH || self.accepts(piece, a, b, &mut seen)? {
             *gap = seen.max(a.miss).max(b.miss);
             nodes.push(if depth >= MAX_DEPTH { self.controls_inside(a, b) } else { (a, b) });

@@ -136,10 +136,11 @@ impl Chain {
     }
 }
 
-/// Twice the signed area of a polygon, halved: positive counter-clockwise.
+/// The signed area of a polygon, positive counter-clockwise.
 pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
     let n = polygon.len();
     let Some(&o) = polygon.first() else { return 0.0 };
+    // About the first corner: far from the origin the products would cancel.
     0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
 }
 
@@ -207,6 +208,7 @@ fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turne
     });
     let Some(pole) = pole else {
         let distance = (p - q).length();
+        // A little apart is one point written twice; more than that is bridged, and told.
         if distance > 10.0 * tolerance {
             chain.bridged = chain.bridged.max(distance);
             chain.pieces.push(Piece::straight(from, near));

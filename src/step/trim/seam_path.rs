@@ -78,6 +78,7 @@ impl Obstacles<'_> {
             let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
             let Some(i) = open.min_by(|&a, &b| nodes[a].length.total_cmp(&nodes[b].length)) else { break };
             let (place, so_far) = (nodes[i].place, nodes[i].length);
+            // Nodes are settled in order of length: what is left is longer than the best whole way.
             if best.is_some_and(|b| b.0 <= so_far) {
                 break;
             }
@@ -111,6 +112,7 @@ impl Obstacles<'_> {
             }
         }
         points.reverse();
+        // A way that crosses itself is no seam.
         self.is_simple(&points).then_some(SeamPath { start: at, goal, points })
     }
 

@@ -44,6 +44,7 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         let seam = &self.curves[k];
         let ends = [0, piece.curve.points.len() - 1].map(|i| piece.curve.points[i].truncate());
         let [a, b] = ends.map(|p| self.region.parameters(p));
+        // An isoline has the spline's own parameter.
         if seam.varies.is_some() {
             let [a, b] = if seam.turned { [b, a] } else { [a, b] };
             return Ok(UvCurve::line(a, b, seam.curve.domain()));

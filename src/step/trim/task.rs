@@ -94,6 +94,7 @@ impl FaceTask<'_> {
             *count.entry(edge).or_default() += 1;
         }
         if count.is_empty() || count.values().any(|&n| n > 1) {
+            // Run twice, an edge is a seam that the file has cut itself: the poles are where it wants them.
             return;
         }
         let mut directions: Vec<Vector> = Vec::new();
