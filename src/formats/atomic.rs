@@ -19,12 +19,16 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// When the folder cannot be written or `write` fails; the unfinished file is removed and an older file of that name stays.
 pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
     let beside = unfinished(path);
+    // Before its own file is made: a run that was killed must not leave a part for ever.
     remove_stale(path);
     let attempt = || -> io::Result<()> {
+        // Known before it exists: an interruption between the two finds no file, which is no harm.
         let _registered = Unfinished::register(&beside);
         let mut out = BufWriter::with_capacity(1 << 18, File::create(&beside)?);
         write(&mut out)?;
+        // Dropping the buffer would hide that its last bytes found no place on the disk.
         out.into_inner().map_err(|e| e.into_error())?;
+        // On one file system a rename replaces the old file at once: a reader sees either.
         fs::rename(&beside, path)
     };
     attempt().map_err(|e| {
@@ -40,6 +44,7 @@ pub(super) struct Unfinished(PathBuf);
 
 impl Unfinished {
     pub(super) fn register(path: &Path) -> Self {
+        // A thread that failed while it held the lock left the list whole.
         UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).push(path.to_path_buf());
         Self(path.to_path_buf())
     }
@@ -61,6 +66,7 @@ pub fn remove_unfinished_files() {
 /// A name in the same folder (renaming across devices is a copy) that no other process or thread uses.
 fn unfinished(path: &Path) -> PathBuf {
     let name = file_name(path);
+    // Threads of one process may write the same name: each takes a number of its own.
     let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
     path.with_file_name(format!(".{name}.{}-{serial}.part", std::process::id()))
 }
@@ -77,6 +83,7 @@ pub(super) fn remove_stale(path: &Path) {
         let Some(rest) = file.strip_prefix(&name).and_then(|f| f.strip_suffix(".part")) else { continue };
         let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
         let Ok(process) = digits.parse::<u32>() else { continue };
+        // Only Linux shows processes as folders; elsewhere age decides.
         let gone = match fs::exists("/proc/self") {
             Ok(true) => matches!(fs::exists(format!("/proc/{process}")), Ok(false)),
             _ => (entry.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok()))
@@ -100,11 +107,13 @@ const LONGEST_STEM: usize = 120;
 /// ```
 pub fn file_stem(name: &str) -> String {
     let mut safe: String =
+        // Letters of any script stay: only what file systems or shells read as more than a letter goes.
         name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
     if safe.len() > LONGEST_STEM {
-        // FNV-1a (Fowler, Noll, Vo), 64 bits.
+        // FNV-1a (Fowler, Noll, Vo), 64 bits: the same on every machine, so that names stay what they were.
         let hash =
             name.bytes().fold(0xcbf2_9ce4_8422_2325u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3));
+        // The hash with its dash takes 17 bytes.
         let kept = safe.floor_char_boundary(LONGEST_STEM - 17);
         safe.truncate(kept);
         safe += &format!("-{hash:016x}");

@@ -10,7 +10,8 @@ pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
-        // A last chunk of one or two bytes is filled up with zero bits, RFC 4648 §3.5.
+        // A last chunk of one or two bytes is filled up with zero bits, RFC 4648 §3.5. The first byte of the word stays empty: three bytes
+        // are 24 bits, which four letters of six bits take.
         let mut bytes = [0; 4];
         bytes[1..=chunk.len()].copy_from_slice(chunk);
         let word = u32::from_be_bytes(bytes);

@@ -54,6 +54,7 @@ impl<'a> Lines<'a> {
     }
 
     pub(super) fn error(&self, message: impl Into<String>) -> Error {
+        // Before the first line the file is at fault as a whole; places count from one.
         Error::at_line(self.path, self.at.max(1), message)
     }
 
@@ -65,6 +66,7 @@ impl<'a> Lines<'a> {
         self.at = n;
         let numbers: Vec<f64> =
             line.split_whitespace().map_while(|w| w.parse::<f64>().ok()).filter(|x| x.is_finite()).collect();
+        // Counted twice: words that are no number must not make a shorter list look whole.
         if numbers.len() != count || line.split_whitespace().count() != count {
             return Err(self.error(format!("{count} finite numbers must stand here: {what}")));
         }
@@ -92,6 +94,7 @@ impl<'a> Lines<'a> {
     }
 
     pub(super) fn end(&mut self) -> Result<(), Error> {
+        // More lines than promised mean that the count or the file is wrong; which, nobody can tell.
         match self.lines.next() {
             None => Ok(()),
             Some((n, _)) => Err(Error::at_line(self.path, n, "more lines than the number of rays says")),

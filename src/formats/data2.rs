@@ -44,6 +44,7 @@ pub fn read_data2(path: &Path) -> Result<Vec<Data2Facet>, Error> {
     let (first, count) = lines
         .next()
         .and_then(|(n, l)| l.trim().parse::<usize>().ok().map(|c| (n, c)))
+        // The first line is looked at by itself: without a count no later line has a meaning.
         .ok_or_else(|| Error::at_line(path, 1, "the first line must be the number of facets"))?;
     let mut facets = Vec::new();
     for (n, line) in lines {

@@ -51,6 +51,7 @@ pub fn read_data3(path: &Path) -> Result<Data3, Error> {
     let mut lines = Lines::new(path, &text);
     let [rows, columns] = lines.counts("rows and columns of the results")?;
     let mut results = Vec::new();
+    // Rows without columns have no lines.
     if columns > 0 {
         for _ in 0..rows {
             results.extend(lines.numbers(columns, "a row of results")?);

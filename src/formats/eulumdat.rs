@@ -11,6 +11,7 @@ use std::path::Path;
 /// # Errors
 /// When the file cannot be read or is not EULUMDAT.
 pub fn read_eulumdat(path: &Path) -> Result<Photometry, Error> {
+    // Old files hold Latin-1 in their names; the numbers are ASCII in any case.
     let bytes = read_bytes(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     parse_eulumdat(path, &String::from_utf8_lossy(&bytes))
 }
@@ -30,6 +31,7 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     let stored: Vec<f64> = match ldt.symmetry {
         Symmetry::VerticalAxis => vec![0.0],
         Symmetry::PlaneC90C270 => {
+            // From −90 (C270) to 90 in steps of 360/n: half of the planes stand on each side of C0.
             (0..ldt.intensities.len()).map(|i| 90.0 - 180.0 * (1.0 - i as f64 / (n / 2) as f64)).collect()
         }
         _ => ldt.c_angles.iter().copied().take(ldt.intensities.len()).collect(),
@@ -38,6 +40,8 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
         return Err(malformed("the C-planes do not fit the symmetry the file states".into()));
     }
     let first = ldt.lamp_sets.first();
+    // Zero lumens stand in files without a lamp; intensities then are taken for a lamp of 1000 lm, which leaves
+    // them as written.
     let lumens = first.map(|s| s.total_luminous_flux).filter(|f| *f > 0.0);
     // A negative number of lamps marks absolute photometry, whose flux is that of the luminaire.
     let absolute = first.is_some_and(|s| s.num_lamps < 0);
@@ -53,6 +57,7 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     }
     let ascending = |a: &[f64]| a.windows(2).all(|p| p[0] < p[1]);
     let horizontal_deg: Vec<f64> = planes.iter().map(|p| p.0).collect();
+    // Interpolation divides by the step between neighbours.
     if !ascending(&horizontal_deg) || !ascending(&ldt.g_angles) {
         return Err(malformed("C-planes and γ angles must ascend".into()));
     }
@@ -92,6 +97,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     if p.kind != PhotometricType::C {
         return Err(malformed("EULUMDAT holds type C photometry alone; write types A and B as .ies"));
     }
+    // One plane is rotational already; to expand it would write the same plane twice.
     let all = if p.horizontal_deg.len() == 1 { p.clone() } else { p.expanded() };
     let rows = all.vertical_deg.len();
     let rotational = all.horizontal_deg.len() == 1;
@@ -101,8 +107,10 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     if all.candela.len() != rows * all.horizontal_deg.len() || rows < 2 {
         return Err(malformed("the intensities do not fill the planes"));
     }
+    // The last plane, at 360°, is the first one again.
     let planes = if rotational { 1 } else { all.horizontal_deg.len() - 1 };
     let lumens = p.lamp_lumens.unwrap_or_else(|| p.flux());
+    // Dark luminaires have no flux to refer to.
     let per_klm = if lumens > 0.0 { 1000.0 / lumens } else { 1.0 };
     // The format has a field for the step of the angles, zero where they are uneven.
     let even = |a: &[f64]| {
@@ -110,6 +118,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
         if a.windows(2).all(|p| (p[1] - p[0] - step).abs() < SAME_ANGLE_DEG) { step } else { 0.0 }
     };
     let find = |name: &str| {
+        // A line end in a name would shift all lines that follow: the format counts them.
         all.keywords.iter().find(|k| k.0 == name).map_or(String::new(), |k| k.1.replace(['\n', '\r'], " "))
     };
     let mut ldt = Eulumdat::new();
@@ -127,6 +136,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     ldt.date_user = find("ISSUEDATE");
     let [width, length, height] = all.opening_mm.map(f64::abs);
     (ldt.luminous_area_width, ldt.luminous_area_length, ldt.height_c0) = (width, length, height);
+    // The size of the luminaire is not known; that of its opening stands in for it.
     (ldt.width, ldt.length, ldt.height) = (width, length, height);
     ldt.light_output_ratio = 100.0;
     ldt.downward_flux_fraction = 100.0;

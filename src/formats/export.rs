@@ -33,5 +33,6 @@ pub fn write_facets(path: &Path, facets: &Facets) -> Result<(), Error> {
 /// ```
 pub fn is_facet_file(path: &Path) -> bool {
     let extension = lower_extension(path);
+    // The dot of the list is not part of an extension.
     FACET_EXTENSIONS.split(' ').any(|known| known[1..] == extension)
 }

@@ -61,6 +61,7 @@ impl<'a> Facets<'a> {
     /// Index into `groups` of a face.
     pub fn group_of(&self, face: FaceId) -> usize {
         let g = self.group_of_face.get(face.index()).map_or(0, |&g| g as usize);
+        // A face without a group belongs to the first: files for show must not fail for it.
         if g < self.groups.len() { g } else { 0 }
     }
 

@@ -23,6 +23,7 @@ impl Buffer {
         let start = self.bytes.len();
         self.bytes.extend(bytes);
         let length = self.bytes.len() - start;
+        // Accessors must start at multiples of their number's size: four bytes.
         while !self.bytes.len().is_multiple_of(4) {
             self.bytes.push(0);
         }
@@ -32,6 +33,7 @@ impl Buffer {
 
     fn vectors(&mut self, list: &[[f32; 3]]) -> usize {
         let view = self.view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
+        // The standard asks for the bounds of positions; for normals they do no harm.
         let bound = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
             (0..3).map(|k| list.iter().fold(start, |m, p| pick(m, p[k]))).collect()
         };
@@ -61,11 +63,13 @@ fn linear(c: f64) -> f64 {
 
 fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Point, material: usize) -> Value {
     let mesh = facets.mesh;
+    // Vertices that a group does not use would be sent with every group.
     let mut local = rustc_hash::FxHashMap::default();
     let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for &i in list {
         let corners = mesh.facets[i].vertices.map(|v| {
             *local.entry(v).or_insert_with(|| {
+                // Subtracted in double precision: what is rounded to single precision is the small rest.
                 let vertex = &mesh.vertices[v as usize];
                 positions.push(single(mesh.positions[vertex.position as usize] - middle));
                 normals.push(single(vertex.normal));
@@ -74,6 +78,7 @@ fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Poin
         });
         triangles.extend([corners[0], corners[1], corners[2]]);
         if !mesh.facets[i].is_triangle() {
+            // glTF knows triangles only; the diagonal is the one the tracer uses.
             triangles.extend([corners[0], corners[2], corners[3]]);
         }
     }
@@ -107,6 +112,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         let mut start = 0;
         for &end in &paths.ends {
             // Mode 1 draws separate lines, a pair of points each.
+            // A line of one point draws nothing.
             segments.extend((start + 1..end).flat_map(|k| [k as u32 - 1, k as u32]));
             start = end;
         }
@@ -119,6 +125,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     }
     let children: Vec<usize> = (0..nodes.len()).collect();
     // x → x, y → −z, z → y, and mm → m: a quarter turn about x.
+    // The rotation is a quaternion: −90° about x.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let shift = Vector::new(middle.x, middle.z, -middle.y) * METRES_PER_MM;
     nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [METRES_PER_MM, METRES_PER_MM, METRES_PER_MM],

@@ -188,6 +188,7 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
         arrays.push(NpyArray { name: "error", shape: vec![b.cells, a.cells], data: error });
     }
     let shape = || vec![b.cells, a.cells];
+    // The names must outlive the arrays that borrow them.
     let names: Vec<[String; 2]> =
         (grid.layers.iter()).map(|layer| [layer.column(), format!("{}_error", layer.column())]).collect();
     for (layer, [name, error]) in grid.layers.iter().zip(&names) {

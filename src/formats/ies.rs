@@ -41,6 +41,7 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
         }
         if let Some((name, value)) = line.strip_prefix('[').and_then(|l| l.split_once(']')) {
             match keywords.last_mut() {
+                // MORE goes on with the keyword before; without one it is kept as it stands.
                 Some((_, before)) if name.eq_ignore_ascii_case("MORE") => {
                     before.push('\n');
                     before.push_str(value.trim());
@@ -138,6 +139,7 @@ impl Numbers<'_> {
 
     fn count(&mut self, what: &str) -> Result<usize, Error> {
         let x = self.next(what)?;
+        // No count can exceed the numbers that are there: a lie about it costs no memory.
         if x >= 1.0 && x.fract() == 0.0 && x <= self.words.len() as f64 {
             Ok(x as usize)
         } else {
@@ -146,6 +148,7 @@ impl Numbers<'_> {
     }
 
     fn list(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+        // Asked before the loop, so that the message names what the file promises.
         let left = self.words.len() - self.at;
         if count > left {
             return Err(self.error(format!("{count} numbers should follow ({what}), but only {left} do")));
@@ -155,6 +158,7 @@ impl Numbers<'_> {
 
     fn ascending(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
         let list = self.list(count, what)?;
+        // Interpolation divides by the steps.
         match list.windows(2).find(|p| p[1] <= p[0]) {
             Some(p) => Err(self.error(format!("{what} must ascend, but {} follows {}", p[1], p[0]))),
             None => Ok(list),
@@ -208,6 +212,7 @@ struct Lines(String);
 
 impl Lines {
     fn line(&mut self, text: &str) {
+        // Cut rather than broken: the rest of a keyword on a line of its own would be a line of the format.
         self.0.extend(text.chars().take(LONGEST_LINE));
         self.0.push_str("\r\n");
     }
@@ -215,6 +220,7 @@ impl Lines {
     fn numbers(&mut self, numbers: &[f64]) {
         let mut line = String::new();
         for number in numbers {
+            // The shortest decimals that read back the same bits.
             let word = number.to_string();
             if !line.is_empty() && line.len() + 1 + word.len() > LONGEST_LINE {
                 self.line(&line);

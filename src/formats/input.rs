@@ -29,6 +29,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let file = open_file(path)?;
     let size = file.metadata()?.len();
     let mut bytes = Vec::new();
+    // A file that grows while it is read, such as a log, would else never end.
     file.take(size).read_to_end(&mut bytes)?;
     Ok(bytes)
 }

@@ -25,6 +25,7 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
         let message = format!("array '{}' of shape {:?} has {} values", wrong.name, wrong.shape, wrong.data.len());
         return Err(Error::new(path, ErrorKind::Malformed(message)));
     }
+    // Packed in memory: the ZIP writer seeks back to sizes that it learns late, and grids of receivers are small.
     let pack = || -> Result<Vec<u8>, zip::result::ZipError> {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
         let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
@@ -46,6 +47,7 @@ pub(super) fn header(numbers: &str, shape: &[usize]) -> Vec<u8> {
     // A tuple of one number needs its comma.
     let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut text = format!("{{'descr': '{numbers}', 'fortran_order': False, 'shape': ({}), }}", dims.trim_end());
+    // NumPy aligns the data to 64 bytes, so that it may be mapped.
     while (10 + text.len() + 1) % 64 != 0 {
         text.push(' ');
     }

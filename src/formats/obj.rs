@@ -7,6 +7,7 @@ use std::path::Path;
 /// Writes positions, normals and quads; numbers read back bit for bit.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
+    // Rust prints the shortest decimals that read back the same bits.
     write_atomic(path, |w| {
         writeln!(w, "# lampyris {}: {} facets, mm", env!("CARGO_PKG_VERSION"), mesh.facets.len())?;
         for p in &mesh.positions {

@@ -59,6 +59,7 @@ impl PhotometricType {
         let (sh, ch) = horizontal_deg.to_radians().sin_cos();
         let (sv, cv) = vertical_deg.to_radians().sin_cos();
         match self {
+            // γ from the axis: its sine opens the cone, C turns about it.
             Self::C => Vector::new(sv * ch, sv * sh, cv),
             Self::B => Vector::new(sh, ch * sv, ch * cv),
             Self::A => Vector::new(cv * sh, sv, cv * ch),
@@ -72,6 +73,7 @@ impl PhotometricType {
                 let c = d.y.atan2(d.x).to_degrees();
                 // Not rem_euclid alone: it rounds a small negative angle up to 360.
                 let c = if c < 0.0 { (c + 360.0) % 360.0 } else { c };
+                // By atan2 of the lengths, not acos of the cosine: near the axis a cosine loses half of its digits.
                 return [c, d.x.hypot(d.y).atan2(d.z).to_degrees()];
             }
             Self::B => [d.x.atan2(d.y.hypot(d.z)), d.y.atan2(d.z)],
@@ -88,6 +90,7 @@ impl Photometry {
     /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is,
     /// also intensities that do not fill their planes.
     pub fn expanded(&self) -> Self {
+        // A mesh of planes that are not filled cannot be mirrored.
         if self.candela.len() != self.horizontal_deg.len() * self.vertical_deg.len() {
             return self.clone();
         }
@@ -99,6 +102,7 @@ impl Photometry {
             let images = planes.iter().rev().map(|&(c, i)| (2.0 * about - c, i));
             let mut all: Vec<(f64, usize)> = planes.iter().copied().chain(images).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // Planes on the mirror are their own images, and would stand twice.
             all.dedup_by(|a, b| (a.0 - b.0).abs() < SAME_ANGLE_DEG);
             all
         };
@@ -115,6 +119,7 @@ impl Photometry {
                 all.dedup_by(|a, b| (a.0 - b.0).abs() < SAME_ANGLE_DEG);
                 all
             }
+            // The turn is closed by its first plane once more: interpolation needs no case of its own there.
             PhotometricType::C if first == 0.0 && last < 360.0 => {
                 planes.iter().copied().chain([(360.0, 0)]).collect()
             }
@@ -142,6 +147,7 @@ impl Photometry {
             PhotometricType::A => (&all.vertical_deg, 90.0, &all.horizontal_deg),
             PhotometricType::B => (&all.horizontal_deg, 90.0, &all.vertical_deg),
         };
+        // Evenly about the turn: each half of a hat is a triangle of height 1.
         let around = hat_integrals(turning, |a, b| [0.5 * (b - a), 0.5 * (b - a)]);
         let from_pole =
             hat_integrals(polar, |a, b| sine_integrals(a + offset.to_radians(), b + offset.to_radians()));
@@ -169,6 +175,7 @@ fn hat_integrals(nodes_deg: &[f64], halves: impl Fn(f64, f64) -> [f64; 2]) -> Ve
 
 /// `∫ (b−x)/(b−a) sin x dx` and `∫ (x−a)/(b−a) sin x dx` over `[a, b]`.
 fn sine_integrals(a: f64, b: f64) -> [f64; 2] {
+    // By parts: what the integral of cos x leaves is the mean of the cosine over the interval.
     let mean = (b.sin() - a.sin()) / (b - a);
     [a.cos() - mean, mean - b.cos()]
 }

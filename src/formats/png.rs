@@ -17,6 +17,7 @@ pub enum ColourMap {
 impl ColourMap {
     /// The colour at `x` in `[0, 1]`; values outside are clamped, NaN is grey.
     pub fn colour(self, x: f64) -> [u8; 3] {
+        // NaN passes through `clamp`.
         if x.is_nan() {
             return [128; 3];
         }
@@ -44,10 +45,13 @@ impl Picture {
     /// negative) to the largest; `exponent` below 1 lifts the dark parts.
     pub fn of_grid(grid: &Grid, map: ColourMap, zoom: u32, exponent: f64) -> Self {
         let (nx, ny) = (grid.axes[0].cells, grid.axes[1].cells);
+        // From zero, so that darkness is dark; a grid of negative values needs its own floor.
         let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
+        // A grid of equal values has no span to divide by.
         let span = if high > low { high - low } else { 1.0 };
         let zoom = zoom.max(1) as usize;
         let mut rgb = Vec::with_capacity(3 * nx * ny * zoom * zoom);
+        // Pictures start at the top, the second axis at the bottom.
         for j in (0..ny).rev() {
             let row: Vec<u8> = (0..nx)
                 .flat_map(|i| {
@@ -71,6 +75,7 @@ impl Picture {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
         encoder.set_color(png::ColorType::Rgb);
+        // A report waits for its pictures: speed counts more than size.
         encoder.set_compression(png::Compression::Fast);
         encoder.set_filter(png::Filter::Adaptive);
         let mut writer = encoder.write_header().map_err(io::Error::other)?;

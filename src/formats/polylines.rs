@@ -46,6 +46,7 @@ impl Polylines {
         let mut cut = Self { values: self.values.clone(), ..Self::default() };
         for line in self.lines() {
             let mut kept: Vec<Point> = line.iter().copied().take_while(|p| bounds.contains(*p)).collect();
+            // The next point lies outside: the line goes on towards it to the wall.
             if let (Some(&a), Some(&b)) = (kept.last(), line.get(kept.len()))
                 && let Some(direction) = (b - a).try_normalize()
                 && let Some((_, far)) = bounds.clip(&crate::math::Ray::new(a, direction))
@@ -53,6 +54,7 @@ impl Polylines {
                 kept.push(a + direction * far);
             }
             if kept.is_empty() {
+                // A line keeps one point at least, or values would belong to the wrong lines.
                 kept.extend(line.first());
             }
             cut.push(kept);

@@ -7,9 +7,11 @@ use std::borrow::Cow;
 /// invisible tags and shy characters that hide text.
 pub fn is_unprintable(c: char) -> bool {
     match c {
+        // Line ends and tabulators lay text out; a viewer that shows them does no harm.
         '\n' | '\t' => false,
         // Arabic letter mark, left-to-right and right-to-left marks, embeddings, overrides and isolates.
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
+        // Line and paragraph separators, the byte order mark, interlinear annotations, tags.
         '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}' => true,
         c => c.is_control(),
     }
@@ -27,6 +29,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     }
     let mut shown = String::with_capacity(text.len() + 8);
     for c in text.chars() {
+        // As Rust writes them: readable, and nothing a terminal obeys.
         if is_unprintable(c) { shown.extend(c.escape_unicode()) } else { shown.push(c) }
     }
     Cow::Owned(shown)
@@ -47,6 +50,7 @@ pub fn printable_in_place(text: &str) -> Cow<'_, str> {
         return Cow::Borrowed(text);
     }
     let replaced = |c: char| match (is_unprintable(c), c.len_utf8()) {
+        // By length: messages point into the text by bytes.
         (false, _) => c,
         (true, 1) => '?',
         (true, 2) => '¿',
@@ -85,6 +89,7 @@ pub fn printable_json(text: String) -> String {
 /// ```
 pub fn csv_text(text: &str) -> String {
     let text = printable(text);
+    // Spreadsheets obey what starts so, but a negative number is one.
     let is_formula = text.starts_with(['=', '+', '-', '@', '\t']) && text.parse::<f64>().is_err();
     let safe = if is_formula { format!("'{text}") } else { text.into_owned() };
     if safe.contains([',', ';', '"', '\n', '\t']) { quoted(&safe) } else { safe }

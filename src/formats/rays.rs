@@ -85,6 +85,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
 /// # Errors
 /// When the extension is another, or the file cannot be written.
 pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
+    // Lists have a wavelength for all rays or for none; the first tells.
     let spectral = rays.first().is_some_and(|r| r.wavelength_nm.is_some());
     let extension = lower_extension(path);
     match extension.as_str() {
@@ -110,6 +111,7 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
             for ray in rays {
                 line.clear();
                 for (i, x) in ray.numbers().iter().enumerate() {
+                    // Writing to a string cannot fail.
                     let _ = write!(line, "{}{x}", if i > 0 { "," } else { "" });
                 }
                 if spectral {
@@ -128,6 +130,7 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     // Position of each of `COLUMNS` in a line.
     let mut order: Vec<usize> = Vec::new();
     let mut wanted = 0;
+    // Spreadsheets put a byte order mark in front.
     for (n, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
@@ -155,6 +158,7 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
                 continue;
             }
         }
+        // Cells beyond those that are asked for may be missing, but no line may have more than the first.
         let last = order.iter().max().map_or(0, |k| k + 1);
         if cells.len() < last || cells.len() > wanted {
             let message = match cells.len() {
@@ -186,6 +190,7 @@ fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
     }
     let mut order = Vec::new();
     for (k, name) in COLUMNS.iter().enumerate() {
+        // Looked for twice: of two columns of one name either may be meant.
         let mut places = (0..cells.len()).filter(|&i| cells[i].eq_ignore_ascii_case(name));
         match (places.next(), places.next()) {
             (_, Some(again)) => {
@@ -210,6 +215,7 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     let mut zip = zip::ZipArchive::new(file).map_err(|e| malformed(format!("not an NPZ file: {e}")))?;
     let mut array = |name: &str, width: usize| -> Result<Option<Vec<f64>>, Error> {
         let entry = match zip.by_name(&format!("{name}.npy")) {
+            // An array that may be missing is no error here; whether it may be is the caller's to say.
             Ok(entry) => entry,
             Err(zip::result::ZipError::FileNotFound) => return Ok(None),
             Err(e) => return Err(malformed(format!("array '{name}': {e}"))),
@@ -222,6 +228,7 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     };
     let (origin, direction, power) = (needed("origin", 3)?, needed("direction", 3)?, needed("power", 1)?);
     let wavelength = array("wavelength_nm", 1)?;
+    // By the powers, one a ray.
     let n = power.len();
     if origin.len() != 3 * n || direction.len() != 3 * n || wavelength.as_ref().is_some_and(|w| w.len() != n) {
         return Err(malformed("the arrays origin, direction, power and wavelength_nm differ in length".into()));
@@ -245,11 +252,13 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
         return Err("not an NPY array".into());
     }
     // Versions 2 and 3 have a header length of four bytes; a header of this kind never needs them.
+    // The two bytes are the upper half of that length, and zero.
     if start[6] > 1 {
         entry.read_exact(&mut [0u8; 2]).map_err(cut)?;
     }
     let mut header = vec![0u8; usize::from(u16::from_le_bytes([start[8], start[9]]))];
     entry.read_exact(&mut header).map_err(cut)?;
+    // Python writes the dictionary with blanks and quotes of either kind.
     let header = String::from_utf8_lossy(&header).replace([' ', '"'], "");
     let bytes = if header.contains("'descr':'<f8'") {
         8
@@ -269,6 +278,7 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
     if !fits || !header.contains("'fortran_order':False") {
         return Err(format!("shape ({shape}), where (n, {width}) in C order is needed"));
     }
+    // Saturating: a shape of 2⁶⁰ rows must be refused, not wrapped.
     let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);
     *budget = budget.checked_sub(wanted).ok_or_else(|| {
         format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays")
@@ -276,6 +286,7 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
     // What is read grows with what is there, whatever the header says.
     let mut raw = Vec::new();
     entry.take(wanted).read_to_end(&mut raw).map_err(cut)?;
+    // A file that ends early would else give fewer rays than it promises.
     if raw.len() as u64 != wanted {
         return Err(format!("{} bytes where shape ({shape}) needs {wanted}", raw.len()));
     }

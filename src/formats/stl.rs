@@ -23,6 +23,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         w.write_all(&header)?;
         w.write_all(&(triangles.len() as u32).to_le_bytes())?;
         for [a, b, c] in &triangles {
+            // Readers use the normal for shading only; zero is what the format gives to a facet without area.
             let normal: Vector = (*b - *a).cross(*c - *a).normalize_or_zero();
             for x in [normal, *a, *b, *c].iter().flat_map(|p| p.to_array()) {
                 w.write_all(&(x as f32).to_le_bytes())?;

@@ -44,6 +44,7 @@ impl NpzStream {
         let name = file_name(path);
         remove_stale(path);
         for column in columns {
+            // The columns' names keep the files apart; the process' number keeps runs apart.
             let beside = path.with_file_name(format!(".{name}.{}.{}.part", std::process::id(), column.name));
             stream.unfinished.push(Unfinished::register(&beside));
             let file = File::create(&beside).map_err(|e| Error::new(path, ErrorKind::Write(e)))?;
@@ -57,6 +58,7 @@ impl NpzStream {
     /// # Errors
     /// When the disk is full, or the columns do not hold so many rows.
     pub fn write(&mut self, rows: u64, bytes: &[&[u8]]) -> Result<(), Error> {
+        // A column that is short would shift all later rows against the others.
         let fits = |(c, b): (&(Column, PathBuf, BufWriter<File>), &&[u8])| {
             b.len() as u64 == rows * (c.0.bytes * c.0.width) as u64
         };
@@ -80,14 +82,18 @@ impl NpzStream {
             out.flush().map_err(|e| Error::new(&self.path, ErrorKind::Write(e)))?;
         }
         write_atomic(&self.path, |w| {
+            // Without seeking: what is packed goes straight to the disk.
             let mut zip = ZipWriter::new_stream(w);
             let options = SimpleFileOptions::default()
                 .compression_method(zip::CompressionMethod::Deflated)
+                // The least effort: directions hardly shrink whatever is spent.
                 .compression_level(Some(1))
+                // Beyond 4 GiB a ZIP file needs longer sizes, which must be announced at the start.
                 .large_file(true);
             for (column, beside, _) in &self.columns {
                 zip.start_file(format!("{}.npy", column.name), options).map_err(io::Error::other)?;
                 let shape = match column.width {
+                    // NumPy tells a row of one number from a number.
                     1 => vec![self.rows as usize],
                     n => vec![self.rows as usize, n],
                 };

@@ -22,6 +22,7 @@ fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::R
         Array::I64(v) => ("Int64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
         Array::U8(v) => ("UInt8", v.to_vec()),
     };
+    // The length in front, of eight bytes as `header_type` says.
     let mut bytes = (body.len() as u64).to_le_bytes().to_vec();
     bytes.extend(body);
     let name = escape(name);
@@ -31,6 +32,7 @@ fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::R
 }
 
 fn escape(text: &str) -> String {
+    // Attributes of XML: the quote would end them.
     printable_line(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
@@ -70,6 +72,7 @@ pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
             ("normal_error_deg", &facets.normal_error_deg),
             ("curvature_per_mm", &facets.curvature_per_mm),
         ] {
+            // What was not measured is empty and left out.
             if data.len() == count {
                 array(w, name, 1, Array::F64(data))?;
             }
@@ -124,6 +127,7 @@ pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
     let [a, b] = &grid.axes;
     write_atomic(path, |w| {
         open(w, "ImageData")?;
+        // One cell thick in z, for the readers that the doc names.
         let extent = format!("0 {} 0 {} 0 1", a.cells, b.cells);
         writeln!(
             w,

@@ -43,6 +43,7 @@ impl ByteReader {
     }
 
     pub(super) fn fill(&mut self, bytes: &mut [u8], field: &str) -> Result<(), Error> {
+        // Kept for the message: it must name where the field began.
         let start = self.position;
         self.file.read_exact(bytes).map_err(|e| match e.kind() {
             std::io::ErrorKind::UnexpectedEof => self.malformed(format!(
@@ -63,6 +64,7 @@ impl ByteReader {
 
     /// So many bytes, which the file is known to hold.
     pub(super) fn block(&mut self, bytes: u64, field: &str) -> Result<Vec<u8>, Error> {
+        // Before memory is taken: a damaged length may ask for all there is.
         if bytes > self.length.saturating_sub(self.position) {
             return Err(self.malformed(format!(
                 "{field} at byte {} would need {bytes} bytes, but the file has {} in all",
@@ -90,7 +92,7 @@ impl ByteReader {
         Ok(f32::from_le_bytes(self.array(field)?))
     }
 
-    /// One row of numbers; `None` at the end of the file.
+    /// One row of numbers; a file that ends within it is an error.
     pub(super) fn row(&mut self, row: &mut [f32], field: &str) -> Result<(), Error> {
         for number in row {
             *number = self.f32(field)?;
@@ -116,6 +118,7 @@ impl ByteReader {
 }
 
 /// A ray from the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm.
+// Single precision in the file, double from here on: scales and directions must not be rounded again.
 pub(super) fn light_ray(row: &[f32], scale: f64, wavelength_nm: Option<f64>) -> Result<LightRay, String> {
     let mut numbers = [0.0; 8];
     for (number, value) in numbers.iter_mut().zip(&row[..7]) {

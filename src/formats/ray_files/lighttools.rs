@@ -50,6 +50,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     };
     let mut origin = [0.0; 3];
     file.row(&mut origin, "the origin")?;
+    // Whether rays are listed about it or from it, the format does not say.
     if origin != [0.0; 3] {
         notes.push(format!("the origin of the data, {origin:?}, is not applied: rays stand as they are listed"));
     }
@@ -59,6 +60,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     }
 
     // The number of rays is not stated: it follows from the length.
+    // What the end mark takes is no ray.
     let bytes = file.length().saturating_sub(file.position() + END.len() as u64);
     let row = 4 * columns as u64;
     if bytes % row != 0 {
@@ -67,6 +69,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     }
     let rays =
         file.rays(bytes / row, columns, |_, row| light_ray(row, scale, row.get(7).map(|w| f64::from(*w))))?;
+    // A file cut between two rows would else pass.
     if file.array::<7>("the end mark")? != *END {
         return Err(file.malformed("LTRFEND is missing behind the rays; it was cut short"));
     }

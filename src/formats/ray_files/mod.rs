@@ -57,6 +57,7 @@ impl RaySet {
     fn scale_to(&mut self, stated: Option<f64>) {
         let sum: f64 = self.rays.iter().map(|r| r.power).sum();
         let Some(stated) = stated.filter(|s| *s > 0.0) else { return };
+        // Dark sets cannot be scaled, and differences of rounding should not be.
         if sum <= 0.0 || (sum / stated - 1.0).abs() <= TOTAL_ROUNDING {
             return;
         }
@@ -83,6 +84,7 @@ pub fn read_ray_set(path: &Path, preferred: Flux) -> Result<RaySet, Error> {
     match &start {
         b"TM25" if binary => Tm25Reader::open(path)?.into_rays(preferred),
         b"LTRF" if binary => lighttools::read(path),
+        // The identifier of the other binary format is a number, not letters.
         start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path),
         _ => {
             let rays = super::read_rays(path)?;

@@ -18,6 +18,7 @@ pub struct Tm25 {
 impl Tm25 {
     /// A file of traced rays, with wavelengths when every ray has one and the flux is radiant.
     pub fn from_rays(rays: &[LightRay], flux: Flux) -> Self {
+        // The standard allows a wavelength per ray with the radiant flux alone.
         let spectral = flux == Flux::Radiant && !rays.is_empty() && rays.iter().all(|r| r.wavelength_nm.is_some());
         let columns = Tm25Columns {
             radiant: flux == Flux::Radiant,
@@ -34,6 +35,7 @@ impl Tm25 {
         }
         let mut rows = Vec::with_capacity(rays.len() * header.places().count);
         for ray in rays {
+            // Seven numbers in every row; the eighth where all rays have one.
             rows.extend(ray.numbers().map(|x| x as f32));
             rows.extend(ray.wavelength_nm.filter(|_| spectral).map(|w| w as f32));
         }
@@ -61,6 +63,7 @@ pub fn write_tm25(path: &Path, tm25: &Tm25) -> Result<(), Error> {
     write_atomic(path, |out| {
         out.write_all(&tm25.header.bytes())?;
         for number in &tm25.rows {
+            // Number by number: a file of rays may be larger than what memory has left.
             out.write_all(&number.to_le_bytes())?;
         }
         Ok(())
@@ -101,6 +104,7 @@ impl Tm25Reader {
     /// # Errors
     /// When the file ends early or a row makes no ray; the message names the ray.
     pub fn into_rays(mut self, preferred: Flux) -> Result<RaySet, Error> {
+        // Where both are there the caller's unit counts; a file of one kind is read as that.
         let flux = match (self.places.radiant, self.places.luminous) {
             (Some(_), Some(_)) => preferred,
             (Some(_), None) => Flux::Radiant,
@@ -108,6 +112,7 @@ impl Tm25Reader {
         };
         let place = if flux == Flux::Radiant { self.places.radiant } else { self.places.luminous };
         let place = place.ok_or_else(|| self.file.malformed("no column of the flux"))?;
+        // Zero or no number stands for unknown.
         let single = Some(f64::from(self.header.wavelengths[0])).filter(|w| *w > 0.0);
         let tables: Vec<Option<Spectrum>> = self.header.spectra.iter().map(|t| Spectrum::new(t)).collect();
         let mut drawn = vec![0u64; tables.len()];
@@ -120,6 +125,7 @@ impl Tm25Reader {
                 SpectralData::Single => single,
                 SpectralData::PerRay => places.wavelength.map(|p| f64::from(row[p])),
                 SpectralData::TablePerRay => {
+                    // Numbered from 1; what lies outside is damage, and must not become another table's spectrum.
                     let number = places.spectrum_index.map_or(0.0, |p| row[p]);
                     let table = (number as usize).checked_sub(1).filter(|t| *t < tables.len());
                     let table = table.ok_or_else(|| format!("spectral table {number}, of {}", tables.len()))?;
@@ -163,10 +169,12 @@ impl Spectrum {
     /// `None` for an empty table.
     fn new(table: &[[f32; 2]]) -> Option<Self> {
         let mut pairs: Vec<[f64; 2]> = table.iter().map(|pair| pair.map(f64::from)).collect();
+        // Sorted: nothing in the standard promises that the pairs rise.
         pairs.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let mut total = 0.0;
         let mut sums = vec![total];
         for pair in pairs.windows(2) {
+            // Trapezia: the density is linear between its pairs.
             total += 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]);
             sums.push(total);
         }
@@ -176,6 +184,7 @@ impl Spectrum {
     /// The wavelength below which this share of the power lies, nm; a table of no power gives its first wavelength.
     fn wavelength(&self, share: f64) -> f64 {
         let wanted = share * self.total;
+        // The first node beyond the wanted power: it is reached in the interval before.
         let k = self.sums.partition_point(|s| *s <= wanted);
         if k == 0 || k >= self.pairs.len() {
             return self.pairs[0][0];
@@ -183,11 +192,13 @@ impl Spectrum {
         let ([a, fa], [b, fb]) = (self.pairs[k - 1], self.pairs[k]);
         // The area below x is fa·x + (fb − fa)/(b − a)·x²/2; this form of the root has no cancellation.
         let rest = wanted - self.sums[k - 1];
+        // On a node itself: below, where the density is zero too, the root would be 0/0.
         if rest <= 0.0 {
             return a;
         }
         let slope = (fb - fa) / (b - a);
         let root = (fa * fa + 2.0 * slope * rest).max(0.0).sqrt();
+        // Clamped, for rounding may carry the root a little beyond its interval.
         (a + 2.0 * rest / (fa + root)).clamp(a, b)
     }
 }

@@ -71,6 +71,7 @@ impl Tm25Columns {
         let mut count = 6;
         let mut place = |present: bool, width: usize| {
             let first = count;
+            // Columns stand in this order, and those that are absent take no place.
             count += if present { width } else { 0 };
             present.then_some(first)
         };
@@ -144,6 +145,7 @@ impl Tm25Header {
 
     /// Reads the header and leaves the reader at the first ray; what was supposed goes to `notes`.
     pub(super) fn read(file: &mut ByteReader, notes: &mut Vec<String>) -> Result<Self, Error> {
+        // The mark was read by whoever chose this reader; a caller who did not ask is told here.
         if &file.array::<4>("the mark TM25")? != b"TM25" {
             return Err(file.malformed("not a TM-25 file"));
         }
@@ -175,6 +177,7 @@ impl Tm25Header {
         let text_bytes = file.i32("the size of the additional text")?;
         let text_bytes = u64::try_from(text_bytes)
             .map_err(|_| file.malformed(format!("an additional text of {text_bytes} bytes at byte 84")))?;
+        // Room for later versions: what stands there is not understood, and would be lost in silence.
         if file.array::<168>("the reserved bytes")?.iter().any(|b| *b != 0) {
             notes.push("reserved bytes of the header are not zero; they are not kept".to_owned());
         }
@@ -200,6 +203,7 @@ impl Tm25Header {
             text: String::new(),
             text_bytes,
         };
+        // Before the names: their place follows from the columns, which must make sense by then.
         header.check().map_err(|m| file.malformed(m))?;
         header.read_names(file, additional, notes)?;
         header.text = utf32(&file.block(text_bytes, "the additional text")?);
@@ -214,6 +218,7 @@ impl Tm25Header {
         notes: &mut Vec<String>,
     ) -> Result<(), Error> {
         let row = 4 * self.columns.places(additional).count as u64;
+        // Checked in 64 bits: the number of rays is the file's own word.
         let rays = self.rays.checked_mul(row).filter(|bytes| *bytes <= file.length());
         let rays = rays.ok_or_else(|| {
             file.malformed(format!(
@@ -222,6 +227,7 @@ impl Tm25Header {
                 file.length()
             ))
         })?;
+        // The rays end with the file: where they start tells whether the names are there.
         let before_rays = file.length() - rays;
         let named = file.position() + COLUMN_NAME_BYTES * additional as u64 + self.text_bytes;
         let unnamed = file.position() + self.text_bytes;
@@ -248,6 +254,7 @@ impl Tm25Header {
         let per_ray = matches!(self.spectral, SpectralData::PerRay | SpectralData::TablePerRay);
         let rules = [
             (c.radiant || c.luminous, "neither radiant nor luminous flux is among the columns"),
+            // Wavelengths weigh power; lumens beside them would count the eye twice.
             (!per_ray || (c.radiant && !c.luminous), "wavelengths or tables per ray need the radiant flux alone"),
             (self.spectral != SpectralData::PerRay || c.wavelength, "the column of wavelengths is missing"),
             (
@@ -287,10 +294,12 @@ impl Tm25Header {
         out.extend(self.wavelengths.iter().flat_map(|w| w.to_le_bytes()));
         out.extend((self.spectra.len() as i32).to_le_bytes());
         out.extend((self.column_names.len() as i32).to_le_bytes());
+        // The size of a text that was read stays, so that a file is written back byte by byte.
         let text_bytes = self.text_bytes.max((4 * self.text.chars().count() as u64).next_multiple_of(PADDING));
         out.extend((text_bytes as i32).to_le_bytes());
         out.extend([0; 168]);
         let c = self.columns;
+        // Position and direction are columns too, and always there.
         let flags = [true, true, c.radiant, c.wavelength, c.luminous, c.stokes, c.tristimulus, c.spectrum_index];
         out.extend(flags.iter().flat_map(|f| i32::from(*f).to_le_bytes()));
         for text in &self.descriptions {
@@ -301,6 +310,7 @@ impl Tm25Header {
             out.extend((table.len() as i32).to_le_bytes());
             out.extend(table.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
         }
+        // Tables are padded together, not one by one.
         out.resize(start + (out.len() - start).next_multiple_of(PADDING as usize), 0);
         for name in &self.column_names {
             push_utf32(&mut out, name, COLUMN_NAME_BYTES as usize);
@@ -349,6 +359,7 @@ fn read_spectra(file: &mut ByteReader, tables: usize) -> Result<Vec<Vec<[f32; 2]
         let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
         spectra.push(block.chunks_exact(8).map(|pair| [number(&pair[..4]), number(&pair[4..])]).collect());
     }
+    // The padding counts from where the tables begin.
     let padding = (file.position() - start).next_multiple_of(PADDING) - (file.position() - start);
     file.block(padding, "the padding of the spectral tables")?;
     Ok(spectra)

@@ -21,6 +21,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     file.i32("the identifier")?;
     let count = file.u32("the number of rays")?;
     file.array::<100>("the description")?;
+    // Read over: of the two fluxes that of the ray set is what its rays add up to.
     file.f32("the flux of the source")?;
     let stated = file.f32("the flux of the ray set")?;
     let composite = file.f32("the wavelength")?;
@@ -52,6 +53,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     // Without a wavelength per ray, the header may give one for all; 0 stands for a composite.
     let common = (composite > 0.0).then(|| f64::from(composite) * MICROMETRE);
     let rays = file.rays(u64::from(count), columns, |_, row| {
+        // Each ray's own wavelength goes before that of the header.
         let own = row.get(7).map(|w| f64::from(*w) * MICROMETRE);
         light_ray(row, scale, own.or(common))
     })?;

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 /// Adds the conditions to the schema of a scene.
 pub(super) fn add(schema: &mut Value) {
     let needs = |keys: &[&str]| json!({"required": keys});
+    // Asked to be there: a scene without `kind` has the default one, whose conditions stand under `never`.
     let of_kind = |kinds: &[&str], then: Value| json!({"if": {"properties": {"kind": {"enum": kinds}}, "required": ["kind"]}, "then": then});
     let never = |keys: &[&str]| json!({"not": {"anyOf": keys.iter().map(|k| needs(&[k])).collect::<Vec<_>>()}});
     let measured = ["ies", "eulumdat", "rays", "data_1"];
@@ -20,6 +21,7 @@ pub(super) fn add(schema: &mut Value) {
     let indices = ["index", "catalogue", "sellmeier", "cauchy", "schott", "index_table"];
     let receiver = json!({"required": ["name"], "allOf": [
         {"not": needs(&["channels", "bins_nm"])},
+        // Without a kind a receiver is a plane.
         {"if": never(&["kind"]), "then": needs(&["size"])},
         of_kind(&["plane"], needs(&["size"])),
         of_kind(&["sphere"], needs(&["radius"])),
@@ -32,6 +34,7 @@ pub(super) fn add(schema: &mut Value) {
         of_kind(&["cosine"], needs(&["exponent"])),
         of_kind(&measured, needs(&["file"])),
         {"not": needs(&["radius", "size"])},
+        // Without a kind a source is a point, which has none of these.
         {"if": never(&["kind"]), "then": never(&["half_angle_deg", "exponent", "file"])},
     ]});
     let spectrum = json!({"allOf": [
@@ -56,6 +59,7 @@ pub(super) fn add(schema: &mut Value) {
             }}),
         ),
     ] {
+        // The schema's own definitions stand under the names of the structs.
         merge(&mut schema["$defs"][name], &more);
     }
     for direction in ["direction", "normal"] {
@@ -76,6 +80,7 @@ fn any_case_pattern(words: &[&str]) -> String {
 fn merge(into: &mut Value, more: &Value) {
     match (into, more) {
         (Value::Object(into), Value::Object(more)) => {
+            // What the structs say stays; conditions only come beside it.
             more.iter().for_each(|(k, v)| merge(into.entry(k.clone()).or_insert(Value::Null), v));
         }
         (into, more) => *into = more.clone(),

@@ -58,6 +58,7 @@ impl<'de> Visitor<'de> for Range {
         Ok([x; 2])
     }
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<[f64; 2], A::Error> {
+        // A third number is asked for, so that three are refused and not cut to two.
         let mut next = || seq.next_element::<f64>();
         match (next()?, next()?, next()?) {
             (Some(low), Some(high), None) => Ok([low, high]),

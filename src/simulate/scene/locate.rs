@@ -33,6 +33,7 @@ const REFUSED: [(&str, &str); 20] = [
 
 /// The effect that a word asks for and that is not simulated.
 fn refused(word: &str) -> Option<&'static str> {
+    // Spelling with hyphens or capitals is forgiven: the word is refused either way, and should be with its reason.
     let word = word.to_lowercase().replace('-', "_");
     REFUSED.iter().find(|(start, _)| word.starts_with(start)).map(|(_, effect)| *effect)
 }
@@ -56,6 +57,7 @@ const LISTS: [(&str, &str); 9] = [
 
 /// The bytes of the value at a path; of the deepest table on the way when the value itself is not there.
 pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
+    // The values that were read do not know their places: the text is read once more for them.
     let root = DeTable::parse(text).ok()?;
     let mut value: Option<&DeValue<'_>> = None;
     let mut span = None;
@@ -66,6 +68,7 @@ pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
             (Key::Index(i), Some(DeValue::Array(a))) => a.get(*i),
             _ => None,
         };
+        // A key that is not written has no place: its table is shown.
         let Some(next) = next else { break };
         span = Some(next.span());
         value = Some(next.get_ref());
@@ -88,6 +91,7 @@ const TABLES: [(&str, &str); 8] = [
 /// A value of the wrong type, in words that do not speak of the program's own types.
 fn typed(message: &str, key: &str) -> Error {
     let message = message.trim();
+    // The key is asked first: a list has its own form, which the type does not tell.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
         let message = message.replace("a sequence", "a list").replace("an array", "a list");
         return Error::new(ErrorKind::Syntax, message).help(*help);

@@ -160,6 +160,7 @@ impl Material {
 
     /// Its selectors.
     pub(crate) fn faces(&self) -> FaceSelector {
+        // `check` has refused a rule with both, so that none of its selectors is lost here.
         if let Some(on) = &self.on {
             return on.clone();
         }

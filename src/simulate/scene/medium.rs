@@ -103,6 +103,7 @@ fn catalogued(name: &str) -> Result<optics::Medium, String> {
 
 /// Finds a medium by name: one of the scene, or one of the catalogue.
 pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
+    // Names of the scene come before those of the catalogue, so that a scene may have a glass of its own.
     if let Some(m) = scene.media.iter().find(|m| m.name == name) {
         return m.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, at, e));
     }
@@ -124,6 +125,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
         if m.name.is_empty() {
             return Err(scene.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
         }
+        // Of two media of one name a material could mean either.
         if scene.media[..i].iter().any(|o| o.name == m.name) {
             return Err(scene.error(ErrorKind::Value, &at("name"), format!("two media are called '{}'", m.name)));
         }
@@ -131,6 +133,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
             return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
         }
         let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
+        // A formula may leave the range where it is used, though its coefficients look well.
         let n = medium.index.value(scene.run.wavelength_nm);
         if !(0.1..=10.0).contains(&n) {
             let message =

@@ -110,6 +110,7 @@ impl Scene {
     /// Reads a scene file; paths in it are relative to its folder.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
+        // Through `formats`: a pipe in place of the file would never end.
         let text = crate::formats::read_text(path).map_err(|e| {
             let kind = ErrorKind::Unreadable;
             Error::new(kind, format!("{name}: cannot read the scene file: {e}")).help("check the path")
@@ -123,6 +124,7 @@ impl Scene {
         let shared: Arc<str> = text.into();
         let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax(&e, file_name, &shared))?;
         scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
+        // Written out again, the scene shows what was understood: a list that lost entries on the way was too long.
         let understood = serde_json::to_value(&scene)
             .map_err(|e| Error::new(ErrorKind::Syntax, e.to_string()).located(file_name, &shared, None))?;
         if let Some((span, message)) = locate::lengths(text, &understood) {
@@ -164,6 +166,7 @@ impl Scene {
         locate::span(self.origin.text.as_deref()?, path)
     }
 
+    // In the order of the file's keys, so that the first fault told is one that stands far up.
     fn check(&self) -> Result<(), Error> {
         self.run.check(self)?;
         self.accuracy.check(self)?;
@@ -187,6 +190,7 @@ impl Scene {
 
     /// Every receiver has files of its own.
     fn check_receiver_names(&self) -> Result<(), Error> {
+        // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other.
         let mut stems: HashMap<String, &str> = HashMap::new();
         for (i, Receiver { name, .. }) in self.receivers.iter().enumerate() {
             let stem = file_stem(name);

@@ -131,6 +131,7 @@ impl Receiver {
     pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
         let unset = Self::default();
         match self.angles {
+            // A range that is the default was not given: degrees from −90 mean nothing for C-planes.
             FarFieldType::C if self.h_deg == unset.h_deg && self.v_deg == unset.v_deg => {
                 ([0.0, 360.0], [0.0, 180.0])
             }
@@ -143,7 +144,9 @@ impl Receiver {
     /// Sums that it keeps: a cell for power and one for every channel.
     pub(super) fn sums(&self) -> u64 {
         let channels = match (self.channels, &self.bins_nm) {
+            // A bin has a sum, and power one beside them: as many sums as edges.
             (_, Some(edges)) => edges.len() as u64,
+            // X, Y, Z and power; lumens and power.
             (Some(Channels::Xyz), None) => 4,
             (Some(Channels::Photometric), None) => 2,
             (None, None) => 1,
@@ -155,6 +158,7 @@ impl Receiver {
     fn misplaced(&self) -> Option<(&'static str, &'static str)> {
         use ReceiverKind::{Absorbed, FarField, Plane, Sphere};
         let unset = Self::default();
+        // One table for all kinds: a new key that is missing here would be ignored in silence.
         let keys: [(&str, bool, &[ReceiverKind], &str); 13] = [
             ("at", self.at != unset.at, &[Plane, Sphere], "plane or sphere"),
             ("normal", self.normal != unset.normal, &[Plane, Sphere, FarField], "plane, sphere or far_field"),
@@ -187,6 +191,7 @@ impl Receiver {
         if self.cells.contains(&0) || u64::from(self.cells[0]) * u64::from(self.cells[1]) > 1 << 24 {
             return fail("cells", "`cells` must be at least 1 and at most 16 million in all");
         }
+        // Finite first: comparisons with what is no number would let it pass.
         if !self.at.iter().chain(&self.normal).chain(&self.up).chain(self.x.iter().flatten()).all(|x| x.is_finite())
             || self.normal.iter().all(|x| *x == 0.0)
         {
@@ -218,6 +223,7 @@ impl Receiver {
             ReceiverKind::FarField => {
                 let ([h0, h1], [v0, v1]) = self.angles_deg();
                 let (h, v) = match self.angles {
+                    // The elevation from the polar axis covers half a turn, the angle about it a whole one.
                     FarFieldType::A => (180.0, 90.0),
                     FarFieldType::B => (90.0, 180.0),
                     FarFieldType::C => (360.0, 180.0),

@@ -29,6 +29,7 @@ impl RegulationUse {
         };
         let mut found = scene.receivers.iter().enumerate().filter(|(_, r)| fits(r)).map(|(k, _)| k);
         let first = found.next();
+        // Only one receiver can be meant; of several the file must say which.
         if found.next().is_some() { None } else { first }
     }
 
@@ -39,8 +40,10 @@ impl RegulationUse {
             (0..=cells).map(|k| low + (high - low) * f64::from(k) / f64::from(cells)).collect()
         };
         let [columns, rows] = receiver.cells;
+        // No light at all: the verdict does not count, only whether the cells can give one.
         let dark = vec![[0.0; 3]; columns as usize * rows as usize];
         let map = IntensityMap::new(edges(h, columns), edges(v, rows), dark)?;
+        // Aiming needs a cut-off, and a dark map has none.
         let assumptions = Assumptions { as_placed: true, ..Assumptions::default() };
         assess(&map, &Regulation::find(&self.id)?, &assumptions).map(|_| ())
     }

@@ -166,6 +166,7 @@ impl Accuracy {
                 None => error,
             });
         }
+        // Written so that what is no number fails.
         match (self.tolerance_mm, self.angle_deg) {
             (Some([low, high]), _) if !(low > 0.0 && low <= high && high.is_finite()) => {
                 fail("tolerance_mm", "must be two positive lengths, the tighter one first, as in [0.05, 0.2]")

@@ -86,6 +86,7 @@ impl ColourKey {
         match self {
             Self::Rgb(c) => Some(*c),
             Self::Hex(s) => {
+                // Six ASCII digits: slicing by bytes would else split a character.
                 let hex = s.strip_prefix('#').filter(|h| h.len() == 6 && h.is_ascii())?;
                 let byte = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).ok().map(|b| f64::from(b) / 255.0);
                 Some([byte(0)?, byte(2)?, byte(4)?])

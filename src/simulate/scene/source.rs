@@ -117,6 +117,7 @@ impl Source {
             let at = [Key::Name("source"), Key::Index(index), Key::Name(key)];
             return Err(scene.error(ErrorKind::Value, &at, message));
         }
+        // Photometric files are in lumens by definition, and their power need not be written.
         let photometric = matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
         if photometric && self.power.is_none() && scene.run.unit != PowerUnit::Lumen {
             let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];

@@ -59,6 +59,7 @@ impl SpectrumKey {
             ("blue_share", self.blue_share.is_some()),
             ("phosphor_nm", self.phosphor_nm.is_some()),
         ] {
+            // A key of another kind is a slip, and to ignore it would trace another spectrum than the one meant.
             if given && !allowed.contains(&key) {
                 return Err(format!("`{key}` does not belong to this kind of spectrum"));
             }
@@ -83,6 +84,7 @@ impl SpectrumKey {
                 })
             }
         };
+        // Made once and thrown away: what cannot be sampled is refused where it is written.
         spectrum.sampler().map_err(|e| e.to_string())?;
         Ok(spectrum)
     }

@@ -6,6 +6,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
     candidates
         .into_iter()
         .map(|c| (distance(&word, &c.to_lowercase()), c))
+        // A third of the letters, and one more for short words: what differs more is another word.
         .filter(|(d, c)| *d <= 1 + c.len().max(word.len()) / 3)
         .min_by_key(|(d, _)| *d)
         .map(|(_, c)| c)
@@ -15,6 +16,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
 pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     match nearest(word, names.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
+        // Twelve fit into a line or two.
         None => format!("there are: {}", names[..names.len().min(12)].join(", ")),
     }
 }
@@ -26,6 +28,7 @@ fn distance(a: &str, b: &str) -> usize {
     for (i, x) in a.iter().enumerate() {
         let mut diagonal = std::mem::replace(&mut row[0], i + 1);
         for (j, y) in b.iter().enumerate() {
+            // The row above is overwritten as it is read: one row holds the whole table.
             let change = diagonal + usize::from(x != y);
             diagonal = row[j + 1];
             row[j + 1] = change.min(row[j] + 1).min(diagonal + 1);

@@ -11,6 +11,7 @@ const LARGEST_INDEX: f64 = 1e3;
 impl Material {
     /// The surface as a coating and a scatter, for all kinds but `absorber`; what is wrong with it otherwise, and at which key.
     pub(crate) fn optics(&self) -> Result<(Coating, Option<Scatter>), (&'static str, String)> {
+        // A boundary that says only its medium is a bare one.
         let kind = self.surface.unwrap_or(SurfaceKind::Interface);
         let coating = match kind {
             SurfaceKind::Absorber => Coating::ideal(0.0, 0.0).map_err(|e| ("surface", e.to_string())),
@@ -26,6 +27,7 @@ impl Material {
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
             },
         }?;
+        // The values first: a wrong reflectance is a better message than a key that does not belong.
         self.check_keys(kind)?;
         let scatter = match kind {
             SurfaceKind::Diffuse => Some(Scatter { share: 1.0, lobe: Lobe::Lambertian }),
@@ -39,6 +41,7 @@ impl Material {
         let mirror = matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse);
         let coated = kind == SurfaceKind::Coating;
         let scatters = !matches!(kind, SurfaceKind::Diffuse | SurfaceKind::Absorber);
+        // One table for all kinds: a key that is not asked about here would be ignored in silence.
         let keys = [
             ("reflectance", self.reflectance.is_some(), mirror || coated, "`surface` mirror, diffuse or coating"),
             ("transmittance", self.transmittance.is_some(), coated, "`surface = \"coating\"`"),
@@ -61,6 +64,7 @@ impl Material {
             (LobeKind::Abg, None, None, Some([a, b, g])) => {
                 Lobe::Abg(Abg::new(a, b, g).map_err(|e| e.to_string())?)
             }
+            // The lobe is known, so what is wrong are its parameters.
             (LobeKind::Lambertian, ..) => return Err("a lambertian lobe has no parameters".into()),
             (LobeKind::Gaussian, ..) => return Err("a gaussian lobe has `sigma_deg` and nothing else".into()),
             (LobeKind::Cosine, ..) => return Err("a cosine lobe has `exponent` and nothing else".into()),
@@ -82,6 +86,7 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
         }
         Some(Reflectance::ByAngle(t)) => {
             let (angles, cells) = t.iter().map(|[a, r]| (*a, same(*r))).unzip();
+            // One column: a table without wavelengths holds for all, and which one it names does not matter.
             CoatingTable::new(angles, vec![550.0], cells)
                 .map(Coating::Table)
                 .map_err(|e| ("reflectance", e.to_string()))
@@ -109,10 +114,12 @@ fn table(rows: &[Vec<f64>]) -> Result<Coating, String> {
 fn grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String> {
     let (keys, cells): (Vec<[f64; 2]>, Vec<Split>) = rows.unzip();
     let first = keys.first().ok_or("the table is empty")?[0];
+    // The first angle's rows tell the wavelengths; the rest must repeat them.
     let columns = keys.iter().take_while(|k| k[0] == first).count();
     let nm: Vec<f64> = keys[..columns].iter().map(|k| k[1]).collect();
     let angles: Vec<f64> = keys.iter().step_by(columns).map(|k| k[0]).collect();
     let full = keys.iter().enumerate().all(|(i, k)| *k == [angles[i / columns], nm[i % columns]]);
+    // Without this a missing row would shift all that follow.
     if !full || keys.len() != angles.len() * nm.len() {
         return Err("the rows are no full grid of angles and wavelengths, wavelengths fastest".into());
     }
