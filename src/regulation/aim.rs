@@ -42,10 +42,12 @@ impl Aim {
     }
 
     /// Brings the cut-off of a passing beam to its line, then its elbow to line A.
+    // First up and down, then sideways: the scan for the elbow lies below the cut-off that was found.
     pub(super) fn by_cut_off(map: &IntensityMap, rule: CutOff) -> Self {
         let Some(edge) = steepest(map, |b| [rule.scan_h_deg, b], [-SCAN_V_DEG, SCAN_V_DEG], 1.0) else {
             return Self::unchanged("as placed: the far field does not hold the scan for the cut-off");
         };
+        // What has no edge cannot be aimed by it; to turn the lamp by noise would be worse.
         if edge.gradient < LEAST_GRADIENT {
             let how = format!(
                 "as placed: the steepest place at {}° is G = {:.3}, no cut-off (G of {LEAST_GRADIENT} and more)",
@@ -86,11 +88,13 @@ struct Edge {
 /// The steepest fall of log₁₀ E along a scan in the direction of `sign`; `None` where the map does not hold two steps of it.
 fn steepest(map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2], range: [f64; 2], sign: f64) -> Option<Edge> {
     // As fine as the map allows: a wider opening would blunt the edge.
+    // Half an opening to each side of the scanned point.
     let sensor = Sensor { half_deg: 0.5 * map.coarsest_deg().max(STEP_DEG), round: false };
     let steps = ((range[1] - range[0]) / STEP_DEG).round() as usize;
     let positions = (0..=steps).map(|k| range[0] + STEP_DEG * k as f64);
     let readings: Vec<(f64, f64)> = positions
         .filter_map(|b| {
+            // Places outside the far field are left out; fewer than two steps make no edge.
             let [h, v] = direction(b);
             Some((b, map.read(&map.measure(sensor, h, v)?).value))
         })
@@ -98,10 +102,12 @@ fn steepest(map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2], range: [f64
     let brightest = readings.iter().map(|r| r.1).fold(0.0, f64::max);
     let dark = DARK_SHARE * brightest;
     // A scan that meets no light at all is flat.
+    // The dark share bounds the logarithm, which has no end at zero.
     let level = |value: f64| if dark > 0.0 { (value.max(0.0) + dark).log10() } else { 0.0 };
     let span = (GRADIENT_DEG / STEP_DEG).round() as usize;
     let gradients = readings.windows(span + 1).map(|w| {
         let (first, last) = (w[0], w[span]);
+        // The gradient belongs to the middle of its distance.
         (0.5 * (first.0 + last.0), sign * (level(first.1) - level(last.1)))
     });
     // Neighbours of the steepest place share in it: its centre is the mean of those within a step, weighed by their gradient.

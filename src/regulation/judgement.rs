@@ -17,6 +17,7 @@ pub enum Verdict {
 impl Verdict {
     /// Of requirements that must all be met.
     pub(super) fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
+        // One failure decides; doubt counts only where nothing fails.
         verdicts.into_iter().fold(Self::Pass, |sum, v| match (sum, v) {
             (Self::Fail, _) | (_, Self::Fail) => Self::Fail,
             (Self::Unsure, _) | (_, Self::Unsure) => Self::Unsure,
@@ -72,13 +73,17 @@ impl Decisive {
     pub(super) fn settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
+        // At most so large may the whole error be.
         let wanted = self.margin.abs() / self.sigmas;
         let Reading { statistical, geometric, .. } = self.reading;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
+        // Otherwise the geometric error stays as it is, and the statistical one gets what it leaves of the square.
         let room = if finer { wanted * 0.5f64.sqrt() } else { (wanted * wanted - geometric * geometric).sqrt() };
+        // Statistical errors fall with the root of the rays; fewer rays than traced are no advice.
         let rays = (traced as f64 * (statistical / room).powi(2)).max(traced as f64).ceil();
         let tolerance_mm = tolerance_mm.filter(|_| finer).map(|t| t * room / geometric);
+        // An error of zero times no room is no number.
         (rays.is_finite() && rays < MOST_RAYS).then_some(Settles { rays: rays as u64, tolerance_mm })
     }
 }
@@ -89,6 +94,7 @@ impl Judgement {
         // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
         let count = requirement.comparisons.len().max(1) as f64;
         let many = if count > 1.0 { (2.0 * (count / (2.0 * ONE_SIDED)).ln()).sqrt().max(SIGMAS) } else { SIGMAS };
+        // Luck helps where one reading is enough: to pass where any will do, to fail where all must hold.
         let (to_pass, to_fail) = if requirement.any { (many, SIGMAS) } else { (SIGMAS, many) };
 
         let mut passing = 0;
@@ -97,6 +103,7 @@ impl Judgement {
         for comparison in &requirement.comparisons {
             let (reading, margin) = read(photometer, comparison);
             let error = reading.error();
+            // A limit that is just reached is met, where there is no error.
             passing += usize::from(margin >= to_pass * error && margin >= 0.0);
             failing += usize::from(-margin >= to_fail * error && margin < 0.0);
             // The best of those of which any is enough, the worst of those that must all hold.

@@ -42,6 +42,7 @@ impl Reading {
 /// What a photometer in one or several directions adds up: cells with weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measurement {
+    // Ordered: sums over cells come in one order, and two runs agree to the last bit.
     weights: BTreeMap<usize, f64>,
 }
 
@@ -92,6 +93,7 @@ impl IntensityMap {
         let width: Vec<f64> = self.h_edges.windows(2).map(|e| (e[1] - e[0]).to_radians()).collect();
         let height = |row: usize| self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin();
         let columns = width.len();
+        // The flux of a ray spread over the cell's solid angle.
         for (index, cell) in self.cells.iter_mut().enumerate() {
             cell[1] = cell[1].max(flux / (width[index % columns] * height(index / columns)));
         }
@@ -113,6 +115,7 @@ impl IntensityMap {
     pub(super) fn mirrored(&self) -> Self {
         let columns = self.h_edges.len() - 1;
         let cells = self.cells.chunks(columns).flat_map(|row| row.iter().rev().copied()).collect();
+        // Edges turn their order with their sign: they must rise again.
         Self { h_edges: self.h_edges.iter().rev().map(|h| -h).collect(), v_edges: self.v_edges.clone(), cells }
     }
 
@@ -122,12 +125,15 @@ impl IntensityMap {
         let mut measurement = Measurement::default();
         let mut total = 0.0;
         for band in 0..bands {
+            // Bands of equal height; in a square opening all of it is one.
             let from = v + sensor.half_deg * (2.0 * band as f64 / bands as f64 - 1.0);
             let to = v + sensor.half_deg * (2.0 * (band + 1) as f64 / bands as f64 - 1.0);
+            // The band's width at its middle.
             let offset = 0.5 * (from + to) - v;
             // Degrees of azimuth are shorter towards the poles.
             let half =
                 if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
+            // By the elevation of the aim, not of the band: over an opening of a degree they hardly differ.
             let half = half / v.to_radians().cos().max(LEAST_COSINE);
             for (row, v_share) in overlaps(&self.v_edges, from, to, |v| v.to_radians().sin())? {
                 for (column, h_share) in overlaps(&self.h_edges, h - half, h + half, f64::to_radians)? {
@@ -137,6 +143,7 @@ impl IntensityMap {
                 }
             }
         }
+        // By what was met: rounding of edges must not make the mean too large.
         for weight in measurement.weights.values_mut() {
             *weight /= total;
         }
@@ -166,6 +173,7 @@ fn overlaps(edges: &[f64], from: f64, to: f64, measure: impl Fn(f64) -> f64) -> 
     if from < edges[0] - EDGE_ROUNDING || to > edges[edges.len() - 1] + EDGE_ROUNDING {
         return None;
     }
+    // The cell that holds the start, not the one behind it.
     let first = edges.partition_point(|e| *e <= from).saturating_sub(1);
     let cells = edges[first..].windows(2).enumerate().take_while(|(_, e)| e[0] < to);
     Some(

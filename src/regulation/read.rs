@@ -18,6 +18,7 @@ impl IntensityMap {
     /// # Errors
     /// When a column is missing or the cells make no regular grid; the message names the line.
     pub fn from_csv(text: &str, ray_flux: Option<f64>) -> Result<Self, String> {
+        // Comments are allowed, as in other CSV files that the program reads.
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let (_, header) = lines.next().ok_or("the file is empty")?;
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
@@ -33,6 +34,7 @@ impl IntensityMap {
 
         let mut cells: BTreeMap<(i64, i64), [f64; 3]> = BTreeMap::new();
         let [mut columns, mut rows] = [BTreeMap::new(), BTreeMap::new()];
+        // Centres as whole numbers: decimals that were written and read must still be equal to be keys.
         let key = |x: f64| (x / SAME_CENTRE_DEG).round() as i64;
         for (number, line) in lines {
             let values: Vec<&str> = line.split(',').map(str::trim).collect();
@@ -48,12 +50,14 @@ impl IntensityMap {
             let geometric = geometric.map_or(Ok(0.0), value)?;
             cells.insert((key(centre_v), key(centre_h)), [value(intensity)?, value(statistical)?, geometric]);
         }
+        // A cell twice, or one that is missing: either makes the count wrong.
         if cells.len() != columns.len() * rows.len() {
             return Err(format!("{} cells are no grid of {} × {}", cells.len(), columns.len(), rows.len()));
         }
         let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
         let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
+        // Only where the flux of a ray is known.
         Ok(ray_flux.into_iter().fold(map, Self::with_ray_flux))
     }
 }
@@ -61,6 +65,7 @@ impl IntensityMap {
 /// The edges of cells of equal width, from their centres.
 fn edges_between(centres: &[f64]) -> Result<Vec<f64>, String> {
     let [first, .., last] = centres else { return Err("a far field of one cell is no map".into()) };
+    // The mean step: single differences carry the rounding of two decimals.
     let step = (last - first) / (centres.len() - 1) as f64;
     if centres.windows(2).any(|c| (c[1] - c[0] - step).abs() > 10.0 * SAME_CENTRE_DEG) {
         return Err("its cells are not of equal width".into());

@@ -47,6 +47,7 @@ impl Photometer<'_> {
     fn near(&self, direction: [f64; 2]) -> Vec<[f64; 2]> {
         let mut directions = vec![direction];
         if self.tolerance_deg > 0.0 {
+            // Two rings: a smooth beam is met between them if at all.
             for ring in [0.5, 1.0] {
                 directions.extend((0..TOLERANCE_RING).map(|k| {
                     let (sin, cos) = (std::f64::consts::TAU * k as f64 / TOLERANCE_RING as f64).sin_cos();
@@ -61,6 +62,7 @@ impl Photometer<'_> {
     /// Directions along a line, one opening beside the other.
     fn line(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        // Half an opening apart, so that nothing bright lies between two of them unseen.
         let steps = (length / self.sensor.half_deg).ceil().max(1.0);
         let at = |k: f64| [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * k / steps);
         (0..=steps as usize).map(|k| at(k as f64)).collect()
@@ -75,12 +77,17 @@ impl Photometer<'_> {
         for (axis, extent) in self.map.extent().into_iter().enumerate() {
             let values = || polygon.iter().map(|p| p[axis].clamp(-MOST_DEG, MOST_DEG));
             let asked = [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)];
+            // The opening must fit: directions end half its width inside of the field.
             let held = [extent[0] + step - shift[axis], extent[1] - step - shift[axis]];
+            // Two steps more: a zone that ends on the rim of the field counts as held, though no opening centred
+            // there fits into it.
             complete &= asked[0] >= held[0] - 2.0 * step && asked[1] <= held[1] + 2.0 * step;
             bounds[axis] = [asked[0].max(held[0]), asked[1].min(held[1])];
         }
         let [h, v] = bounds;
+        // Both ends count; an empty range has no direction.
         let count = |[low, high]: [f64; 2]| if high < low { 0 } else { ((high - low) / step).ceil() as usize + 1 };
+        // The last step may be shorter.
         let place = |[low, high]: [f64; 2], k: usize| (low + step * k as f64).min(high);
         let mut directions = Vec::new();
         for j in 0..count(v) {
@@ -135,6 +142,7 @@ fn bounds(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [boo
     let limits = [(row.min, true, any[0]), (row.max, false, any[1])];
     let requirement = |(limit, at_least, any): (Option<f64>, bool, bool)| {
         let limit = limit?;
+        // A limit that is not given asks for nothing.
         let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: 0 };
         for direction in directions {
             match photometer.measure(*direction) {
@@ -171,6 +179,7 @@ fn sum(photometer: &Photometer, row: &Row) -> Option<Requirement> {
     for point in points {
         match photometer.measure(*point) {
             Some(measurement) => total = total.plus(1.0, &measurement),
+            // A sum of which a part is unseen is unknown: no part of it may count for the whole.
             None => return Some(Requirement { comparisons: Vec::new(), any: false, unseen: points.len() }),
         }
     }
@@ -180,6 +189,7 @@ fn sum(photometer: &Photometer, row: &Row) -> Option<Requirement> {
 
 /// A reading compared with a multiple of another: the difference is one measurement, so that what both have in common cancels.
 fn relative(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
+    // Without a factor the row is text.
     let factor = row.factor?;
     let reference = match row.of.as_deref()? {
         "imax" => photometer.brightest()?,
@@ -191,11 +201,13 @@ fn relative(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirem
         (None, None) => return None,
     };
     let reference = photometer.measure(reference);
+    // For a point near its place any direction will do, in a zone all of them must hold.
     let any = row.polygon.is_none() && photometer.tolerance_deg > 0.0;
     let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: usize::from(!complete) };
     for direction in directions {
         match (photometer.measure(direction), &reference) {
             (Some(measurement), Some(reference)) => requirement.comparisons.push(Comparison {
+                // Errors of cells that both readings share would count twice if the two were judged apart.
                 measurement: measurement.plus(-factor, reference),
                 limit: 0.0,
                 at_least: row.bound.as_deref() == Some("min"),
@@ -215,10 +227,12 @@ fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
     for (k, a) in polygon.iter().enumerate() {
         let b = polygon[(k + 1) % polygon.len()];
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        // The nearest point of the side: rounding must not throw corners of the zone out.
         let t = (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
         if (p[0] - a[0] - t * dx).hypot(p[1] - a[1] - t * dy) <= RIM_DEG {
             return true;
         }
+        // By rays to the right: each side that is crossed changes sides.
         if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + dx * (p[1] - a[1]) / dy {
             inside = !inside;
         }

@@ -58,6 +58,8 @@ pub struct Function {
 impl Function {
     /// The rows of a group are weighed together: each point reaches this share of its minimum when the sum of its group is met.
     pub(super) fn point_floor(&self) -> Option<f64> {
+        // FMVSS 108 has two ways: each point at least 60 % of its figure, or any share of it when its group's sum
+        // is met.
         match self.point_rule.as_deref() {
             Some("floor-60") => Some(0.6),
             Some("group-alternative") => Some(0.0),
@@ -144,15 +146,18 @@ impl Regulation {
     /// When there is none; the message names those that come nearest.
     pub fn find(id: &str) -> Result<Self, String> {
         let plain = |s: &str| -> String {
+            // Spaces and dashes are written in many ways.
             s.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
         };
         let wanted = plain(id);
         let all = Self::all();
         let exact = all.iter().find(|r| plain(&r.id) == wanted);
+        // The first of those that begin so, in the order of the tables.
         let begins = || all.iter().find(|r| !wanted.is_empty() && plain(&r.id).starts_with(&wanted));
         if let Some(found) = exact.or_else(begins) {
             return Ok(found.clone());
         }
+        // Five letters name a family: `unr11`, `fmvss`.
         let family = |r: &&Self| plain(&r.id).chars().take(5).eq(wanted.chars().take(5));
         let mut near: Vec<&str> = all.iter().filter(family).map(|r| r.id.as_str()).take(12).collect();
         if near.is_empty() {
@@ -192,6 +197,7 @@ fn read(prefix: &str, text: &str) -> Vec<Regulation> {
         .map(|function| {
             let driving = function.id.starts_with("driving");
             let sensor =
+                // The two names are of two generations of the tables' form.
                 number(&file.measurement, "/receiver_half_deg").or(number(&file.measurement, "/sensor_half_deg"));
             let signal = prefix == "UN R148-01" || file.title.contains("signal lamps");
             let reaim = number(&file.measurement, "/reaim_deg").or(number(&file.measurement, "/tolerance_deg"));
@@ -199,10 +205,12 @@ fn read(prefix: &str, text: &str) -> Vec<Regulation> {
             let scan = number(&file.aim, "/instrumental_vertical/scan_h_deg");
             let cut_off = scan.filter(|_| function.id.starts_with("passing")).map(|scan_h_deg| CutOff {
                 scan_h_deg,
+                // What UN R112 and R149 have in common for those files that do not repeat it.
                 line_v_deg: number(&file.aim, "/vertical/line_b_deg").unwrap_or(-0.57),
                 elbow_h_deg: number(&file.aim, "/horizontal_visual/line_a_deg").unwrap_or(0.5),
             });
             let id = match function.id.split_once('-') {
+                // People say `C passing`, the tables `passing-C`.
                 Some((beam @ ("passing" | "driving"), class)) => format!("{prefix} {class} {beam}"),
                 _ => format!("{prefix} {}", function.id),
             };

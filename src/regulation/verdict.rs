@@ -70,12 +70,15 @@ pub fn assess(
     assumptions: &Assumptions,
 ) -> Result<Assessment, String> {
     let rules = &regulation.rules;
+    // The tables are written for right-hand traffic: the lamp is mirrored, not the tables.
     let mirrored = (assumptions.traffic == Traffic::Left).then(|| map.mirrored());
     let map = mirrored.as_ref().unwrap_or(map);
     let mut half = rules.sensor_half_deg;
+    // As wide as the cells need and the text allows.
     if regulation.id.starts_with("UN R148") {
         half = half.max(0.5 * map.coarsest_deg()).min(WIDEST_SIGNAL_SENSOR_DEG);
     }
+    // A photometer finer than the cells would read a precision that is not there.
     if map.coarsest_deg() > 2.0 * half * (1.0 + ROUNDED_EDGES) {
         return Err(format!(
             "the cells of the far field are {:.3}° wide, the photometer of {} {:.3}°; trace with cells of at most that",
@@ -91,6 +94,7 @@ pub fn assess(
         (None, _) => Aim::unchanged("as placed: this function has no cut-off to aim by"),
     };
     let first = assess_aimed(map, regulation, assumptions, sensor, aim);
+    // Realigning is for beams with a cut-off, and for those that fail by more than doubt.
     if first.verdict != Verdict::Fail || rules.cut_off.is_none() || assumptions.as_placed {
         return Ok(first);
     }
@@ -111,6 +115,7 @@ fn realign(
         .flat_map(|h| (-vertical..=vertical).map(move |v| (h, v)))
         .filter(|t| *t != (0, 0))
         .collect();
+    // The least turn first: what mends by little is nearer to the lamp as aimed.
     turns.sort_by_key(|(h, v)| h * h + v * v);
     // Rows that failed are asked first: most turns do not mend them.
     let failed: Vec<&Row> =
@@ -121,6 +126,7 @@ fn realign(
         let photometer = Photometer { map, aim: &aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
         let mended =
             |row: &&Row| judge_row(&photometer, regulation, assumptions, row).verdict != Some(Verdict::Fail);
+        // Then all of them, for a turn that mends one row may break another.
         if !failed.iter().all(mended) {
             return None;
         }
@@ -148,11 +154,13 @@ fn assess_aimed(
             let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
             point.verdict = match (point.verdict, group) {
                 (Some(Verdict::Pass), _) | (_, Some(Verdict::Pass)) => Some(Verdict::Pass),
+                // A group that is unsure may still save its point.
                 (Some(Verdict::Fail), Some(Verdict::Fail) | None) => Some(Verdict::Fail),
                 (own, _) => own.map(|_| Verdict::Unsure),
             };
         }
     }
+    // A group of points counts through its points.
     let counted = rows.iter().filter(|r| !(leaning && r.row.kind == "group_sum"));
     let verdict = Verdict::all(counted.filter_map(|r| r.verdict));
     Assessment { regulation: regulation.clone(), sensor_deg: 2.0 * sensor.half_deg, aim, rows, verdict }
@@ -160,9 +168,11 @@ fn assess_aimed(
 
 fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Assumptions, row: &Row) -> RowVerdict {
     let mut verdict = RowVerdict { row: row.clone(), reading: None, direction: None, verdict: None, settles: None };
+    // Conditions are about the lamp's use, which the simulation does not know.
     if row.when.is_some() {
         return verdict;
     }
+    // A share of the printed minimum; what is printed stays in the row that is reported.
     let mut asked = row.clone();
     if let Some(floor) = regulation.function.point_floor().filter(|f| *f > 0.0 && row.group.is_some())
         && row.kind == "point"
@@ -182,6 +192,7 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
     if let Some(decisive) = &worst.decisive {
         verdict.reading = Some(decisive.reading);
         verdict.direction = Some(decisive.direction);
+        // Outside the field no number of rays helps.
         if worst.verdict == Verdict::Unsure && worst.unseen == 0 {
             verdict.settles = decisive.settles(assumptions.rays, assumptions.tolerance_mm);
         }
