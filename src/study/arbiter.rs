@@ -48,6 +48,7 @@ pub fn same_distance(a: f64, b: f64) -> bool {
 /// Judges two answers to one ray.
 pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Verdict {
     let mut met = Vec::new();
+    // All of them: a tree here could share the fault of the trees that are judged.
     for f in (0..mesh.facets.len()).filter(|&f| passes_near(ray, &mesh.corners(f))) {
         let [a, b, c, d] = mesh.corners(f);
         let second = (!mesh.facets[f].is_triangle()).then_some([a, c, d]);
@@ -78,6 +79,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
                 && nearest.is_none_or(|n| hit.t <= n || same_distance(n, hit.t))
         }
     };
+    // Two right answers may differ at a silhouette; two wrong ones tell nothing of either.
     match (holds(first), holds(second)) {
         (true, false) => Verdict::First,
         (false, true) => Verdict::Second,
@@ -88,6 +90,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
 /// Whether the line of a ray comes near a facet at all.
 fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     let from_corner = corners[0] - ray.origin;
+    // The facet's first corner off the line, against the farthest that another corner is from it.
     let aside: Vector = from_corner - ray.direction * from_corner.dot(ray.direction);
     let reach = corners.iter().map(|p| p.distance_squared(corners[0])).fold(0.0, f64::max).sqrt();
     aside.length() <= reach * (1.0 + CULL_RELATIVE) + CULL_ROUNDING * (1.0 + from_corner.length())
@@ -112,6 +115,7 @@ fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     let d = ray.direction.to_array().map(DoubleDouble::from);
     let from = ray.origin.to_array();
     let [a, b, c] = corners.map(|p| {
+        // Differences of coordinates are exact as two numbers; all that follows starts from them.
         let p = p.to_array();
         std::array::from_fn(|k| DoubleDouble::sum(p[k], -from[k]))
     });
@@ -124,11 +128,13 @@ fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
         !(beyond(1.0) && beyond(-1.0))
     };
     let exact = 2f64.powi(-90);
+    // The line runs within the plane, or past an edge.
     let det = volumes[0] + volumes[1] + volumes[2];
     if det.high.abs() <= exact * scale || !one_sided(BAND) {
         return None;
     }
     // The weights of the corners are the volumes; the distance is that along the main axis.
+    // Along the axis on which the direction is longest, its division loses least.
     let main = (0..3).fold(0, |m, k| if d[k].high.abs() > d[m].high.abs() { k } else { m });
     let along = a[main] * volumes[0] + b[main] * volumes[1] + c[main] * volumes[2];
     let t = along.high / det.high / d[main].high;
@@ -152,6 +158,7 @@ struct DoubleDouble {
 }
 
 impl DoubleDouble {
+    // Knuth's two-sum: what rounding took from the sum is recovered, whichever of the two is larger.
     /// The exact sum of two numbers.
     fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
@@ -159,6 +166,7 @@ impl DoubleDouble {
         Self { high, low: (a - (high - back)) + (b - back) }
     }
 
+    // Dekker's quick two-sum: the first is the larger here.
     fn new(high: f64, low: f64) -> Self {
         let sum = high + low;
         Self { high: sum, low: low - (sum - high) }
@@ -189,6 +197,8 @@ impl Sub for DoubleDouble {
 
 impl Mul for DoubleDouble {
     type Output = Self;
+    // The product's rounding comes out exactly of a fused multiply-add; what the low parts give together lies below
+    // the last bit.
     fn mul(self, o: Self) -> Self {
         let high = self.high * o.high;
         let low = self.high.mul_add(o.high, -high) + (self.high * o.low + self.low * o.high);

@@ -103,7 +103,7 @@ struct Ready<'r> {
 
 /// Runs all methods on the three lamps.
 ///
-/// # HitErrors
+/// # Errors
 /// Those of binding the generated scenes.
 pub fn complexity(
     methods: &[Method<'_>],
@@ -118,6 +118,7 @@ pub fn complexity(
         clock.report(lamp.name, share);
         let bound = Scene::parse(&lamp.scene, "lamp.toml", Path::new("."))?.bind(&lamp.model)?;
         let mut rounds = Rounds::default();
+        // Times of preparing come from rounds of their own: while tracing all methods must live at once.
         for method in methods {
             rounds.add(method.name, || (method.with)(&lamp.model, &mut |_, _| ()));
         }
@@ -128,6 +129,7 @@ pub fn complexity(
     }
     clock.report("done", 1.0);
     let answer = sentence(&rows);
+    // The paper prints savings: a share s of the time saved makes 1/(1 − s) times as fast.
     rows.extend(PAPER.map(|(model, saved)| Row {
         model: model.into(),
         method: "octree".into(),
@@ -138,6 +140,8 @@ pub fn complexity(
 }
 
 /// Prepares all methods, one inside the other, so that all are alive at once and rounds can alternate.
+// An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
+// one before.
 fn gather(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut dyn FnMut(&[Ready<'_>])) {
     let Some((first, rest)) = methods.split_first() else { return then(ready) };
     (first.with)(model, &mut |who, facets| {
@@ -160,6 +164,7 @@ fn race(
     };
     let traditional = ready.iter().find(|r| r.name == "traditional");
     let few = traditional.map_or(settings.rays, |t| {
+        // A short run first tells how many rays the time allows.
         let start = Instant::now();
         run(t.who, 1024);
         let affordable = 1024.0 * settings.traditional_seconds / start.elapsed().as_secs_f64();
@@ -175,6 +180,7 @@ fn race(
         });
     }
     let timings: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
+    // All with the same few rays: a receiver's power is only comparable at the same number.
     let power = |r: &Ready<'_>| run(r.who, few).receivers.first().map_or(0.0, |x| x.power);
     let before = Cell::new(None);
     if let Some(i) = ready.iter().position(|r| r.name == "traditional") {
@@ -182,6 +188,7 @@ fn race(
     }
     let row = |((r, t), p): ((&Ready<'_>, &Timing), &Timing)| {
         let own = power(r);
+        // The traditional trace is in proportion to its rays: every ray is put to every patch.
         let traditional = before.get().map(|b: (f64, f64, f64)| b.2 + b.0 * count(r) as f64);
         Row {
             model: lamp.name.into(),
@@ -209,6 +216,7 @@ fn sentence(rows: &[Row]) -> String {
         let each = rows.iter().filter_map(|r| r.ratio_to_traditional).map(|x| format!("{x:.0}"));
         each.collect::<Vec<_>>().join(" / ")
     };
+    // The last is the intricate lamp.
     let compared = octree.last().and_then(|r| Some((r, r.rays?, r.receiver_difference?)));
     let Some((row, rays, difference)) = compared else {
         return "Nothing to compare: the traditional method or the octree was not run.".into();

@@ -137,7 +137,9 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
         return (chosen, None);
     }
     let settings = undecided.pilot_settings();
+    // Standard errors are foretold for as many rays as the run has, or will have grown to.
     let scale = undecided.judged_rays() as f64 / settings.rays as f64;
+    // Once: both facets and finer facets are compared with the same rays of the spline.
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
     let error = undecided.measure(facets, &settings, &spline);
     let worst = worst_figure(&error, &settings, scale);
@@ -155,10 +157,12 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
         alternatives,
         geometric,
     };
+    // Facets go first wherever they are good enough: they are faster.
     if worst.ratio <= 1.0 {
         let because = format!("facets change no figure by more than its statistical error ({})", worst.in_words());
         return (chosen("octree", tolerance, because, alternatives, Some(error)), None);
     }
+    // What the spline loses is an error too, and one that more rays do not mend.
     if error.lost[1] > error.lost[0] + LOST {
         let because = "the spline loses more light than facets do".to_owned();
         return (chosen("octree", tolerance, because, alternatives, Some(error)), None);
@@ -168,6 +172,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
         let meshed = undecided.source.mesh(finer);
         let error = undecided.measure(&meshed.mesh, &settings, &spline);
         let finer_worst = worst_figure(&error, &settings, scale);
+        // Between the two that are always there, in the order of accuracy.
         alternatives
             .insert(1, alternative(finer, "octree", &finer_worst, error.seconds[0] * scale + meshed.seconds));
         if finer_worst.ratio <= 1.0 {
@@ -197,6 +202,7 @@ fn alternative(tolerance_mm: [f64; 2], intersector: &'static str, worst: &Worst,
 
 impl Undecided<'_> {
     /// What can be said without a pilot.
+    // From cheap to ask to dear.
     fn without_pilot(&self) -> Option<Chosen> {
         let (intersector, because) = if self.facets.facets.is_empty() {
             ("octree", "there is no surface to meet")
@@ -243,8 +249,9 @@ impl Undecided<'_> {
     }
 
     fn pilot_settings(&self) -> RunSettings {
+        // No more rays than the run itself has.
         let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());
-        // The first rays, whichever are asked for.
+        // The first rays, whichever are asked for: every range of a run that grows must choose alike.
         RunSettings {
             rays,
             first_ray: 0,
@@ -267,7 +274,9 @@ impl Undecided<'_> {
     fn finer(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let factor = MARGIN * worst.ratio;
         let hits = error.segments_per_ray * self.judged_rays() as f64;
+        // Tracing on finer facets takes about a tenth longer for each halving of the tolerance.
         let saved = hits * (SPLINE_HIT - FACET_HIT * (1.0 + 0.1 * factor.log2()));
+        // The number of facets goes with the inverse of the tolerance.
         let spent = factor * self.facets.facets.len() as f64 * FACET;
         (factor <= MOST_FINER && spent < saved).then_some(factor)
     }
@@ -279,6 +288,7 @@ fn is_polygon(face: &Face) -> bool {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let corners =
         [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)].map(|uv| surface.evaluate(uv));
+    // Of a quadrangle in a plane the diagonals span that plane.
     let [a, b, c, d] = corners;
     let normal = (c - a).cross(d - b);
     let size = (c - a).length().max((d - b).length());
@@ -293,6 +303,7 @@ fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> W
     let mut worst = Worst::default();
     for r in &error.receivers {
         let mut weigh = |figure: &str, geometric: f64, allowed: f64, value: f64| {
+            // No figure is asked for beyond a millionth of itself.
             let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
             if ratio > worst.ratio {
                 let share = (value != 0.0).then(|| geometric / value.abs());
@@ -311,6 +322,7 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
     for c in &r.channels {
         weigh(&c.name, c.total.geometric(), c.statistical * sums, c.total.spline);
     }
+    // Without a unit there are no cells: absorbed power alone is counted.
     if r.unit.is_empty() {
         return;
     }

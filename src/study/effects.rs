@@ -54,12 +54,14 @@ pub fn effects(
     for (_, _, kernel) in &choices {
         let run = with(*kernel);
         let called = kernel_name(bound, &run);
+        // Several choices may call for one kernel: it is timed once.
         if kernels.iter().all(|(known, ..)| *known != called) {
             kernels.push((called, run, Mutex::new(None)));
         }
     }
     let mut race = Rounds::default();
     for (called, run, slot) in &kernels {
+        // Results are kept beside the clock: a run for the digest alone would double the study.
         race.add(*called, move || {
             let result = simulate(bound, who, run, &|_| true);
             if let Ok(mut slot) = slot.lock() {
@@ -79,6 +81,7 @@ pub fn effects(
     let row = |(choice, added, kernel): &(&str, Option<Effect>, KernelChoice)| {
         let (t, called, rays, own) = ran(&with(*kernel))?;
         let able = match kernel {
+            // What the kernel was asked to do, which may be less than what it can.
             KernelChoice::Full => Effects::ALL,
             _ => added.map_or(needed, |e| needed.with_effect(e)),
         };

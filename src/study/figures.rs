@@ -32,6 +32,7 @@ pub struct Figure {
 impl Figure {
     fn new(value: f64, unit: &str, statistical: f64, geometric: Option<f64>) -> Self {
         let limited_by =
+            // Without a measured geometric error the number of rays is all there is to blame.
             if geometric.is_some_and(|g| g > statistical) { Limit::Geometry } else { Limit::Statistics };
         Self { value, unit: unit.into(), statistical, geometric, limited_by }
     }
@@ -129,9 +130,11 @@ pub fn halving(results: &Results, geometric: Option<&GeometricError>) -> Halving
     let s = &results.seconds;
     let judged = geometric.filter(|e| e.rays > 0);
     Halving {
+        // Four times the rays halve the error of independent ones; this run has traced a quarter of them.
         statistical_seconds: 3.0 * s.trace,
         // Facets go with the inverse of the tolerance.
         geometric_seconds: judged.map(|_| 2.0 * (s.tessellate + s.build) + SLOWER_A_HALVING * s.trace),
+        // The pilot's seconds in proportion to its rays.
         spline_seconds: judged.map(|e| e.seconds[1] * results.rays as f64 / e.rays as f64),
     }
 }
@@ -173,6 +176,7 @@ impl<'a> Errors<'a> {
         let power = self.geometric(self.lost_power, |m| m.power.geometric());
         let power = Figure::new(r.power, unit, r.power_error, power);
         let channels = self.channels(r, unit);
+        // Absorbed power has neither cells nor places.
         if r.kind == "absorbed" {
             return ReceiverFigures {
                 power,
@@ -188,6 +192,7 @@ impl<'a> Errors<'a> {
         let max = self.geometric(self.lost_share * r.max, |m| {
             if m.peak.facets > 0.0 { r.max * m.peak.geometric() / m.peak.facets } else { m.peak.geometric() }
         });
+        // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
         let length = if r.kind == "plane" { "mm" } else { "deg" };
         let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
@@ -228,6 +233,7 @@ const REACH: f64 = 6.0;
 fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
     let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])) else { return 0.0 };
     let Some(&own) = errors.get(largest) else { return 0.0 };
+    // Below this the maximum nearly certainly does not lie.
     let low = cells[largest] - REACH * own;
     let rivals: Vec<[f64; 2]> = (cells.iter().zip(errors))
         .filter(|(v, e)| **e > 0.0 && **v + REACH * **e > cells[largest])
@@ -239,6 +245,7 @@ fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
     }
     let step = (high - low) / STEPS as f64;
     let exceeded = (0..STEPS).map(|k| {
+        // The mean of a maximum is what its distribution function lacks to 1, integrated.
         let x = low + (k as f64 + 0.5) * step;
         let below: f64 = rivals.iter().map(|[v, e]| normal((x - v) / e)).product();
         (1.0 - below) * step

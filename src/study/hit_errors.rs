@@ -11,7 +11,7 @@ const SAME_ABSCISSA: f64 = 1e-12;
 /// Relative index of the refraction that direction errors are given for: air to glass.
 pub(super) const GLASS: f64 = 1.5;
 
-/// HitErrors of one intersector's hits against the exact hits of the same rays.
+/// Errors of one intersector's hits against the exact hits of the same rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HitErrors {
     /// Distance between the two hit points, mm.
@@ -32,6 +32,7 @@ impl HitErrors {
         for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {
             let (h, t) = match (hit, truth) {
                 (None, None) => continue,
+                // On another face the distance tells nothing of the facets: it is counted, not averaged.
                 (Some(h), Some(t)) if h.face == t.face => (h, t),
                 _ => {
                     e.flips += 1;
@@ -41,6 +42,7 @@ impl HitErrors {
             e.position.add((h.t - t.t).abs());
             e.normal.add(h.normal.distance(t.normal));
             e.reflected.add(angle_deg(reflect(ray.direction, h.normal), reflect(ray.direction, t.normal)));
+            // Total reflection of either leaves no direction to compare.
             if let (Some(a), Some(b)) =
                 (refract(ray.direction, h.normal, GLASS), refract(ray.direction, t.normal, GLASS))
             {
@@ -55,6 +57,7 @@ impl HitErrors {
 pub(super) fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> =
         points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();
+    // Powers are straight lines over logarithms.
     let n = logs.len() as f64;
     let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
     let (sxy, sxx) = logs.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));

@@ -97,13 +97,16 @@ pub fn interpolation(
 
 /// A mesh of about the wanted number of facets: their number goes with 1/tolerance.
 pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMesh {
+    // Any start will do: each step corrects the tolerance by how far the number was off.
     let mut tolerance = 0.1;
     let mut meshed = mesh_source.mesh([tolerance; 2]);
     for _ in 0..6 {
         let ratio = meshed.mesh.facets.len() as f64 / facets.max(1) as f64;
+        // Within a quarter: the errors change by as much as the tolerance does.
         if (0.8..1.25).contains(&ratio) || meshed.mesh.facets.is_empty() {
             break;
         }
+        // Held back, for far from the goal the law does not hold.
         tolerance = (tolerance * ratio.clamp(0.02, 50.0)).clamp(TOLERANCES_MM[0], TOLERANCES_MM[1]);
         meshed = mesh_source.mesh([tolerance; 2]);
     }
@@ -128,6 +131,7 @@ fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row
     });
     let row = |((algorithm, hits), (_, timing)): ((NormalMode, &Mutex<Vec<Option<Hit>>>), _)| {
         let timing: super::Timing = timing;
+        // A panic in another thread would have ended the study; the hits are whole.
         let hits = hits.lock().unwrap_or_else(|e| e.into_inner()).clone();
         let errors = HitErrors::between(&rays, &hits, &truth);
         Row {
@@ -151,6 +155,7 @@ fn hitting(
     settings: &Settings,
 ) -> (Vec<Ray>, Vec<Option<Hit>>) {
     let (mut rays, mut truth) = (Vec::new(), Vec::new());
+    // Twenty times as many are tried: a model that fewer than a twentieth meet gives fewer rays.
     let source = Uniform::new(&meshed.mesh.bounds(), settings.seed, 20 * settings.rays);
     let mut begin = 0;
     while begin < source.len() && (rays.len() as u64) < settings.rays {
@@ -159,6 +164,7 @@ fn hitting(
         let mut hits = vec![None; tried.len()];
         answer(mesh_source.exact(), &tried, rayon::current_num_threads(), &mut hits);
         let good = tried.into_iter().zip(hits).filter(|(_, h)| h.is_some());
+        // No more than wanted: every model is judged by as many.
         for (ray, hit) in good.take(settings.rays as usize - rays.len()) {
             rays.push(ray);
             truth.push(hit);
@@ -196,6 +202,7 @@ impl Ratios {
         let falls = |[x, y]: [f64; 2]| x > 1.0 && y > 1.0;
         let mean_falls = falls([n / b, b / c]);
         // Rays that meet the face elsewhere on facets err whatever the normals: so do those polished to the spline.
+        // Half of the error stays with the true normals: the places are to blame, not the normals.
         let elsewhere = row("exact").is_some_and(|e| e.normal_error_mean > 0.5 * c);
         let why_not = match (mean_falls, at_p99.is_none_or(falls)) {
             (true, true) => None,

@@ -31,6 +31,7 @@ pub fn lamps() -> Vec<Lamp> {
 
 /// `spans`² bicubic patches a cavity, rippled by `ripple` mm to spread the light.
 fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp {
+    // In rows of four.
     let columns = cavities.min(4);
     let mut surfaces = Vec::new();
     let mut scene = String::from(
@@ -38,6 +39,7 @@ fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp 
     );
     for c in 0..cavities {
         let at = [(c % columns) as f64 * PITCH, (c / columns) as f64 * PITCH];
+        // Other focal lengths, so that no cavity repeats another's patches.
         let focus = 18.0 + 12.0 * c as f64 / cavities as f64;
         surfaces.push(cavity(at, focus, spans, ripple));
         let power = 1.0 / cavities as f64;
@@ -58,6 +60,7 @@ fn cavity([x0, y0]: [f64; 2], focus: f64, spans: usize, ripple: f64) -> Surface 
     let knots: Vec<f64> = std::iter::repeat_n(-HALF, 3).chain(inner).chain(std::iter::repeat_n(HALF, 3)).collect();
     let greville: Vec<f64> = knots[1..knots.len() - 1].windows(3).map(|w| (w[0] + w[1] + w[2]) / 3.0).collect();
     let height = |x: f64, y: f64| {
+        // A span is a quarter of a wave: cubic splines follow it with ease.
         let waves = std::f64::consts::PI * spans as f64 / (4.0 * HALF);
         (x * x + y * y) / (4.0 * focus) + ripple * (waves * x).cos() * (waves * y).cos()
     };

@@ -86,6 +86,7 @@ const CHUNK: usize = 4096;
 pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: &mut [Option<Hit>]) -> Cost {
     if threads == 1 {
         let mut cost = Cost::default();
+        // On this thread, for times of one thread must not hold what a pool costs.
         who.intersect_batch(rays, hits, &mut cost);
         return cost;
     }
@@ -98,6 +99,7 @@ pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: 
         a += b;
         a
     };
+    // Sums of integers: their order does not matter.
     rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).map(one).reduce(Cost::default, sum)
 }
 
@@ -109,6 +111,7 @@ pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
 /// The direction behind a surface whose far side has the relative index `eta`; `None` for total reflection. The normal
 /// may point to either side.
 pub(super) fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
+    // Snell's law wants the normal against the ray.
     let n = if d.dot(n) > 0.0 { -n } else { n };
     let cos_i = -d.dot(n);
     let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);

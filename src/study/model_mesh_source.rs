@@ -43,6 +43,7 @@ impl<'a> ModelMeshSource<'a> {
         MeasuredMesh {
             mesh: made.mesh,
             seconds: made.report.seconds.tessellate,
+            // Where nothing was sampled the certified bound stands in, which is never too small.
             sag_mean: sag.sampled_mean.unwrap_or(sag.bound_max),
             sag_max: sag.sampled_max.unwrap_or(sag.bound_max),
         }

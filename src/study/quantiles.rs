@@ -48,6 +48,7 @@ impl Default for Quantiles {
 impl Quantiles {
     /// Counts one value; anything that is not a number counts as infinite.
     pub fn add(&mut self, value: f64) {
+        // An error that is no number is the worst there is; it must not vanish from the histogram.
         let value = if value.is_nan() { f64::INFINITY } else { value.max(0.0) };
         self.count += 1;
         self.max = self.max.max(value);
@@ -57,6 +58,7 @@ impl Quantiles {
             self.zeros += 1;
             return;
         }
+        // An empty histogram takes no memory: its bins are 60 kB.
         if self.bins.is_empty() {
             self.bins = vec![0; BINS];
         }
@@ -110,6 +112,7 @@ impl Quantiles {
         for (bin, &n) in self.bins.iter().enumerate() {
             seen += n;
             if seen >= wanted {
+                // The middle of the bin; not beyond the largest value, which is known exactly.
                 return (LOWEST + (bin as f64 + 0.5) / PER_OCTAVE).exp2().min(self.max);
             }
         }

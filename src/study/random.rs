@@ -29,6 +29,7 @@ fn mix(mut z: u64) -> u64 {
 impl Random {
     /// The stream of one index under a seed.
     pub fn new(seed: u64, index: u64) -> Self {
+        // The index is mixed by itself: neighbours would else run along one sequence, shifted by one.
         Self { state: mix(seed.wrapping_add(GOLDEN)) ^ mix(index.wrapping_mul(GOLDEN).wrapping_add(1)) }
     }
 
@@ -40,6 +41,7 @@ impl Random {
 
     /// Uniform in `[0, 1)`.
     pub fn unit(&mut self) -> f64 {
+        // The 53 upper bits: as many as a double holds below 1.
         (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 

@@ -51,6 +51,7 @@ pub struct Camera {
 impl Camera {
     /// A square picture of about `count` pixels from an odd direction, so that no axis of the model is favoured.
     pub fn new(bounds: &Aabb, count: u64) -> Self {
+        // Some direction that is along no axis, diagonal or plane of symmetry.
         let view = Vector::new(0.48, -0.62, 0.39).normalize();
         let radius = (0.5 * bounds.diagonal()).max(f64::MIN_POSITIVE);
         let (across, up) = orthonormal_pair(view);
@@ -88,6 +89,7 @@ pub struct Uniform {
 impl Uniform {
     /// `count` rays through a box.
     pub fn new(bounds: &Aabb, seed: u64, count: u64) -> Self {
+        // Grown, so that some rays pass by: what is missed must be missed by all.
         let margin = 0.025 * bounds.diagonal();
         Self { bounds: bounds.grown(margin), seed, count }
     }
@@ -97,6 +99,7 @@ impl Uniform {
         let size = self.bounds.size();
         let target = self.bounds.min + size * Vector::new(random.unit(), random.unit(), random.unit());
         let d = random.direction();
+        // From outside of everything, wherever the point lies.
         Ray::new(target - d * (1.1 * self.bounds.diagonal()), d)
     }
 }
@@ -131,6 +134,7 @@ impl<'a> Bounces<'a> {
     }
 
     fn path(&self, path: u64) -> Vec<Ray> {
+        // Another stream than that of the first rays, which are keyed by the same numbers.
         let mut random = Random::new(self.first.seed ^ 0x5851_f42d_4c95_7f2d, path);
         let mut cost = Cost::default();
         let mut rays = Vec::with_capacity(BOUNCES as usize);
@@ -155,6 +159,7 @@ impl RaySource for Bounces<'_> {
         self.first.count
     }
     fn rays(&self, range: Range<u64>) -> Vec<Ray> {
+        // Whole paths are made, for a ray follows from those before it; what was not asked for is dropped.
         let mut rays = Vec::with_capacity((range.end - range.start) as usize);
         let mut path = range.start / BOUNCES;
         while path * BOUNCES < range.end {

@@ -73,6 +73,7 @@ pub fn compare_power(
     exact: &dyn Intersector,
     settings: &RunSettings,
 ) -> Vec<PowerComparison> {
+    // The same rays and random numbers on both.
     let [on_facets, on_spline] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
     let (found, truth) = (&on_facets.results, &on_spline.results);
     (found.receivers.iter().zip(&truth.receivers).enumerate())
@@ -81,6 +82,7 @@ pub fn compare_power(
                 .replicates
                 .iter()
                 .zip(&on_spline.replicates)
+                // Counts are exact integers: their differences are too.
                 .map(|(a, b)| a[k].power as f64 - b[k].power as f64);
             let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
             let n = differences.len().max(2) as f64;
@@ -91,6 +93,7 @@ pub fn compare_power(
                 power_facets: f.power,
                 power_exact: e.power,
                 difference: differences.iter().sum(),
+                // The variance of a sum of n parts is n times that of one.
                 difference_error: (spread * n / (n - 1.0)).sqrt(),
                 power_error: e.power_error,
             }
@@ -166,7 +169,9 @@ fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
     let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);
     let geometric = norm(&mut found.cells.iter().zip(&truth.cells).map(|(a, b)| a - b)) / scale;
     let statistical = norm(&mut truth.errors.iter().copied()) / scale;
+    // A spot of no width has no share of it to lose.
     let relative = |a: f64, b: f64| if b == 0.0 { a.abs() } else { (a / b - 1.0).abs() };
+    // Within a factor of two neither is worth mending alone.
     let limited_by = if geometric > 2.0 * statistical {
         "geometry"
     } else if statistical > 2.0 * geometric {

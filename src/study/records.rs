@@ -39,6 +39,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Vec<(Ray, Option<f64>)>> {
     let mut bytes = Vec::new();
     input.read_to_end(&mut bytes)?;
     let bad = |i: usize, what: &str| io::Error::new(io::ErrorKind::InvalidData, format!("ray record {i}: {what}"));
+    // Before anything is made of it: a torn file was cut while it was written.
     if bytes.len() % RECORD != 0 {
         return Err(bad(
             bytes.len() / RECORD,
@@ -61,6 +62,7 @@ pub fn read(input: &mut impl Read) -> io::Result<Vec<(Ray, Option<f64>)>> {
         } else {
             given.try_normalize().ok_or_else(|| bad(i, "the direction is zero"))?
         };
+        // A miss is written as infinite.
         Ok((Ray::new(Point::new(x[0], x[1], x[2]), direction), x[6].is_finite().then_some(x[6])))
     };
     bytes.chunks_exact(RECORD).enumerate().map(record).collect()

@@ -41,6 +41,7 @@ pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
             let b = f.surface.bounds().corners();
             b.map(|c| p.placement.point(c))
         }));
+    // Cells of the search are 16 of these wide, so that few points lie at a side.
     let cell = (WELD * bounds.diagonal()).max(f64::MIN_POSITIVE);
     let mut weld = Weld { origin: bounds.min, cell, seen: FxHashMap::default() };
     let mut mesh = FacetMesh::default();
@@ -82,6 +83,7 @@ impl Weld {
 
 fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
     let [a, b] = surface.domain()[direction];
+    // Knots stay grid lines: facets across a break would have the break's error.
     let mut knots: Vec<f64> = surface.knots[direction].iter().copied().filter(|k| (a..=b).contains(k)).collect();
     knots.dedup();
     let inner = knots
@@ -107,6 +109,7 @@ fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, fac
     for i in 0..us.len() - 1 {
         for j in 0..vs.len() - 1 {
             let mut corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            // A mirrored placement turns facets around once more.
             if mirrored != face.reversed {
                 corners.reverse();
             }
@@ -135,6 +138,7 @@ fn sampled_sag(mesh: &FacetMesh, facet: usize, placed: &PlacedFace<'_>, face: &F
     for triangle in [[0, 1, 2], [0, 2, 3]] {
         for i in 0..=4 {
             for j in 0..=4 - i {
+                // Four steps a side: the worst is seldom at a corner.
                 let b = [i, j, 4 - i - j].map(|k| k as f64 / 4.0);
                 let mix = |k: usize| triangle[k];
                 let p = corners[mix(0)] * b[0] + corners[mix(1)] * b[1] + corners[mix(2)] * b[2];

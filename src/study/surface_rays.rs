@@ -16,7 +16,6 @@ pub struct SurfacePaths<'a> {
     mesh: &'a FacetMesh,
     guide: &'a dyn Intersector,
     /// Area of the facets up to each, mm².
-    /// Of the facets up to each, and of all, mm².
     areas: Vec<f64>,
     area: f64,
     seed: u64,
@@ -46,6 +45,7 @@ impl<'a> SurfacePaths<'a> {
         for _ in 0..PATH {
             rays.push(ray);
             ray = match self.guide.intersect(&ray, &mut Cost::default()) {
+                // The side from which the ray came: paths stay in the space that they are in.
                 Some(hit) => {
                     let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
                     let direction = cosine_direction(&mut random, hit.geometric_normal * side);
@@ -64,10 +64,12 @@ impl<'a> SurfacePaths<'a> {
             let facet = self.areas.partition_point(|&area| area < wanted).min(self.areas.len() - 1);
             let [a, b, c, _] = self.mesh.corners(facet);
             let (mut u, mut v) = (random.unit(), random.unit());
+            // The other half of the parallelogram, folded back into the triangle.
             if u + v > 1.0 {
                 u = 1.0 - u;
                 v = 1.0 - v;
             }
+            // Either side: facets that bound nothing have two outsides.
             let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
             // The first triangle of a facet may be a line where the second has all its area.
             if let Some(normal) = (b - a).cross(c - a).try_normalize() {

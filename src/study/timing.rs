@@ -42,6 +42,7 @@ impl Timing {
         let n = seconds.len();
         Self {
             min: seconds[0],
+            // Of an even number the mean of the two in the middle.
             median: 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2]),
             p90: seconds[((n as f64 * 0.9).ceil() as usize).clamp(1, n) - 1],
             runs: n,
@@ -65,6 +66,7 @@ impl<'a> Rounds<'a> {
     /// Runs every competitor once untimed and then `rounds` times; results in the order of adding.
     pub fn run(mut self, rounds: usize) -> Vec<(String, Timing)> {
         let mut seconds = vec![Vec::with_capacity(rounds); self.competitors.len()];
+        // Untimed: caches, pages and clock frequencies settle.
         for (_, run) in &mut self.competitors {
             run();
         }
@@ -98,6 +100,7 @@ impl<'a> Clock<'a> {
     /// `done` is the share of the expected work, not of the number of steps.
     pub(super) fn report(&self, stage: &str, done: f64) {
         let elapsed = self.start.elapsed().as_secs_f64();
+        // Before a hundredth is done any forecast is a guess.
         let remaining_seconds = (done > 0.01).then(|| elapsed * (1.0 - done).max(0.0) / done);
         (self.report)(Progress { stage: stage.into(), done, remaining_seconds });
     }
@@ -132,6 +135,7 @@ impl<'a> Countdown<'a> {
     pub(super) fn tick(&self) {
         let elapsed = self.start.elapsed().as_secs_f64();
         let left = self.ahead.map(|a| (a - self.since.elapsed().as_secs_f64()).max(0.0));
+        // Nothing left is all done, also where nothing took any time.
         let done = left.map_or(0.0, |left| if left > 0.0 { elapsed / (elapsed + left) } else { 1.0 });
         (self.report)(Progress { stage: self.stage.clone(), done, remaining_seconds: left });
     }

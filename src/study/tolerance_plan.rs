@@ -36,6 +36,7 @@ fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Err
 impl TolerancePlan {
     /// The same tolerance everywhere.
     pub fn uniform(tolerance_mm: f64) -> Self {
+        // A power law between equal radii is a constant.
         let other = RelativeTolerance { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
         Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
     }
@@ -63,6 +64,7 @@ impl TolerancePlan {
 
     /// What the least tolerance would be without the bounds, mm.
     pub(in crate::study) fn unbounded_mm(&self) -> f64 {
+        // Where places have their own, the rest is only a default that no face may use.
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
         shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(f64::MIN_POSITIVE)
     }
@@ -82,6 +84,7 @@ impl TolerancePlan {
             let (tolerance, radii) = self.range(share);
             ToleranceOverride { place: FaceSelector::Placed(share.faces.clone()), tolerance, radii: Some(radii) }
         });
+        // In front: of several overrides for a face the last one counts.
         settings.overrides.splice(0..0, own);
     }
 }
