@@ -38,16 +38,20 @@ pub fn settings_for_accuracy(
     model: &Model,
     monitor: &dyn Monitor,
 ) -> Result<AccurateSettings, Error> {
+    // Without an accuracy nothing is looked for, and the settings go on as they are.
     let Some(mut ask) = target(accuracy_deg, &meshing)? else {
         return Ok(AccurateSettings { meshing, tracing, plan: None });
     };
     let choice = IntersectorChoice::new(&tracing, scene)?;
+    // The spline has no direction error to be kept.
     if choice.intersector == IntersectorKind::Exact {
         let error = Error::setting("accuracy", "with the exact intersector: there is nothing to choose");
         return Err(error.help("leave out the accuracy, or the intersector"));
     }
     ask.seed = tracing.seed.unwrap_or(ask.seed);
+    // What the job costs decides between finer facets and dearer normals.
     ask.job_rays = tracing.rays().or(scene.map(|s| s.run.rays)).map_or(ask.job_rays, |n| n as f64);
+    // Who asks for a kind of normals gets that kind.
     if let Some(normals) = tracing.normals {
         ask.kinds = vec![normals];
     }
@@ -83,6 +87,7 @@ pub fn settings_for_accurate_facets(
     monitor: &dyn Monitor,
 ) -> Result<(MeshingSettings, Option<AccuracyPlan>), Error> {
     let Some(ask) = target(accuracy_deg, &meshing)? else { return Ok((meshing, None)) };
+    // Readers of the facets interpolate between corners, and trace elsewhere: neither normals nor rays count.
     let ask = AccuracyTarget { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
     monitor.begin(Stage::Aiming);
     let found = meet_target(model, &ModelMeshSource::new(model), &ask, &|p| monitor.study_progress(&p));
@@ -109,6 +114,7 @@ fn scene_rays(
     bound: &crate::simulate::BoundScene,
 ) -> Vec<Ray> {
     let exact: &dyn Intersector = product.spline();
+    // As many as are traced: about every ray meets one surface.
     let sampler = RaySampler::new(exact, settings.rays, settings.rays);
     simulate(bound, &sampler, settings, &|_| true);
     sampler.rays(settings.rays as usize, model, RAY_LIFT_MM)

@@ -81,6 +81,7 @@ impl Cache {
     /// When the folder cannot be read.
     pub fn entries(&self) -> io::Result<Vec<CacheEntry>> {
         let mut entries = self.files(|name| KINDS.iter().any(|kind| is_entry(name, kind)))?;
+        // By name where times are equal, so that all processes remove the same.
         entries.sort_by(|a, b| (a.used, &a.file).cmp(&(b.used, &b.file)));
         Ok(entries)
     }
@@ -90,6 +91,7 @@ impl Cache {
     /// # Errors
     /// When one cannot be removed.
     pub fn clear(&self) -> io::Result<usize> {
+        // Only what bears a name of ours: the folder may hold other files.
         let files = self.files(|name| is_unfinished(name) || KINDS.iter().any(|kind| is_entry(name, kind)))?;
         for entry in &files {
             remove(&entry.file)?;
@@ -112,6 +114,7 @@ impl Cache {
             // Another process may just have removed it.
             let Ok(metadata) = entry.metadata() else { continue };
             if metadata.is_file() {
+                // A time that cannot be told counts as the oldest.
                 let used = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
                 files.push(CacheEntry { file: entry.path(), bytes: metadata.len(), used });
             }
@@ -127,6 +130,7 @@ impl Cache {
         read: impl FnOnce(&mut ArrayReader) -> io::Result<T>,
     ) -> Option<T> {
         let path = self.folder.join(name);
+        // A folder or device of that name is no entry.
         let metadata = fs::metadata(&path).ok().filter(fs::Metadata::is_file)?;
         let mut file = File::open(&path).ok()?;
         match read_entry(&mut file, metadata.len(), read) {
@@ -145,6 +149,7 @@ impl Cache {
 
     /// Keeps an entry; a run whose work cannot be kept goes on.
     fn keep(&self, name: &str, monitor: &dyn Monitor, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+        // The standard library's seeded hasher is random: no further crate for a name.
         let random = RandomState::new().build_hasher().finish();
         let beside = self.folder.join(format!(".{name}.{random:016x}{UNFINISHED}"));
         let attempt = || {
@@ -154,6 +159,7 @@ impl Cache {
             write_entry(file, write)?;
             fs::rename(&beside, self.folder.join(name))
         };
+        // Room is made after the entry is whole: one that is larger than the limit removes itself as the last.
         if let Err(e) = attempt().and_then(|()| self.remove_excess()) {
             let _ = fs::remove_file(&beside);
             monitor.warns(&format!("{}: nothing is kept: {e}", self.folder.display()));
@@ -167,6 +173,7 @@ impl Cache {
                 remove(&unfinished.file)?;
             }
         }
+        // The oldest first.
         let entries = self.entries()?;
         let mut total: u64 = entries.iter().map(|e| e.bytes).sum();
         for entry in entries {
@@ -217,11 +224,14 @@ impl CachedFacets<'_> {
 
 /// A hash of all that decides facets and octree; `None` where a file of the scene can no longer be read.
 pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option<Fingerprint> {
+    // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };
     let program = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
+    // The settings in their debug form: a new field changes the names by itself.
     let words = format!("{program} {machine} {mesher:?} {:?}", scene.models);
     let mut pieces = vec![words.into_bytes()];
     for model in &scene.models {
+        // By content, not by date: a file that was replaced must not give the facets of another.
         pieces.push(crate::formats::read_bytes(&scene.resolve(&model.file)).ok()?);
     }
     let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
@@ -254,6 +264,7 @@ fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     write(&mut to)?;
     let sum = to.sum.finalize();
     to.to.write_all(&sum.to_le_bytes())?;
+    // Dropping the buffer would hide that the disk is full.
     to.to.into_inner().map_err(|e| e.into_error())?;
     Ok(())
 }
@@ -272,6 +283,7 @@ fn read_entry<T>(
         return Err(damaged("no entry of this version"));
     }
     let made = read(&mut ArrayReader::new(&mut from, payload.saturating_sub(MAGIC.len() as u64)))?;
+    // After reading: the sum is one of all that was read, and what follows must be the sum and nothing else.
     let sum = from.sum.finalize();
     let mut kept = [0; CHECKSUM_BYTES as usize];
     file.read_exact(&mut kept)?;

@@ -38,11 +38,13 @@ impl PreparedScene {
     pub fn trace(&self, request: TraceRequest<'_>, monitor: &dyn Monitor) -> Result<SceneResults, Box<PartialRun>> {
         self.with_intersector(monitor, |intersector, build_seconds| {
             let settings = self.run_settings();
+            // Verifying traces twice, and keeps no sums that could be merged.
             let (mut results, verification, sums) = if request.verify_pruning {
                 let (results, verification) = verify_pruning(&self.bound, intersector, &settings, &|_| true);
                 (results, Some(verification), None)
             } else {
                 let traced = self.run(intersector, &settings, request, monitor);
+                // A run that was ended early has no results, but sums to go on with.
                 if !traced.partial.is_whole() {
                     return Err(Box::new(traced.partial));
                 }
@@ -82,6 +84,7 @@ fn recheck(
 /// Segments of some rays of the run, which are spread evenly over it and traced once more.
 fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
     let settings = prepared.run_settings();
+    // No more than the run has.
     let count = settings.rays.min(RECHECKED as u64);
     let step = (settings.rays / count.max(1)).max(1);
     // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
@@ -107,6 +110,7 @@ fn check_rays(
     // The check is about facets: a run on the spline, or polished to it, says nothing about the octree.
     let on_octree =
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
+    // A tree of its own where the run had another intersector.
     let built = (!on_octree).then(|| Octree::build(mesh, &octree::Settings { normals, ..Default::default() }));
     let octree = built.as_ref().map_or(intersector, |octree| octree as &dyn Intersector);
     monitor.end();
@@ -130,9 +134,11 @@ fn facet_effects(
     facets_and_spline: [&dyn Intersector; 2],
 ) -> Option<GeometricError> {
     if prepared.choice.intersector == IntersectorKind::Exact || prepared.tessellation.mesh.facets.is_empty() {
+        // On the spline, and without facets, there is nothing to compare.
         return None;
     }
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
+    // Long paths cost more a ray: fewer of them tell as much in the same time.
     let rays = (FACETING_SEGMENTS / segments_a_ray.max(1.0)).clamp(FEWEST_FACETING_RAYS, FACETING_RAYS) as u64;
     let run = prepared.run_settings();
     // In replicates of their own, however the run itself is divided.

@@ -27,6 +27,7 @@ pub(super) fn is_asked(meshing: &MeshingSettings, tracing: &TracingSettings, sce
         || accuracy.angle_deg.is_some()
         || accuracy.normals.is_some()
         || accuracy.intersector.is_some();
+    // Tolerances of single places are a choice too.
     let places = !(meshing.part.is_empty() && meshing.face.is_empty() && meshing.role.is_empty());
     let facets = meshing.tolerance.is_some() || meshing.angle_deg.is_some() || meshing.plan.is_some() || places;
     in_scene || facets || tracing.normals.is_some() || tracing.intersector.is_some()

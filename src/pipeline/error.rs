@@ -114,11 +114,13 @@ impl From<step::Error> for Error {
 impl From<simulate::Error> for Error {
     fn from(e: simulate::Error) -> Self {
         let place = match (e.file(), e.line()) {
+            // Scenes that came from memory have no file.
             ("", _) => String::new(),
             (file, None) => format!("{file}: "),
             (file, Some((line, column))) => format!("{file}:{line}:{column}: "),
         };
         let mut error = match e.kind() {
+            // The message of a file that cannot be read names it already.
             simulate::ErrorKind::Unreadable => Self::input(e.message()),
             _ => Self::request(format!("{place}{}", e.message())),
         };

@@ -81,6 +81,7 @@ impl ErrorTarget {
     /// The relative error of a run, percent; `None` where nothing arrived.
     fn error(&self, results: &Results) -> Option<f64> {
         let r = results.receivers.iter().find(|r| r.name == self.receiver)?;
+        // The cells weighted by their light: dark ones have large errors that nobody sees.
         let (power, error) = if self.cells { light_weighted_error(r) } else { (r.power, r.power_error) };
         (power > 0.0).then(|| 100.0 * error / power)
     }
@@ -96,6 +97,7 @@ impl ErrorTarget {
             if result.reached || !portion.is_whole() || rays >= most {
                 return (portion, result);
             }
+            // At least twice as many, though the first error may promise less: it is a guess itself.
             rays = ((rays as f64 * self.growth(found).max(GROWTH_RANGE[0])) as u64).min(most);
             monitor.grows(found, rays);
         }
@@ -109,6 +111,7 @@ impl ErrorTarget {
     fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
         let reached = found.is_some_and(|e| e <= self.percent);
         let wanted = (rays as f64 * self.growth(found)) as u64;
+        // A run that grows goes by whole replicates.
         let missing = wanted.saturating_sub(rays).next_multiple_of(GROWING_REPLICATE).max(GROWING_REPLICATE);
         TargetResult {
             receiver: self.receiver.clone(),
@@ -123,6 +126,7 @@ impl ErrorTarget {
 
     /// How many times as many rays the error asks for: it falls at least as the root of the rays.
     fn growth(&self, found: Option<f64>) -> f64 {
+        // The error falls with the root of the rays, so that they go with the square of what is missing.
         found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
     }
 

@@ -20,6 +20,7 @@ pub fn mesh_settings(
 ) -> Result<tessellate::Settings, Error> {
     let mut settings = tessellate::Settings::default();
     let accuracy = scene.map(|s| &s.accuracy);
+    // What is asked stands above the scene, the scene above the defaults.
     if let Some(range) = meshing.tolerance.or(accuracy.and_then(|a| a.tolerance_mm)) {
         settings.tolerance = range;
     }
@@ -64,6 +65,7 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
         return Ok(FaceSelector::Part(name.to_owned()));
     }
     let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
+    // Only names that exist help; many parts have none.
     Err(Error::setting("part", format!("{name}: the model has no part of this name")).help(suggest::closest_name(
         "its parts are",
         name,
@@ -73,6 +75,7 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
 
 /// A face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
 fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
+    // As STEP writes entities.
     let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
     let faces = || model.placed_faces().filter_map(|f| f.face);
     if faces().any(|f| f.name == name) {

@@ -19,6 +19,7 @@ pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
         rays: if grows { 0 } else { asked.rays },
         first_ray: 0,
         grows,
+        // Threads, batches, kernel and shard leave every bit as it is.
         threads: 0,
         batch: 0,
         kernel: defaults.kernel,
@@ -34,6 +35,7 @@ pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
         prepared.choice
     );
     let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
+    // By their bytes: a file that changed changes the run.
     let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
     for file in files {
         let path = scene.resolve(file);

@@ -28,6 +28,7 @@ impl IntersectorChoice {
     /// # Errors
     /// When the scene names an intersector or normals that are not known.
     pub fn new(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<Self, Error> {
+        // What is asked on the command line stands above the scene.
         let accuracy = scene.map(|s| &s.accuracy);
         let intersector = match (tracing.intersector, accuracy.and_then(|a| a.intersector.as_deref())) {
             (Some(intersector), _) => intersector,
@@ -73,6 +74,7 @@ pub(super) fn with_built_intersector<'m, T>(
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
     monitor.begin(Stage::Building(choice.intersector));
+    // On the spline facets are not needed at all.
     if choice.intersector == IntersectorKind::Exact {
         let exact = spline();
         monitor.end();
@@ -88,6 +90,7 @@ pub(super) fn with_built_intersector<'m, T>(
             Box::new(octree(&octree::Settings { normals, ..Default::default() }))
         }
     };
+    // Only exact normals need the spline beside the facets.
     if choice.normals != NormalMode::Exact {
         monitor.end();
         return work(&*facets, facets.footprint());

@@ -28,6 +28,7 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
     let start = Instant::now();
     let (mut models, mut reports) = (Vec::new(), Vec::new());
     for (i, entry) in scene.models.iter().enumerate() {
+        // An error about a file is shown where the scene names it.
         let shown = |error: Error| match scene.place_of_model(i) {
             Some(place) => error.excerpt_of(place, "named here"),
             None => error,
@@ -53,6 +54,7 @@ pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedM
     read_models(scene, |entry| {
         let path = scene.resolve(&entry.file);
         let length_unit_mm = entry.unit_mm;
+        // The box of the model is not asked for here, and costs a look at every surface.
         let settings = step::Settings { length_unit_mm, measure_box: false, ..step::Settings::default() };
         Ok(in_stage(monitor, Stage::Reading(&path), || step::read(&path, &settings))?)
     })
@@ -63,6 +65,7 @@ pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedM
 /// # Errors
 /// When the file is no scene, or a model cannot be read.
 pub fn read_scene(path: &Path, monitor: &dyn Monitor) -> Result<(Scene, LoadedModel), Error> {
+    // The likely slip: the CAD file in place of the scene.
     let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
     if ["stp", "step", "p21"].into_iter().any(is) {
         let error = Error::request(format!("{}: a STEP file, where a scene (.toml) is needed", path.display()));

@@ -59,6 +59,7 @@ impl SceneJob {
     /// The facets of the model with these settings, and the seconds that they took; those that are kept have no report.
     fn facets(&self, settings: &tessellate::Settings, monitor: &dyn Monitor) -> (Tessellation, f64) {
         let (start, model) = (Instant::now(), &self.loaded.model);
+        // Without a cache, or where a file of the scene has gone since, facets are made anew.
         let Some((cache, key)) = self.cached(settings) else { return tessellate_model(model, settings, monitor) };
         let kept = CachedFacets { cache, key: &key, monitor };
         if let Some(mesh) = kept.mesh(model.placed_faces().count()) {
@@ -129,6 +130,7 @@ impl PreparedScene {
     /// # Errors
     /// When the scene does not fit its model, or the settings do not fit the scene.
     pub fn new(job: SceneJob, monitor: &dyn Monitor) -> Result<Self, Error> {
+        // All that can be refused is refused before facets are made, which may take minutes.
         let threads = job.tracing.thread_count()?;
         let choice = IntersectorChoice::new(&job.tracing, Some(&job.scene))?;
         let bound = job.scene.bind(&job.loaded.model)?;
@@ -146,6 +148,7 @@ impl PreparedScene {
             chosen: None,
             spline: OnceLock::new(),
         };
+        // Whoever asks for anything of how it is traced gets just that.
         if !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene) {
             prepared.choose_accuracy(monitor);
         }
@@ -161,6 +164,7 @@ impl PreparedScene {
         if let Some(finer) = choice.finer {
             self.tessellation.mesh = finer.mesh;
             self.tessellation_seconds += finer.seconds;
+            // The settings tell what the facets are: those of the finer ones.
             self.mesh_settings.tolerance = choice.chosen.tolerance_mm;
         }
         self.choice = choice.intersector;
@@ -184,11 +188,13 @@ impl PreparedScene {
         let mut settings = RunSettings::from(&self.job.scene.run);
         settings.rays = self.rays.or(self.job.tracing.rays()).unwrap_or(settings.rays);
         if let Some(first) = self.job.tracing.ray_range.and_then(|range| range.first) {
+            // A run that grows to an error begins with its first ray, whatever range was asked.
             settings.first_ray = if self.rays.is_some() { 0 } else { first };
             settings.grows = true;
         }
         settings.seed = self.job.tracing.seed.unwrap_or(settings.seed);
         settings.threads = self.threads;
+        // No more paths than rays.
         settings.path_samples = RECORDED_PATHS.min(settings.rays);
         settings
     }

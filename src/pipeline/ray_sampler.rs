@@ -19,6 +19,7 @@ impl<'a> RaySampler<'a> {
     /// Notes about `wanted` and a fifth more of `expected` rays.
     pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
+        // Hashes are even over 64 bits: their share below the threshold is the share of the rays noted.
         Self { inner, threshold: (share * u64::MAX as f64) as u64, sample: Mutex::new(Vec::new()) }
     }
 
@@ -35,6 +36,7 @@ impl<'a> RaySampler<'a> {
     pub fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
+        // By the hash: an order that no thread and no batch decides, and that mixes sources and bounces.
         noted.sort_by_key(|(hash, _)| *hash);
         noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, lift)).take(wanted).collect()
     }
@@ -45,12 +47,14 @@ fn lift_off(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
     let Some(departure) = ray.departure else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;
     let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
+    // To the side on which it goes on.
     let side = if normal.dot(ray.direction) < 0.0 { -lift } else { lift };
     Some(Ray::new(ray.origin + side * normal, ray.direction))
 }
 
 /// Mixes the bits of origin and direction (the finaliser of SplitMix64, Steele et al. 2014).
 fn hash(ray: &Ray) -> u64 {
+    // By the bits: two rays that differ at all are two.
     let mix = |p: Point, h: u64| p.to_array().into_iter().fold(h, |h, x| h.rotate_left(17) ^ x.to_bits());
     let mut z = mix(ray.direction, mix(ray.origin, 0x9e37_79b9_7f4a_7c15)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -75,6 +79,7 @@ impl Intersector for RaySampler<'_> {
 
     /// A ray that escapes is not asked about any more: it is noted here.
     fn escapes(&self, ray: &Ray) -> bool {
+        // Asked first: the sampler must not change what the intersector is asked.
         let escapes = self.inner.escapes(ray);
         if escapes {
             self.note(ray);

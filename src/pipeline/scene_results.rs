@@ -36,6 +36,7 @@ impl SceneResults {
 
     /// The errors of a receiver's cells from the facets, where they are known.
     pub fn geometric_cells(&self, prepared: &PreparedScene, receiver: usize) -> Option<Vec<f64>> {
+        // On the true surfaces the error is known, and it is none.
         let none = vec![0.0; self.results.receivers[receiver].cells.len()];
         match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => Some(none),

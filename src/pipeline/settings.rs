@@ -53,6 +53,7 @@ impl TracingSettings {
     /// When none are asked for.
     pub fn thread_count(&self) -> Result<usize, Error> {
         match self.threads {
+            // A machine that does not tell its threads has one at least.
             None => Ok(std::thread::available_parallelism().map_or(1, |n| n.get())),
             Some(0) => Err(Error::setting("threads", "0: at least one thread is needed")),
             Some(n) => Ok(n.min(MOST_THREADS)),

@@ -30,6 +30,7 @@ pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) 
             let portion = traced.partial.clone();
             (portion, rays_wanted(prepared, &Results::new(&prepared.bound, &settings, traced)))
         });
+        // Settled, stopped or at the most: either way this is the run.
         let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
             return (portion, rays);
         };
@@ -43,6 +44,7 @@ pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) 
 /// many are tried.
 fn rays_wanted(prepared: &PreparedScene, results: &Results) -> Vec<u64> {
     let all = prepared.job.scene.regulations.iter();
+    // One that cannot be judged asks for no rays; the last run tells why.
     let verdicts = all.filter_map(|wanted| verdict(wanted, prepared, results, |_| None).ok());
     let is_unsure = |row: &RowVerdict| row.verdict == Some(Verdict::Unsure);
     let rays = |row: &RowVerdict| row.settles.map_or(results.rays.saturating_mul(2), |s| s.rays);

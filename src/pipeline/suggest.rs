@@ -10,6 +10,7 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
     }
     let close =
         unique.iter().map(|n| (distance(given, n), *n)).min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
+    // A screen of names; files may have thousands of parts.
     let shown = unique.iter().take(20).copied().collect::<Vec<_>>().join(", ");
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
     match close {

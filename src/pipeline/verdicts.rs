@@ -29,6 +29,7 @@ fn intensities(
     let cells: Option<Vec<[f64; 3]>> = (receiver.cells.iter().zip(&receiver.errors).enumerate())
         .map(|(k, (value, statistical))| Some([*value, *statistical, error(k)?]))
         .collect();
+    // A map that was not compared cell by cell cannot be judged with both errors.
     let cells = cells.ok_or("its cells have no errors from the facets")?;
     Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_ray_flux(ray_flux))
 }
@@ -43,12 +44,14 @@ pub(super) fn verdict(
     let regulation = Regulation::find(&wanted.id)?;
     let receiver = wanted.receiver_index(&prepared.job.scene).ok_or("the scene has no such far field")?;
     let errors = geometric(receiver);
+    // What a cell that no ray met may hold.
     let ray_flux = results.power.emitted / results.rays.max(1) as f64;
     let map = intensities(&results.receivers[receiver], errors.as_deref(), ray_flux)?;
     let assumptions = Assumptions {
         traffic: if wanted.left_hand { Traffic::Left } else { Traffic::Right },
         as_placed: wanted.as_placed,
         rays: results.rays,
+        // The coarser end: it is what facets err by where they are largest.
         tolerance_mm: prepared.tolerance_mm().map(|[_, high]| high),
     };
     Ok(ReceiverVerdict { receiver, assessment: assess(&map, &regulation, &assumptions)? })

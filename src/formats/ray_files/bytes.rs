@@ -118,7 +118,6 @@ impl ByteReader {
 }
 
 /// A ray from the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm.
-// Single precision in the file, double from here on: scales and directions must not be rounded again.
 pub(super) fn light_ray(row: &[f32], scale: f64, wavelength_nm: Option<f64>) -> Result<LightRay, String> {
     let mut numbers = [0.0; 8];
     for (number, value) in numbers.iter_mut().zip(&row[..7]) {

@@ -38,6 +38,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
+        // Halved each time, so that slopes over them are read off even steps of the logarithm.
         let uniform = [1.6, 0.8, 0.4, 0.2, 0.1, 0.05, 0.025, 0.0125].map(|t| [t, t]);
         let all = rayon::current_num_threads();
         Self {
@@ -163,6 +164,7 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
         let own = |r: &&Row| {
             r.normals == name && r.intersector == first.intersector && r.threads == first.threads && !r.adaptive
         };
+        // One tree and one number of threads: the errors of all are the same, and would count twice.
         let all: Vec<&Row> = rows.iter().filter(own).filter(|r| r.tolerance_mm.is_some()).collect();
         // Below 1e-7° an error is rounding and follows no power law.
         let planes = all.iter().any(|r| r.direction_error_deg_p50 <= ROUNDING_DEG);
@@ -188,9 +190,11 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
 
 /// Rows that are not dominated, among those with the most threads.
 fn front(rows: &[Row]) -> Vec<usize> {
+    // Fewer threads are slower throughout: their rows would only hide behind the others.
     let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
     let mut order: Vec<usize> = (0..rows.len()).filter(|&i| rows[i].threads == threads).collect();
     let key = |i: usize| (rows[i].seconds(), rows[i].direction_error_deg_p99);
+    // By time; of equal times the smaller error first, so that the larger one never enters.
     order.sort_by(|&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
     let mut best = f64::INFINITY;
     order.retain(|&i| {
@@ -216,6 +220,7 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
     let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
     let timed =
         |facets: bool| rows.iter().filter(move |r| r.threads == threads && r.tolerance_mm.is_some() == facets);
+    // The spline has no direction error and would win every comparison of errors.
     let good = timed(true).filter(|r| r.direction_error_deg_p99 <= target);
     let cheapest = good.min_by(|a, b| a.seconds_of_job().total_cmp(&b.seconds_of_job()));
     let cheapest = cheapest.and_then(|r| Some((r, r.tolerance_mm?)));

@@ -20,6 +20,7 @@ pub fn accuracy(
 ) -> Accuracy {
     let mut countdown = Countdown::new(progress);
     countdown.stage("the exact spline", None);
+    // Any facets tell the box that rays are shot through.
     let coarse = mesh_source.mesh(settings.tolerances.first().copied().unwrap_or([0.2, 0.2]));
     let source = Uniform::new(&coarse.mesh.bounds(), settings.seed, settings.rays);
     let rays = source.rays(0..source.len());
@@ -42,6 +43,7 @@ pub fn accuracy(
         }
         let [low, high] = settings.tolerances[k];
         let range = if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") };
+        // Known at least is the guess, of as many tolerances as there are.
         let left = ahead.seconds() + settings.seconds_after;
         study.countdown.stage(&format!("tolerance {range}"), Some(left));
         let start = Instant::now();
@@ -50,6 +52,7 @@ pub fn accuracy(
         blocks.push((k + 1, std::mem::take(&mut study.rows)));
     }
     study.countdown.stage("done", Some(settings.seconds_after));
+    // Rows are told from coarse to fine, whichever came first.
     blocks.sort_by_key(|b| b.0);
     let rows: Vec<Row> = blocks.into_iter().flat_map(|b| b.1).collect();
     let answer = sentence(&rows, 0.05);
@@ -88,6 +91,7 @@ impl Forecast {
         let one = |k: usize| {
             let x = self.fineness(k);
             let i = known.partition_point(|p| p.0 < x);
+            // Between two that are known, along the two laws; beyond them, by the laws from the nearest one.
             match (i.checked_sub(1).map(|j| known[j]), known.get(i)) {
                 (Some(a), Some(b)) => {
                     let share = |f: fn(f64) -> f64| (f(x) - f(a.0)) / (f(b.0) - f(a.0));
@@ -163,10 +167,12 @@ impl Sweep<'_> {
         let mesh_source = self.mesh_source;
         with_intersectors(mesh_source, &meshed.mesh, &settings.trees, &settings.normals, |combinations| {
             let prepare = start.elapsed().as_secs_f64();
+            // All kinds in one race: a slow phase of the machine meets them alike.
             let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
             for &threads in &settings.threads {
                 let timings = self.race(&runners, threads);
                 for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
+                    // Hits are the same in every round; those of the last one are judged.
                     let hits = runner.hits.lock().unwrap_or_else(|e| e.into_inner()).clone();
                     let row = self.row(tolerance, &meshed, *combination, &hits);
                     self.push(row, timing, threads);

@@ -49,6 +49,7 @@ pub fn meet_target(
     target: &AccuracyTarget,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> AccuracyPlan {
+    // Of the surfaces, not of facets: there are none yet.
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
     let uniform = |seed: u64, count: u64| {
@@ -84,6 +85,7 @@ pub fn meet_target_for_rays(
     for (k, candidate) in kinds.iter().enumerate() {
         // A kind that is dearer by its own forecast than what another was measured to cost is not worth the wait.
         let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.predicted > 0.8 * b.seconds());
+        // What nobody could mesh in reasonable time is tried only while nothing else is there.
         if beaten || (candidate.facets > MOST_FACETS && best.is_some()) {
             continue;
         }
@@ -144,7 +146,7 @@ fn brief(x: f64) -> String {
     format!("{x:.decimals$}")
 }
 
-/// 0.2 mm, the coarse end of what users target for, or 1/500 of a small model.
+/// 0.2 mm, the coarse end of what users ask for, or 1/500 of a small model.
 fn coarse(model: &Model) -> f64 {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
@@ -234,6 +236,7 @@ impl Search<'_> {
         let mut measured =
             with_intersectors(self.mesh_source, &meshed.mesh, &[FacetTree::Octree], &[normals], |trees| {
                 let build = start.elapsed().as_secs_f64();
+                // Twice, and the better of both: the first pass also fills the caches.
                 let seconds = [0, 1].map(|_| {
                     let start = Instant::now();
                     answer(trees[0].2, &on.rays, rayon::current_num_threads(), &mut hits);
@@ -251,6 +254,7 @@ impl Search<'_> {
                     let (a, b) = (reflect(ray.direction, h.normal), reflect(ray.direction, t.normal));
                     measured.errors.push((t.face, angle_deg(a, b)));
                 }
+                // On another face there is no angle: such rays are told apart from the percentile.
                 _ => measured.flips += 1,
             }
         }
@@ -263,12 +267,13 @@ impl Search<'_> {
         let epsilon = (MARGIN * self.target.degrees).to_radians();
         let range = [FINEST * self.coarse, COARSEST_FACTOR * self.coarse];
         let mut plan = match normals {
+            // On the true normals no tolerance is needed for the angle: facets only find the face.
             NormalMode::Exact => TolerancePlan::uniform(self.coarse),
             _ if local => self.survey.plan(epsilon, order == 0.5, range),
             _ => TolerancePlan::even(0.25 * self.coarse, range),
         };
         // The pilot's facets: the plan itself where it is coarse, else as much coarser as keeps the pilot quick.
-        // Flat normals target for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
+        // Flat normals ask for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
         // 0.001° took a minute.
         let finest = if order == 0.5 { plan.unbounded_mm() } else { plan.tolerance_mm()[0] };
         let coarser = (0.25 * self.coarse / finest).max(1.0);
@@ -276,6 +281,7 @@ impl Search<'_> {
         pilot.scale(coarser);
         let m = self.measure(&pilot, normals, &self.pilots);
         let mut facets = m.made.len() as f64;
+        // The pilots measured the coarser plan: their errors are judged against what that one should give.
         if normals != NormalMode::Exact {
             let expected = self.target.degrees * MARGIN * coarser.powf(order);
             plan = pilot.clone();
@@ -295,6 +301,7 @@ impl Search<'_> {
         let mut best: Option<Solution> = None;
         for attempt in 0..ATTEMPTS {
             self.fresh.set(self.fresh.get() + 1);
+            // Another seed for each set: facets tuned to one set of rays must not be judged by it.
             let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let fresh = ReferenceRays::new(self.mesh_source, (self.rays)(seed, self.target.check_rays));
             let m = self.measure(&plan, normals, &fresh);
@@ -320,6 +327,7 @@ impl Search<'_> {
                 seconds: found.seconds(),
             });
             let good = reached <= ACCEPTED * self.target.degrees;
+            // Reached far too well at a cost that counts: coarser facets are worth another try, twice.
             let wasteful =
                 reached < 0.6 * self.target.degrees && attempt < 2 && found.prepare > 0.2 * found.seconds();
             let better = |b: &Solution| match (good, b.reached <= ACCEPTED * self.target.degrees) {
@@ -330,9 +338,11 @@ impl Search<'_> {
             if best.as_ref().is_none_or(better) {
                 best = Some(found);
             }
+            // A plan that fell short after one that did not ends the search: what is asked lies between.
             if normals == NormalMode::Exact || good && !wasteful || !good && was_good {
                 break;
             }
+            // Along the law of the error in the sag.
             let growth = factor(reached, MARGIN * self.target.degrees, candidate.order);
             if m.made.len() as f64 / growth > MOST_FACETS {
                 break;

@@ -48,6 +48,7 @@ impl Survey {
         let mut survey = Self { faces: Vec::new(), of: Vec::with_capacity(placed.len()), pilots: Vec::new() };
         for p in &placed {
             survey.of.push(p.face.map(|face| {
+                // One face of a part in many placements is one face: its rays are counted together.
                 let k = *names.entry(std::ptr::from_ref(face)).or_insert(survey.faces.len());
                 if k == survey.faces.len() {
                     survey.faces.push(Vec::new());
@@ -61,6 +62,7 @@ impl Survey {
             let i = h.face.index();
             let (Some(&Some(face)), Some(p)) = (survey.of.get(i), placed.get(i)) else { continue };
             let Some(forms) = p.face.and_then(|f| f.surface.forms(h.uv)) else { continue };
+            // The largest curvature is what bends the mirrored light most.
             let radius = p.placement.scale / forms.largest_curvature();
             let cos = h.normal.dot(ray.direction).abs().clamp(GRAZING, 1.0);
             if radius > 0.0 {
@@ -79,6 +81,7 @@ impl Survey {
             let at = |share: f64| ((count as f64 * share) as usize).min(count.saturating_sub(1));
             let tilt = pilots.get(at(0.99)).map_or(1.0, |p| p.tilt.max(LEAST_TILT));
             let of_radius = if flat { 1.0 - (0.5 * epsilon).cos() } else { epsilon / tilt };
+            // The radii without their outermost 2 %: a few rays at a sharp end should not set the scale.
             pilots.sort_by(|a, b| a.radius.total_cmp(&b.radius));
             let end = |k: usize| pilots.get(k).map_or(1.0, |p| p.radius);
             // Beyond the radius at which the coarsest tolerance is reached nothing changes; infinity is no length.
@@ -90,6 +93,7 @@ impl Survey {
             own[p.face].push(*p);
         }
         let mut places = Vec::new();
+        // With fewer hits a 99th percentile is one or two rays.
         for (faces, pilots) in self.faces.iter().zip(&mut own).filter(|(_, pilots)| pilots.len() >= ENOUGH) {
             places.push(of(faces.clone(), pilots));
         }
@@ -112,6 +116,7 @@ impl Survey {
         let places = self.place_of(plan);
         let mean = |plan: &TolerancePlan, k: Option<usize>| {
             let [a, b] = plan.range(k.and_then(|k| plan.places.get(k)).unwrap_or(&plan.other)).0;
+            // The geometric mean: between its ends a tolerance follows the radius.
             (a * b).sqrt()
         };
         // Both plans stand on the same survey, so their places are the same.

@@ -25,6 +25,7 @@ impl Border {
     pub(super) fn new(curve: UvCurve, surface: &Surface) -> Self {
         let breaks = curve.breakpoints();
         let mut samples = Vec::new();
+        // From knot to knot: within a span the curve is smooth, and even samples follow it.
         for pair in breaks.windows(2) {
             for i in 0..SAMPLES {
                 let t = pair[0] + (pair[1] - pair[0]) * i as f64 / SAMPLES as f64;
@@ -35,6 +36,7 @@ impl Border {
         samples.push((end, surface.evaluate(curve.evaluate(end))));
         // A straight line of parameters may be a helix of many turns in space.
         samples = straightened(samples, |t| surface.evaluate(curve.evaluate(t)));
+        // The curve strays from its chords by no more than a quarter of their length, as it was straightened.
         let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
         let bounds = Aabb::from_points(samples.iter().map(|s| s.1)).grown(0.25 * longest);
         Self { curve, samples, bounds }
@@ -63,6 +65,7 @@ impl Border {
             }
             let at = |t: f64| p.distance_squared(surface.evaluate(self.curve.evaluate(t)));
             let (mut lo, mut hi) = (ta, tb);
+            // Each third that is dropped leaves two: 24 of them leave 6e-5 of the stretch.
             for _ in 0..24 {
                 let (x, y) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
                 if at(x) < at(y) { hi = y } else { lo = x }
@@ -80,6 +83,7 @@ fn straightened(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f
         let mut stack = vec![(pair[0], pair[1], 0)];
         while let Some((a, b, depth)) = stack.pop() {
             let chord = b.1 - a.1;
+            // Not in the middle alone, nor evenly: an S-curve crosses its chord there.
             let bent = [0.21, 0.5, 0.83].iter().any(|f| {
                 let x = at(a.0 + (b.0 - a.0) * f) - a.1;
                 let s = if chord == Vector::ZERO { 0.0 } else { x.dot(chord) / chord.length_squared() };
@@ -115,6 +119,7 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
     let [[u0, u1], [v0, v1]] = surface.domain();
     let side = |a: Uv, b: Uv| UvCurve::line(a, b, [0.0, 1.0]);
     let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+    // In pairs of opposite sides, each along the other: `i ^ 1` is the opposite one.
     let sides = [
         side(corners[0], corners[1]),
         side(corners[3], corners[2]),

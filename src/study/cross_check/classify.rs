@@ -33,6 +33,7 @@ pub(super) struct Classifier<'a> {
 
 impl<'a> Classifier<'a> {
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
+        // Surfaces are moved into place only for faces that differ: most never do.
         let placed: Vec<_> = model.placed_faces().collect();
         let mut facets = vec![Vec::new(); placed.len()];
         for (i, facet) in (0u32..).zip(&mesh.facets) {
@@ -42,6 +43,7 @@ impl<'a> Classifier<'a> {
         }
         let surfaces = placed.iter().map(|_| OnceLock::new()).collect();
         let bounds = mesh.bounds();
+        // Rounding goes with the numbers that coordinates are, not with the size of the model.
         let reach = Aabb::from_points([bounds.min.abs(), bounds.max.abs()]).max;
         let size = if bounds.is_empty() { 1.0 } else { reach.length() + bounds.diagonal() };
         Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
@@ -77,6 +79,7 @@ impl<'a> Classifier<'a> {
 
     /// How far a facet that nobody proved strays from the spline: the farthest of 25 of its points.
     fn measured(&self, hit: &Hit, surface: &PlacedSurface, ray: &Ray) -> f64 {
+        // A grid over the facet's two triangles, which share the diagonal from a to c.
         let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
         let points = (0..25).map(|k| {
             let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
@@ -93,10 +96,12 @@ impl<'a> Classifier<'a> {
             _ => return Some(self.explain(ray, facet, exact)),
         };
         let apart = (f.t - e.t).abs();
+        // Beyond rounding and its own sag the facet has to be explained by what is around it.
         if apart > self.rounding + self.sag(f.primitive) {
             return Some(self.explain(ray, facet, exact));
         }
         // The spline passes within `apart` of the facet's hit, so the hit lies within the sag.
+        // At grazing incidence facets may turn their backs within their sag.
         let steep = |h: &Hit| h.geometric_normal.dot(ray.direction).abs() > 0.3;
         if f.geometric_normal.dot(e.geometric_normal) < 0.0 && steep(f) && steep(e) {
             return Some(Cause::Unexplained(Defect::Orientation));
@@ -106,15 +111,18 @@ impl<'a> Classifier<'a> {
 
     /// The cause of a difference, from the earlier of the two hits: why did the other not see it?
     fn explain(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Cause {
+        // A touch is no crossing: rounding decides who sees it.
         if exact.is_some_and(|e| e.certainty == Certainty::Tangent) {
             return Cause::Tangent;
         }
         let facet_first = match (facet, exact) {
+            // Whoever hits first saw something that the other did not, at a place that is known.
             (Some(f), Some(e)) => f.t < e.t,
             (f, _) => f.is_some(),
         };
         let (first, other) = if facet_first { (facet, exact) } else { (exact, facet) };
         let Some(first) = first else { return Cause::Unexplained(Defect::Inconclusive) };
+        // A face that could not be meshed has no facets to hit.
         if self.facets.get(first.face.index()).is_none_or(|f| f.is_empty()) {
             return Cause::Unmeshed;
         }
@@ -157,6 +165,7 @@ impl<'a> Classifier<'a> {
             return Cause::Silhouette;
         }
         if let Some(o) = other.filter(|o| o.face != first.face) {
+            // The other face lies within the band too: which of the two comes first is a matter of sag.
             let both = band + self.band(o.face, ray, surface.gap);
             if surface.foot(ray.point_at(o.t), first.uv, ray.direction).offset.abs() <= both {
                 return Cause::Coincident;
@@ -173,6 +182,7 @@ impl<'a> Classifier<'a> {
             _ => return Err(()),
         };
         let cos = a.geometric_normal.dot(ray.direction).abs().min(b.geometric_normal.dot(ray.direction).abs());
+        // The rounding of a distance goes with the numbers it is made of.
         let scale = ray.origin.length() + a.t.abs() + self.rounding / ROUNDING;
         if (a.t - b.t).abs() > 16.0 * f64::EPSILON * scale / cos.max(GRAZING) {
             return Err(());

@@ -32,6 +32,7 @@ pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> V
                     *hit = who.intersect(ray, &mut cost);
                 }
             }
+            // Without it the compiler could leave out hits that nobody reads.
             black_box(&hits);
         });
     }

@@ -83,6 +83,7 @@ pub fn cross_check(
             let range = c * CHUNK..((c + 1) * CHUNK).min(count);
             let length = range.end - range.start;
             let tally = Tally::of_rays(intersectors, &classifier, range.start, &rays.rays(range));
+            // Tasks end in any order: what is reported is how many are done.
             let so_far = done.fetch_add(length, Ordering::Relaxed) + length;
             clock.report("checking rays", so_far as f64 / count as f64);
             tally
@@ -105,6 +106,7 @@ pub fn cross_check(
 
 /// Angle between unit vectors, degrees, accurate for small angles too.
 pub(super) fn angle_deg(a: crate::math::Vector, b: crate::math::Vector) -> f64 {
+    // By the cross product too: the arc cosine loses half of the digits of small angles.
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
@@ -152,6 +154,7 @@ impl Tally {
         }
         let cause = classifier.compare(ray, octree.as_ref(), exact.as_ref());
         self.count(cause, octree, exact);
+        // A hit that only one has is kept whatever its cause, for it changes where the light goes.
         let flipped = octree.is_some() != exact.is_some();
         if facets_differ || flipped || cause.is_some_and(|c| c != Cause::WithinSag) {
             self.kept.push(Disagreement { index, ray: *ray, octree, bvh, exact, cause, facets_differ });

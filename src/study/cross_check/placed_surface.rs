@@ -67,6 +67,7 @@ impl PlacedSurface {
     pub(super) fn new(placed: &PlacedFace<'_>) -> Option<Self> {
         let face = placed.face?;
         let surface = face.surface.transformed(|p| placed.placement.point(p));
+        // A face that is reversed within a mirrored placement looks outwards again.
         let flips = [face.reversed, placed.placement.is_mirrored()].iter().filter(|&&f| f).count();
         let size = surface.bounds().diagonal();
         let borders = border_curves(face, &surface, size).into_iter().map(|c| Border::new(c, &surface)).collect();
@@ -90,8 +91,10 @@ impl PlacedSurface {
         let near = self.project(p, guess);
         let mut best = self.describe(p, near, direction);
         if best.held {
+            // The guess ran into a side of the domain: on a closed surface the foot may lie beyond the seam.
             let mut seeds: Vec<_> = self.seeds.iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
             seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // From the four nearest of some three hundred samples.
             for (_, uv) in seeds.into_iter().take(4) {
                 let other = self.describe(p, self.project(p, uv), direction);
                 // Nearest alone counts: a foot that nothing holds may lie on the next turn of a screw.
@@ -113,6 +116,7 @@ impl PlacedSurface {
         let height = away.dot(normal);
         let offset = if height < 0.0 { -away.length() } else { away.length() };
         let held = (away - normal * height).length() > HELD_SLANT * away.length() + EQUALLY_NEAR * self.size;
+        // The ray's way along the surface, as parameters, by the first fundamental form.
         let tangential = direction - normal * direction.dot(normal);
         let (e, f, g) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
         let det = e * g - f * f;
@@ -120,6 +124,7 @@ impl PlacedSurface {
         let (a, b) = ((g * bu - f * bv) / det, (e * bv - f * bu) / det);
         let second = d.duu * (a * a) + d.duv * (2.0 * a * b) + d.dvv * (b * b);
         let curvature = second.dot(normal);
+        // At a pole the form cannot be inverted; a sphere of the surface's size is near enough for a step.
         let curvature = if curvature.is_finite() { curvature } else { 1.0 / self.size };
         Foot { uv, point: d.point, normal, offset, curvature, held }
     }
@@ -192,6 +197,7 @@ impl PlacedSurface {
                 if self.border_distance(foot.point, band + 2.0 * self.gap) <= band + 2.0 * self.gap {
                     found.border = true;
                 }
+                // Beyond the band the side is told; a foot that is held has left the face.
                 if foot.offset.abs() > band || foot.held {
                     found.sides[end] = if foot.offset < 0.0 { -1 } else { 1 };
                     break;

@@ -85,6 +85,7 @@ impl<'r> CellPairs<'r> {
         for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
             add_replicate(&mut cells, facets.layers.get(layer)?, spline.layers.get(layer)?);
         }
+        // At least two, for a variance divides by one less.
         let n = replicates[1].len().max(2) as f64;
         for c in &mut cells {
             let variance = |squares: f64, sum: f64| (squares - sum * sum / n).max(0.0) * n / (n - 1.0);
@@ -130,6 +131,7 @@ impl<'r> CellPairs<'r> {
 
     /// The brightest place, over the smallest squares of cells that hold rays enough.
     pub(super) fn peak(&self) -> Peak {
+        // Power is counted in quanta: as many make one ray of the mean power.
         let rays = |block: Block| self.inside(block).map(|c| self.cells[c].spline).sum::<f64>() / QUANTA;
         let mut side = 1;
         let (mut block, mut spline) = self.brightest(side, |c| c.spline);
@@ -137,6 +139,7 @@ impl<'r> CellPairs<'r> {
             side *= 2;
             (block, spline) = self.brightest(side, |c| c.spline);
         }
+        // Facets may have their brightest place elsewhere: places are compared by how bright they are.
         let (on_facets, facets) = self.brightest(side, |c| c.facets);
         let inverse = |block: Block| self.inside(block).map(|c| 1.0 / self.unit[c]).sum::<f64>();
         let measures = [inverse(on_facets), inverse(block)];
@@ -169,7 +172,9 @@ impl<'r> CellPairs<'r> {
         let sum = |of: &dyn Fn(&Cell) -> f64| self.cells.iter().map(of).sum::<f64>();
         let norm = sum(&|c| c.spline * c.spline).sqrt().max(1.0);
         MapError {
+            // A sum that noise made negative means that nothing was found.
             geometric: sum(&Cell::excess).max(0.0).sqrt() / norm,
+            // The variance of a squared normal deviation is twice the square of its variance.
             noise: sum(&|c| 2.0 * c.difference_variance.powi(2)).powf(0.25) / norm,
             statistical: sum(&|c| c.spline_variance).sqrt() / norm,
         }
@@ -198,6 +203,7 @@ impl<'r> CellPairs<'r> {
             let excess = quanta(Cell::excess) / count;
             let mean = quanta(Cell::difference) / count;
             let noise = quanta(|c| c.difference_variance) / (count * count);
+            // The mean of a square of cells may say more than their scatter, where all err the same way.
             let error = (excess.max(mean * mean) + noise).sqrt();
             self.inside(block).for_each(|c| layer[c] = error * self.unit[c]);
         }
@@ -207,6 +213,7 @@ impl<'r> CellPairs<'r> {
 
 /// Adds what one replicate of both runs brought to the sums of the cells.
 fn add_replicate(cells: &mut [Cell], facets: &[(u32, u64)], spline: &[(u32, u64)]) {
+    // Both lists rise: they are merged like two sorted files.
     let (mut a, mut b) = (facets.iter().peekable(), spline.iter().peekable());
     loop {
         let cell = match (a.peek(), b.peek()) {

@@ -33,6 +33,7 @@ impl Means {
 
     /// Of the mean position, in half sides.
     fn centroid(&self, run: &ReplicatedRun, receiver: usize, axis: usize) -> Influence {
+        // The derivative of a quotient: what a replicate adds to the sum, less its share of the mean.
         let by_replicate = |s: &ReplicateSums| (s.first[axis] - self.mean * s.power as f64) / self.power;
         Influence { value: self.mean, by_replicate: sums(run, receiver).map(by_replicate).collect() }
     }
@@ -42,6 +43,7 @@ impl Means {
         let value = (self.square - about * about).max(0.0).sqrt();
         let by_replicate = |s: &ReplicateSums| {
             let power = s.power as f64;
+            // The derivative of `square − about²`; about the centre, which is fixed, the second part vanishes.
             let change = (s.second[axis] - self.square * power) - 2.0 * about * (s.first[axis] - about * power);
             if value > 0.0 { 0.5 * change / (self.power * value) } else { 0.0 }
         };

@@ -35,6 +35,7 @@ pub struct Paired {
 impl Paired {
     /// What the facets change, with how well that is known: one standard error of the figure on facets.
     pub fn geometric(&self) -> f64 {
+        // An error that cannot be told from none is still no smaller than its own uncertainty.
         (self.facets - self.spline).hypot(self.error)
     }
 

@@ -47,6 +47,7 @@ struct KeptCells {
 impl KeptCells {
     fn new(cells: usize, channels: usize) -> Self {
         let fits = |layers: usize| cells * layers <= MOST_CELLS;
+        // Power alone where all channels together are too many.
         let layers = if fits(1 + channels) { 1 + channels } else { usize::from(fits(1)) };
         Self { cells, layers }
     }
@@ -55,6 +56,7 @@ impl KeptCells {
 impl Totals {
     /// Takes over the sums of a portion and gives what the one replicate that is new brought to each receiver.
     fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>)> {
+        // Portions are handed over one replicate at a time; the one that is not yet known is new.
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
         let tallies = &portion.tallies;
         self.power.resize(tallies.receivers.len(), 0);
@@ -102,6 +104,7 @@ pub(in crate::study) fn trace_replicates(
     let kept: Vec<KeptCells> = kept.collect();
     let state = Mutex::new((Totals::default(), vec![Vec::new(); count]));
     let finished = |portion: &PartialRun| {
+        // A panic elsewhere ends the run anyway; the sums so far are whole.
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
         let (totals, by_replicate) = &mut *state;
         if let Some((new, sums)) = totals.advance(portion, &kept) {

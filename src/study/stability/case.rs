@@ -146,10 +146,13 @@ impl Case {
     /// The case in a variant.
     pub fn scene(&self, variant: Variant) -> Scene<'_> {
         let frame = variant.frame();
+        // The control points themselves are moved: the truth of a moved case is that of the case, to their
+        // rounding.
         let placed = self.surfaces.iter().map(|s| s.transformed(|p| frame.point(p)));
         let mut model = sample_models::model(self.name, placed);
         let mesh = if self.loops.is_empty() {
             sample_models::grid_mesh(&model, self.divisions)
+        // The plain mesher knows no trims, so that such a case is asked of the spline alone.
         } else {
             for face in model.parts.iter_mut().flat_map(|p| &mut p.shells).flat_map(|s| &mut s.faces) {
                 face.loops.clone_from(&self.loops);

@@ -23,6 +23,7 @@ pub(super) fn bezier_knots(degree: usize) -> Vec<f64> {
 
 /// A ray in a plane of constant x, coming down from z = 100 onto `(x, y, z)`, inclined along y.
 pub(super) fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
+    // Inclined along y, in which nothing changes: depth and cosine stay those of the profile.
     let slope = random.between(-0.6, 0.6);
     let d = Vector::new(0.0, slope, -1.0).normalize();
     let t = (100.0 - z) / -d.z;
@@ -37,6 +38,7 @@ fn crease() -> Case {
     let knots = [vec![0.0; 4], vec![0.5; 3], vec![1.0; 4]].concat();
     let question = |i| {
         let mut random = Random::new(21, i);
+        // Half of the rays meet the crease itself.
         let x = if i % 2 == 0 { 0.0 } else { random.between(-40.0, 40.0) };
         let (ray, t, cos) = down(&mut random, x, -0.8 * x.abs());
         Question::First { ray, truth: Truth::hit(t, cos / 0.64f64.hypot(1.0), 10.0) }
@@ -68,6 +70,7 @@ fn cusp() -> Case {
         let (ray, t, cos) = down(&mut random, x, height(x));
         // dx/dz on the curve is 3/2·(|x|/40)^(1/3): the cosine of a vertical ray.
         let across = 1.5 * (x.abs() / 40.0).cbrt();
+        // At the cusp a vertical ray runs along the surface; a cosine of zero would divide the tolerance.
         let steep = across / across.hypot(1.0);
         Question::First {
             ray,
@@ -113,6 +116,7 @@ fn crossing_sheets() -> Case {
         let mut random = Random::new(23, i);
         let x = if i % 4 == 0 { random.between(-0.01, 0.01) } else { random.between(-7.0, 7.0) };
         let mut sheets: Vec<(f64, f64)> =
+            // The height and the slope dx/dz of the sheet with parameter s.
             roots(x).iter().map(|s| (20.0 * s * s, (3.0 * s * s - 1.0) / (2.0 * s))).collect();
         sheets.sort_by(|p, q| q.0.total_cmp(&p.0));
         let (ray, t, cos) = down(&mut random, x, sheets[0].0);
@@ -145,6 +149,7 @@ fn ruling() -> Case {
         let mut random = Random::new(24, i);
         let x = random.between(-40.0, 40.0);
         let ray = Ray::new(Point::new(x, -150.0, 0.5 * x), Vector::Y);
+        // On the ruling the ray lies in the surface; a cosine of zero would divide the tolerance.
         Question::First { ray, truth: Truth::hit(100.0, 1e-12, 0.0) }
     });
     Case {
@@ -170,6 +175,7 @@ pub(super) fn paraboloid(a: f64, b: f64) -> Surface {
 fn tangent() -> Case {
     let (a, b) = (0.01, 0.015);
     let mut questions = Vec::new();
+    // A micrometre, a nanometre and a picometre above and below.
     for (k, delta) in [1e-3, -1e-3, 1e-6, -1e-6, 1e-9, -1e-9].into_iter().enumerate() {
         for i in 0..60 {
             let mut random = Random::new(25, 100 * k as u64 + i);
@@ -210,11 +216,13 @@ fn collapsed() -> Case {
     let surface = Surface { degree: [1, 1], knots: [bezier_knots(1), bezier_knots(1)], points };
     let question = |i| {
         let mut random = Random::new(26, i);
+        // Mostly near the tip, over seven powers of ten.
         let back = if i % 4 == 0 { random.between(0.1, 90.0) } else { 10f64.powf(random.between(-6.0, 1.5)) };
         let x = 50.0 - back;
         let half = 0.4 * back;
         let y = half * random.between(-1.3, 1.3);
         let d = random.hemisphere(-Vector::Z);
+        // Not flatter than 11°: the sides would be met at too flat an angle for a clear truth.
         let d = if d.z > -0.2 { -Vector::Z } else { d };
         let target = Point::new(x, y, 0.0);
         // The distance from the slanted sides, y = ±0.4 (50 − x).
@@ -238,6 +246,7 @@ fn apex() -> Case {
     let cone = sweep::cone(&Frame::IDENTITY, 0.0, -PI / 4.0, [0.0, 2.0 * PI], [-50.0, 0.0]);
     let question = |i| {
         let mut random = Random::new(27, i);
+        // A third at the apex itself, the others from a nanometre to a centimetre away.
         let r = if i % 3 == 0 { 0.0 } else { 10f64.powf(random.between(-9.0, 1.0)) };
         let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
         let d = Vector::new(random.between(-0.4, 0.4), random.between(-0.4, 0.4), -1.0).normalize();

@@ -79,6 +79,7 @@ const STEPS: usize = 256;
 impl Scene<'_> {
     /// One grade per question, in order.
     pub fn grades(&self, who: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
+        // A trimmed case has no mesh.
         if geometry == Geometry::Facets && self.mesh.facets.is_empty() {
             return Vec::new();
         }
@@ -108,6 +109,7 @@ impl Scene<'_> {
 
     /// Rounding of coordinates of the size that the ray's numbers have here, in the case's own millimetres.
     pub fn resolution(&self, ray: &Ray, t: f64) -> f64 {
+        // In the place where the case stands: coordinates there set the rounding, not those at home.
         let reach = self.frame.point(ray.origin).length() + self.frame.scale * t.abs() + self.frame.origin.length();
         f64::EPSILON * (reach / self.frame.scale + 1.0)
     }
@@ -182,6 +184,7 @@ impl Grader<'_> {
             (Some(_), None) => open,
             (None, Some(h)) => open && self.on_surface(ray, h, resolution),
             (Some(t), Some(h)) => {
+                // Rounding of a crossing grows with one over the cosine.
                 let close = (self.local_t(h) - t).abs() <= 16.0 * resolution * (1.0 + 1.0 / truth.cos);
                 let normal = truth.normal.map(|n| self.scene.frame.normal(n));
                 // 1e-6 rad is far below what any facet reaches; coordinates rounded to r turn the normal of the surface
@@ -191,6 +194,7 @@ impl Grader<'_> {
             }
         };
         match (right, hit) {
+            // An answer that says it is unsure counts as such, right or not, unless the truth itself is open.
             (_, Some(h)) if flagged(h) && !open => Grade::Flagged,
             (true, _) => Grade::Right,
             (false, Some(h)) if flagged(h) => Grade::Flagged,
@@ -230,6 +234,7 @@ impl Grader<'_> {
         let origin = next.origin;
         let mut hits: Vec<Hit> = Vec::new();
         let mut unsure = false;
+        // Two more than there are, to see answers that are too many.
         while hits.len() <= truths.len() + 2 {
             let Some(h) = self.ask(&next) else {
                 unsure = self.unsure_miss(&next);
@@ -242,6 +247,7 @@ impl Grader<'_> {
         let resolution = self.scene.resolution(ray, truths.last().map_or(0.0, Truth::distance));
         let right = match self.geometry {
             Geometry::Facets => {
+                // Crossings that the facets can miss by their sag do so in pairs, in and out.
                 let sure = truths.iter().filter(|t| t.margin > self.band).count();
                 let sequence = hits.len() >= sure
                     && hits.len() <= truths.len()

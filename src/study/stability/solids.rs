@@ -17,10 +17,12 @@ pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
         let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
         for high in [false, true] {
             let origin = if high { min + Vector::AXES[axis] * size[axis] } else { min };
+            // The corner at the low end bounds three faces, the high ones are shifted by the box's size.
             let (a, b) = if high { (x, y) } else { (y, x) };
             let frame = Frame {
                 origin,
                 x: Vector::AXES[a],
+                // The two directions are exchanged at the low side, so that their product looks outwards.
                 y: Vector::AXES[b],
                 z: Vector::AXES[a].cross(Vector::AXES[b]),
                 scale: 1.0,
@@ -34,6 +36,7 @@ pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
 pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + Send + Sync + Clone {
     move |p| {
         let d = (p - 0.5 * (min + max)).abs() - 0.5 * (max - min);
+        // Outside the distance to the nearest point, inside the least depth.
         d.max(Vector::ZERO).length() + d.max_element().min(0.0)
     }
 }
@@ -89,6 +92,7 @@ fn coincident() -> Case {
         let target = Point::new(10.0, random.between(1.0, 9.0), random.between(1.0, 9.0));
         let d = random.hemisphere(if i % 2 == 0 { Vector::X } else { -Vector::X });
         let d = if d.x.abs() < 0.3 { Vector::X * d.x.signum() } else { d };
+        // Short enough to start within the box that the ray leaves.
         let t = 0.9 * (1.0 / (d.y.abs() + d.z.abs()).max(0.15)).min(9.0 / d.x.abs());
         Question::First { ray: Ray::new(target - d * t, d), truth: Truth::hit(t, d.x, 5.0) }
     });

@@ -44,11 +44,13 @@ fn ball(name: &'static str, questions: Vec<Question>) -> Case {
 fn past(random: &mut Random, b: f64) -> Ray {
     let d = random.direction();
     let (a, c) = orthonormal_pair(d);
+    // Around the origin by chance, so that no plane of the tree is favoured.
     let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
     Ray::new((a * cos + c * sin) * b - d * 150.0, d)
 }
 
 /// Both crossings of the sphere for an impact parameter whose difference from the radius is known exactly.
+// 2·√(R² − b²) by the difference R − b: squares would lose what is left of a grazing chord.
 fn crossings(depth: f64) -> [Truth; 2] {
     let half = (depth * (2.0 * R - depth)).sqrt();
     [150.0 - half, 150.0 + half].map(|t| Truth::hit(t, half / R, depth))
@@ -60,6 +62,7 @@ fn graze() -> Case {
         for sign in [-1.0, 1.0] {
             for i in 0..40 {
                 let mut random = Random::new(1, k * 1000 + i + if sign > 0.0 { 500 } else { 0 });
+                // From a tenth to a picometre on both sides of touching.
                 let delta = sign * 10f64.powi(-(k as i32));
                 let truth = if sign < 0.0 { crossings(-delta)[0] } else { Truth::miss(delta) };
                 questions.push(Question::First { ray: past(&mut random, R + delta), truth });
@@ -151,6 +154,7 @@ fn thin_torus() -> Case {
         let v = random.between(-1.2, 1.2);
         let (_, n) = torus_point(major, minor, u, v);
         // In the meridian plane the tube is a circle: a ray at distance b from its centre has the chord 2√(r² − b²).
+        // Chords from ten micrometres down to a hundredth of one.
         let half = 0.5 * 10f64.powf(random.between(-5.0, -1.71));
         let b = (minor * minor - half * half).sqrt();
         let side = Vector::new(-v.sin() * u.cos(), -v.sin() * u.sin(), v.cos());
@@ -198,6 +202,7 @@ fn on_surface() -> Case {
         let toward = Ray::new(random.direction() * random.between(0.0, 20.0), random.direction());
         let half = {
             let b = toward.origin.dot(toward.direction);
+            // The far crossing of a sphere from a point inside it.
             -b + (b * b + R * R - toward.origin.length_squared()).sqrt()
         };
         let n = toward.point_at(half) / R;
@@ -227,6 +232,7 @@ fn from_inside() -> Case {
     let question = |i| {
         let mut random = Random::new(10, i);
         let o = random.direction() * (R * 0.98 * random.unit().cbrt());
+        // A quarter along the axes, where a ray stays within planes of the tree.
         let d = if i % 4 == 0 {
             [Vector::X, Vector::Y, Vector::Z, -Vector::X][i as usize / 4 % 4]
         } else {
