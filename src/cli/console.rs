@@ -36,6 +36,7 @@ pub(crate) struct Console {
 impl Console {
     /// From the options that every command has, and the command line as typed.
     pub(crate) fn new(json: bool, quiet: bool, verbose: u8, typed: &[OsString]) -> Self {
+        // https://no-color.org: set and not empty, whatever its value.
         let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
         let dumb = std::env::var_os("TERM").is_some_and(|t| t == "dumb");
         let terminal = io::stderr().is_terminal();
@@ -65,6 +66,7 @@ impl Console {
         }
         let mut shown = String::with_capacity(text.len());
         let mut rest = text;
+        // The earliest of our own codes; what stands between them is data.
         while let Some((at, code)) = EMPHASIS.iter().filter_map(|code| Some((rest.find(code)?, code))).min() {
             shown += &printable(&rest[..at]);
             shown += code;
@@ -100,6 +102,7 @@ impl Console {
     /// A progress bar with rate and remaining time; invisible where stderr is no terminal.
     pub(crate) fn progress_bar(&self, label: &str, unit: &str, total: u64) -> ProgressBar {
         let bar = ProgressBar::new(total);
+        // Hidden and not left out: the work reports to it all the same.
         if !self.terminal || self.quiet {
             bar.set_draw_target(ProgressDrawTarget::hidden());
             return bar;
@@ -140,6 +143,7 @@ impl Console {
         let style = ProgressStyle::with_template("  {spinner} {msg}  {elapsed}");
         spinner.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
         spinner.set_message(printable_line(label).into_owned());
+        // Drawn by a thread of its own: the work does not tick.
         spinner.enable_steady_tick(std::time::Duration::from_millis(100));
         spinner
     }
@@ -173,6 +177,7 @@ fn command_line(line: &[OsString]) -> String {
     let quote = |word: &OsString| {
         let word = word.to_string_lossy();
         let plain = |c: char| c.is_alphanumeric() || "-_./=,:%@+".contains(c);
+        // Letters of any script need no quotes; what a shell reads as more does.
         if !word.is_empty() && word.chars().all(plain) {
             word.into_owned()
         } else {
@@ -186,6 +191,7 @@ fn command_line(line: &[OsString]) -> String {
 pub(crate) fn show_progress(bar: &ProgressBar, p: &crate::study::Progress) {
     let remaining = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
     bar.set_message(printable_line(&format!("{}{remaining}", p.stage)).into_owned());
+    // A share a little beyond 1 would make the bar wrap.
     bar.set_position((STAGE_STEPS as f64 * p.done.clamp(0.0, 1.0)) as u64);
 }
 

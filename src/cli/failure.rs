@@ -30,6 +30,7 @@ struct Excerpt {
 
 impl Failure {
     fn new(code: u8, message: impl Into<String>) -> Self {
+        // What a message quotes may hold codes that a terminal obeys.
         Self { code, message: printable(&message.into()).into_owned(), help: None, excerpt: None }
     }
 
@@ -59,6 +60,7 @@ impl Failure {
         // A span beyond the text, which only a message about another file could have, is cut to it.
         let span = span.start.min(text.len())..span.end.min(text.len());
         let [file, label] = [file, label].map(|text| printable_line(text).into_owned());
+        // In place: spans are bytes of this text.
         let text = printable_in_place(text).into_owned();
         self.excerpt = Some(Box::new(Excerpt { file, text, span, label }));
         self
@@ -77,6 +79,7 @@ impl Failure {
         let report = Level::ERROR.primary_title(&message).elements(snippet);
         let report = report.elements(help.as_ref().map(|help| Level::HELP.message(help)));
         let text = renderer.render(&[report]) + "\n";
+        // A closed stderr changes nothing of the exit code.
         let _ = std::io::stderr().lock().write_all(text.as_bytes());
         ExitCode::from(self.code)
     }
@@ -93,6 +96,7 @@ fn wrapped(text: &str, width: usize) -> String {
             out.push('\n');
         }
         let mut length = 0;
+        // At single spaces, so that runs of them keep their length.
         for (k, word) in line.split(' ').enumerate() {
             let letters = word.chars().count();
             if length > 0 && length + 1 + letters > width {
@@ -124,6 +128,7 @@ impl From<crate::formats::Error> for Failure {
 impl From<pipeline::Error> for Failure {
     fn from(e: pipeline::Error) -> Self {
         // What a setting is called on the command line.
+        // Settings are named alike everywhere, but for the line in the middle.
         let option = e.setting_name().map_or_else(String::new, |name| format!("--{} ", name.replace('_', "-")));
         let message = option + e.message();
         let mut failure = match e.kind() {

@@ -38,13 +38,16 @@ pub(crate) fn watch() {
     let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else { return };
     let listen = move || {
         for signal in &mut signals {
+            // The second signal ends the command at once, whatever is being saved.
             let is_first = !REQUESTED.swap(true, Ordering::SeqCst);
             if is_first && SAVEABLE_RUNS.load(Ordering::SeqCst) > 0 {
                 let message = "\nstopping: what is being traced is finished and saved; once more stops at once\n";
                 let _ = std::io::Write::write_all(&mut std::io::stderr().lock(), message.as_bytes());
                 continue;
             }
+            // Files that were begun are named by the process: they would stay for ever.
             crate::formats::remove_unfinished_files();
+            // As the signal would have done: the shell sees a process that was stopped.
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     };

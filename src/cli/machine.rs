@@ -9,6 +9,7 @@ const KILOBYTES_PER_GB: f64 = 1_000_000.0;
 pub(crate) fn hardware() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
+    // Not every kernel names its processor: then its architecture is said.
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemTotal"));
     let mut parts = vec![cpu, format!("{cores} cores")];

@@ -52,6 +52,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let Arguments { command, json, quiet, verbose } = arguments;
     let console = Console::new(json, quiet, verbose, &typed);
+    // Before any work, so that no file is begun unwatched.
     interruption::watch();
     keep_caught_panics_quiet();
     match commands::execute(command, &console) {
@@ -66,6 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 fn keep_caught_panics_quiet() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
+        // A panic that is caught is guarded by a mark of its thread, or runs in a thread of truck's.
         let caught = is_panic_guarded() || std::thread::current().name() == Some(baseline::THREAD);
         if !caught {
             usual(panic);

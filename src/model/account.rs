@@ -73,6 +73,7 @@ const PIECES: usize = 2;
 impl Model {
     /// Every part with its solids and faces; parts without faces are left out.
     pub fn account(&self) -> Vec<PartAccount> {
+        // The first instance stands for all: one place to look at is enough to know a face.
         let mut first: Vec<Option<&Instance>> = vec![None; self.parts.len()];
         let mut count = vec![0; self.parts.len()];
         for instance in &self.instances {
@@ -107,6 +108,7 @@ impl Part {
                 faces: shells.iter().flat_map(|s| s.faces.iter().map(move |f| face(s, f))).collect(),
             });
         }
+        // Ready meshes have no shells; they are one more solid behind the others.
         if !self.tessellated.is_empty() {
             solids.push(SolidAccount {
                 index: solids.len(),
@@ -153,11 +155,13 @@ impl Face {
     pub fn area(&self) -> f64 {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+        // Between knots the density of area is smooth, which is what Gauss' rule needs.
         let mut breaks = self.surface.knots.clone();
         breaks.iter_mut().for_each(Vec::dedup);
         let sweep = Sweep { face: self, breaks };
         if self.loops.is_empty() {
             let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
+            // The sign tells which way the loops run; an area has none.
             return sides.map(|side| sweep.area_left_of(&side)).sum::<f64>().abs();
         }
         let uses = self.loops.iter().flat_map(|l| &l.uses);
@@ -183,6 +187,7 @@ impl Sweep<'_> {
                 let width = piece[1] - piece[0];
                 for (x, weight) in GAUSS {
                     let d = curve.derivatives(piece[0] + x * width);
+                    // A piece along a row adds nothing to an integral over dv, and its row need not be computed.
                     if d.first.y != 0.0 {
                         sum += weight * width * d.first.y * self.row(d.point);
                     }
@@ -200,6 +205,7 @@ impl Sweep<'_> {
         let between = |k: &&f64| **k > v0.min(v1) && **k < v0.max(v1);
         let crossed: Vec<f64> = self.breaks[1].iter().filter(between).copied().collect();
         let mut cuts = vec![t0, t1];
+        // A straight line's crossings are known in closed form; those of a bent one would need a search each.
         if curve.degree == 1 {
             cuts.extend(crossed.iter().map(|k| t0 + (t1 - t0) * (k - v0) / (v1 - v0)));
         } else {
@@ -224,6 +230,7 @@ impl Sweep<'_> {
                 for (x, weight) in GAUSS {
                     let u = span[0] + (piece as f64 + x) * width;
                     let d = self.face.surface.derivatives(Uv::new(u, end.y));
+                    // The area of a patch of surface is |Su × Sv| du dv.
                     sum += weight * width * d.du.cross(d.dv).length();
                 }
             }

@@ -66,6 +66,7 @@ impl Model {
             let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.instances.len());
             for (i, instance) in self.instances.iter().enumerate() {
                 let whole = &hulls[instance.part.0 as usize].whole;
+                // A part without shapes reaches nowhere.
                 if !whole.is_empty() {
                     reaches.push((side.reach(&placed(whole, &instance.placement)), i));
                 }
@@ -110,6 +111,7 @@ impl<'m> PartHulls<'m> {
         reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (reach, k) in reaches {
             if reach <= side.reach(&bounds) {
+                // Sorted: what follows reaches less far.
                 break;
             }
             bounds = match self.shapes[k].0 {
@@ -165,6 +167,7 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     for side in SIDES {
         if side.reach(&hull) <= side.reach(&bounds) {
             continue;
+            // The highest samples are the nearest to a summit.
         }
         samples.sort_unstable_by(|a, b| side.height(b.1).total_cmp(&side.height(a.1)));
         let starts = samples.iter().filter(|s| outline.contains(s.0)).take(STARTS);
@@ -179,6 +182,7 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
 fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> Uv {
     let mut uv = start;
     let mut best = height(uv);
+    // Half a cell, for the summit lies between the samples beside the best one.
     let mut stride = 0.5 * cell;
     for _ in 0..ROUNDS {
         let mut moved = false;

@@ -24,6 +24,7 @@ impl Outline {
                 let breaks = u.uv.breakpoints();
                 let spans = breaks.len() - 1;
                 let per_span =
+                    // A straight use is its two ends.
                     if u.uv.degree == 1 { 1 } else { POINTS_PER_USE.div_ceil(spans).max(POINTS_PER_SPAN) };
                 let start = points.len();
                 for w in breaks.windows(2) {
@@ -32,6 +33,7 @@ impl Outline {
                 }
                 points.push(u.uv.evaluate(breaks[spans]));
                 if u.reversed {
+                    // In the loop's direction, for the polygon to close.
                     points[start..].reverse();
                 }
                 // The next use begins with this point.
@@ -71,6 +73,7 @@ impl Outline {
             }
             crossings.sort_by(f64::total_cmp);
             let stretches = crossings.chunks_exact(2).filter(|s| s[1] > s[0]);
+            // The longest stretch has the most room around its middle.
             let longest = stretches.max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
             Some(Uv::new(0.5 * (longest[0] + longest[1]), v))
         })
@@ -78,6 +81,7 @@ impl Outline {
 }
 
 fn sides(polygon: &[Uv]) -> impl Iterator<Item = (Uv, Uv)> {
+    // The polygon closes by itself.
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
 }
 

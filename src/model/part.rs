@@ -67,6 +67,7 @@ impl Part {
         let mut solids: Vec<Range<usize>> = Vec::new();
         for (i, shell) in self.shells.iter().enumerate() {
             match solids.last_mut() {
+                // A void belongs to the solid before it; one without a solid before it stands alone.
                 Some(solid) if shell.void => solid.end = i + 1,
                 _ => solids.push(i..i + 1),
             }

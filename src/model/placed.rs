@@ -66,6 +66,7 @@ impl Model {
     pub fn label(&self, instance: usize) -> String {
         let own = &self.instances[instance].name;
         let part = &self.part(self.instances[instance].part).name;
+        // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
         match (own.is_empty() || own.starts_with("=>["), part.is_empty()) {
             (false, _) => own.clone(),
             (true, false) => part.clone(),
@@ -93,6 +94,7 @@ impl Model {
             let mut solids = 0;
             let mut surfaces = Vec::with_capacity(part.shells.len());
             for (s, shell) in part.shells.iter().enumerate() {
+                // A first shell that claims to be a void has no solid before it.
                 solids += usize::from(!shell.void || s == 0);
                 surfaces.push(PlacedFace { solid: solids - 1, shell: Some(s), ..placed });
             }
@@ -112,6 +114,7 @@ impl Model {
 
     /// The id of the first face of every instance.
     pub fn first_faces(&self) -> Vec<FaceId> {
+        // Counted once a part: a thousand lenses are one.
         let counts: Vec<u32> = self.parts.iter().map(|p| p.face_count() as u32).collect();
         let mut next = 0;
         let step = |i: &Instance| {

@@ -42,8 +42,8 @@ impl Aim {
     }
 
     /// Brings the cut-off of a passing beam to its line, then its elbow to line A.
-    // First up and down, then sideways: the scan for the elbow lies below the cut-off that was found.
     pub(super) fn by_cut_off(map: &IntensityMap, rule: CutOff) -> Self {
+        // First up and down, then sideways: the scan for the elbow lies below the cut-off that was found.
         let Some(edge) = steepest(map, |b| [rule.scan_h_deg, b], [-SCAN_V_DEG, SCAN_V_DEG], 1.0) else {
             return Self::unchanged("as placed: the far field does not hold the scan for the cut-off");
         };

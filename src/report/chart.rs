@@ -121,6 +121,7 @@ pub(super) const PALETTE: [&str; 8] =
 pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
     let mut used = 0usize;
     let colour = |s: &Series| {
+        // A reference stands beside its series and takes its colour; one that is first has a colour of its own.
         if s.style != SeriesStyle::Dashed || used == 0 {
             used += 1;
         }
@@ -150,6 +151,7 @@ impl Chart {
     /// A map of a grid with lines of equal value at round levels; the axes are the grid's.
     pub fn map(name: &str, title: &str, caption: &str, grid: Grid) -> Self {
         let axis = |k: usize| AxisStyle::linear(&grid.axes[k].label, &grid.axes[k].unit);
+        // From zero up: a map of negative values alone has no lines.
         let levels = round_levels(grid.values.iter().copied().fold(0.0, f64::max));
         let lines = isolines(&grid, &levels);
         let named: Vec<String> = levels.iter().map(|l| figures(*l, 3)).collect();

@@ -68,10 +68,12 @@ fn paint(pixels: &mut Pixmap, element: &Element, font: &FontRef) -> Option<()> {
             let ([x, y], [width, height]) = (single(corner), single(size));
             let mut source = Pixmap::new(picture.width, picture.height)?;
             for (pixel, rgb) in source.data_mut().chunks_exact_mut(4).zip(picture.rgb.chunks_exact(3)) {
+                // Pictures are opaque.
                 pixel.copy_from_slice(&[rgb[0], rgb[1], rgb[2], 255]);
             }
             let [across, down] = [width / picture.width as f32, height / picture.height as f32];
             let fit = Transform::from_row(across, 0.0, 0.0, down, x, y);
+            // Sharp pixels: a cell is one value, and should not fade into its neighbours.
             let shader = Pattern::new(source.as_ref(), SpreadMode::Pad, FilterQuality::Nearest, 1.0, fit);
             let paint = Paint { shader, anti_alias: false, ..Paint::default() };
             pixels.fill_rect(Rect::from_xywh(x, y, width, height)?, &paint, zoom, None);
@@ -116,6 +118,7 @@ fn outline(text: &str, anchor: Anchor, font: &FontRef) -> Option<Path> {
     let scale = TYPE_SIZE as f32 / font.units_per_em()?;
     let mut path = PathBuilder::new();
     let mut along = 0.0;
+    // Kerning belongs to pairs: the first letter has none.
     let mut before = None;
     for id in text.chars().map(|c| font.glyph_id(c)) {
         along += before.map_or(0.0, |b| font.kern_unscaled(b, id));

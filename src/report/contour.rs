@@ -23,9 +23,11 @@ pub(super) fn round_levels(most: f64) -> Vec<f64> {
     if !(most > 0.0 && most.is_finite()) {
         return Vec::new();
     }
+    // From three decades below, of which the last levels are kept.
     let decade = most.log10().floor() as i32;
     let all = (decade - 3..=decade).flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e)));
     let mut levels: Vec<f64> = all.filter(|level| *level < most).collect();
+    // Lines crowd towards the dark; the brightest levels are the ones that count.
     levels.drain(..levels.len().saturating_sub(LEVELS));
     levels
 }
@@ -36,6 +38,7 @@ type Edge = (usize, usize, bool);
 /// The lines of these levels, through values averaged with their neighbours (1-2-1), so that noise does not tear them.
 pub(super) fn isolines(grid: &Grid, levels: &[f64]) -> Vec<Isoline> {
     let [a, b] = &grid.axes;
+    // Marching squares need squares.
     if a.cells < 2 || b.cells < 2 || grid.values.len() != a.cells * b.cells {
         return Vec::new();
     }
@@ -65,6 +68,7 @@ fn smoothed(values: &[f64], columns: usize, rows: usize) -> Vec<f64> {
         (0..values.len())
             .map(|k| {
                 let before = if place(k) > 0 { values[k - step] } else { values[k] };
+                // At the border the missing neighbour is taken to be like the cell itself.
                 let after = if place(k) + 1 < count { values[k + step] } else { values[k] };
                 0.25 * (before + 2.0 * values[k] + after)
             })
@@ -111,6 +115,7 @@ fn crossings(values: &[f64], [columns, rows]: [usize; 2], level: f64) -> FxHashM
 
 /// Neighbouring edges as chains: those with an end first, then the closed ones.
 fn chains(mut links: FxHashMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
+    // Starts are sorted: a table of hashes has no order, and pictures must not change from run to run.
     let mut starts: Vec<(bool, Edge)> = links.iter().map(|(edge, next)| (next.len() > 1, *edge)).collect();
     starts.sort_unstable();
     let mut chains = Vec::new();
@@ -118,6 +123,7 @@ fn chains(mut links: FxHashMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
         let mut chain = vec![start];
         let mut at = start;
         while let Some(next) = links.get_mut(&at).and_then(Vec::pop) {
+            // Each link is used once, from whichever side the chain comes.
             if let Some(back) = links.get_mut(&next)
                 && let Some(k) = back.iter().position(|e| *e == at)
             {

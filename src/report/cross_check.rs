@@ -91,6 +91,7 @@ fn kinds(check: &CrossCheck) -> Vec<Kind> {
 /// The kind that a ray belongs to, as named in [`kinds`].
 fn kind_of(d: &Disagreement) -> &'static str {
     match d.cause {
+        // A difference between two trees over the same facets is graver than any between facets and spline.
         _ if d.facets_differ => "octree and BVH differ",
         Some(Cause::Unexplained(_)) => "unexplained",
         Some(cause) => cause.name(),
@@ -162,6 +163,7 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
     for kind in kinds(check) {
         let own: Vec<&Disagreement> = check.disagreements.iter().filter(|d| kind_of(d) == kind.name).collect();
         let (mut lines, mut places) = (Polylines::default(), Vec::new());
+        // Evenly over all, for rays come source by source.
         for d in own.iter().step_by(own.len().div_ceil(DRAWN).max(1)) {
             let hits = || [d.octree, d.bvh, d.exact].into_iter().flatten().map(|h| h.t);
             let (first, last) = hits().fold((f64::INFINITY, 0f64), |(a, b), t| (a.min(t), b.max(t)));

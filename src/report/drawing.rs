@@ -69,6 +69,7 @@ impl Ink {
         let part = |k: usize| text.get(1 + 2 * k..3 + 2 * k).and_then(|h| u8::from_str_radix(h, 16).ok());
         match [part(0), part(1), part(2)] {
             [Some(r), Some(g), Some(b)] => Self::Colour([r, g, b]),
+            // A colour that is none is drawn like the text, and stays visible.
             _ => Self::Text,
         }
     }

@@ -16,6 +16,7 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
             "{value} {unit} (± {} from the rays alone; the facets were not judged)",
             figures(*statistical, 2)
         ),
+        // Below a tenth of the statistical error the facets change the sum by half a percent.
         Some(g) if *g > 0.1 * statistical => format!(
             "{value} ± {} {unit} (± {} from the rays, ± {} from the facets)",
             figures(figure.combined(), 2),
@@ -44,6 +45,7 @@ pub(super) fn limits(error: &GeometricError, all: &[ReceiverFigures]) -> String 
 /// What facets change of one receiver, as far as it is both beyond doubt and beyond the noise of the run.
 fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     let is_limit = |paired: &Paired, figure: Option<&Figure>| {
+        // Both: a difference that is real, and larger than what the rays leave open.
         paired.is_significant() && figure.is_some_and(|f| f.limited_by == Limit::Geometry)
     };
     let mut parts = Vec::new();
@@ -67,10 +69,12 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
         parts.push(format!("the light is {on_facets} wide (rms), {on_spline} on the true surfaces"));
     }
     let moved = is_limit(&r.centroid[0], f.centroid_1.as_ref()) || is_limit(&r.centroid[1], f.centroid_2.as_ref());
+    // Where power or width changed, that the middle moved goes without saying.
     if moved && parts.is_empty() {
         let by = [0, 1].map(|a| figures(r.centroid[a].facets - r.centroid[a].spline, 2));
         parts.push(format!("the light is moved by {} and {} {}", by[0], by[1], r.unit));
     }
+    // Only where nothing else was found: it says least of what is wrong.
     if parts.is_empty() && r.map.geometric > 3.0 * r.map.noise && r.map.geometric > r.map.statistical {
         parts.push(format!("{} % of the light (rms) falls into other cells", figures(100.0 * r.map.geometric, 2)));
     }

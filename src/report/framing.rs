@@ -17,12 +17,14 @@ const FEWEST_CELLS: usize = 24;
 /// The part of a grid around all cells that are not dark; `None` where that is most of it, or nothing.
 pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
     let [a, b] = [grid.axes[0].cells, grid.axes[1].cells];
+    // A dark receiver has no part that is lit.
     let peak = grid.values.iter().copied().fold(0.0, f64::max);
     let lit: Vec<usize> = (0..grid.values.len()).filter(|&k| grid.values[k] > DARK * peak).collect();
     let extent = |place: &dyn Fn(usize) -> usize, cells: usize| {
         let first = lit.iter().map(|&k| place(k)).min()?;
         let last = lit.iter().map(|&k| place(k)).max()?;
         let margin =
+            // Half of what is missing to the least frame goes to each side.
             ((last - first) as f64 * MARGIN).ceil() as usize + FEWEST_CELLS.saturating_sub(last - first) / 2 + 1;
         Some([first.saturating_sub(margin), (last + margin + 1).min(cells)])
     };
@@ -36,6 +38,7 @@ pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
         (rows[0]..rows[1]).flat_map(|j| values[j * a + columns[0]..j * a + columns[1]].iter().copied()).collect()
     };
     let axis = |axis: &Axis, [from, to]: [usize; 2]| {
+        // By the edges of cells, so that the axes of the part agree with those of the whole.
         let edge = |k: usize| axis.range[0] + axis.step() * k as f64;
         Axis { range: [edge(from), edge(to)], cells: to - from, ..axis.clone() }
     };

@@ -32,6 +32,7 @@ fn policy(scripts: &[&str]) -> String {
 
 /// The page, complete: styles, scripts, data, static twins.
 pub(super) fn page(report: &Report, png: PngOf) -> String {
+    // The library weighs more than all the rest: a page of text and tables goes without.
     let interactive =
         report.sections.iter().flat_map(|s| &s.blocks).any(|b| !matches!(b, Block::Text(_) | Block::Table(_)));
     let library = if interactive { plotly::script() } else { String::new() };

@@ -14,6 +14,7 @@ const RADII: usize = 200;
 fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
     let peak = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
     let half = 0.5 * values[peak];
+    // Linear between the two cells beside the half.
     let fraction = |inner: f64, outer: f64| (inner - half) / (inner - outer);
     let after = (peak + 1..values.len()).find(|&k| values[k] < half)?;
     let before = (0..peak).rev().find(|&k| values[k] < half)?;
@@ -75,6 +76,7 @@ pub(super) fn table(
 /// The intensity straight ahead: of the cell there, or the mean of those that meet there.
 fn value_ahead(grid: &Grid) -> Option<f64> {
     let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
+        // An even number of cells has none in the middle: two or four meet there, to rounding.
         (0..axis.cells).filter(|&k| axis.center(k).abs() <= 0.5 * axis.step() * (1.0 + 1e-9)).collect()
     };
     let (columns, rows) = (cells(&grid.axes[0]), cells(&grid.axes[1]));
@@ -92,6 +94,7 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     if receiver.kind != "plane" || total <= 0.0 {
         return None;
     }
+    // The mean position of the light, not the place of the plane's middle.
     let centre = receiver.centroid;
     let mut cells: Vec<(f64, f64)> = (0..grid.values.len())
         .filter(|&k| grid.values[k] > 0.0)
@@ -118,6 +121,7 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
         figures(radius_of(95.0), 3)
     );
     let mut points: Vec<[f64; 2]> = summed.iter().step_by(summed.len().div_ceil(RADII)).copied().collect();
+    // The last point, so that the curve ends at 100 %.
     points.extend(summed.last());
     let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
     let name = format!("{}-encircled", crate::formats::file_stem(&receiver.name));
@@ -129,6 +133,7 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
 /// The polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below.
 pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [c, gamma] = &grid.axes;
+    // The diagram needs the whole turn.
     if c.label != "C" || c.cells < 4 || (c.range[1] - c.range[0] - 360.0).abs() > 1e-6 {
         return None;
     }
@@ -140,6 +145,7 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
         (0..gamma.cells).map(|j| (gamma.center(j).to_radians(), value(j))).collect::<Vec<_>>()
     };
     let plane = |name: &str, right: f64| {
+        // The opposite half-plane, drawn to the left.
         let left = half_plane(right + 180.0).into_iter().rev().map(|(g, i)| [-i * g.sin(), -i * g.cos()]);
         let right = half_plane(right).into_iter().map(|(g, i)| [i * g.sin(), -i * g.cos()]);
         let points = left.chain(right).collect();

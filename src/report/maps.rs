@@ -8,6 +8,7 @@ use crate::simulate::{ChannelResult, ReceiverResult};
 
 /// The cells of a receiver with their axes; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
+    // One cell is a number, not a map.
     if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
         return None;
     }
@@ -34,6 +35,7 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         unit: r.unit.into(),
         axes: [axis(0), axis(1)],
         values: r.cells.clone(),
+        // Where errors were not kept for cells there are none.
         error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
         geometric: None,
         layers: r.channels.iter().map(layer).collect(),
@@ -86,6 +88,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
         ..Series::default()
     };
     let series = vec![along(a, b, row, &|k| row * a.cells + k), along(b, a, column, &|k| k * a.cells + column)];
+    // Cuts along two axes of different units have no unit in common.
     let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
     let axes =
         [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];

@@ -25,12 +25,14 @@ pub fn figures(value: f64, digits: usize) -> String {
         return "0".into();
     }
     let digits = digits.clamp(1, 17);
+    // Rounded to its digits first: 0.9996 to three digits is 1, and has another exponent.
     let scientific = format!("{:.*e}", digits - 1, value);
     let parts = scientific.split_once('e').and_then(|(m, e)| Some((m, e.parse::<i32>().ok()?)));
     let Some((mantissa, exponent)) = parts else {
         debug_assert!(false, "{scientific} has no exponent");
         return scientific;
     };
+    // Longer than that a number is read wrong.
     if !(-4..9).contains(&exponent) {
         return format!("{}e{exponent}", trimmed(mantissa)).replace('-', "−");
     }
@@ -75,6 +77,7 @@ fn trimmed(mantissa: &str) -> &str {
 
 fn apart(whole: &str) -> String {
     let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |d| ("-", d));
+    // Four digits are read at a glance.
     if digits.len() < 5 {
         return whole.to_owned();
     }

@@ -56,6 +56,7 @@ fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
     let good = values.filter(|v| v.is_finite() && *v > 0.0);
     let (low, high) = good.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
     let decades = (high / low).log10();
+    // Where plotly's own steps are good it is left to them.
     let step = match decades {
         d if !style.log || !d.is_finite() || d > 4.0 => Value::Null,
         d if d > 1.5 => json!(1),
@@ -221,6 +222,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 "lighting": {"ambient": 0.6, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6},
                 "lightposition": {"x": 600, "y": -1500, "z": 2500}});
             if !labels.is_empty() {
+                // Where each face begins among the points: the page finds a face by the point under the pointer.
                 let (first, selectors): (Vec<u32>, Vec<&str>) =
                     labels.iter().map(|(k, s)| (*k, s.as_str())).unzip();
                 mesh["meta"] = json!({"points": points.len(), "first": first, "selectors": selectors});

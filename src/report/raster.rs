@@ -31,10 +31,12 @@ impl Canvas {
 
     fn put(&mut self, x: usize, y: usize, depth: f32, colour: [f32; 3], opacity: f32) {
         let at = y * self.width + x;
+        // At equal depth the later one wins, as lines along facets must show.
         if depth <= self.depth[at] {
             for (old, new) in self.rgb[at].iter_mut().zip(colour) {
                 *old += (new - *old) * opacity;
             }
+            // Glass hides nothing behind it.
             if opacity > 0.5 {
                 self.depth[at] = depth;
             }
@@ -44,10 +46,12 @@ impl Canvas {
     fn triangle(&mut self, [a, b, c]: [Vec3; 3], colour: [f32; 3], opacity: f32) {
         let [p, q, r] = [a.truncate(), b.truncate(), c.truncate()];
         let area = (q - p).perp_dot(r - p);
+        // A facet seen from its edge covers no sample.
         if area == 0.0 || !area.is_finite() {
             return;
         }
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+        // A triangle far outside has an empty range: both ends are cut to the picture.
         let range = |lo: f32, hi: f32, n: usize| (lo.max(0.0) as usize)..((hi.max(-1.0) + 1.0) as usize).min(n);
         for y in range(low.y, high.y, self.height) {
             for x in range(low.x, high.x, self.width) {
@@ -62,6 +66,7 @@ impl Canvas {
     }
 
     fn line(&mut self, a: Vec3, b: Vec3, width: f32, colour: [f32; 3], opacity: f32) {
+        // A step a pixel; what runs far out of the picture is not followed for ever.
         let steps = (b - a).truncate().abs().max_element().ceil().clamp(1.0, 8000.0) as usize;
         let half = (width * FINE as f32 / 2.0).max(0.5);
         for k in 0..=steps {
@@ -104,6 +109,7 @@ pub(super) fn render(view: &View) -> Picture {
     let mut canvas = Canvas::new();
     let Some([low, high]) = view.bounds().map(|b| b.map(Vec3::from)) else { return canvas.picture() };
     let back = Vec3::from(EYE.map(|x| x as f32)).normalize();
+    // Z is up in the picture as it is in CAD; the eye is never straight above.
     let right = Vec3::Z.cross(back).normalize();
     let up = back.cross(right);
     // The eight corners of the box decide the scale, so that nothing is cut off.
@@ -114,6 +120,7 @@ pub(super) fn render(view: &View) -> Picture {
             Vec3::new([low.x, high.x][k & 1], [low.y, high.y][k >> 1 & 1], [low.z, high.z][k >> 2]) - middle;
         reach = reach.max(Vec2::new(corner.dot(right), corner.dot(up)).abs());
     }
+    // Twice 0.46: a margin of 4 % on each side.
     let scale = (0.46 * canvas.width as f32 / reach.x).min(0.46 * canvas.height as f32 / reach.y);
     let (cx, cy) = (canvas.width as f32 / 2.0, canvas.height as f32 / 2.0);
     let project = |p: &[f32; 3]| {
@@ -133,6 +140,7 @@ pub(super) fn render(view: &View) -> Picture {
                     let normal = (b - a).cross(c - a).normalize_or_zero();
                     // Colours that are to be read keep their brightness on every side.
                     let dim = if values.is_some() { 0.75 } else { 0.3 };
+                    // Facets may look either way; both sides are lit.
                     let shade = dim + (1.0 - dim) * normal.dot(light).abs();
                     let base = match values {
                         Some(v) => v

@@ -12,6 +12,7 @@ use crate::simulate::{ReceiverResult, Results};
 pub(super) fn map(r: &ReceiverResult, grid: &Grid) -> Chart {
     let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
+    // Candela and lux beside watts: the unit tells the files apart.
     let name = if grid.unit == r.unit { stem } else { format!("{stem}-{}", grid.unit) };
     let caption = reading(r, grid);
     match lit_part(grid) {

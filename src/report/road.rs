@@ -31,9 +31,11 @@ fn intensity(grid: &Grid, h_deg: f64, v_deg: f64) -> Option<f64> {
 fn road_illuminance(grid: &Grid, aim: [f64; 2], aside: f64, ahead: f64) -> f64 {
     let distance = (aside * aside + ahead * ahead + LAMP_HEIGHT_M * LAMP_HEIGHT_M).sqrt();
     let h = aside.atan2(ahead).to_degrees();
+    // By the true elevation, which is what V of type A angles means.
     let v = -(LAMP_HEIGHT_M / distance).asin().to_degrees();
     // Outside the far field nothing is known; it is drawn dark.
     let candela = intensity(grid, h + aim[0], v + aim[1]).unwrap_or(0.0);
+    // E = I cos/d², with the cosine to the vertical h/d.
     candela * LAMP_HEIGHT_M / distance.powi(3)
 }
 
@@ -80,6 +82,7 @@ pub(super) fn from_driver(name: &str, grid: &Grid, aim: [f64; 2]) -> Chart {
     );
     let value = |h: f64, v: f64| {
         let drop = (-v).to_radians().tan();
+        // At the horizon and above the line of sight meets no road.
         if drop <= 0.0 {
             return 0.0;
         }

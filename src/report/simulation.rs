@@ -52,6 +52,7 @@ pub struct SimulationReport<'a> {
 pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     let mut lines = Polylines::default();
     let (mut power, mut rays, mut ends) = (Vec::new(), Vec::new(), Vec::new());
+    // A ray that was split has branches, and each is a line.
     for path in paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
         lines.push(path.iter().map(|v| v.point));
         power.push(path[0].power);
@@ -182,8 +183,10 @@ impl SimulationReport<'_> {
         maps.sort_by_key(|(k, _)| self.results.receivers[*k].kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
         let around = self.facets.mesh.bounds();
+        // Rays that leave go to infinity: they are cut a little outside of the model.
         let lines = lines.inside(&around.grown(0.35 * around.diagonal().max(1.0)));
         let out = ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
+        // Far fewer that end inside: they would hide the others.
         let stay = ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
         let note = "Facets as traced, parts in their colours, with some ray paths of the run.";
         let mut view = Some(
@@ -220,6 +223,7 @@ impl SimulationReport<'_> {
         for (k, r) in self.results.receivers.iter().enumerate() {
             maps.extend(photometric_grid(r).map(|grid| (k, grid)));
             let geometric = self.geometric.and_then(|g| g.receivers.get(k)).map(|error| error.cells.clone());
+            // Errors of other cells than these are none of them.
             let geometric = geometric.filter(|cells| cells.len() == r.cells.len());
             maps.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
         }
@@ -308,6 +312,7 @@ impl SimulationReport<'_> {
                 let figure = self.figures.get(i).and_then(|f| f.channels.get(j));
                 let geometric = figure.and_then(|f| f.figure.geometric);
                 let shown = |name: &str| c.name == name && sum > 0.0;
+                // x and y stand at the row of X; a dark receiver has no chromaticity.
                 let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
                 let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
                 table.row([

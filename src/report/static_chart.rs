@@ -26,12 +26,14 @@ impl Scale {
         let range =
             usable.fold(None, |r: Option<[f64; 2]>, v| Some(r.map_or([v, v], |[lo, hi]| [lo.min(v), hi.max(v)])));
         let [mut low, mut high] = range.unwrap_or(if axis.log { [1.0, 10.0] } else { [0.0, 1.0] });
+        // Room beside the outermost points, by a factor where the axis is logarithmic.
         if axis.log {
             (low, high) = (low / 1.3, high * 1.3);
         } else {
             if zero {
                 low = low.min(0.0);
             }
+            // All values alike leave no range; half of the value on both sides makes one.
             let pad = if high > low { 0.04 * (high - low) } else { 0.5 * high.abs().max(1.0) };
             (low, high) = (if zero && low == 0.0 { 0.0 } else { low - pad }, high + pad);
         }
@@ -58,6 +60,7 @@ impl Scale {
             let decades: Vec<f64> = (self.low.log10().ceil() as i32..=self.high.log10().floor() as i32)
                 .map(|e| 10f64.powi(e))
                 .collect();
+            // Fewer than three decades say too little: 1, 2 and 5 of each are marked then.
             if decades.len() >= 3 {
                 return decades;
             }
@@ -69,6 +72,7 @@ impl Scale {
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough).unwrap_or(rough);
         let first = (self.low / step).ceil() as i64;
+        // Twenty at most, for rounding may make a step that never ends.
         (first..).map(|k| k as f64 * step).take_while(|t| *t <= self.high).take(20).collect()
     }
 }
@@ -165,6 +169,7 @@ fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
 
 /// Widens the range of one linear scale, so that a unit is as long on both.
 fn equalise(x: &mut Scale, y: &mut Scale) {
+    // The coarser unit of the two: the other scale is widened to it, and nothing is cut off.
     let unit = |s: &Scale| (s.high - s.low) / (s.to - s.from).abs();
     let most = unit(x).max(unit(y));
     for scale in [x, y] {
@@ -196,6 +201,7 @@ const LINE: f64 = 15.0;
 
 /// A name in lines that fit under a bar, broken at spaces; a letter takes about half the size of the type.
 fn wrapped(name: &str, width: f64) -> Vec<String> {
+    // Three letters at least: a bar of a pixel still needs lines that end.
     let most = ((width - 4.0) / 6.8).max(3.0) as usize;
     let mut lines: Vec<String> = Vec::new();
     for word in name.split_whitespace() {
@@ -269,6 +275,7 @@ fn bar_chart(
 
 fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) -> [Scale; 2] {
     let [left, top, right, bottom] = AREA;
+    // Room for the colour bar.
     let right = right - 74.0;
     let plain =
         |range: [f64; 2], to: [f64; 2]| Scale { low: range[0], high: range[1], log: false, from: to[0], to: to[1] };

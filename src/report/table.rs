@@ -63,6 +63,7 @@ impl Table {
 
     /// Adds a row, cut or filled to the number of columns.
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        // Rows that do not fit would shift the cells of the page.
         let mut row: Vec<Cell> = cells.into_iter().take(self.columns.len()).collect();
         row.resize(self.columns.len(), Cell::Empty);
         self.rows.push(row);
@@ -110,6 +111,7 @@ impl Cell {
             Self::Empty => String::new(),
             Self::Text(t) => t.clone(),
             Self::Count(n) => n.to_string(),
+            // As Rust writes them: every digit, and none too many.
             Self::Number(x, _) => x.to_string(),
         }
     }

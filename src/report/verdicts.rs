@@ -103,6 +103,7 @@ fn table(a: &Assessment, name: &str) -> Table {
 
 /// The test points where they were read, over the far field as placed.
 fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
+    // As placed: the map is the one that the user knows; the points are moved to where they were read.
     let shown = lit_part(grid).unwrap_or_else(|| grid.clone());
     let placed = |[h, v]: [f64; 2]| [h + a.aim.h_deg, v + a.aim.v_deg];
     let within =
@@ -114,6 +115,7 @@ fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
         points.extend(at.map(|at| MapPoint { name: row.row.id.clone(), note: verdict, at }));
     }
     let outlines = a.rows.iter().filter_map(|r| r.row.polygon.as_ref());
+    // Closed: the first corner once more.
     let outlines = outlines.map(|p| p.iter().chain(p.first()).map(|q| placed(*q)).collect::<Vec<_>>());
     let outlines = outlines.filter(|p| p.iter().all(within)).collect();
     let title = format!("{}: test points over isocandela lines", a.regulation.id);

@@ -82,6 +82,7 @@ impl View {
         let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
         for shown in shown(facets) {
             let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
+            // Each part by its share of the triangles, but enough to be recognised.
             let limit = (SHOWN * traced.triangles.len()).div_ceil(total.max(1)).max(2000);
             let (FaceTriangles { points, faces, triangles }, cell) = simplified(traced, limit);
             merged = merged.max(cell);
@@ -131,6 +132,7 @@ impl View {
                 let count = if facets.mesh.facets[i].is_triangle() { 1 } else { 2 };
                 per_triangle.extend(std::iter::repeat_n(value, count));
             }
+            // Every so many triangles: merging corners would mix the values.
             if step > 1 {
                 triangles = triangles.into_iter().step_by(step).collect();
                 per_triangle = per_triangle.into_iter().step_by(step).collect();

@@ -140,9 +140,9 @@ pub fn complexity(
 }
 
 /// Prepares all methods, one inside the other, so that all are alive at once and rounds can alternate.
-// An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
-// one before.
 fn gather(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut dyn FnMut(&[Ready<'_>])) {
+    // An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
+    // one before.
     let Some((first, rest)) = methods.split_first() else { return then(ready) };
     (first.with)(model, &mut |who, facets| {
         let mut more = ready.to_vec();

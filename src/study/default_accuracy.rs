@@ -202,8 +202,8 @@ fn alternative(tolerance_mm: [f64; 2], intersector: &'static str, worst: &Worst,
 
 impl Undecided<'_> {
     /// What can be said without a pilot.
-    // From cheap to ask to dear.
     fn without_pilot(&self) -> Option<Chosen> {
+        // From cheap to ask to dear.
         let (intersector, because) = if self.facets.facets.is_empty() {
             ("octree", "there is no surface to meet")
         } else if self.model.placed_faces().any(|p| p.face.is_none()) {

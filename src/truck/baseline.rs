@@ -63,8 +63,10 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
         // All at once, as truck is meant to be used: its faces then share the points of their edges.
         let start = Instant::now();
         let shell: TruckShell = faces.iter().map(|f| f.truck.clone()).collect();
+        // What is left of the model's time, so that a hundred bad shells do not take a hundred times a shell's.
         let left = || MODEL.saturating_sub(begun.elapsed());
         let meshes = triangulated(shell, tolerance, SHELL.min(left())).unwrap_or_else(|| {
+            // Each face alone where all together fail: one bad face should not cost the rest.
             let alone = |f: &TruckFace| {
                 triangulated([f.truck.clone()].into_iter().collect(), tolerance, FACE.min(left()))?.pop()?
             };
@@ -135,6 +137,7 @@ fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh>
     })
 }
 
+/// Adds a face's triangles. Points with the same bits are one: truck gives those of a common edge with both faces.
 fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &PolygonMesh, face: FaceId) {
     let mut corner = |v: &StandardVertex| {
         let p = point(m.positions()[v.pos]);
@@ -150,6 +153,7 @@ fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &Polygon
     };
     let mut facets = Vec::new();
     for t in m.tri_faces() {
+        // A triangle is a facet whose last corner stands twice.
         let [a, b, c] = [0, 1, 2].map(|i| corner(&t[i]));
         facets.push([a, b, c, c]);
     }

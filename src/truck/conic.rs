@@ -51,6 +51,7 @@ impl Conic {
         }
         let c = 1.0 / self.radius;
         let inside = 1.0 - (1.0 + self.conic) * c * c * h * h;
+        // In this form there is no difference of large numbers, as z = R − √(R² − …) would have.
         (inside > 0.0).then(|| c * h * h / (1.0 + inside.sqrt()))
     }
 
@@ -77,12 +78,14 @@ impl Conic {
 
     /// The profile from the vertex `(0, z0)` to `(reach, z0 + sag)` in the x–z plane, exact as one rational quadratic.
     pub(super) fn profile(&self, z0: f64, reach: f64) -> Result<Curve, ShapeError> {
+        // One over the radius: a plane's is zero, and a radius of no number or zero is told with it.
         checked("a radius of curvature", 1.0 / self.radius, self.radius != 0.0, "anything but zero")?;
         checked("a conic constant", self.conic, true, "a finite number")?;
         checked("the half aperture", reach, reach > 0.0, "positive")?;
         let sag = self.sag_within(reach)?;
         let start = Point3::new(0.0, 0.0, z0);
         let end = Point3::new(reach, 0.0, z0 + sag);
+        // A flat profile is a line; the tangents of its ends meet nowhere.
         if sag == 0.0 {
             return Ok(Curve::Line(Line(start, end)));
         }

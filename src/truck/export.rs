@@ -60,6 +60,7 @@ impl<'a> Exporter<'a> {
             modeling::Face::try_new(wires, TruckSurface::NurbsSurface(surface.clone()))
                 .map_err(|e| format!("truck refuses its wires: {e}"))
         };
+        // First with edges that neighbours share; where truck refuses, with edges of the face's own.
         let shared = f.loops.iter().map(|l| self.wire(l)).collect::<Result<Vec<_>, _>>().and_then(build);
         let face =
             shared.or_else(|_| build(f.loops.iter().map(|l| self.cut_open(f, l)).collect::<Result<_, _>>()?))?;
@@ -71,6 +72,7 @@ impl<'a> Exporter<'a> {
     fn wire(&mut self, l: &TrimLoop) -> Result<modeling::Wire, String> {
         let mut sides: Vec<modeling::Edge> = Vec::new();
         for u in &l.uses {
+            // Poles are not there in space.
             let Some(id) = u.edge else { continue };
             let mut pieces = self.edge(id)?;
             if u.reversed {
@@ -96,6 +98,7 @@ impl<'a> Exporter<'a> {
                 curves.push(self.placed(if u.reversed { curve.reversed() } else { curve }));
             }
         }
+        // Truck's edges need two ends: a closed one is cut in the middle.
         if curves.len() == 1 {
             let [t0, t1] = curves[0].domain();
             let t = 0.5 * (t0 + t1);
@@ -115,6 +118,7 @@ impl<'a> Exporter<'a> {
         let edge = &self.part.edges[index];
         let [front, back] = edge.vertices.map(|v| self.vertices[v.0 as usize].clone());
         let curve = self.placed(edge.curve.clone());
+        // A closed edge, which truck does not know, is two.
         let made = if front == back {
             let [t0, t1] = curve.domain();
             let t = 0.5 * (t0 + t1);
@@ -146,12 +150,14 @@ fn truck_edge(a: &modeling::Vertex, b: &modeling::Vertex, c: &Curve) -> Result<m
 fn seam(f: &Face, u: &EdgeUse) -> Result<Curve, String> {
     let [t0, t1] = u.uv.domain();
     let (a, b) = (u.uv.evaluate(t0), u.uv.evaluate(t1));
+    // Seams are lines of constant parameter; anything else has no curve that both sides share.
     let constant = (0..2).find(|&k| u.uv.points.iter().all(|p| (p.position()[k] - a[k]).abs() < 1e-9));
     let constant = constant.ok_or("a seam that is no line of constant parameter")?;
     let [from, to] = [a[1 - constant], b[1 - constant]];
     let line = f.surface.isoline(constant, a[constant]);
     let [low, high] = line.domain();
     let cut = [from.min(to).max(low), from.max(to).min(high)];
+    // A stretch without length is a pole: a line from the point to itself.
     if cut[1] - cut[0] < 1e-12 * (high - low) {
         return Ok(Curve::line(line.evaluate(from), line.evaluate(from), [0.0, 1.0]));
     }

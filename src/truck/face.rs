@@ -37,6 +37,7 @@ pub(super) fn convert<'a>(
                 .iter()
                 .map(|w| {
                     let side = |e: &WireEdge<'a>| Side { curve: e.curve, reversed: e.reversed != flipped };
+                    // Turned to the other side, the wire is run backwards too.
                     if flipped { w.iter().rev().map(side).collect() } else { w.iter().map(side).collect() }
                 })
                 .collect();
@@ -49,6 +50,7 @@ pub(super) fn convert<'a>(
             traced(cut.surface, Analytic::Revolution, flipped, wires, Some(&middles))?
         }
     };
+    // Our normal is Su × Sv, truck's may be its opposite; and a face may be turned against its surface.
     let reversed = flipped == oriented;
     Ok(Face { analytic, reversed, loops, gap, ..Face::whole(surface) })
 }
@@ -77,6 +79,7 @@ fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
         }
         loops.push(TrimLoop { uses });
     }
+    // Truck's wires may run beside their plane by its own tolerance.
     if gap > ACCEPTED {
         return Err(format!("an edge lies {gap:.3e} mm off its plane; at most {ACCEPTED:e} mm is accepted"));
     }
@@ -89,6 +92,7 @@ fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     if !(low.x < high.x && low.y < high.y) {
         return Err("a plane face without an extent".into());
     }
+    // The plane goes no farther than its loops, for a domain must be finite.
     let surface = sweep::plane(&frame, [[low.x, high.x], [low.y, high.y]]);
     let loops = finished(&surface, loops)?;
     Ok((surface, Analytic::Plane { frame }, false, loops, gap))
@@ -114,6 +118,7 @@ fn traced(
             gap = gap.max(traced.gap);
             let mut uv = traced.uv;
             for p in &mut uv.points {
+                // A step of rounding beyond the domain would be outside of the face.
                 *p = ControlPoint::weighted(surface.clamp(p.position()), p.weight());
             }
             uses.push(EdgeUse { edge: Some(e.id), reversed: e.reversed, uv });
@@ -128,6 +133,7 @@ fn traced(
 fn finished(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, String> {
     let mut closed = loops.into_iter().map(|l| close(surface, l)).collect::<Result<Vec<_>, _>>()?;
     let areas: Vec<f64> = closed.iter().map(signed_area).collect();
+    // In the plane of parameters the largest loop holds the others.
     let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
     for (i, l) in closed.iter_mut().enumerate() {
         if (areas[i] > 0.0) != (Some(i) == outer) {
@@ -153,6 +159,7 @@ fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
         }
         let start = uses.last().map(EdgeUse::end);
         uses.push(next);
+        // The ends of neighbours agree to rounding and must agree to the bit.
         if let (Some(start), Some(last)) = (start, uses.last_mut()) {
             move_end(last, true, start);
         }
@@ -172,6 +179,7 @@ fn bridge(surface: &Surface, extent: Uv, uses: &mut Vec<EdgeUse>, to: Uv) -> Res
         return Ok(());
     }
     let off = |s: f64| (surface.evaluate(from + (to - from) * s) - surface.evaluate(from)).length();
+    // Only a pole lets the parameters jump while the point stays.
     if [0.25, 0.5, 0.75, 1.0].map(off).into_iter().fold(0.0, f64::max) > ACCEPTED {
         return Err("edges that do not meet in the parameters of their surface".into());
     }

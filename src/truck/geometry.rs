@@ -68,6 +68,7 @@ fn fitted(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Cur
     Err(format!("an intersection curve that {MAX_PIECES} cubic pieces do not follow within {FIT} mm"))
 }
 
+/// A curve as we need it, clamped to its domain; truck itself checks little of what it is given.
 fn checked_curve(c: Curve) -> Result<Curve, String> {
     if c.degree == 0 || c.degree > MAX_DEGREE {
         return Err(format!("a curve of degree {}; 1 to {MAX_DEGREE} are supported", c.degree));
@@ -77,6 +78,7 @@ fn checked_curve(c: Curve) -> Result<Curve, String> {
     if !(a < b && c.knots.iter().all(|k| k.is_finite())) {
         return Err("a curve over an empty parameter interval".into());
     }
+    // Cut to its domain a spline is clamped, as all our curves are.
     Ok(c.restricted(a, b))
 }
 
@@ -94,6 +96,7 @@ fn check_points(points: &[Homogeneous]) -> Result<(), String> {
 pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) -> Result<Surface, String> {
     let knots = [knots.0.iter().copied().collect::<Vec<f64>>(), knots.1.iter().copied().collect()];
     let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
+    // Truck tells no degree of a surface: knots and control points do.
     let degree = [0, 1].map(|k| knots[k].len().saturating_sub(counts[k] + 1));
     if counts.contains(&0) || degree.iter().any(|d| *d == 0 || *d > MAX_DEGREE) {
         return Err(format!("a surface of degrees {degree:?}; 1 to {MAX_DEGREE} are supported"));

@@ -51,6 +51,7 @@ pub fn solid(name: &str, solid: &modeling::Solid) -> Conversion {
 /// The model of a shell; normals are those of truck's faces, turned outward when the shell is closed.
 pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     let mut made = Maker::default();
+    // Of an open shell nobody can say which side is out.
     let closed = shell.shell_condition() == modeling::ShellCondition::Closed;
     made.shell(shell, closed);
     made.finish(name)
@@ -96,6 +97,7 @@ impl Maker {
     }
 
     fn edge(&mut self, e: &modeling::Edge) -> Result<EdgeId, String> {
+        // By truck's id: neighbours hold the same edge, and must get the same curve.
         if let Some(known) = self.edges.get(&e.id()) {
             return known.clone();
         }
@@ -125,12 +127,14 @@ impl Maker {
             let inside_out = shell.closed && points_outward(shell) == Some(false);
             let is_void = Some(i) != outer;
             if shell.closed && inside_out != is_void {
+                // An outer shell should look out of the material, and so should a void: into its hollow.
                 shell.faces.iter_mut().for_each(|f| f.reversed = !f.reversed);
             }
         }
         if let Some(outer) = outer {
             self.part.shells.swap(0, outer);
             for r in &mut self.refused {
+                // Refusals name shells by their place, which has changed for two of them.
                 r.shell = if r.shell == outer {
                     0
                 } else if r.shell == 0 {
@@ -155,11 +159,13 @@ fn shell_bounds(shell: &Shell, edges: &[Edge]) -> Aabb {
 fn points_outward(shell: &Shell) -> Option<bool> {
     let samples: Vec<(Vector, Vector)> = shell.faces.iter().flat_map(face_samples).collect();
     let mut votes = 0i32;
+    // Many directions, for a face may be hidden, or missing, in some.
     for k in 0..26 {
         // The 26 neighbours of a cell, slightly skewed so that flat sides do not tie.
         let c = if k < 13 { k } else { k + 1 };
         let skew = Vector::new(0.137, -0.071, 0.093);
         let d = Vector::new(f64::from(c % 3) - 1.0, f64::from(c / 3 % 3) - 1.0, f64::from(c / 9) - 1.0) + skew;
+        // Where the shell reaches farthest lies its outside.
         if let Some((_, n)) = samples.iter().max_by(|a, b| a.0.dot(d).total_cmp(&b.0.dot(d))) {
             votes += if n.dot(d) > 0.0 { 1 } else { -1 };
         }

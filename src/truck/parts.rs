@@ -43,6 +43,7 @@ impl Lens {
         let reach = self.half_aperture;
         let front = self.front.profile(0.0, reach)?;
         let back = self.back.profile(self.thickness, reach)?;
+        // Both profiles reach the aperture, or they would have been refused.
         let rim = [self.front.sag(reach), self.back.sag(reach)].map(Option::unwrap_or_default);
         let edge = self.thickness + rim[1] - rim[0];
         checked("the thickness", self.thickness, self.thickness > 0.0, "positive")?;
@@ -57,6 +58,7 @@ impl Lens {
             [at(0.0, 0.0), at(reach, rim[0]), at(reach, self.thickness + rim[1]), at(0.0, self.thickness)];
         let side = Curve::Line(Line(vertices[1].point(), vertices[2].point()));
         let wire = Wire::from(vec![
+            // From the axis outwards, around the rim and back: turned about the axis the wire closes itself.
             Edge::new(&vertices[0], &vertices[1], front),
             Edge::new(&vertices[1], &vertices[2], side),
             Edge::new(&vertices[3], &vertices[2], back).inverse(),
@@ -126,6 +128,7 @@ impl Reflector {
         let at = |h: f64| Ok(builder::vertex(Point3::new(h, 0.0, self.shape.sag_within(h)?)));
         let (inner, outer) = (at(self.hole)?, at(self.half_aperture)?);
         let wire = Wire::from(vec![Edge::new(&inner, &outer, profile)]);
+        // With a hole the profile ends off the axis, without one on it: truck has a sweep for each.
         Ok(if self.hole > 0.0 {
             builder::rsweep(&wire, Point3::new(0.0, 0.0, 0.0), Vector3::unit_z(), TURN)
         } else {

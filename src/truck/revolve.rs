@@ -66,6 +66,7 @@ impl Revolved {
         for sides in loops {
             let (mut low, mut high, mut angles) = self.angles(sides)?;
             if let Some([a, b]) = range {
+                // By whole turns beside the loops before it, for angles of a loop have no beginning of their own.
                 let turn = 2.0 * PI * ((0.5 * (a + b) - 0.5 * (low + high)) / (2.0 * PI)).round();
                 (low, high) = (low + turn, high + turn);
                 angles.iter_mut().for_each(|x| *x += turn);
@@ -84,6 +85,7 @@ impl Revolved {
         b = b.min(a + 2.0 * PI);
         let range = [a, b];
         let local = sweep::revolution(&self.meridian, &self.axis, range);
+        // The spline's parameter is no angle but the tangent of a part of it.
         for angle in middles.iter_mut().flatten() {
             *angle = conic::parameter_of_angle(range, angle.clamp(a, b));
         }
@@ -107,6 +109,7 @@ impl Revolved {
         for i in (0..n).map(|k| (first + k) % n) {
             let side = &sides[i];
             let [t0, t1] = side.curve.domain();
+            // Steps of less than half a turn, so that unwrapping cannot go wrong.
             for k in 0..=SAMPLES {
                 let s = k as f64 / SAMPLES as f64;
                 let s = if side.reversed { 1.0 - s } else { s };
@@ -138,6 +141,7 @@ impl Revolved {
             return Err("a loop on the axis of its surface".into());
         };
         let has_pole = sides.iter().any(ends_on_axis);
+        // Without a pole a loop must end at the angle at which it began.
         if !has_pole && (last - start).abs() > 1.0 {
             return Err(
                 "a face that closes around its axis; cut it into sectors, as truck's own builder does".into()
@@ -169,6 +173,7 @@ fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
     let samples: Vec<Point> = samples.collect();
     let radius = |p: &Point| p.x.hypot(p.y);
     let farther = |far: Point, p: Point| if radius(&p) >= radius(&far) { p } else { far };
+    // The farthest point tells the angle best.
     let farthest = samples.iter().copied().fold(samples[0], farther);
     let reach = radius(&farthest);
     if reach < ON_AXIS * (1.0 + size) {

@@ -41,6 +41,7 @@ pub(super) struct Traced {
 impl<'a> Tracer<'a> {
     pub(super) fn new(surface: &'a Surface) -> Self {
         let [[u0, u1], [v0, v1]] = surface.domain();
+        // Some samples a span, within what is quick to search.
         let steps = |k: usize| (4 * surface.knots[k].len()).clamp(12, 64);
         let (nu, nv) = (steps(0), steps(1));
         let seeds = (0..=nu)
@@ -69,6 +70,7 @@ impl<'a> Tracer<'a> {
             ts[last] = t1;
             let uv = self.through(edge, &ts, near_u)?;
             let gap = self.gap(edge, &uv, &ts);
+            // When halving no longer helps, the file's own gap is what is left.
             if gap <= WANTED || 2 * ts.len() > MAX_PIECES {
                 return if gap <= ACCEPTED {
                     Ok(Traced { uv, gap })
@@ -83,6 +85,7 @@ impl<'a> Tracer<'a> {
     fn gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
         let off = |t: f64| (self.surface.evaluate(uv.evaluate(t)) - edge.evaluate(t)).length();
         ts.windows(2)
+            // At the middles, where Hermite pieces are worst, and on both sides of them.
             .flat_map(|p| [0.25, 0.5, 0.75, 1.0].map(|s| p[0] + s * (p[1] - p[0])))
             .map(off)
             .fold(off(ts[0]), f64::max)
@@ -129,12 +132,14 @@ impl<'a> Tracer<'a> {
 
     /// The parameters of the point of the surface that is closest to `p`.
     fn closest(&self, p: Point, near_u: Option<f64>) -> Result<Uv, String> {
+        // A seam's two sides lie a whole domain apart: a third of it tells them.
         let allowed = |uv: Uv| near_u.is_none_or(|u| (uv.x - u).abs() <= 0.3 * self.extent.x);
         let seeds = self.seeds.iter().filter(|(uv, _)| allowed(*uv));
         let mut order: Vec<(f64, Uv)> = seeds.map(|(uv, q)| ((*q - p).length_squared(), *uv)).collect();
         if order.is_empty() {
             return Err("an edge outside the parameters of its surface".into());
         }
+        // The six nearest samples: a fold may hide the true foot from the nearest one.
         let tried = order.len().min(6);
         order.select_nth_unstable_by(tried - 1, |a, b| a.0.total_cmp(&b.0));
         let distance = |uv: Uv| (self.surface.evaluate(uv) - p).length();
@@ -165,6 +170,7 @@ impl<'a> Tracer<'a> {
                 scale *= 0.5;
             };
             let moved = ((next - uv) / self.extent).abs().max_element();
+            // What no step brings nearer is the foot, to rounding.
             if next_off > off {
                 break;
             }
@@ -191,6 +197,7 @@ fn solve(du: Vector, dv: Vector, v: Vector) -> Uv {
         let (p, q) = (du.dot(v), dv.dot(v));
         return Uv::new(c * p - b * q, a * q - b * p) / determinant;
     }
+    // Parallel derivatives: along the longer one, for the other has no say.
     let one = |along: Vector, length2: f64| if length2 > 0.0 { along.dot(v) / length2 } else { 0.0 };
     if a > c { Uv::new(one(du, a), 0.0) } else { Uv::new(0.0, one(dv, c)) }
 }

@@ -123,6 +123,7 @@ impl ValueEnum for NormalMode {
 /// A positive length in mm.
 fn length(text: &str) -> Result<f64, String> {
     let value: f64 =
+        // The unit may be written; it is always mm.
         text.trim().trim_end_matches("mm").trim().parse().map_err(|_| format!("'{text}' is no number of mm"))?;
     if value > 0.0 && value.is_finite() {
         Ok(value)
@@ -163,6 +164,7 @@ fn ray_range(text: &str) -> Result<RayRange, String> {
     let Some((first, end)) = text.split_once("..") else {
         return Ok(RayRange { first: None, end: count(text)? });
     };
+    // `count` takes nothing below 1, but ranges begin at ray 0.
     let first = if first.trim() == "0" { 0 } else { count(first.trim())? };
     let end = count(end.trim())?;
     if first >= end {
@@ -179,6 +181,7 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
     let (digits, factor) = match plain.chars().last() {
         Some('k') => (&plain[..plain.len() - 1], 1000.0),
+        // Letters of one byte: the cut is at a character.
         Some('M') => (&plain[..plain.len() - 1], 1_000_000.0),
         Some('G') => (&plain[..plain.len() - 1], 1_000_000_000.0),
         _ => (plain.as_str(), 1.0),
@@ -193,6 +196,7 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
 
 /// `0.05deg`: a direction error in degrees.
 fn accuracy(text: &str) -> Result<f64, String> {
+    // A bare number is taken for degrees.
     let number = text.strip_suffix("deg").or_else(|| text.strip_suffix('°')).unwrap_or(text);
     let value = number.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && *v < 90.0);
     value.ok_or_else(|| format!("an accuracy is an angle above 0, as in 0.05deg, not '{text}'"))

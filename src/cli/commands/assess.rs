@@ -34,6 +34,7 @@ pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
 }
 
 pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completion, Failure> {
+    // The parser asks for both, but for --list.
     let name = command.regulation.ok_or_else(|| Failure::arguments("no --regulation is given"))?;
     let regulation = Regulation::find(name).map_err(Failure::arguments)?;
     let given = command.result.ok_or_else(|| Failure::arguments("no result is given"))?;
@@ -86,6 +87,7 @@ impl ResultsFile {
             let help = "a verdict needs a receiver of kind \"far_field\" with angles \"A\" in a run that counts lm";
             Failure::arguments(format!("{}: {what}", self.path.display())).with_help(help)
         };
+        // The second one tells whether there is a choice to make.
         match (found.next(), found.next()) {
             (Some(one), None) => Ok(one),
             (None, _) => Err(failure("no far field in candela over H and V")),
@@ -112,6 +114,7 @@ impl ResultsFile {
         let failure = |what: String| Failure::input(format!("{}: {what}", path.display()));
         let text = std::fs::read_to_string(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
         let (rays, emitted) = (self.results["rays"].as_f64(), self.results["power"]["emitted"].as_f64());
+        // A run without rays tells no flux of one.
         let ray_flux = rays.zip(emitted).filter(|(rays, _)| *rays > 0.0).map(|(rays, emitted)| emitted / rays);
         IntensityMap::from_csv(&text, ray_flux).map_err(failure)
     }

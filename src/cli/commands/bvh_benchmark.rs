@@ -60,6 +60,7 @@ pub(crate) fn run(
     console: &Console,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<BvhBenchmark, Failure> {
+    // Read first: a file that is no list of rays must not cost the time of meshing.
     let given = command.rays_in.map(read_rays).transpose()?;
     let loaded = match command.file {
         None => demo::lamp()?.1,
@@ -69,6 +70,7 @@ pub(crate) fn run(
     };
     let name = command.file.map_or("three-cavity lamp".into(), |p| p.display().to_string());
     let threads = threads::set_threads(command.tracing.threads)?;
+    // A tolerance that is asked for is the only one.
     let tolerances = command.meshing.tolerance.map_or(TOLERANCES.to_vec(), |[finest, _]| vec![finest]);
     let mut benchmark = BvhBenchmark { rows: Vec::new(), answer: String::new(), shapes: Vec::new() };
     for (k, &tolerance) in tolerances.iter().enumerate() {
@@ -169,6 +171,7 @@ impl BvhBenchmark {
     /// All intersectors on rays of one kind, on one thread and on all; what the first of them, the octree, did for them.
     fn measure_rays(&mut self, question: &Question, entrants: &[Entrant; 6], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
+        // The octree's answers are what others are compared with; who is right is asked of the arbiter.
         let truth = answers(entrants[0].who, rays).0;
         let hits = truth.iter().flatten().count();
         let mut judged: Vec<(Comparison, Cost)> = (entrants.iter())
@@ -180,6 +183,7 @@ impl BvhBenchmark {
         // The octree errs where any other is right against it.
         judged[0].0.wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
         for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
+            // With one thread in all the second batch would be the first once more.
             if call == "batch" && threads == 1 && self.has_row(mesh, kind, call, 1) {
                 continue;
             }
@@ -227,6 +231,7 @@ fn row(
     json!({
         "model": model, "facets": mesh.facets.len(), "intersector": entrant.name, "build": entrant.build,
         "rays_kind": kind, "call": call, "threads": threads,
+        // A rate is fast where the time is short: the percentiles change places.
         "mrays_per_s_min": rate(timing.p90), "mrays_per_s_median": rate(timing.median), "mrays_per_s_p90": rate(timing.min),
         "build_seconds": footprint.build_seconds,
         "bytes_per_facet": footprint.bytes as f64 / mesh.facets.len().max(1) as f64,
@@ -265,8 +270,10 @@ fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray>
             if mesh.facets.is_empty() {
                 return Some(ray);
             }
+            // A prime step goes through the facets without following their order.
             let corners = mesh.corners(k.wrapping_mul(7919) % facets);
             let target = if k % 2 == 0 { corners[k % 4] } else { 0.5 * (corners[k % 4] + corners[(k + 1) % 4]) };
+            // A ray from a point to itself has no direction.
             Ray::from_points(ray.origin, target)
         })
         .collect()

@@ -17,12 +17,14 @@ pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Resul
             .with_help(format!("--cache DIR or the variable {FOLDER_VARIABLE} names the folder to keep it in")));
     };
     let unreadable = |e: std::io::Error| Failure::running(format!("{}: {e}", cache.folder().display()));
+    // Removed first: what is then listed is what is left.
     let removed = if clear { cache.clear().map_err(unreadable)? } else { 0 };
     let entries = cache.entries().map_err(unreadable)?;
     let total: u64 = entries.iter().map(|e| e.bytes).sum();
     if console.json {
         let entries: Vec<_> = (entries.iter())
             .map(|e| {
+                // A clock that was set back makes an age negative.
                 let unused = e.used.elapsed().map_or(0.0, |age| age.as_secs_f64());
                 json!({"file": e.file.display().to_string(), "bytes": e.bytes, "seconds_since_use": unused})
             })

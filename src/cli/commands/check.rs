@@ -40,6 +40,7 @@ const FEWEST_SCENE_RAYS: u64 = 64;
 const TABLE_WIDTH: usize = 100;
 
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
+    // Before any work: a folder that cannot be made would cost it.
     for path in command.rays_out.iter().chain(&command.disagreements) {
         make_folder(&folder_of(path))?;
     }
@@ -76,6 +77,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let mut found =
         cross_check::cross_check(&intersectors, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
     bar.finish_and_clear();
+    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
     if normals == NormalMode::Exact {
         let [distance, angle] = polished_errors(&polish, exact, &rays, settings.loosest());
         found.facets_vs_exact.t_error_mm = distance;
@@ -114,6 +116,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         print(&(summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
         say_files(command, &found, console);
     }
+    // Last, for the answer counts although faces are missing.
     let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
 }
@@ -206,6 +209,7 @@ fn own_rays(
     let count = tracing.rays().unwrap_or(RAYS);
     let Some(scene) = scene else {
         let seed = tracing.seed.unwrap_or(1);
+        // A third each: coherent, random and bouncing rays find different faults.
         let (bounds, third) = (mesh.bounds(), (count / 3).max(1));
         let camera = Camera::new(&bounds, third.min(count));
         let uniform = Uniform::new(&bounds, seed, third.min(count - camera.len()));
@@ -236,6 +240,7 @@ fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ra
     let (mut distance, mut angle) = (Quantiles::default(), Quantiles::default());
     for (p, e) in ask(polish).into_iter().zip(ask(exact)).filter_map(|(p, e)| p.zip(e)) {
         let apart = (p.t - e.t).abs();
+        // On another face, or farther away, it is another crossing.
         if p.face == e.face && apart <= near {
             distance.add(apart);
             angle.add(p.normal.cross(e.normal).length().atan2(p.normal.dot(e.normal)).to_degrees());

@@ -51,6 +51,7 @@ pub(crate) fn run(
     let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
     say_step("tessellate", what, prepared.tessellation_seconds);
     let start = std::time::Instant::now();
+    // Claimed before the trace, which would be lost on a folder that cannot be written.
     let _owned = OutputPlace::folder(folder)?;
     let with_page = page.is_wanted();
     results_folder::try_folder(&prepared, folder, with_page)?;
@@ -65,12 +66,14 @@ pub(crate) fn run(
     say_step("trace", what, s.trace);
     if let Some(check) = &run.check {
         let what = format!("{} rays asked again of BVH and exact spline", grouped(check.rays));
+        // What is left of the time of both.
         say_step("check", what, both - s.build - s.trace);
     }
     let comparison = comparison(r);
     let start = std::time::Instant::now();
     let (document, answer) = results_folder::write(&prepared, folder, &mut run, comparison, with_page, console)?;
     write_atomic(&folder.join("lamp.stp"), |w| w.write_all(LAMP))?;
+    // The scene beside its model, as a user would keep them.
     write_atomic(&folder.join("lamp.toml"), |w| w.write_all(SCENE.replace(LAMP_FILE, "lamp.stp").as_bytes()))?;
     say_step("write", format!("report, pictures, data into {}", folder.display()), start.elapsed().as_secs_f64());
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;

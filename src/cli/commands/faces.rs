@@ -37,10 +37,12 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
 fn part_selectors(model: &Model) -> Vec<Option<String>> {
     let mut first: Vec<Option<usize>> = vec![None; model.parts.len()];
     for (k, instance) in model.instances.iter().enumerate() {
+        // Where the part stands first: one face of a part is told by the same keys everywhere.
         first[instance.part.0 as usize].get_or_insert(k);
     }
     let mut faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
     faces.retain(|f| first[f.part.0 as usize] == Some(f.instance));
+    // The account goes by parts, the model by instances.
     faces.sort_by_key(|f| (f.part.0, f.id));
     let mut texts = face_selectors(model, &faces).into_iter().map(|s| Some(s.as_key()));
     let mut selectors = Vec::new();
@@ -68,6 +70,7 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
     let count = grouped(solid.faces.len() as u64);
     let mut text = format!("  solid {}{name}: {closed}, {count} faces, {} mm²\n", solid.index, figures(area, 5));
+    // Every selector is taken, shown or not, or the next solid would get those of this one.
     for (k, (face, selector)) in solid.faces.iter().zip(selectors).enumerate() {
         if k < most {
             text += &face_text(face, selector.as_deref());

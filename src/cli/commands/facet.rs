@@ -36,11 +36,13 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         &monitor,
     )?;
     let mut settings = mesh_settings(&meshing, None, &loaded.model)?;
+    // The report tells what was reached, measured by other code than the prover's.
     settings.measure = true;
     let (mut made, _) = tessellate_model(&loaded.model, &settings, &monitor);
     made.report.seconds.read = loaded.seconds;
     made.report.peak_bytes = machine::peak_bytes();
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
+    // Only VTU has a place for them, and they cost a look at every facet.
     if command.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
         (facets.normal_error_deg, facets.curvature_per_mm) = normal_errors(&loaded.model, &made.mesh);
     }
@@ -221,6 +223,7 @@ pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f
             let facet = &mesh.facets[i];
             let Some((placed, face)) = faces.get(facet.face.index()).and_then(|p| p.face.map(|face| (p, face)))
             else {
+                // A ready mesh has no surface to err from.
                 return (f64::NAN, f64::NAN);
             };
             let corners = facet.vertices.map(|v| mesh.vertices[v as usize]);
@@ -233,6 +236,7 @@ pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f
                 let uv = place.iter().map(|&k| corners[k].uv * share).sum();
                 let mixed: crate::math::Vector = place.iter().map(|&k| corners[k].normal).sum();
                 let d = face.surface.second_derivatives(face.surface.clamp(uv));
+                // At a pole there is no normal to compare.
                 let Some(n) = d.du.cross(d.dv).try_normalize() else { continue };
                 let true_normal = placed.placement.normal(if face.reversed { -n } else { n });
                 let angle = mixed.cross(true_normal).length().atan2(mixed.dot(true_normal)).to_degrees();
@@ -246,6 +250,7 @@ pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f
 
 /// Largest absolute principal curvature from the two fundamental forms.
 fn curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64 {
+    // From the first and second fundamental form: E, F, G and L, M, N.
     let (e, f, g) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
     let (l, m, k) = (d.duu.dot(n), d.duv.dot(n), d.dvv.dot(n));
     let det = e * g - f * f;
@@ -254,5 +259,6 @@ fn curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64
     }
     let mean = (e * k - 2.0 * f * m + g * l) / (2.0 * det);
     let gauss = (l * k - m * m) / det;
+    // The larger of both principal curvatures is |H| + √(H² − K).
     mean.abs() + (mean * mean - gauss).max(0.0).sqrt()
 }

@@ -31,6 +31,7 @@ pub(crate) fn run(
     } else {
         print(&summary(&report, console))?;
     }
+    // Products, for zero of zero faces are no excess.
     let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
     Ok(Completion::incomplete_if(over))
 }

@@ -32,6 +32,7 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
         Some(path) => path.to_path_buf(),
         None => PathBuf::from(last_component(file)).with_extension("toml"),
     };
+    // A scene has work in it: it is never written over.
     if scene_file.exists() {
         let failure = Failure::arguments(format!("{}: is there already", scene_file.display()));
         return Err(failure.with_help("give another name with -o"));
@@ -60,6 +61,7 @@ fn last_component(file: &Path) -> &OsStr {
 fn model_reference(file: &Path, scene_file: &Path) -> String {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
+    // A path beside the scene moves with it; any other must be absolute, for the scene may be read from elsewhere.
     let path = if is_beside { PathBuf::from(last_component(file)) } else { absolute(file) };
     path.to_string_lossy().into_owned()
 }
@@ -107,6 +109,7 @@ fn rule(part: &Part) -> String {
 /// A beam along z that covers the model, and a plane behind it.
 fn light(model: &Model) -> String {
     let bounds = model.bounds();
+    // A model without faces still gets a scene that can be read.
     let [low, high] =
         if bounds.is_empty() { [[-1.0; 3], [1.0; 3]] } else { [bounds.min.to_array(), bounds.max.to_array()] };
     let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
@@ -114,6 +117,7 @@ fn light(model: &Model) -> String {
     // A middle that is off by rounding alone stands at 0.
     let middle =
         [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])).map(|x| if x.abs() < ROUNDING * diagonal { 0.0 } else { x });
+    // A model that is a rod along z still gets a beam.
     let radius = BEAM_MARGIN * half[0].hypot(half[1]).max(DISTANCE * diagonal / 10.0);
     let at = |z: f64| format!("[{}, {}, {}]", short(middle[0]), short(middle[1]), short(z));
     let width = short(RECEIVER_WIDTHS * radius);
@@ -139,6 +143,7 @@ fn light(model: &Model) -> String {
 
 /// A number of five digits as TOML takes it.
 fn short(value: f64) -> String {
+    // As `figures` writes for people: TOML knows neither their minus nor their spaces.
     let digits = figures(value, 5).replace('−', "-").replace('\u{202f}', "");
     digits.parse::<f64>().map_or_else(|_| value.to_string(), |_| digits)
 }

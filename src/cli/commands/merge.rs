@@ -45,6 +45,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let monitor = TerminalMonitor::new(console);
     let first = first_part(command, &patience, console)?;
     let header: TallyHeader = PartialRun::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
+    // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
     let (scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
         Some(_) => Failure::from(error),
@@ -57,10 +58,12 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let job = SceneJob { meshing, tracing, cache, ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
     let (mut whole, mut usage) = sum(command, &header, &prepared)?;
+    // Looked at again as a whole: parts may grow while they are waited for.
     while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, &header)) {
         (whole, usage) = sum(command, &header, &prepared)?;
     }
     if is_tally(command.folder) {
+        // A merge into a tally sums up what is there, whole or not.
         return write_sum(command, &prepared, &scene_path, (&whole, usage), console);
     }
     if !whole.is_whole() {
@@ -156,6 +159,7 @@ impl Patience {
 /// The first part there is, waited for where that was asked.
 fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<PathBuf, Failure> {
     loop {
+        // Listed anew each time: parts appear in the folder.
         let files = part_files(command.parts)?;
         match files.into_iter().find(|file| file.exists()) {
             Some(file) => return Ok(file),
@@ -178,6 +182,7 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         let entries = std::fs::read_dir(argument).map_err(|e| unreadable(argument, e))?;
         let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        // A checkpoint is of a run that is still traced.
         inside.retain(|path| path.extension().is_some_and(|e| e == "tally") && !path.ends_with(CHECKPOINT));
         inside.sort();
         files.extend(inside);
@@ -227,6 +232,7 @@ fn sum(
     }
     let mut sum = sum.ok_or_else(|| Failure::arguments("merge: no parts given"))?;
     if let Some(rays) = command.rays {
+        // As many whole replicates as hold these rays.
         let replicates = u32::try_from(rays.div_ceil(GROWING_REPLICATE)).unwrap_or(u32::MAX);
         if !sum.grows || replicates < sum.replicates {
             let there = u64::from(sum.replicates) * GROWING_REPLICATE;
@@ -248,6 +254,7 @@ fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
         text += &format!(": rays {}", missing_rays(whole).join(", "));
     } else if let Some([_, n]) = header.shard {
         let shards: Vec<String> = (0..n)
+            // A shard without any of its replicates, or with some of them only.
             .filter(|&k| replicates_of_shard(0..whole.replicates, [k, n]).any(|r| absent(&r)))
             .map(|k| format!("{}/{n}", k + 1))
             .collect();
@@ -260,6 +267,7 @@ fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
 fn missing_rays(whole: &PartialRun) -> Vec<String> {
     let mut ranges = Vec::new();
     let mut next = 0;
+    // The number of all replicates closes the last gap.
     for &replicate in whole.done.iter().chain([&whole.replicates]) {
         if replicate > next {
             let [first, end] = [next, replicate].map(|r| u64::from(r) * GROWING_REPLICATE);

@@ -21,6 +21,7 @@ pub(crate) fn schema() -> Result<Completion, Failure> {
 
 pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
     let mut command = Arguments::command();
+    // Built, so that options of every command stand in every page.
     command.build();
     let render = |command: clap::Command| -> std::io::Result<Vec<u8>> {
         let mut page = Vec::new();
@@ -33,6 +34,7 @@ pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion
     };
     std::fs::create_dir_all(folder)?;
     let subcommands: Vec<clap::Command> =
+        // `help` is clap's own and has nothing to tell.
         command.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
     let mut pages = vec![("lampyris".to_owned(), command)];
     for subcommand in subcommands {

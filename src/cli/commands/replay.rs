@@ -40,6 +40,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
         })?;
         read_ledger(&text, &mut request).map_err(|m| Failure::input(format!("--replay {word}: {m}")))?;
     }
+    // Traced once each, in the order of the run.
     request.rays.sort_unstable();
     request.rays.dedup();
     Ok(request)
@@ -57,6 +58,7 @@ fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
         request.rays.push(number(line.split(',').next())?);
         let mut last = line.rsplit(',');
         let (rays, seed) = (number(last.next())?, number(last.next())?);
+        // One ledger is of one run; of two nobody could say which seed holds.
         if request.run.replace([seed, rays]).is_some_and(|r| r != [seed, rays]) {
             return Err(format!("line {}: another seed or number of rays than the lines before", k + 2));
         }
@@ -73,10 +75,12 @@ pub(crate) fn run(
 ) -> Result<(), Failure> {
     let settings = prepared.run_settings();
     let [seed, rays] = request.run.unwrap_or([settings.seed, settings.rays]);
+    // A ray is traced again only by the seed and the number of rays of its own run.
     let settings = RunSettings { seed, rays, ..settings };
     let found = prepared.with_intersector(&TerminalMonitor::new(console), |intersector, _| {
         replay(&prepared.bound, intersector, &settings, &request.rays)
     });
+    // Rays beyond the last are not traced.
     if found.rays < request.rays.len() as u64 {
         let message = format!("--replay: the run has {rays} rays, counted from 0");
         return Err(Failure::arguments(message).with_help("give the number of rays that the run had with --rays"));
@@ -97,6 +101,7 @@ pub(crate) fn run(
 
 /// Every vertex of every path, and where a ray was lost.
 fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure> {
+    // Branches of a split ray follow each other.
     for path in found.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
         print(&format!("ray {}, branch {}\n", path[0].ray, path[0].branch))?;
         for v in path {

@@ -101,6 +101,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ),
         ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
     ];
+    // The first one is told; the others would be in vain too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
     let Some((option, _, _, why)) = idle else { return Ok(()) };
     let failure = Failure::arguments(format!("study {} does not take {option}: {why}", kind.name()));
@@ -156,6 +157,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     write_atomic(&folder.join("study.json"), |w| w.write_all(text.as_bytes()))?;
     let mut report = study_report(&document, provenance);
     if command.kind == StudyKind::Accuracy {
+        // Behind the front, before the times.
         report.sections.insert(1, error_view(command, console)?);
     }
     if command.kind == StudyKind::Bvh {
@@ -200,6 +202,7 @@ fn study_accuracy(
     progress: Report,
 ) -> Result<StudyResult, Failure> {
     let (scene, loaded, name) = read_model(command.file, console)?;
+    // Measured, for the study tells the sag reached and not the one asked for.
     let product = ModelMeshSource::measuring(&loaded.model);
     let mut settings = accuracy::Settings { seed, ..Default::default() };
     if let Some(range) = command.meshing.tolerance {
@@ -212,7 +215,9 @@ fn study_accuracy(
     };
     let bound = scene.bind(&loaded.model)?;
     let own = RunSettings::from(&scene.run);
+    // More rays would make the study long; fewer would hide the facets behind the noise.
     let run = RunSettings { rays: own.rays.min(SCENE_RAYS), seed, threads: 0, path_samples: 0, ..own };
+    // Light needs no sag, and measuring takes as long as meshing.
     let plain = ModelMeshSource::new(&loaded.model);
     let (study, light) = study::scene_accuracy(&name, [&product, &plain], (&bound, &run), &settings, progress);
     StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
@@ -243,6 +248,7 @@ fn study_interpolation(
 ) -> Result<StudyResult, Failure> {
     let (_, loaded, name) = read_model(command.file, console)?;
     let mut models: Vec<(String, Model)> = vec![(name, loaded.model)];
+    // Without a file all models that are built in, to tell how the ratios vary.
     if command.file.is_none() {
         models.extend(study::lamp::lamps().into_iter().map(|l| (format!("{} lamp", l.name), l.model)));
     }
@@ -269,6 +275,7 @@ fn study_complexity(
         Method {
             name: "traditional",
             with: Box::new(|model, then| {
+                // The traditional way stands on the spline's patches, and is charged with making them.
                 let exact = Exact::build(model, &Default::default());
                 then(&Traditional::new(model, &exact, Seeds::Sampled(4)), None);
             }),

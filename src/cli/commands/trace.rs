@@ -75,6 +75,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return dry_run(&prepared, folder, console);
     }
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, extra.limits.max_refused, console);
+    // A replay traces single rays and writes no results.
     if !replay.is_empty() {
         replay::run(&prepared, &replay, folder, console)?;
         return Ok(refused);
@@ -82,6 +83,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     check_growing(&prepared, console)?;
     // A range of rays is part of a run that grows: its tally joins those of the other rays.
     let is_range = prepared.job.tracing.ray_range.is_some_and(|range| range.first.is_some());
+    // A range without a shard is the only shard.
     let done = match shard.or(is_range.then_some([0, 1])) {
         Some(shard) => trace_shard(&prepared, command, shard, console)?,
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
@@ -121,10 +123,12 @@ fn trace_whole(
     };
     let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
 
+    // Called by any thread: it saves when it is time to.
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
+        // What was traced to find the number of rays is saved no more.
         finished: traced.is_none().then_some(&save),
         from: traced.or(saved),
         every: checkpoint.interval(),
@@ -141,6 +145,7 @@ fn trace_whole(
     };
     let path_failure = match (paths, &extra.paths) {
         (Some(paths), Some(file)) => say_paths(paths, file, console).err(),
+        // The run counts whether its paths could be written or not.
         _ => None,
     };
     say_verification(&run, console)?;
@@ -165,6 +170,7 @@ fn trace_whole(
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
+    // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))
@@ -290,6 +296,7 @@ fn trace_shard(
     let checkpoint =
         Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console)?;
     let from = checkpoint.read()?;
+    // Asked again, a shard that is done is not traced once more: arrays of jobs are restarted as a whole.
     if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
         say_shard(&checkpoint.file, portion, shard, console)?;
@@ -307,10 +314,12 @@ fn trace_shard(
         ..TraceRequest::default()
     };
     let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
+    // Fewer replicates than the shard has: it was stopped.
     if !shards::is_shard_done(&portion, replicates, shard) {
         return Err(checkpoint.stopped(&portion, "interrupted"));
     }
     let file = checkpoint.save_anywhere(&portion)?;
+    // It was rescued to another place.
     if file != checkpoint.file {
         let message = format!("{}: cannot be written", checkpoint.file.display());
         return Err(

@@ -41,6 +41,7 @@ pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Consol
         let failure = Failure::arguments("--until-settled: the scene names no regulation");
         return Err(failure.with_help("add a [[regulation]] with its `id`"));
     }
+    // Rays of its own do not grow with the run.
     if scene.sources.iter().any(|s| s.rays.is_some()) {
         let failure = Failure::arguments("--until-settled: a source with `rays` of its own does not grow");
         return Err(failure.with_help("take `rays` out of the [[source]]s"));

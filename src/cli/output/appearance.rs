@@ -20,6 +20,7 @@ const PALETTE: [[f64; 3]; 8] = [
 /// The mesh with a group for every instance.
 pub(crate) fn grouped_facets<'a>(model: &Model, mesh: &'a FacetMesh, scene: Option<&Scene>) -> Facets<'a> {
     let colours: Vec<_> = {
+        // The first colour that a face of the instance shows stands for all of it.
         let mut first = vec![None; model.instances.len()];
         for face in model.placed_faces() {
             let slot = &mut first[face.instance];
@@ -54,6 +55,7 @@ fn medium_index(scene: &Scene, part: &str, instance: &str) -> Option<f64> {
         list.as_ref().is_some_and(|l| l.as_slice().iter().any(|n| n == name))
     };
     let rule = (scene.materials.iter())
+        // The last rule that names it, as in the simulation.
         .rfind(|m| m.medium.is_some() && (named(&m.part, part) || named(&m.instance, instance)))?;
     let name = rule.medium.as_deref()?;
     Some(scene.media.iter().find(|m| m.name == name).and_then(|m| m.index).unwrap_or(1.5))

@@ -40,6 +40,7 @@ fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: 
     }
     console.say("");
     let mut files = notable_files(folder, results);
+    // Without a page its line, the first one, is left out.
     if !with_page {
         files.remove(0);
     }

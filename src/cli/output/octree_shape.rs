@@ -63,8 +63,10 @@ impl OctreeShape {
 pub(crate) fn write_octree_files(folder: &Path, shapes: &[OctreeShape]) -> Result<(), Failure> {
     let text: Vec<String> = shapes.iter().map(OctreeShape::summary).collect();
     write_atomic(&folder.join("octree.txt"), |w| w.write_all(text.join("\n").as_bytes()))?;
+    // The first is that of the coarsest facets, which can still be looked at.
     let Some(first) = shapes.first() else { return Ok(()) };
     let mut boxes = first.boxes.clone();
+    // Upper levels first: what is cut off are leaves.
     boxes.sort_by_key(|(depth, _)| *depth);
     boxes.truncate(MOST_BOXES);
     let mesh = box_facets(&boxes);
@@ -100,6 +102,7 @@ fn box_facets(boxes: &[(usize, Aabb)]) -> FacetMesh {
             let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
             for side in [0, 1] {
                 let base = side << axis;
+                // Counter-clockwise as seen from outside.
                 let ring = if side == 1 { [0, u, u | v, v] } else { [0, v, u | v, u] };
                 let mut normal = Vector::ZERO;
                 normal[axis] = if side == 1 { 1.0 } else { -1.0 };
@@ -133,6 +136,7 @@ pub(crate) fn octree_view(shape: &OctreeShape) -> View {
             continue;
         }
         let mut lines = Polylines::default();
+        // Evenly over the level, so that what is left shows where leaves crowd.
         for b in level.iter().step_by(level.len().div_ceil(left)) {
             lines.push(box_edges(b));
             (left, shown) = (left - 1, shown + 1);

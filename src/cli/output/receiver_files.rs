@@ -23,6 +23,7 @@ pub(crate) fn write(
 ) -> Result<Vec<String>, Failure> {
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
     let mut grid = grid;
+    // The first layer is that of the grid itself, the others are those of its channels.
     let mut layers = geometric.into_iter().map(|layer| layer.filter(|g| g.len() == grid.values.len()));
     grid.geometric = layers.next().flatten();
     for (layer, geometric) in grid.layers.iter_mut().zip(layers) {
@@ -41,6 +42,7 @@ pub(crate) fn write(
         names.push(format!("{stem}.data3"));
         names.push(format!("{stem}.tm25ray"));
         write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
+        // Data_3 gives rows first.
         let size = [receiver.grid[1], receiver.grid[0]];
         let data = Data3 { size, results: receiver.cells.clone(), rays };
         write_data3(&folder.join(format!("{stem}.data3")), &data)?;
@@ -49,6 +51,7 @@ pub(crate) fn write(
         "cd" => Some((grid, receiver.power)),
         _ => photometric_grid(receiver).zip(receiver.photometric().map(|c| c.total)),
     };
+    // LM-63 holds whole distributions alone.
     if let Some(photometry) = candela.and_then(|(grid, lumens)| photometry(receiver, &grid, lumens)) {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;
@@ -82,6 +85,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
         FarFieldType::C => (PhotometricType::C, [[0.0, 360.0], [0.0, 180.0]]),
     };
     let same = |k: usize| (0..2).all(|e| (grid.axes[k].range[e] - whole[k][e]).abs() < WHOLE_RANGE_DEG);
+    // Part of a far field has no flux that a file of a luminaire could claim.
     if !same(0) || !same(1) {
         return None;
     }
@@ -125,6 +129,7 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
         .into(),
     };
     let factor = lumens / photometry.flux();
+    // A dark far field has no flux to be scaled to.
     if factor.is_finite() {
         photometry.candela.iter_mut().for_each(|c| *c *= factor);
     }

@@ -9,6 +9,7 @@ const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().f
 /// An empty table in the common style that wraps its cells at the width.
 pub(crate) fn blank_table(width: usize) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
+    // Terminals count columns in 16 bits.
     let width = u16::try_from(width).unwrap_or(u16::MAX);
     table.load_style(STYLE).set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     table
@@ -25,6 +26,7 @@ pub(crate) fn table_text(table: &Table, width: usize) -> String {
         grid.add_row(row.iter().map(Cell::shown));
     }
     for (k, column) in grid.column_iter_mut().enumerate() {
+        // A column with words is read from the left.
         let words = table.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Text(_))));
         column.set_cell_alignment(if words { CellAlignment::Left } else { CellAlignment::Right });
     }

@@ -18,6 +18,7 @@ const BYTES_IN_GB: f64 = 1e9;
 /// # Errors
 /// When its limit is no number.
 pub(crate) fn cache(option: &CacheOption) -> Result<Option<Cache>, Failure> {
+    // The option stands above the environment.
     let Some(folder) = option.cache.clone().or_else(|| variable(FOLDER_VARIABLE).map(PathBuf::from)) else {
         return Ok(None);
     };
@@ -30,5 +31,6 @@ pub(crate) fn cache(option: &CacheOption) -> Result<Option<Cache>, Failure> {
 }
 
 fn variable(name: &str) -> Option<OsString> {
+    // An empty variable is none, as shells unset it.
     std::env::var_os(name).filter(|value| !value.is_empty())
 }

@@ -45,6 +45,7 @@ impl<'a> Checkpoint<'a> {
     ) -> Result<Self, Failure> {
         // Made before tracing: the files of the scene may be gone when it ends.
         let header = TallyHeader::new(prepared, scene, shard, console)?;
+        // Seconds without end mean never.
         let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
         Ok(Self {
             prepared,
@@ -59,6 +60,7 @@ impl<'a> Checkpoint<'a> {
 
     /// How often to look whether it is time to save.
     pub(crate) fn interval(&self) -> Duration {
+        // Looking is cheap; to look seldom would save late.
         self.every.min(LOOK_EVERY)
     }
 
@@ -72,6 +74,7 @@ impl<'a> Checkpoint<'a> {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(Failure::input(format!("{}: {e}", self.file.display()))),
         };
+        // Of the scene as it is now: what changed since cannot be gone on with.
         let expected = fingerprint(self.prepared)?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {
@@ -97,6 +100,7 @@ impl<'a> Checkpoint<'a> {
             // A run that cannot be saved goes on all the same.
             self.console.say(format_args!("not saved: {failure}"));
         }
+        // After saving, for saving may take long and must not follow itself.
         *last = Instant::now();
     }
 
@@ -121,6 +125,7 @@ impl<'a> Checkpoint<'a> {
     /// The header with what it took so far.
     fn header_now(&self) -> TallyHeader {
         let wall = self.console.started.elapsed().as_secs_f64();
+        // A run that goes on counts what it took before.
         self.header.with_usage(Usage::of_process(wall).continued(&self.earlier()))
     }
 
@@ -159,6 +164,7 @@ impl<'a> Checkpoint<'a> {
 
     /// Removes the file of a run that is over.
     pub(crate) fn remove(&self) {
+        // Left behind it is only refused next time.
         let _ = std::fs::remove_file(&self.file);
     }
 }

@@ -31,6 +31,7 @@ pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) ->
     let start = Instant::now();
     let settings = step::Settings { measure_box: false, ..placed.settings() };
     let Import { model, report } = step_file(path, &settings, console)?;
+    // Said here: a tracer without faces would answer with darkness.
     if model.placed_face_count() == 0 {
         let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
         return Err(failure.with_help("run `lampyris info` on it to see what it holds and what was refused"));
@@ -40,6 +41,7 @@ pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) ->
 
 /// A scene when the name ends in `.toml`, a STEP file within a limit otherwise.
 pub(crate) fn either(path: &Path, placed: PlacedLimit, console: &Console) -> Result<Input, Failure> {
+    // By the name: a STEP file has several, a scene one.
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let (scene, loaded) = read_scene(path, &TerminalMonitor::new(console))?;
         return Ok(Input::Scene(Box::new(scene), loaded));

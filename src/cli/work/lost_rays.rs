@@ -68,6 +68,7 @@ pub(crate) fn report_lost_light(
     folder: &Path,
     console: &Console,
 ) -> Completion {
+    // Shares of it would be no numbers.
     if !results.power.emitted.is_finite() {
         console.say("the powers of the sources sum to no finite number: the powers of this run mean nothing");
         return Completion::Incomplete;
@@ -87,16 +88,19 @@ pub(crate) fn report_lost_light(
 
 /// Why rays were lost and where, the most frequent first.
 fn reasons(results: &Results, prepared: &PreparedScene) -> String {
+    // Sorted by the words, so that equal counts come in one order.
     let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for l in &results.ledger {
         let hit = l.face.and_then(|f| prepared.bound.instance(f));
         let inside = || prepared.bound.body(l.body).map(|[instance, _]| instance);
+        // Where it was hit; a ray that left the scene is told by the body that it was in.
         *count.entry((meaning(l.cause), hit.or_else(inside).unwrap_or(""))).or_default() += 1;
     }
     let mut all: Vec<_> = count.into_iter().collect();
     all.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
     let reasons: Vec<String> =
         all.iter().take(NAMED_REASONS).map(|((why, place), n)| format!("{n} {why} at '{place}'")).collect();
+    // The ledger keeps the first 1000.
     let counted = if results.lost_rays as usize > results.ledger.len() { "of the first 1000: " } else { "" };
     format!("{counted}{}", reasons.join("; "))
 }

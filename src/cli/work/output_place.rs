@@ -52,6 +52,7 @@ impl OutputPlace {
                 .read(true)
                 .write(true)
                 .create(true)
+                // Not cut: until the lock is held its content names another owner.
                 .truncate(false)
                 .open(&lock)
                 .map_err(unwritable)?;
@@ -94,6 +95,7 @@ fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
 fn is_file_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let identity = |m: fs::Metadata| (m.dev(), m.ino());
+    // Device and inode: a file of the same name may be another one.
     match (file.metadata(), fs::metadata(path)) {
         (Ok(opened), Ok(named)) => identity(opened) == identity(named),
         _ => false,
@@ -115,6 +117,7 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
 
 /// The folder that a file is in.
 pub(crate) fn folder_of(path: &Path) -> PathBuf {
+    // A bare name is in the working folder.
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     parent.unwrap_or(Path::new(".")).to_path_buf()
 }

@@ -59,6 +59,7 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
 /// What facets change of every receiver, a line each.
 pub(crate) fn summary(pairs: &[PowerComparison]) -> String {
     let mut text = String::new();
+    // A share of darkness is no share.
     for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
         let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);
         text += &format!(

@@ -31,6 +31,7 @@ impl PathFile {
 
     /// Takes some vertices; after a failure no more.
     pub(crate) fn take(&self, vertices: &[PathVertex]) {
+        // Packed before the lock is taken: threads wait for the file alone.
         let mut columns: [Vec<u8>; 6] = Default::default();
         for v in vertices {
             columns[0].extend(v.ray.to_le_bytes());
@@ -41,6 +42,7 @@ impl PathFile {
             columns[5].extend(v.power.to_le_bytes());
         }
         let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
+        // The first failure is the one that is told.
         if state.1.is_none() {
             let slices: Vec<&[u8]> = columns.iter().map(Vec::as_slice).collect();
             state.1 = state.0.write(vertices.len() as u64, &slices).err();

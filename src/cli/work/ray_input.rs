@@ -23,6 +23,7 @@ pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
         read.map_err(unreadable)?.into_iter().map(|(ray, _)| ray).collect()
     };
     if rays.is_empty() {
+        // A benchmark of nothing would divide by it.
         return Err(Failure::input(format!("{}: no rays in it", path.display())));
     }
     Ok(rays)

@@ -35,6 +35,7 @@ pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: boo
     let page = if with_page { PAGE_BYTES } else { 0 };
     require_space(folder, page + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
     for receiver in &scene.receivers {
+        // By the names of the results: one may be too long or forbidden.
         let file = folder.join(format!("{}.try", file_stem(&receiver.name)));
         write_atomic(&file, |_| Ok(()))?;
         std::fs::remove_file(&file)?;
@@ -88,10 +89,12 @@ pub(crate) fn write(
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &prepared.tessellation.mesh;
     let bounds = mesh.bounds();
+    // Rays that leave go to infinity and would make the model a speck.
     let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
     let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.job.scene));
     facets.paths = Some(&near);
     write_facets(&folder.join("facets.glb"), &facets)?;
+    // The page shows paths as lines of its own.
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
@@ -107,6 +110,7 @@ pub(crate) fn write(
     }
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
+    // Labels are for the page, where a click names a face.
     if with_page {
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }

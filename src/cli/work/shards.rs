@@ -85,6 +85,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         text.trim().parse().map(Some).map_err(wrong)
     };
     for launcher in &LAUNCHERS {
+        // The first that is there: an array before the ranks within it.
         let Some(index) = number(launcher.index)? else { continue };
         let stated = launcher.count.map(number).transpose()?.flatten();
         let Some(count) = parts.or(stated) else {
@@ -95,6 +96,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         let is_from_one = launcher.index == "PBS_ARRAY_INDEX";
         let first = launcher.first.map(number).transpose()?.flatten().unwrap_or(u32::from(is_from_one));
         let step = launcher.step.map(number).transpose()?.flatten().unwrap_or(1).max(1);
+        // An index off the steps is of another array.
         let place = index.checked_sub(first).filter(|offset| offset % step == 0).map(|offset| offset / step);
         return match place {
             Some(place) if place < count && count <= MOST_SHARDS => {
@@ -114,6 +116,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
 /// The replicates of a shard of these.
 pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> Range<u32> {
     let whole = u64::from(all.end.saturating_sub(all.start));
+    // By multiplication first: shards differ by one replicate at most.
     let first = |k: u32| all.start + (whole * u64::from(k) / u64::from(count.max(1))) as u32;
     first(index)..first(index + 1)
 }

@@ -53,7 +53,9 @@ impl TallyHeader {
     ) -> Result<Self, Failure> {
         let m = &prepared.job.meshing;
         let t = &prepared.job.tracing;
+        // Absolute: parts are merged from elsewhere.
         let scene = std::path::absolute(scene).unwrap_or_else(|_| scene.to_path_buf());
+        // As bits: text would have to be read back exactly.
         let bits = |x: [f64; 2]| x.map(f64::to_bits);
         Ok(Self {
             fingerprint: fingerprint(prepared)?.0,
@@ -64,6 +66,7 @@ impl TallyHeader {
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            // As many as were traced, whichever way they were asked for.
             rays: prepared.rays.or(t.rays()),
             first_ray: t.ray_range.and_then(|range| range.first),
             accuracy: accuracy_options(prepared),

@@ -53,6 +53,7 @@ impl Monitor for TerminalMonitor<'_> {
             Stage::Building(kind) => console.spinner(&format!("building {kind}")),
             Stage::BuildingCheck(what) => console.spinner(&format!("building {what} for the cross-check")),
             Stage::Tracing(rays) => {
+                // From here on a signal stops the run and saves it; before it there is nothing to save.
                 shown.saveable = self.is_saveable.then(SaveableRun::begin);
                 console.progress_bar("tracing", "rays", rays)
             }
@@ -63,6 +64,7 @@ impl Monitor for TerminalMonitor<'_> {
     fn advance(&self, done: u64, total: u64) -> bool {
         let shown = self.shown();
         if let Some(bar) = &shown.bar {
+            // A resumed run learns its total late.
             bar.set_length(total);
             bar.set_position(done);
         }

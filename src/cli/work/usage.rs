@@ -34,6 +34,7 @@ impl Usage {
                 continue;
             };
             mine.parts += theirs.parts;
+            // Unknown of one is unknown of the sum.
             mine.cpu_seconds = mine.cpu_seconds.zip(theirs.cpu_seconds).map(|(a, b)| a + b);
             mine.slowest_seconds = mine.slowest_seconds.max(theirs.slowest_seconds);
         }
@@ -45,8 +46,10 @@ impl Usage {
             match self.0.get_mut(machine) {
                 Some(mine) => {
                     mine.cpu_seconds = mine.cpu_seconds.zip(theirs.cpu_seconds).map(|(a, b)| a + b);
+                    // One after the other on the same machine.
                     mine.slowest_seconds += theirs.slowest_seconds;
                 }
+                // The part counts where it ends.
                 None => drop(self.0.insert(machine.clone(), MachineUsage { parts: 0, ..*theirs })),
             }
         }

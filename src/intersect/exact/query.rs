@@ -167,8 +167,8 @@ impl DeparturePoint {
     }
 
     /// The departure in the leaf's parameters; on a neighbouring patch only when it lies on the common border.
-    // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
     pub(super) fn local_to(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
+        // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
         if leaf.face != self.face {
             return None;
         }

@@ -54,6 +54,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let model = distinct(rows, "model").join(", ");
     // Facts at the largest number of threads: that is what a user waits for.
     let threads = rows.iter().filter_map(|r| r["threads"].as_u64()).max().unwrap_or(1);
+    // Rows that do not say their threads count as of the largest number.
     let chosen: Vec<&Value> =
         rows.iter().copied().filter(|r| r["threads"].as_u64().unwrap_or(threads) == threads).collect();
     let points: Vec<Point> = chosen.iter().filter_map(|r| Point::from_row(r)).collect();
@@ -91,6 +92,7 @@ fn answer(points: &[Point]) -> String {
 
 /// Whether another combination is at least as good in both time and error, and better in one.
 fn is_dominated(p: &Point, points: &[Point]) -> bool {
+    // As good in both and better in one: of two equal ones neither is dominated.
     let better = |q: &Point| q.seconds < p.seconds || q.error < p.error;
     points.iter().any(|q| q.seconds <= p.seconds && q.error <= p.error && better(q))
 }
@@ -167,6 +169,7 @@ fn slopes(rows: &[&Value]) -> Chart {
     let octree = |r: &&&Value| text(r, "intersector") == "octree" && text(r, "normals") != "exact";
     let medians = || rows.iter().filter(octree).filter_map(|r| number(r, "direction_error_deg_p50"));
     let (key, word) = if medians().next().is_some() && medians().all(|e| e > ROUNDING_DEG) {
+        // Rounding follows no law: its slope would mean nothing.
         ("direction_error_deg_p50", "median")
     } else {
         ("direction_error_deg_p99", "p99")
@@ -182,6 +185,7 @@ fn slopes(rows: &[&Value]) -> Chart {
             })
             .filter(|p| p[0] > 0.0 && p[1] > 0.0)
             .collect();
+        // From coarse to fine, for the theory starts at the coarsest.
         points.sort_by(|a, b| b[0].total_cmp(&a[0]));
         let Some(&start) = points.first() else { continue };
         // The order of a cubic patch depends on how evenly its corners stand: no single slope to expect.
@@ -227,6 +231,7 @@ fn stacked(rows: &[&Value]) -> Chart {
             text(r, "intersector") == "exact"
                 || text(r, "intersector") == "octree" && text(r, "normals") == "bilinear"
         })
+        // More bars than that cannot be told apart.
         .take(14)
         .collect();
     let name = |r: &&&Value| match (text(r, "intersector"), r["adaptive"].as_bool()) {

@@ -26,6 +26,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
             seconds(pruned),
             seconds(full),
             figures(full / pruned, 3),
+            // Rows that do not say it count as the same.
             if rows.iter().all(|r| r["identical"].as_bool() != Some(false)) {
                 "bit-identical"
             } else {

@@ -12,6 +12,8 @@ use serde_json::Value;
 
 /// The report of a study document as `lampyris study … --json` prints it.
 pub fn study_report(document: &Value, provenance: Provenance) -> Report {
+    // Whatever is missing in the document is an empty list: a kept file of an older program is drawn as far as it
+    // goes.
     let list = |key: &str| -> Vec<&Value> { document[key].as_array().into_iter().flatten().collect() };
     let (rows, lit) = (list("rows"), list("receivers"));
     let kind = rows::text(document, "study");
@@ -46,6 +48,7 @@ fn heading(key: &str) -> (String, &'static str) {
         ("_mm", "mm", ""),
         ("_deg", "°", ""),
     ];
+    // The longer suffixes first, of which the short ones are the end.
     for (suffix, unit, kept) in units {
         if let Some(stem) = key.strip_suffix(suffix) {
             return (format!("{}{kept}", stem.replace('_', " ")), unit);
@@ -66,6 +69,7 @@ fn rows_table(kind: &str, rows: &[&Value]) -> Table {
     let mut keys: Vec<&str> = Vec::new();
     for key in rows.iter().filter_map(|r| r.as_object()).flat_map(|o| o.keys()) {
         if !keys.contains(&key.as_str()) {
+            // In the order of first appearance, which is that of the struct.
             keys.push(key);
         }
     }
@@ -77,6 +81,7 @@ fn rows_table(kind: &str, rows: &[&Value]) -> Table {
             Value::Null => Cell::Empty,
             Value::Bool(b) => Cell::from(if *b { "yes" } else { "no" }),
             Value::String(s) => Cell::from(s.as_str()),
+            // Whole numbers as such: a count with a decimal point looks measured.
             Value::Number(n) => n.as_u64().map_or_else(|| n.as_f64().into(), Cell::from),
             Value::Array(list) => {
                 let words: Vec<String> =

@@ -22,6 +22,7 @@ fn bars(
         .map(|layer| {
             let height = |category: &&str| {
                 let fits = |r: &&&Value| text(r, by) == *category && text(r, split) == layer;
+                // The last one counts, for a later row of the same names replaces the one before.
                 rows.iter().filter(fits).filter_map(|r| number(r, value)).next_back()
             };
             (layer.to_owned(), categories.iter().map(height).collect())
@@ -135,6 +136,7 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let count = |row: &Value, key: &str| -> Cell { row[key].as_u64().into() };
     for row in rows {
         let lamp = models.iter().position(|m| *m == text(row, "model"));
+        // The paper saved time with its octree alone.
         let paper = lamp.filter(|_| text(row, "method") == "octree").and_then(|k| PAPER_COMPLEXITY.get(k));
         table.row([
             text(row, "model").into(),
@@ -173,6 +175,7 @@ fn growth(rows: &[&Value]) -> Chart {
     let line = |method: &&str| {
         let own = rows.iter().filter(|r| text(r, "method") == *method);
         let point = |r: &&Value| {
+            // To a million rays, for the methods trace different numbers of them.
             let rays = number(r, "rays")? / 1_000_000.0;
             Some([number(r, "patches")?, number(r, "seconds_trace_median")? / rays])
         };
@@ -188,6 +191,7 @@ fn growth(rows: &[&Value]) -> Chart {
 pub(super) fn bvh(rows: &[&Value]) -> Parts {
     let rate = |name: &str, kind: &str| {
         let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;
+        // The best of calls and threads.
         rows.iter().filter(fits).filter_map(|r| number(r, "mrays_per_s_median")).fold(0.0, f64::max)
     };
     let (octree, cwbvh) = (rate("octree", "incoherent"), rate("cwbvh", "incoherent"));

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 /// A number of a row; `None` when absent or null.
 pub(super) fn number(row: &Value, key: &str) -> Option<f64> {
+    // JSON has no infinity; what was none is null, and absent.
     row[key].as_f64().filter(|x| x.is_finite())
 }
 

@@ -50,6 +50,7 @@ fn cases(rows: &[&Value]) -> Table {
             let own = rows.iter().filter(|r| text(r, "case") == case && text(r, "intersector") == name);
             own.filter_map(|r| r[key].as_u64()).sum()
         };
+        // All intersectors were asked the same rays.
         let rays = names.first().map_or(0, |n| sum(n, "rays"));
         let verdict = |n: &&str| {
             let [right, flagged, wrong] = ["right", "flagged", "wrong"].map(|key| sum(n, key));

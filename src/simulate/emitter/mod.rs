@@ -151,8 +151,8 @@ impl Emitter {
     }
 
     /// What its rays have in common.
-    // A beam is promised only where all rays have the very point or direction: who is told relies on it to the bit.
     pub(crate) fn beam(&self) -> Option<Beam> {
+        // A beam is promised only where all rays have the very point or direction: who is told relies on it to the bit.
         let (origin, direction) = (self.frame.origin, self.frame.z);
         match (&self.shape, &self.lobe) {
             // Their starts are moved, each along its own direction.

@@ -73,8 +73,8 @@ fn add_multiples(sums: &mut [PacketNumbers; 3], vector: Vector, numbers: &Packet
 
 impl Emitter {
     /// Whether its rays can be made in packets.
-    // Powers, measured lobes and faces are left to rays one by one: their formulas branch or call.
     pub(super) fn fits_packets(&self) -> bool {
+        // Powers, measured lobes and faces are left to rays one by one: their formulas branch or call.
         let simple_shape = matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
         simple_shape
             && match self.lobe {

@@ -152,8 +152,8 @@ impl Case {
         let mut model = sample_models::model(self.name, placed);
         let mesh = if self.loops.is_empty() {
             sample_models::grid_mesh(&model, self.divisions)
-        // The plain mesher knows no trims, so that such a case is asked of the spline alone.
         } else {
+            // The plain mesher knows no trims, so that such a case is asked of the spline alone.
             for face in model.parts.iter_mut().flat_map(|p| &mut p.shells).flat_map(|s| &mut s.faces) {
                 face.loops.clone_from(&self.loops);
             }

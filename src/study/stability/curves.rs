@@ -246,7 +246,7 @@ fn apex() -> Case {
     let cone = sweep::cone(&Frame::IDENTITY, 0.0, -PI / 4.0, [0.0, 2.0 * PI], [-50.0, 0.0]);
     let question = |i| {
         let mut random = Random::new(27, i);
-        // A third at the apex itself, the others from a nanometre to a centimetre away.
+        // A third at the apex itself, the others from a picometre to a centimetre away.
         let r = if i % 3 == 0 { 0.0 } else { 10f64.powf(random.between(-9.0, 1.0)) };
         let (sin, cos) = random.between(0.0, 2.0 * PI).sin_cos();
         let d = Vector::new(random.between(-0.4, 0.4), random.between(-0.4, 0.4), -1.0).normalize();

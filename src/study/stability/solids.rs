@@ -17,12 +17,11 @@ pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
         let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
         for high in [false, true] {
             let origin = if high { min + Vector::AXES[axis] * size[axis] } else { min };
-            // The corner at the low end bounds three faces, the high ones are shifted by the box's size.
+            // The two directions are exchanged at the low side, so that their product looks outwards.
             let (a, b) = if high { (x, y) } else { (y, x) };
             let frame = Frame {
                 origin,
                 x: Vector::AXES[a],
-                // The two directions are exchanged at the low side, so that their product looks outwards.
                 y: Vector::AXES[b],
                 z: Vector::AXES[a].cross(Vector::AXES[b]),
                 scale: 1.0,

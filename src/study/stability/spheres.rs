@@ -50,8 +50,8 @@ fn past(random: &mut Random, b: f64) -> Ray {
 }
 
 /// Both crossings of the sphere for an impact parameter whose difference from the radius is known exactly.
-// 2·√(R² − b²) by the difference R − b: squares would lose what is left of a grazing chord.
 fn crossings(depth: f64) -> [Truth; 2] {
+    // 2·√(R² − b²) by the difference R − b: squares would lose what is left of a grazing chord.
     let half = (depth * (2.0 * R - depth)).sqrt();
     [150.0 - half, 150.0 + half].map(|t| Truth::hit(t, half / R, depth))
 }
@@ -62,7 +62,7 @@ fn graze() -> Case {
         for sign in [-1.0, 1.0] {
             for i in 0..40 {
                 let mut random = Random::new(1, k * 1000 + i + if sign > 0.0 { 500 } else { 0 });
-                // From a tenth to a picometre on both sides of touching.
+                // From a tenth of a millimetre to 1e-12 mm on both sides of touching.
                 let delta = sign * 10f64.powi(-(k as i32));
                 let truth = if sign < 0.0 { crossings(-delta)[0] } else { Truth::miss(delta) };
                 questions.push(Question::First { ray: past(&mut random, R + delta), truth });
@@ -154,7 +154,7 @@ fn thin_torus() -> Case {
         let v = random.between(-1.2, 1.2);
         let (_, n) = torus_point(major, minor, u, v);
         // In the meridian plane the tube is a circle: a ray at distance b from its centre has the chord 2√(r² − b²).
-        // Chords from ten micrometres down to a hundredth of one.
+        // Chords from twenty micrometres down to a hundredth of one.
         let half = 0.5 * 10f64.powf(random.between(-5.0, -1.71));
         let b = (minor * minor - half * half).sqrt();
         let side = Vector::new(-v.sin() * u.cos(), -v.sin() * u.sin(), v.cos());

@@ -210,8 +210,8 @@ impl Tree<'_, '_> {
 
     /// Whether the segments near a cell leave it whole: they run along its sides, or beyond and along them, and no
     /// corner stands between two samples.
-    // What the border's segments do not cross, and no sample of theirs divides, meets neighbours corner to corner.
     fn is_aligned(&self, cell: Cell, near: &[u32]) -> bool {
+        // What the border's segments do not cross, and no sample of theirs divides, meets neighbours corner to corner.
         near.iter().all(|&s| {
             // No cell's side may be divided that another solid's border runs along.
             if s as usize >= self.border {

@@ -21,9 +21,9 @@ pub(super) struct View {
 
 impl View {
     /// From the axes that the ray's direction avoids most.
-    // The shortest component's axis is the farthest from parallel, so that the cross product is not a difference of
-    // near equals.
     pub(super) fn new(ray: &Ray) -> Self {
+        // The shortest component's axis is the farthest from parallel, so that the cross product is not a difference of
+        // near equals.
         let d = ray.direction;
         let axis = if d.x.abs() <= d.y.abs() && d.x.abs() <= d.z.abs() {
             DVec3::X

@@ -230,8 +230,8 @@ impl AuditFace {
     }
 
     /// Whether a point of the domain lies inside: an odd number of crossings above it.
-    // Towards +v, where the tracer looks towards +u: a fault in one of the two does not hide in the other.
     fn holds(&self, q: Uv) -> bool {
+        // Towards +v, where the tracer looks towards +u: a fault in one of the two does not hide in the other.
         if self.trims.is_empty() {
             return true;
         }
