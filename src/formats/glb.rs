@@ -112,7 +112,6 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         let mut start = 0;
         for &end in &paths.ends {
             // Mode 1 draws separate lines, a pair of points each.
-            // A line of one point draws nothing.
             segments.extend((start + 1..end).flat_map(|k| [k as u32 - 1, k as u32]));
             start = end;
         }
@@ -125,7 +124,6 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     }
     let children: Vec<usize> = (0..nodes.len()).collect();
     // x → x, y → −z, z → y, and mm → m: a quarter turn about x.
-    // The rotation is a quaternion: −90° about x.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let shift = Vector::new(middle.x, middle.z, -middle.y) * METRES_PER_MM;
     nodes.push(json!({"name": "millimetres, z up", "children": children, "scale": [METRES_PER_MM, METRES_PER_MM, METRES_PER_MM],

@@ -90,7 +90,7 @@ impl Photometry {
     /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is,
     /// also intensities that do not fill their planes.
     pub fn expanded(&self) -> Self {
-        // A mesh of planes that are not filled cannot be mirrored.
+        // Planes that are not filled cannot be mirrored: their rows would run out.
         if self.candela.len() != self.horizontal_deg.len() * self.vertical_deg.len() {
             return self.clone();
         }

@@ -57,7 +57,6 @@ impl IntensityMap {
         let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
         let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
-        // Only where the flux of a ray is known.
         Ok(ray_flux.into_iter().fold(map, Self::with_ray_flux))
     }
 }

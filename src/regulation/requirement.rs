@@ -87,7 +87,6 @@ impl Photometer<'_> {
         let [h, v] = bounds;
         // Both ends count; an empty range has no direction.
         let count = |[low, high]: [f64; 2]| if high < low { 0 } else { ((high - low) / step).ceil() as usize + 1 };
-        // The last step may be shorter.
         let place = |[low, high]: [f64; 2], k: usize| (low + step * k as f64).min(high);
         let mut directions = Vec::new();
         for j in 0..count(v) {
@@ -232,7 +231,7 @@ fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
         if (p[0] - a[0] - t * dx).hypot(p[1] - a[1] - t * dy) <= RIM_DEG {
             return true;
         }
-        // By rays to the right: each side that is crossed changes sides.
+        // Each side that a ray to the right crosses changes between inside and outside (even–odd).
         if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + dx * (p[1] - a[1]) / dy {
             inside = !inside;
         }

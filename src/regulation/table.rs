@@ -152,7 +152,6 @@ impl Regulation {
         let wanted = plain(id);
         let all = Self::all();
         let exact = all.iter().find(|r| plain(&r.id) == wanted);
-        // The first of those that begin so, in the order of the tables.
         let begins = || all.iter().find(|r| !wanted.is_empty() && plain(&r.id).starts_with(&wanted));
         if let Some(found) = exact.or_else(begins) {
             return Ok(found.clone());
@@ -197,7 +196,7 @@ fn read(prefix: &str, text: &str) -> Vec<Regulation> {
         .map(|function| {
             let driving = function.id.starts_with("driving");
             let sensor =
-                // The two names are of two generations of the tables' form.
+                // Two names for the same figure stand in the tables.
                 number(&file.measurement, "/receiver_half_deg").or(number(&file.measurement, "/sensor_half_deg"));
             let signal = prefix == "UN R148-01" || file.title.contains("signal lamps");
             let reaim = number(&file.measurement, "/reaim_deg").or(number(&file.measurement, "/tolerance_deg"));

@@ -158,16 +158,16 @@ struct DoubleDouble {
 }
 
 impl DoubleDouble {
-    // Knuth's two-sum: what rounding took from the sum is recovered, whichever of the two is larger.
     /// The exact sum of two numbers.
     fn sum(a: f64, b: f64) -> Self {
+        // Knuth's two-sum: what rounding took from the sum is recovered, whichever of the two is larger.
         let high = a + b;
         let back = high - a;
         Self { high, low: (a - (high - back)) + (b - back) }
     }
 
-    // Dekker's quick two-sum: the first is the larger here.
     fn new(high: f64, low: f64) -> Self {
+        // Dekker's quick two-sum: the first is the larger here.
         let sum = high + low;
         Self { high: sum, low: low - (sum - high) }
     }
@@ -197,9 +197,8 @@ impl Sub for DoubleDouble {
 
 impl Mul for DoubleDouble {
     type Output = Self;
-    // The product's rounding comes out exactly of a fused multiply-add; what the low parts give together lies below
-    // the last bit.
     fn mul(self, o: Self) -> Self {
+        // The product's rounding comes out exactly of a fused multiply-add; the product of the low parts lies below the last bit.
         let high = self.high * o.high;
         let low = self.high.mul_add(o.high, -high) + (self.high * o.low + self.low * o.high);
         Self::new(high, low)

@@ -203,7 +203,7 @@ fn alternative(tolerance_mm: [f64; 2], intersector: &'static str, worst: &Worst,
 impl Undecided<'_> {
     /// What can be said without a pilot.
     fn without_pilot(&self) -> Option<Chosen> {
-        // From cheap to ask to dear.
+        // What is cheap to ask comes first.
         let (intersector, because) = if self.facets.facets.is_empty() {
             ("octree", "there is no surface to meet")
         } else if self.model.placed_faces().any(|p| p.face.is_none()) {

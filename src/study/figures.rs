@@ -134,7 +134,6 @@ pub fn halving(results: &Results, geometric: Option<&GeometricError>) -> Halving
         statistical_seconds: 3.0 * s.trace,
         // Facets go with the inverse of the tolerance.
         geometric_seconds: judged.map(|_| 2.0 * (s.tessellate + s.build) + SLOWER_A_HALVING * s.trace),
-        // The pilot's seconds in proportion to its rays.
         spline_seconds: judged.map(|e| e.seconds[1] * results.rays as f64 / e.rays as f64),
     }
 }

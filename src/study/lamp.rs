@@ -31,7 +31,6 @@ pub fn lamps() -> Vec<Lamp> {
 
 /// `spans`² bicubic patches a cavity, rippled by `ripple` mm to spread the light.
 fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp {
-    // In rows of four.
     let columns = cavities.min(4);
     let mut surfaces = Vec::new();
     let mut scene = String::from(

@@ -73,7 +73,6 @@ pub fn compare_power(
     exact: &dyn Intersector,
     settings: &RunSettings,
 ) -> Vec<PowerComparison> {
-    // The same rays and random numbers on both.
     let [on_facets, on_spline] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
     let (found, truth) = (&on_facets.results, &on_spline.results);
     (found.receivers.iter().zip(&truth.receivers).enumerate())

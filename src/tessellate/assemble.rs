@@ -97,7 +97,6 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
     let known: Vec<(&Face, &FaceSurface<'_>)> =
         faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
     // Only sides on faces with a usable surface have a say in how an edge is divided.
-    // The sides of each edge on its faces.
     let mut sides: Vec<Vec<EdgeSide<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
     for &(face, surface) in &known {
         for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
@@ -195,7 +194,6 @@ pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
         return mesh;
     }
     // The least member names a set, so that the numbers do not depend on the order of the pairs.
-    // Union of sets, each named by its least member.
     let mut parent: Vec<u32> = (0..mesh.shared.len() as u32).collect();
     let root = |parent: &[u32], mut p: u32| {
         while parent[p as usize] != p {

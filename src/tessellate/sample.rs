@@ -97,8 +97,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             }
         }
     }
-    // The proof counts that gap too.
-    // Corners lie on the surface, but not where the file's own edges do not.
+    // Corners lie on the surface, but not where the file's own edges do not; the proof counts that gap too.
     for (&x, &at) in p.iter().zip(&uv) {
         if (surface.evaluate(at) - x).length() > out.sag {
             out.sag = out.sag.max((surface.evaluate(project(surface, x, at)) - x).length());

@@ -35,7 +35,6 @@ impl Tm25 {
         }
         let mut rows = Vec::with_capacity(rays.len() * header.places().count);
         for ray in rays {
-            // Seven numbers in every row; the eighth where all rays have one.
             rows.extend(ray.numbers().map(|x| x as f32));
             rows.extend(ray.wavelength_nm.filter(|_| spectral).map(|w| w as f32));
         }
@@ -104,7 +103,6 @@ impl Tm25Reader {
     /// # Errors
     /// When the file ends early or a row makes no ray; the message names the ray.
     pub fn into_rays(mut self, preferred: Flux) -> Result<RaySet, Error> {
-        // Where both are there the caller's unit counts; a file of one kind is read as that.
         let flux = match (self.places.radiant, self.places.luminous) {
             (Some(_), Some(_)) => preferred,
             (Some(_), None) => Flux::Radiant,

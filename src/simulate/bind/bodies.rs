@@ -72,8 +72,8 @@ pub(super) fn find_bodies(
 /// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
 /// body to light, and as long as the box around them all.
 pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
-    // Union–find with halved paths (Tarjan & van Leeuwen 1984); the lowest number stands for its group.
-    // Union–find, since touching goes on from body to body.
+    // Union–find with halved paths (Tarjan & van Leeuwen 1984), since touching goes on from body to body; the lowest number
+    // stands for its group.
     let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
     fn first(united: &mut [u16], mut body: u16) -> u16 {
         while united[body as usize] != body {

@@ -166,8 +166,8 @@ impl Scene {
         locate::span(self.origin.text.as_deref()?, path)
     }
 
-    // In the order of the file's keys, so that the first fault told is one that stands far up.
     fn check(&self) -> Result<(), Error> {
+        // In the order of the file's keys, so that the first fault told is one that stands far up.
         self.run.check(self)?;
         self.accuracy.check(self)?;
         self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;

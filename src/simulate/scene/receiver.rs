@@ -146,7 +146,7 @@ impl Receiver {
         let channels = match (self.channels, &self.bins_nm) {
             // A bin has a sum, and power one beside them: as many sums as edges.
             (_, Some(edges)) => edges.len() as u64,
-            // X, Y, Z and power; lumens and power.
+            // Power is counted beside the channels.
             (Some(Channels::Xyz), None) => 4,
             (Some(Channels::Photometric), None) => 2,
             (None, None) => 1,

@@ -33,8 +33,8 @@ pub(in crate::step) struct SplineChart {
 }
 
 impl Clone for SplineChart {
-    // The patches and what the edges showed belong to one use of the surface; a copy starts anew.
     fn clone(&self) -> Self {
+        // The patches and what the edges showed belong to one use of the surface; a copy starts anew.
         Self::new(self.surface.clone())
     }
 }

@@ -24,7 +24,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let across = self.direction(own.id(3)).and_then(|d| d.try_normalize());
         let across = across.ok_or_else(|| Refusal::new(e, "its reference direction is missing"))?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
-        // Run against its basis, the other side is aside.
+        // Run against its basis, the curve has its other side on the left.
         let sign = if reversed { -distance } else { distance };
         let shape = match shape {
             CurveShape::Line { origin, direction } => {

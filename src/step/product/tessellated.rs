@@ -22,8 +22,8 @@ struct Layout {
     strips: bool,
 }
 
-// A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
 fn layout(keyword: &str) -> Option<Layout> {
+    // A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
     Some(match keyword {
         "TRIANGULATED_FACE" => Layout { pnindex: 5, strips: false },
         "COMPLEX_TRIANGULATED_FACE" => Layout { pnindex: 5, strips: true },

@@ -154,7 +154,6 @@ impl Piece {
     fn worst_excess(&self, inner: &[f64], at: &impl Fn(f64) -> Point) -> f64 {
         let [a, b] = self.ends;
         let last = self.tolerances.len() - 1;
-        // The ends of chord k.
         let end = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
         let excess = |k: usize| {
             let (x, y) = (end(k), end(k + 1));

@@ -108,7 +108,6 @@ impl Equaliser<'_, '_, '_, '_> {
     /// What the edges of one group take over.
     fn equalise_group(&self, group: &[usize]) -> Vec<(usize, Vec<f64>)> {
         // From the densest, so that samples are only ever handed to sides that would have had fewer.
-        // The side with most samples starts.
         let mut order = group.to_vec();
         order.sort_by_key(|&e| (std::cmp::Reverse(self.times[e].len()), e));
         let mut now: FxHashMap<usize, Vec<f64>> = FxHashMap::default();
@@ -194,8 +193,7 @@ fn parameter_run<'f>(edge_use: &'f EdgeUse, surface: &FaceSurface<'_>) -> Option
         let uv = edge_use.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(STEPS));
         [0, 1].map(|d| (uv[d] - domain[d][0]) / (domain[d][1] - domain[d][0]))
     };
-    // Two evaluations turn most uses away before nine are made.
-    // Most that do not run along a line show it at both ends.
+    // Most uses that do not run along a line show it at both ends: two evaluations turn them away before nine are made.
     let (from, to) = (at(0), at(STEPS));
     if (0..2).all(|d| (from[d] - to[d]).abs() > LEVEL) {
         return None;

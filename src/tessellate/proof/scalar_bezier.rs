@@ -53,8 +53,8 @@ impl ScalarBezier {
         let n = self.degree;
         let heaviest = self.control.iter().fold(0.0, |a: f64, x| a.max(x.1));
         self.stack.clear();
-        // The sign of these answers the question without a division, and halving keeps them as polynomials.
-        // Coefficients of W·(d − limit): a piece is within the limit where none is positive.
+        // Coefficients of W·(d − limit): a piece is within the limit where none is positive. Their sign answers the question
+        // without a division, and halving keeps them as polynomials.
         let e = |x: usize| self.control[x].1 * (self.control[x].0 - limit);
         if N == 2 {
             self.stack.extend((0..=n).map(e));

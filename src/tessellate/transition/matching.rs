@@ -96,7 +96,7 @@ impl Matching<'_> {
     /// Searches a path to another triangle without a mate; the last triangle but one, and the candidate that leads from it to the end.
     fn path_from(&mut self, start: usize) -> Option<(usize, usize)> {
         let mut queue = VecDeque::from([(start, 0)]);
-        // Itself as a mark, for each start searches once.
+        // A mark that no other search leaves, for each start searches once.
         self.reached[start] = Some(start);
         while let Some((t, depth)) = queue.pop_front() {
             let open: Vec<usize> = self.of.of(t).collect();

@@ -184,9 +184,9 @@ fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
     out
 }
 
-// Independent of the tracer's own rule on purpose, which adds up chords of Bézier pieces.
 /// Area within the loops, positive where they run counterclockwise, from points along each curve.
 fn area(loops: &[TrimLoop]) -> f64 {
+    // Independent of the tracer's own rule on purpose, which adds up chords of Bézier pieces.
     let uses = loops.iter().flat_map(|l| &l.uses);
     uses.map(|u| {
         let [a, b] = u.uv.domain();

@@ -88,7 +88,6 @@ impl Cone {
             own.store((x as f32).to_bits(), Ordering::Relaxed);
         }
         // Released after the axis: whoever reads the new cosine reads the new axis too.
-        // Whoever sees it sees the axis.
         self.cosine.store((cosine as f32 + COSINE_ROOM).to_bits(), Ordering::Release);
     }
 
@@ -167,7 +166,7 @@ impl RayRecord {
             self.low[axis].fetch_min(place, Ordering::Relaxed);
             self.high[axis].fetch_max(place, Ordering::Relaxed);
         }
-        // As below: the thread that counts to this number lays the cone.
+        // Here too one thread alone counts to the number, and lays the cone.
         if self.left.fetch_add(1, Ordering::Relaxed) != RAYS_BEFORE_CONE {
             return;
         }

@@ -39,8 +39,8 @@ impl BufferFacet {
 
     /// One bit for each triangle, two apart.
     #[inline(always)]
-    // Two apart, so that shifts by one turn sides into triangles for both facets of a pair at once.
     pub(super) fn triangle_bits(&self) -> u8 {
+        // Two apart, so that shifts by one turn sides into triangles for both facets of a pair at once.
         (self.triangles & 1 | (self.triangles & 2) << 1) as u8
     }
 

@@ -222,7 +222,6 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
     values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-// Sorted by depth once: all lists below are taken from this one and keep its order.
 /// All facets that a buffer shows, the nearest first.
 fn projections(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Projection> {
     let projection = |f: usize| {
@@ -230,6 +229,7 @@ fn projections(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Projection> {
         corners.iter().all(|p| is_usable(*p)).then(|| Projection::new(f as u32, corners, view, face)).flatten()
     };
     let mut projections: Vec<Projection> = (0..mesh.facets.len()).filter_map(projection).collect();
+    // Sorted by depth once: all lists below are taken from this one and keep its order.
     projections.sort_by(|a, b| a.near.total_cmp(&b.near).then(a.facet.cmp(&b.facet)));
     projections
 }
