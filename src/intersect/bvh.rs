@@ -196,6 +196,7 @@ impl<'m> Bvh<'m> {
         }
     }
 
+    /// The nearest hit as obvhs finds it: single precision throughout and its own test of triangles.
     fn nearest_shipped(&self, triangles: &[RtTriangle], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         let own = ray.departure.map(|d| d.primitive);
         // Beyond what `f32` holds a range is as good as endless.
@@ -218,6 +219,7 @@ impl<'m> Bvh<'m> {
         Some(FacetHit { t: f64::from(t), facet: code >> 1, second: code & 1 == 1, b: [1.0 - b1 - b2, b1, b2] })
     }
 
+    /// The nearest hit with the tree of obvhs and the facet test of the octree.
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         // Lifted as for the octree: grazing rays would else be told differently.
         let ray = &self.surroundings.lifted(ray);

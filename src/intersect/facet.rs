@@ -241,6 +241,7 @@ impl FacetRay {
         near.then(|| self.tests_of_neighbour(own, facet, corners, around))
     }
 
+    /// How the two triangles of `facet` are tested for a ray that leaves the facet `own` on a border of both.
     #[cold]
     fn tests_of_neighbour(
         &self,
@@ -329,6 +330,7 @@ impl Line {
         }
     }
 
+    /// Tests a facet again of which an edge function is zero, with signs that are exact.
     #[cold]
     #[inline(never)]
     fn on_an_edge(

@@ -37,6 +37,7 @@ macro_rules! as_wide_as_needed {
 }
 
 impl BezierPatch {
+    /// All patches of a surface, those along v in a row, by knot insertion.
     pub(super) fn extract(surface: &Surface) -> Vec<Self> {
         let [p, q] = surface.degree;
         let [nu, nv] = surface.counts();

@@ -127,6 +127,7 @@ pub fn surface(
     Ok((Surface { degree, knots: [ku, kv], points }, repairs_u.union(repairs_v)))
 }
 
+/// Control points with their weights, or what is wrong with either.
 fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogeneous>, Defect> {
     if points.len() > MAX_POINTS || weights.is_some_and(|w| w.len() != points.len()) {
         return Err(Defect::Counts);

@@ -71,6 +71,7 @@ pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
         .with_block(road::from_driver(&name, grid, aim))
 }
 
+/// The rows of an assessment: what is asked and read, both errors, and the verdict.
 fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
         ("row", ""),

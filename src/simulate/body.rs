@@ -33,6 +33,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// A body of the medium `m`, with no faces yet.
     pub(crate) fn new(m: optics::Medium, name: String, light: &SceneLight) -> Self {
         Self {
             // In light of one line an index is a number; the formula is kept only where rays have wavelengths of their own.

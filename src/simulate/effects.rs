@@ -89,6 +89,7 @@ impl Required {
     }
 }
 
+/// The effects that the scene needs, why, and the smallest kernel that has them all.
 fn required(bound: &BoundScene) -> Required {
     let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()

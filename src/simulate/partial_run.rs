@@ -271,6 +271,7 @@ impl<'a> Reader<'a> {
         serde_json::from_slice(self.take(n)?).map_err(|e| format!("not a tally file of this version: {e}"))
     }
 
+    /// Reads the cells that are not empty into sums of the scene's size.
     fn sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
         if self.u64()? != into.len() as u64 {
             return Err("it has other receivers or faces than the scene".into());

@@ -54,6 +54,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// Divides the rays of a run among sources and replicates.
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
         let grows = can_grow(bound) && (settings.grows || grows_unasked(settings));

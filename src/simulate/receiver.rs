@@ -119,6 +119,7 @@ pub(crate) struct Spot {
 }
 
 impl Receiver {
+    /// The receiver of a checked scene; `faces` are those of an absorbing one.
     pub(crate) fn new(r: &scene::Receiver, faces: Vec<u32>) -> Self {
         let (at, n) = (Point::from_array(r.at), Vector::from_array(r.normal));
         let shape = match r.kind {

@@ -276,6 +276,7 @@ fn few_replicates(replicates: u32) -> Option<String> {
     ))
 }
 
+/// Power that instances' faces and bodies' media have taken, where they took any.
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
     let result = |name: &str, r#in: &str, s: &Sum| Absorbed {
         name: name.into(),
@@ -291,6 +292,7 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
 }
 
 impl ReceiverResult {
+    /// The figures of receiver `i`: sums of quanta turned into densities and their errors.
     fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64, unit: PowerUnit) -> Self {
         let grid = r.cells.map(|n| n as usize);
         let degrees = |low: [f64; 2], high: [f64; 2]| {

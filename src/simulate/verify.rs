@@ -48,6 +48,7 @@ pub fn verify_pruning(
     (pruned, verification)
 }
 
+/// Where two runs differ, twenty places at most; nothing when all bits agree.
 fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     let (a, b) = (&a.tallies, &b.tallies);
     let mut found = Vec::new();

@@ -102,6 +102,7 @@ fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (F
     (units, fallback.unwrap_or(Units { length, ..Units::DEFAULT }))
 }
 
+/// Reads a parsed file's assembly and converts what it places.
 fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Result<Model, Error> {
     let (units, fallback) = read_units(file, settings, &mut report.units);
     let assembly = Assembly::read(file, units, fallback);

@@ -88,6 +88,7 @@ pub(super) fn face_with_surface<'m>(
     Some((face, placed.surface(settings, k, face)?))
 }
 
+/// Meshes a part once: divides its edges, meshes its faces, and goes on with denser edges while repairs ask for them.
 fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
     let part = placed.part;
     let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();

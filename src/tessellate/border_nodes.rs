@@ -45,6 +45,7 @@ struct EdgeSegment<'l> {
 }
 
 impl BorderNodes {
+    /// Nodes and segments of a face's border, from its polygons.
     pub(super) fn new(
         part: &Part,
         loops: &[TrimLoop],
@@ -154,6 +155,7 @@ impl BorderNodes {
         vertex_nodes
     }
 
+    /// The node where an imprinted line ends: one that is there, or a new one.
     fn node_at(&mut self, surface: &FaceSurface<'_>, end: &ImprintEnd, near: f64) -> u32 {
         let extent = surface.extent();
         let off = |n: &Node| ((n.uv - end.uv) / extent).abs().max_element();

@@ -57,6 +57,7 @@ fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
     failed.iter().map(|id| FailedFace { face: id.0, entity: entities[id.index()] }).collect()
 }
 
+/// Lists the faces with facets that are not certified, with their entity and the file's gap.
 fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     for (facet, _) in made.mesh.facets.iter().zip(&made.quality).filter(|(_, q)| !q.certified) {
         match report.not_certified.last_mut() {
@@ -110,6 +111,7 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     all
 }
 
+/// Fills in what samples show: sag, facets above their tolerance, and errors of normals.
 fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
     let sampled = sample::sample_mesh(&made.mesh, model);
     let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);

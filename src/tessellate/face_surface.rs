@@ -60,6 +60,7 @@ pub(super) struct FaceSurface<'a> {
 }
 
 impl<'a> FaceSurface<'a> {
+    /// A face's surface with what meshing asks of it; `flip` where the face looks against Su × Sv.
     pub(super) fn new(surface: &'a Surface, flip: bool, field: ToleranceField) -> Self {
         let breaks = [0, 1].map(|d| {
             let n = surface.counts()[d];

@@ -78,6 +78,7 @@ pub(super) fn sample_facets(mesh: &FacetMesh, model: &Model, facets: &[usize]) -
         .collect()
 }
 
+/// Sag and normal errors of facet `f` with corners `p` and their normals `n`, measured at samples.
 fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
     let uv = mesh.facets[f].vertices.map(|v| mesh.vertices[v as usize].uv);
     let triangles: &[[usize; 3]] =

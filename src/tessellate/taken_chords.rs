@@ -72,6 +72,7 @@ struct Chords {
 }
 
 impl Chords {
+    /// Counts the chords of these faces: those of two faces, and those that are one's own diagonal.
     fn new(meshes: &[Option<FaceMesh>], range: Range<usize>) -> Self {
         let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
         let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();

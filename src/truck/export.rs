@@ -51,6 +51,7 @@ impl<'a> Exporter<'a> {
         Self { part, placement, vertices, edges: vec![None; part.edges.len()] }
     }
 
+    /// A face of truck, with edges that its neighbours share where truck takes them.
     fn face(&mut self, f: &Face) -> Result<modeling::Face, String> {
         let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)))?;
         if f.loops.is_empty() {
@@ -110,6 +111,7 @@ impl<'a> Exporter<'a> {
         curves.iter().zip(joints.iter().zip(next)).map(|(c, (a, b))| truck_edge(a, b, c)).collect()
     }
 
+    /// An edge of the part as edges of truck, made once: two where it is closed.
     fn edge(&mut self, id: EdgeId) -> Result<Vec<modeling::Edge>, String> {
         let index = id.0 as usize;
         if let Some(made) = &self.edges[index] {

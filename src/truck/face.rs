@@ -55,8 +55,10 @@ pub(super) fn convert<'a>(
     Ok(Face { analytic, reversed, loops, gap, ..Face::whole(surface) })
 }
 
+/// A surface, what it is exactly, whether Su × Sv is against truck's normal, its trims, and how far edges lie from it, mm.
 type Parts = (Surface, Analytic, bool, Vec<TrimLoop>, f64);
 
+/// A plane's surface, sized by its wires, and its trims, which an affine map gives exactly.
 fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     let (x, normal) = (vector(p.u_axis()), vector(p.normal()));
     if !(x.is_finite() && normal.is_finite() && normal.length() > 0.5) {
@@ -98,6 +100,7 @@ fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     Ok((surface, Analytic::Plane { frame }, false, loops, gap))
 }
 
+/// A spline and its trims, which are traced on it; `middles` tell on which side of a seam each edge runs.
 fn traced(
     surface: Surface,
     analytic: Analytic,
@@ -147,6 +150,7 @@ fn finished(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, St
     Ok(closed)
 }
 
+/// The loop with uses along poles put in and its ends joined to the bit.
 fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);

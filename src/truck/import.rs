@@ -78,6 +78,7 @@ impl Maker {
         self.part.shells.push(Shell { faces, closed, ..Shell::default() });
     }
 
+    /// A face of the part; its edges are added to the part where they are new.
     fn face(&mut self, face: &modeling::Face) -> Result<Face, String> {
         let mut wires: Vec<Vec<(EdgeId, bool)>> = Vec::new();
         for wire in face.absolute_boundaries() {
@@ -96,6 +97,7 @@ impl Maker {
         convert(&face.surface(), face.orientation(), &wires)
     }
 
+    /// The number of an edge in the part, to which it is added when it is met first.
     fn edge(&mut self, e: &modeling::Edge) -> Result<EdgeId, String> {
         // By truck's id: neighbours hold the same edge, and must get the same curve.
         if let Some(known) = self.edges.get(&e.id()) {
@@ -117,6 +119,7 @@ impl Maker {
         })
     }
 
+    /// Turns shells that look the wrong way and puts the outer one first.
     fn finish(mut self, name: &str) -> Conversion {
         self.part.name = name.into();
         let edges = &self.part.edges;

@@ -39,6 +39,7 @@ pub(super) struct Traced {
 }
 
 impl<'a> Tracer<'a> {
+    /// Samples over the domain, from which searches start.
     pub(super) fn new(surface: &'a Surface) -> Self {
         let [[u0, u1], [v0, v1]] = surface.domain();
         // Some samples a span, within what is quick to search.
@@ -91,6 +92,7 @@ impl<'a> Tracer<'a> {
             .fold(off(ts[0]), f64::max)
     }
 
+    /// The trim through the points of an edge at `ts`, with slopes that follow the edge.
     fn through(&self, edge: &Curve, ts: &[f64], near_u: Option<f64>) -> Result<UvCurve, String> {
         // Start in the middle, where no pole is, and walk to both ends.
         let middle = ts.len() / 2;

@@ -67,6 +67,7 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
+    /// The faces of a model as the tracer wants them: surfaces and trims once a part, patches once a place.
     pub(super) fn new(model: &Model, band: f64) -> Self {
         let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
         let mut geometry = Self {
@@ -105,6 +106,7 @@ impl Geometry {
         self.band.max(FLAGGED_OF_GAP * gap * placement.scale)
     }
 
+    /// Adds a face at its place, with patches that are placed there.
     fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, (trim, grid): (u32, u32), solid: Option<[u32; 2]>) {
         let record = self.faces.len() as u32;
         // Mirroring turns a normal over once more.

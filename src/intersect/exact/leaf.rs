@@ -85,6 +85,7 @@ pub(super) struct Described {
     pub(super) net: Net,
 }
 
+/// The leaf that `piece` of a patch's net is, over `rect` of the patch's parameters; who builds the tree fills in its numbers.
 pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
     let middle = net::evaluate(piece, degree, 0.5, 0.5).s;

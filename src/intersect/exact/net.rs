@@ -232,6 +232,7 @@ fn restrict_v(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
     restrict_lines(net, [q, p, 1], range);
 }
 
+/// Restricts all lines of degree `n` along a direction to the part [a, b] of [0, 1], which may reach beyond it.
 #[inline(always)]
 fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f64; 2]) {
     let q = if direction == 0 { lines } else { n };

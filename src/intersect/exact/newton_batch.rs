@@ -84,6 +84,7 @@ struct Group {
 }
 
 impl Convergence<'_> {
+    /// Newton's method for all seeds, as many of one degree at a time as a register has lanes.
     #[inline(always)]
     fn converge<V: F64x8>(self) {
         let mut net = [[V::splat(0.0); 4]; LARGEST_NET];

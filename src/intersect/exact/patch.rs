@@ -37,6 +37,7 @@ pub(super) struct Patch {
 }
 
 impl PatchGrid {
+    /// The breaks of a face's surface, and where sides of it coincide or come to one point.
     pub(super) fn new(face: &Face) -> Self {
         let s = &face.surface;
         let counts = s.counts();
@@ -65,6 +66,7 @@ impl PatchGrid {
 }
 
 impl Patch {
+    /// The patch at its place: its net about its own centre, of weight 1 in the middle.
     pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
         let middle = patch.homogeneous(Uv::splat(0.5))[0];
         // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.

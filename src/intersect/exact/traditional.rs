@@ -96,6 +96,7 @@ impl<'a> Traditional<'a> {
         Self { exact, surfaces, build_seconds: start.elapsed().as_secs_f64() }
     }
 
+    /// Adds the roots of a surface that Newton's method reaches from the samples nearest to the ray.
     fn candidates(&self, ray: &Ray, surface: &SampledSurface, found: &mut Vec<(FaceId, SurfacePoint)>) {
         let distances: Vec<f64> =
             // Squared distances suffice to find the minima.

@@ -45,6 +45,7 @@ struct Binary {
 }
 
 impl Tree {
+    /// The hierarchy over the boxes of leaves, which keep their indices.
     pub(super) fn build(boxes: &[Aabb]) -> Self {
         if boxes.is_empty() {
             return Self { nodes: Vec::new(), center: Vector::ZERO, bounds: Aabb::EMPTY };
@@ -99,6 +100,7 @@ impl Node {
     }
 }
 
+/// A binary tree over boxes, from which the wide one is collapsed.
 fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let centres: Vec<Vector> = boxes.iter().map(Aabb::center).collect();

@@ -74,6 +74,7 @@ pub(super) struct Trim {
 }
 
 impl Trim {
+    /// The trim of a face: `band` in mm, `closed` directions of its surface, and the gap of each edge of its part.
     pub(super) fn new(face: &Face, closed: [bool; 2], band: f64, gaps: &[f64]) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
@@ -125,6 +126,7 @@ impl Trim {
         self.uses.iter().map(|u| u.gap).fold(0.0, f64::max)
     }
 
+    /// Area within the loops in parameters, negative where they run clockwise.
     fn signed_area(&self) -> f64 {
         // Chords will do: pieces are so short beside their loop that the sign is that of the curves.
         let from_origin = |q: &glam::DVec3| q.truncate() / q.z - self.origin;
@@ -143,6 +145,7 @@ impl Trim {
         at(lo)..=at(hi)
     }
 
+    /// Decides the cells that no piece of a trim comes within `reach` of, and lists the pieces of the others.
     fn fill_cells(&mut self, reach: Uv) {
         for (k, piece) in self.pieces.iter().enumerate() {
             let (lo, hi) = (piece.min - reach, piece.max + reach);

@@ -26,6 +26,7 @@ struct Draft {
 /// Levels from the top whose children are drafted in parallel.
 const PARALLEL_LEVELS: u32 = 2;
 
+/// Lays cells out as arrays of nodes and blocks, and counts them in `stats`.
 pub(super) fn flatten(
     mesh: &FacetMesh,
     center: Point,
@@ -106,6 +107,7 @@ impl Draft {
         links
     }
 
+    /// Adds children, each from a thread of its own, and returns the links to them.
     fn add_parallel(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
         // Each child into arrays of its own, put together in the order of the children: the tree is the same for
         // any number of threads.
@@ -120,6 +122,7 @@ impl Draft {
         drafts.into_iter().map(|(draft, link)| self.append(draft, link)).collect()
     }
 
+    /// Puts a draft behind this one; returns its link as it now is.
     fn append(&mut self, draft: Draft, link: Link) -> Link {
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
         self.blocks.extend(draft.blocks);

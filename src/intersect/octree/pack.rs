@@ -65,6 +65,7 @@ fn block_count(n: usize) -> f32 {
 }
 
 impl Packing<'_> {
+    /// Halves the facets of a range until a block holds what is left.
     fn pack(&mut self, range: Range<usize>, depth: u32) -> Cell {
         let mut bounds = Box32::EMPTY;
         for &place in &self.orders[0][range.clone()] {

@@ -56,6 +56,7 @@ pub(super) struct RayState {
 }
 
 impl RayState {
+    /// A state that no ray has yet.
     pub(super) fn idle() -> Self {
         let ray = Ray::new(Point::ZERO, Vector::Z);
         Self {

@@ -32,6 +32,7 @@ impl Statistics {
         self.fill[usize::from(facets.clamp(1, 4)) - 1] += 1;
     }
 
+    /// Adds the counts of another part of the tree, depth by depth.
     pub(super) fn add(&mut self, other: &Self) {
         self.nodes += other.nodes;
         self.blocks += other.blocks;

@@ -66,6 +66,7 @@ pub(super) fn subdivide(
 }
 
 impl Subdivision<'_> {
+    /// The cell of these facets: divided into octants as long as that parts them, else packed.
     fn grow(&self, facets: Vec<ClippedFacet>, cell: Box32, depth: u32, duplication: f64) -> Cell {
         let n = facets.len();
         if n <= self.threshold || depth >= self.max_depth || duplication > self.max_duplication {
@@ -112,6 +113,7 @@ impl Subdivision<'_> {
         })
     }
 
+    /// The parts of facets in each octant about `middle`.
     fn split(&self, facets: &[ClippedFacet], middle: &[f32; 3]) -> [Vec<ClippedFacet>; 8] {
         if facets.len() <= CHUNK {
             // A surface mostly meets four octants of a cell.

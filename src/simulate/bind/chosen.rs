@@ -10,6 +10,7 @@ use std::collections::HashMap;
 /// For each face the last rule that gives its surface, and the last that gives its medium.
 pub(super) type ChosenRules = Vec<(Option<usize>, Option<usize>)>;
 
+/// Which rule of the scene gives each face its surface, and which its medium.
 pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, Error> {
     let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
     let mut nearest = Nearest::new(model);

@@ -103,6 +103,7 @@ struct Faces {
     touching_pairs: Vec<[u16; 2]>,
 }
 
+/// What each face does to light, and the distinct surfaces that faces name by their index.
 fn bind_faces(
     scene: &Scene,
     model: &Model,

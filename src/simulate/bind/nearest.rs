@@ -92,6 +92,7 @@ pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
     if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
 }
 
+/// Distance of a point from the trimmed face, mm; `loops` are its trims as polygons in parameters.
 fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
     let s = &face.surface;
     let [[u0, u1], [v0, v1]] = s.domain();

@@ -75,6 +75,7 @@ fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
     Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))
 }
 
+/// The wavelengths for which what a medium is made of is known, each with what happens beyond.
 fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let mut known = Vec::new();
     let mut add = |what: String, range: Option<[f64; 2]>, beyond| {

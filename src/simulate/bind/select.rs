@@ -114,6 +114,7 @@ pub(super) fn faces(
     Ok(chosen)
 }
 
+/// Refuses a selector of which a name stands for nothing in the model.
 fn each_name_means_something(
     scene: &Scene,
     base: &[Key<'_>],

@@ -62,6 +62,7 @@ pub(crate) struct Emission {
 }
 
 impl Emitter {
+    /// The emitter of source `i`, with its file where it has `loaded` one and its faces where it glows from an `area`.
     pub(crate) fn new(
         scene: &Scene,
         i: usize,

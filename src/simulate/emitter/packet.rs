@@ -84,6 +84,7 @@ impl Emitter {
             }
     }
 
+    /// Starts for the numbers u and v, by the formulas that serve single rays.
     #[inline(always)]
     fn fill_origins(&self, [u, v]: [PacketNumbers; 2], origins: &mut [PacketNumbers; 3]) {
         let f = self.frame;
@@ -111,6 +112,7 @@ impl Emitter {
         }
     }
 
+    /// Directions for the numbers u and v, by the formulas that serve single rays.
     #[inline(always)]
     fn fill_directions(&self, [u, v]: [PacketNumbers; 2], directions: &mut [PacketNumbers; 3]) {
         let f = self.frame;

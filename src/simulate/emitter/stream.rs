@@ -71,6 +71,7 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
+    /// The numbers of one source in one replicate, which has this many of its rays.
     pub(crate) fn new(seed: u64, sampling: Sampling, replicate: u32, source: u32, rays: u64) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));

@@ -30,6 +30,7 @@ pub(super) struct SourceQueue {
 }
 
 impl SourceQueue {
+    /// The queue of a replicate, or of a single ray that is traced again.
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
         let single = matches!(rays, RaySelection::Ray(_));
@@ -52,6 +53,7 @@ impl SourceQueue {
         queue
     }
 
+    /// Turns to a source: its rays in this replicate, from the first on.
     fn enter(&mut self, context: &Context<'_>, source: usize) {
         self.source = source;
         let Some(emitter) = context.bound.emitters.get(source) else { return };

@@ -94,6 +94,7 @@ impl ReceiverIndex {
         room
     }
 
+    /// Adds the receivers whose boxes the ray meets before `end`, in the order of the scene.
     #[inline(never)]
     fn collect(&self, ray: &Ray, end: f64, found: &mut Candidates) {
         let inverse = ray.direction.recip();

@@ -125,6 +125,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         received
     }
 
+    /// Adds a path's power to receiver `r` at a spot: to its cell, its total, its moments and its channels.
     #[inline(always)]
     fn deposit(&mut self, receiver: &Receiver, path: &Path<C>, r: u32, spot: &Spot) {
         let r = r as usize;

@@ -16,6 +16,7 @@ type Table = [[u32; 256]; 4];
 
 static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(table).collect());
 
+/// The direction numbers of a dimension, counted from 0, each as 32 binary places.
 fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0u32; 32];
     if dimension == 0 {

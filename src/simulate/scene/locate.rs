@@ -132,6 +132,7 @@ fn key_of(text: &str, at: usize) -> &str {
 /// Every list of the file must be as long as what was understood of it, for the reader takes as many entries as it needs and passes
 /// over the rest.
 pub(super) fn lengths(text: &str, understood: &serde_json::Value) -> Option<(Range<usize>, String)> {
+    /// The first list of the file with more values than the scene has understood, and what to say of it.
     fn unread(value: &Spanned<DeValue<'_>>, known: &serde_json::Value) -> Option<(Range<usize>, String)> {
         match (value.get_ref(), known) {
             (DeValue::Table(table), serde_json::Value::Object(known)) => {

@@ -23,6 +23,7 @@ pub struct ModelUse {
 const FARTHEST_PLACE: f64 = 1e11;
 
 impl ModelUse {
+    /// Refuses a model without file or at no place.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |keys: &[&str], message: &str| {
             let mut at = vec![Key::Name("model"), Key::Index(index)];

@@ -119,6 +119,7 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     })
 }
 
+/// Refuses media without a name of their own or with an index that no material has.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     for (i, m) in scene.media.iter().enumerate() {
         let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];

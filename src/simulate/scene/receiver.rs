@@ -177,6 +177,7 @@ impl Receiver {
         keys.into_iter().find(|(_, given, kinds, _)| *given && !kinds.contains(&self.kind)).map(|k| (k.0, k.3))
     }
 
+    /// Refuses a receiver whose values contradict each other, or leave it without a place or cells.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("receiver"), Key::Index(index), Key::Name(key)];

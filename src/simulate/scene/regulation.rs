@@ -48,6 +48,7 @@ impl RegulationUse {
         assess(&map, &Regulation::find(&self.id)?, &assumptions).map(|_| ())
     }
 
+    /// Refuses a regulation that is not known, or that has no far field which could answer it.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: String, help: &str| {
             let at = [Key::Name("regulation"), Key::Index(index), Key::Name(key)];

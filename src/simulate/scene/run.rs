@@ -146,6 +146,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
+    /// Refuses names that are not known and tolerances that are none.
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("accuracy"), Key::Name(key)];
@@ -178,6 +179,7 @@ impl Accuracy {
 }
 
 impl Run {
+    /// Refuses numbers out of range.
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             Err(scene.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))

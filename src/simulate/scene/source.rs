@@ -107,6 +107,7 @@ pub enum SourceKind {
 }
 
 impl Source {
+    /// Refuses a source with the first of its faults.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fault = (self.power_fault())
             .or_else(|| self.file_fault())

@@ -55,6 +55,7 @@ impl Material {
         }
     }
 
+    /// The scattering that is asked for, when its lobe has just the parameters that it needs.
     fn scatter(&self) -> Result<Option<Scatter>, String> {
         let Some(s) = &self.scatter else { return Ok(None) };
         let lobe = match (s.lobe, s.sigma_deg, s.exponent, s.abg) {
@@ -74,6 +75,7 @@ impl Material {
     }
 }
 
+/// The coating of given reflectance, `unset` where the scene gives none; errors come with the key they belong to.
 fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<Coating, (&'static str, String)> {
     let same = |r: f64| Split {
         reflected: Power { rs: r, rp: r },
@@ -97,6 +99,7 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
     }
 }
 
+/// A coating from rows of angle, wavelength, R, T or of angle, wavelength, Rs, Rp, Ts, Tp.
 fn table(rows: &[Vec<f64>]) -> Result<Coating, String> {
     let cells = rows.iter().map(|row| match row[..] {
         [a, nm, r, t] => {
@@ -126,6 +129,7 @@ fn grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String
     CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
 }
 
+/// Refuses materials that say nothing, select twice or name a medium that is not known.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(name) = &scene.ambient {
         medium::find(scene, name, &[Key::Name("ambient")])?;

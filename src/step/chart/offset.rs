@@ -236,6 +236,7 @@ impl GridLines {
         rows
     }
 
+    /// Knots of a cubic whose pieces end at the lines, with a corner where the basis has a knot.
     fn knots(&self) -> Vec<f64> {
         let last = self.at.len() - 1;
         let mut knots = Vec::with_capacity(3 * self.at.len() + 2);
@@ -282,6 +283,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     }
 }
 
+/// The bicubic surface with the offset's values, slopes and twists where lines cross; `None` where it has none.
 fn hermite(basis: &Surface, distance: f64, lines: &[GridLines; 2]) -> Option<Surface> {
     let [rows, columns] = [lines[0].control_rows(), lines[1].control_rows()];
     let mut points = Vec::with_capacity(rows.len() * columns.len());

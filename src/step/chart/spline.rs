@@ -40,6 +40,7 @@ impl Clone for SplineChart {
 }
 
 impl SplineChart {
+    /// A spline with its sides that coincide and those that are one point.
     pub(in crate::step) fn new(surface: Surface) -> Self {
         let size = surface.bounds().diagonal();
         let near = CLOSED_CONTROLS_SHARE * size.min(CLOSED_CONTROLS_LARGEST_MM) + CLOSED_MM;
@@ -62,6 +63,7 @@ impl SplineChart {
         [0, 1].map(|d| (self.closed[d] && self.collapsed[d] == [false; 2]).then(|| domain[d][1] - domain[d][0]))
     }
 
+    /// The sides that are one point, as poles.
     pub(super) fn poles(&self) -> Vec<Pole> {
         let domain = self.surface.domain();
         let mut poles = Vec::new();
@@ -97,6 +99,7 @@ impl SplineChart {
         uv
     }
 
+    /// Parameters within the domain: around where it closes on itself, to the border elsewhere.
     fn wrap(&self, uv: Uv) -> Uv {
         let domain = self.surface.domain();
         let one = |d: usize| {

@@ -70,6 +70,7 @@ impl Chart {
         Self::new(Kind::Cone { frame, radius, half_angle: 0.0 }, Analytic::Cylinder { frame, radius })
     }
 
+    /// A chart of this kind, with periods, ranges and poles that follow from it.
     pub(in crate::step) fn new(kind: Kind, analytic: Analytic) -> Self {
         const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
         let mut chart = Self {

@@ -40,6 +40,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(if reversed { whole.reversed() } else { whole })
     }
 
+    /// The part of a basis curve between the two trimming values of a TRIMMED_CURVE.
     fn trimmed_curve(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let basis = self.resolve(e, args.id(0), "basis curve")?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;

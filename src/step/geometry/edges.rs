@@ -40,6 +40,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, sense)
     }
 
+    /// An edge between two vertices, straight where the file gives no curve.
     fn edge_between(
         &self,
         id: u64,
@@ -133,6 +134,7 @@ pub(crate) fn trim_to_vertices(
     finish(shape.segment(ta, tb), forward, p, q)
 }
 
+/// The curve turned as the edge runs, with its gap to the vertices; `None` where nothing is left of it.
 fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge> {
     let curve = if forward { curve } else { curve.reversed() };
     let [a, b] = curve.domain();

@@ -58,6 +58,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart::cylinder(s.frame, radius))
     }
 
+    /// The chart of a CONICAL_SURFACE; one of next to no angle is a cylinder.
     fn cone(&self, s: &Elementary<'f, 'a>) -> Outcome<Chart> {
         let frame = s.frame;
         let radius = self.size(s, 0).filter(|r| *r >= 0.0);

@@ -145,6 +145,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         args.list(1).ids()
     }
 
+    /// Notes which product a representation shows, or which aspect of one.
     fn read_shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
         let (Some(definition), Some(representation)) = (definition, representation) else { return };
         // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
@@ -188,6 +189,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Some((first, second, placement))
     }
 
+    /// Reads a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION: where the child of its usage stands in the parent.
     fn read_contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
         let args = e.args();
         let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
@@ -282,6 +284,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         product().unwrap_or_default()
     }
 
+    /// Places a product with its representations and its children; `path` holds the products around it.
     fn place_product(
         &mut self,
         definition: u64,
@@ -317,6 +320,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         path.pop();
     }
 
+    /// Places the shapes of a representation and, by its relations and mapped items, of others; `path` holds those around it.
     fn place_representation(
         &mut self,
         id: u64,

@@ -301,6 +301,7 @@ fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Ref
     Refusal { id, entity: geometry.file.entity_name(id), reason }
 }
 
+/// One face of a plan: its edges joined to loops, its chart, and the trims on it.
 fn convert_face(
     geometry: &Geometry<'_, '_>,
     id: u64,

@@ -119,6 +119,7 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
     Ok((built, boundaries))
 }
 
+/// The task of trimming a surface by boundaries that belong to it alone.
 fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> FaceTask<'e> {
     // Boundaries of free surfaces share no edges: each use has one of its own, and runs along it.
     let mut edges = FxHashMap::default();

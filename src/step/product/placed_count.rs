@@ -37,6 +37,7 @@ struct Counter<'c, 'f, 'a> {
 }
 
 impl Counter<'_, '_, '_> {
+    /// How many a walk would place for a product: itself, its representations and what its children place.
     fn product(&mut self, id: u64, depth: usize) -> u64 {
         if let Some(known) = self.products.get(&id) {
             return *known;
@@ -57,6 +58,7 @@ impl Counter<'_, '_, '_> {
         count
     }
 
+    /// How many a walk would place for a representation: itself, what it maps and what it is related to.
     fn representation(&mut self, id: u64, depth: usize) -> u64 {
         if let Some(known) = self.shapes.get(&id) {
             return *known;

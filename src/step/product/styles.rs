@@ -83,6 +83,7 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
     None
 }
 
+/// The colour that an entity states by numbers or by name.
 fn rgb(e: Entity<'_, '_>) -> Option<Colour> {
     if let Some(a) = e.attributes("COLOUR_RGB", 1) {
         return Some(Colour([a.real(0)?, a.real(1)?, a.real(2)?]));

@@ -58,6 +58,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
+    /// The triangles of a leaf as a mesh, with the file's normals where it gives them.
     fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
         let args = e.args();
         let list = self.resolve(e, args.id(1), "list of coordinates")?;

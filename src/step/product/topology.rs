@@ -151,6 +151,7 @@ impl ShapeItems {
         }
     }
 
+    /// Adds the plan of a shell: its faces, and for each whether the oriented shells and faces around it turn it.
     fn add_shell(
         &mut self,
         file: &File<'_>,

@@ -227,6 +227,7 @@ impl Target<'_> {
         Ok(Fit { curve: assemble(&nodes), gap })
     }
 
+    /// Adds the cubic from `a` to `b` where it is accepted, else those of its halves; `gap` grows to the largest miss.
     fn halve(
         &self,
         piece: &Curve,

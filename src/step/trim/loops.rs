@@ -177,6 +177,7 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
     second
 }
 
+/// Puts uses one behind the other by whole periods, and counts how often the loop winds around.
 fn chain_uses(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
     let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
     for (i, next) in uses.into_iter().enumerate() {

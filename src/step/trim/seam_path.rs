@@ -66,6 +66,7 @@ impl Obstacles<'_> {
         })
     }
 
+    /// The shortest way from a start to a goal by way of these corners that no loop bars.
     fn way_by(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives, corners: Vec<Uv>) -> Option<SeamPath> {
         let length = |a: Uv, b: Uv| (metric.du * (b.x - a.x) + metric.dv * (b.y - a.y)).length();
         let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };

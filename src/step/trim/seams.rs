@@ -67,6 +67,7 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
     }
 }
 
+/// The curve of a seam in space: an isoline where it can be one.
 fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
     let Region { task, domain, surface } = region;
     let p = region.parameters(a);

@@ -168,6 +168,7 @@ impl Grader<'_> {
         hit.t / self.scene.frame.scale
     }
 
+    /// The grade of a first hit, by what is promised on the spline or on facets.
     fn first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         match self.geometry {
             Geometry::Spline => self.first_on_spline(ray, truth, hit),

@@ -59,6 +59,7 @@ fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector
     EDGE_SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
 }
 
+/// Parameters at which an edge is divided, for the tightest of its faces; each `denser` asks for chords half as long.
 pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32) -> Vec<f64> {
     // A straight edge is one chord, whatever its faces ask.
     let t = if curve.degree == 1 && curve.points.len() == 2 {

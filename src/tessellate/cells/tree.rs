@@ -128,6 +128,7 @@ pub(in crate::tessellate) fn split(
 }
 
 impl Tree<'_, '_> {
+    /// Keeps a whole cell that holds its tolerance, leaves one on the border to the transition, and halves any other.
     fn visit(&self, branch: &mut Branch<'_, '_>, visit: Visit<'_>) {
         let Visit { cell, depth, .. } = visit;
         let Some((near, inside)) = self.border_near(&visit) else { return };

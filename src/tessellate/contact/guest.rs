@@ -289,6 +289,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         })
     }
 
+    /// The guest's node for a node of the carrier's facets: the guest's own vertex, a known one, or a new one inside.
     fn node(&mut self, carrier_node: u32, place: Point, middle: Uv) -> u32 {
         let face = self.guest.face;
         let position = self.facets.nodes[carrier_node as usize].position;

@@ -21,6 +21,7 @@ pub(super) struct Projector<'s> {
 }
 
 impl<'s> Projector<'s> {
+    /// Seeds over the domain, those at poles apart.
     pub(super) fn new(spline: &'s Surface) -> Self {
         let [[u0, u1], [v0, v1]] = spline.domain();
         let steps = |d: usize| {

@@ -42,6 +42,7 @@ pub(in crate::tessellate) struct BorderChord {
 }
 
 impl BorderChord {
+    /// The chord of an edge between parameters `t`, of which one face has the ends at `uv`.
     pub(in crate::tessellate) fn new(
         surface: &FaceSurface<'_>,
         curve: &Curve,

@@ -226,6 +226,7 @@ impl Refinement<'_, '_> {
         Some(())
     }
 
+    /// Inserts a node; `None` where its parameters are no numbers that the library takes.
     pub(super) fn insert(&mut self, n: u32) -> Option<FixedVertexHandle> {
         let at = self.scaled(self.nodes[n].uv)?;
         let before = self.cdt.num_vertices();
@@ -277,6 +278,7 @@ impl Refinement<'_, '_> {
         [conflicts, crossed]
     }
 
+    /// Makes a segment a constraint; false where it would cross another or an end was not inserted.
     fn constrain(&mut self, a: u32, b: u32) -> bool {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
         // Both nodes stand in one place; a constraint of no length holds as it is.

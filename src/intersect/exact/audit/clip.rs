@@ -75,6 +75,7 @@ pub(super) struct PatchClipping<'a> {
 }
 
 impl<'a> PatchClipping<'a> {
+    /// The patch as a ray sees it; `domain` is the whole surface's, by which the patch's sides that are borders are known.
     pub(super) fn new(
         (ray, view): (&Ray, &View),
         face: FaceId,

@@ -109,6 +109,7 @@ struct Base {
 }
 
 impl Base {
+    /// `None` for a triangle without area.
     fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
         let (normal, lines) = lines_around(corners)?;
         let (x, y) = orthonormal_pair(normal);

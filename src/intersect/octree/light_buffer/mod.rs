@@ -112,6 +112,7 @@ impl Lookup {
 const LOOKUP_BATCH: usize = 32;
 
 impl View {
+    /// The view of a beam; `None` where it is no number, or so far off that rounding would not be small against a square.
     fn from_beam(beam: &Beam, tree: &Tree) -> Option<Self> {
         match beam {
             Beam::Point(origin) => origin.is_finite().then(|| Self::Point(origin.to_array())),

@@ -76,6 +76,7 @@ struct Projection {
 }
 
 impl Projection {
+    /// A facet seen on one side of the view; `None` where no ray of that side can meet it.
     fn new(facet: u32, corners: [Point; 4], view: &View, side: usize) -> Option<Self> {
         let mut depths = [0.0; 4];
         // Homogeneous: a corner beside the source or behind it has no place to divide for, but still lies on one
@@ -166,6 +167,7 @@ fn least_edge(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
     dx * (y - p[1]) - dy * (x - p[0])
 }
 
+/// Whether a triangle and a window have a point in common: neither the window's sides nor the triangle's part them.
 fn triangle_overlaps(t: [[f64; 2]; 3], window: &Window) -> bool {
     for a in 0..2 {
         let beyond = |past: &dyn Fn(f64) -> bool| t.iter().all(|p| past(p[a]));
