@@ -31,6 +31,7 @@ impl Buffer {
         self.views.len() - 1
     }
 
+    /// Adds vectors with their bounds; returns the number of their accessor.
     fn vectors(&mut self, list: &[[f32; 3]]) -> usize {
         let view = self.view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
         // The standard asks for the bounds of positions; for normals they do no harm.
@@ -61,6 +62,7 @@ fn linear(c: f64) -> f64 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
+/// The mesh of a group's facets about `middle`, for which vertices are numbered anew.
 fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Point, material: usize) -> Value {
     let mesh = facets.mesh;
     // Vertices that a group does not use would be sent with every group.

@@ -175,6 +175,7 @@ pub fn write_ies(path: &Path, p: &Photometry) -> Result<(), Error> {
     write_atomic(path, |w| w.write_all(text.as_bytes()))
 }
 
+/// The text of an LM-63-2002 file, with absolute photometry where the lamp's lumens are not known.
 fn ies_text(p: &Photometry) -> Result<String, String> {
     let (planes, rows) = (p.horizontal_deg.len(), p.vertical_deg.len());
     if planes == 0 || rows == 0 || p.candela.len() != planes * rows {
@@ -217,6 +218,7 @@ impl Lines {
         self.0.push_str("\r\n");
     }
 
+    /// Numbers in lines that are not too long.
     fn numbers(&mut self, numbers: &[f64]) {
         let mut line = String::new();
         for number in numbers {

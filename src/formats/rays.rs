@@ -125,6 +125,7 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
     }
 }
 
+/// Rays from lines of numbers, with a header that tells the order of columns or without one.
 fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     let mut rays = Vec::new();
     // Position of each of `COLUMNS` in a line.
@@ -206,6 +207,7 @@ fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
     Ok(order)
 }
 
+/// Rays from the arrays origin, direction, power and, where there is one, wavelength_nm.
 fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
     let file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;

@@ -15,6 +15,7 @@ enum Array<'a> {
     U8(&'a [u8]),
 }
 
+/// Writes one DataArray, its numbers in base64 behind their length.
 fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::Result<()> {
     let (kind, body): (&str, Vec<u8>) = match data {
         Array::F64(v) => ("Float64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),

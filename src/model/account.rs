@@ -240,6 +240,7 @@ impl Sweep<'_> {
 }
 
 impl TessellatedFace {
+    /// What is told of a ready mesh, at its place and in its parent's colour where it has none.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         let corner = |k: usize| self.mesh.positions[self.mesh.vertices[k].position as usize];
         // The middle of the first facet.

@@ -17,6 +17,7 @@ pub(super) struct Outline {
 }
 
 impl Outline {
+    /// Polygons along the trims, fine enough to tell inside from outside.
     pub(super) fn new(face: &Face) -> Self {
         let polygon = |l: &super::TrimLoop| {
             let mut points = Vec::new();

@@ -115,6 +115,7 @@ impl Abg {
         half * (NODES[0].1 * self.weight(middle) + NODES[1].1 * pair(NODES[1].0) + NODES[2].1 * pair(NODES[2].0))
     }
 
+    /// Adds up the weight ring by ring, in rings that grow by one factor.
     fn tabulate(&mut self) {
         // The bend of the weight lies at r = b^(1/g), and nothing changes far below it: rings start there.
         let start = (self.b.powf(1.0 / self.g.max(0.1)) * FIRST_RING).clamp(SHARPEST_RING, 0.1);

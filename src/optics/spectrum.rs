@@ -151,6 +151,7 @@ impl Wavelengths {
         Self::with_power(Kind::Lines(lines.iter().map(|l| l[0]).collect()), sums)
     }
 
+    /// The spectrum of a table of wavelength, nm, and relative power, linear between its points.
     fn continuous(table: Table) -> Result<Self, Error> {
         let points: Vec<[f64; 2]> = table.points().map(|(x, y)| [x, y]).collect();
         let [low, _] = table.extremes();

@@ -99,6 +99,7 @@ impl Cache {
         Ok(files.len())
     }
 
+    /// The files of the folder with a wanted name; none when there is no folder.
     fn files(&self, is_wanted: impl Fn(&str) -> bool) -> io::Result<Vec<CacheEntry>> {
         let folder = match fs::read_dir(&self.folder) {
             Ok(folder) => folder,
@@ -269,6 +270,7 @@ fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>)
     Ok(())
 }
 
+/// Reads an entry of this version between its magic and its checksum; `bytes` is the size of the file.
 fn read_entry<T>(
     file: &mut File,
     bytes: u64,

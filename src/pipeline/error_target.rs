@@ -108,6 +108,7 @@ impl ErrorTarget {
         self.result_of(self.error(results), results.rays)
     }
 
+    /// What the run has reached of this target, and how many rays are missing.
     fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
         let reached = found.is_some_and(|e| e <= self.percent);
         let wanted = (rays as f64 * self.growth(found)) as u64;

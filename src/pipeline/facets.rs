@@ -60,6 +60,7 @@ fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Fac
     Ok(FaceSelector::Placed(scene.bind(model)?.faces_in_role(role)))
 }
 
+/// The selector of a part by its name, or an error with the names that are like it.
 fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     if model.parts.iter().any(|p| p.name == name) {
         return Ok(FaceSelector::Part(name.to_owned()));

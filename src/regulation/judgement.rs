@@ -89,6 +89,7 @@ impl Decisive {
 }
 
 impl Judgement {
+    /// Reads all comparisons of a requirement; passes or fails only beyond the errors of the readings.
     pub(super) fn of_requirement(photometer: &Photometer, requirement: &Requirement) -> Self {
         // Of many comparisons one may be lucky: what one alone may decide is asked for at a confidence divided by their number. For a
         // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.

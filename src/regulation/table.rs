@@ -56,7 +56,8 @@ pub struct Function {
 }
 
 impl Function {
-    /// The rows of a group are weighed together: each point reaches this share of its minimum when the sum of its group is met.
+    /// Where the points of a group are judged by their sum: the share of its own minimum that each must reach all the same. `None`
+    /// where each point stands for itself.
     pub(super) fn point_floor(&self) -> Option<f64> {
         // FMVSS 108 has two ways: each point at least 60 % of its figure, or any share of it when its group's sum
         // is met.
@@ -187,6 +188,7 @@ struct File {
     functions: Vec<Function>,
 }
 
+/// The regulations of a table, one a lamp function.
 fn read(prefix: &str, text: &str) -> Vec<Regulation> {
     // The tables are part of the program: a test reads each of them.
     let file: File = serde_json::from_str(text).unwrap_or_else(|e| panic!("table of {prefix}: {e}"));

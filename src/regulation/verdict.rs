@@ -135,6 +135,7 @@ fn realign(
     })
 }
 
+/// Judges every row for the map as it is aimed.
 fn assess_aimed(
     map: &IntensityMap,
     regulation: &Regulation,
@@ -166,6 +167,7 @@ fn assess_aimed(
     Assessment { regulation: regulation.clone(), sensor_deg: 2.0 * sensor.half_deg, aim, rows, verdict }
 }
 
+/// Judges a row by its worst requirement; rows with conditions on use stay without a verdict.
 fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Assumptions, row: &Row) -> RowVerdict {
     let mut verdict = RowVerdict { row: row.clone(), reading: None, direction: None, verdict: None, settles: None };
     // Conditions are about the lamp's use, which the simulation does not know.

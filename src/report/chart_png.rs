@@ -21,6 +21,7 @@ pub(super) fn picture(chart: &Chart) -> Option<Picture> {
     render(&static_chart::draw(chart))
 }
 
+/// The pixels of a drawing; `None` where it has no size.
 fn render(drawing: &Drawing) -> Option<Picture> {
     let [width, height] = drawing.size.map(|s| (s as f32 * ZOOM).ceil() as u32);
     let mut pixels = Pixmap::new(width, height)?;
@@ -35,6 +36,7 @@ fn render(drawing: &Drawing) -> Option<Picture> {
     Some(Picture { width, height, rgb })
 }
 
+/// Paints one element; `None` where it leaves no ink.
 fn paint(pixels: &mut Pixmap, element: &Element, font: &FontRef) -> Option<()> {
     let zoom = Transform::from_scale(ZOOM, ZOOM);
     match element {

@@ -36,6 +36,7 @@ struct Kind {
     meaning: &'static str,
 }
 
+/// The causes of differences with their counts, colours and what they mean.
 fn kinds(check: &CrossCheck) -> Vec<Kind> {
     let e = &check.facets_vs_exact.explained;
     let kind = |name, count, colour, meaning| Kind { name, count, colour, meaning };
@@ -223,6 +224,7 @@ impl CheckReport<'_> {
         Report { title, answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 
+    /// The section on rays answered differently.
     fn rays(&self) -> Section {
         let mut table = Table::new(
             "causes",
@@ -280,6 +282,7 @@ impl CheckReport<'_> {
         self.tables.iter().cloned().fold(section, |s, t| s.with_block(t))
     }
 
+    /// The section on rates, building times and memory.
     fn speed(&self) -> Section {
         let c = self.check;
         let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);

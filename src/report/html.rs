@@ -73,6 +73,7 @@ pub(super) fn page(report: &Report, png: PngOf) -> String {
     page.replacen(SCRIPTS_GO_HERE, &scripts, 1)
 }
 
+/// A section of the page.
 fn part(section: &Section, png: PngOf) -> Markup {
     let mut rows: Vec<Vec<&Block>> = Vec::new();
     // Neighbouring pictures share a row, at most two.
@@ -94,6 +95,7 @@ fn part(section: &Section, png: PngOf) -> Markup {
     }
 }
 
+/// A block of the page; a picture stands as SVG or PNG until the script makes it interactive.
 fn content(block: &Block, png: PngOf) -> Markup {
     match block {
         Block::Text(text) => html! { p { (emphasised(text)) } },
@@ -112,6 +114,7 @@ fn content(block: &Block, png: PngOf) -> Markup {
     }
 }
 
+/// A picture with its data for the script and links to its files.
 fn figure(
     name: &str,
     title: &str,
@@ -137,6 +140,7 @@ fn figure(
     }
 }
 
+/// A table that can be sorted, copied and fetched as CSV.
 fn table_markup(table: &Table) -> Markup {
     html! {
         div.table id={ "table-" (table.name) } {
@@ -164,6 +168,7 @@ fn table_markup(table: &Table) -> Markup {
     }
 }
 
+/// The section that tells command, program, machine and seed.
 fn origin(p: &Provenance) -> Markup {
     let seed = p.seed.map_or("none used".to_owned(), |s| s.to_string());
     html! {

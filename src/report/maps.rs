@@ -101,6 +101,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series))
 }
 
+/// What a map shows, in words: its peak, its noise and its cells.
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     let peak = grid.peak().map(|([x, y], value)| {
         format!(

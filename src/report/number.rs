@@ -75,6 +75,7 @@ fn trimmed(mantissa: &str) -> &str {
     if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa }
 }
 
+/// Digits in groups of three, apart by thin spaces.
 fn apart(whole: &str) -> String {
     let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |d| ("-", d));
     // Four digits are read at a glance.

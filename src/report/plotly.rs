@@ -171,6 +171,7 @@ fn level_labels(marks: &Marks) -> Vec<Value> {
     longest_of_levels(&marks.lines).into_iter().map(label).collect()
 }
 
+/// A series as plotly's trace.
 fn trace(colour: &str, s: &Series) -> Value {
     let mode = match s.style {
         SeriesStyle::LineAndPoints => "lines+markers",
@@ -211,6 +212,7 @@ pub(super) fn view(view: &View) -> Value {
         "legend": {"orientation": "h", "y": -0.01, "yanchor": "top"}}})
 }
 
+/// A shape of a view as plotly's trace; `low` and `high` bound its colours.
 fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
         Shape::Surface { name, points, triangles, colour, opacity, values, labels } => {

@@ -29,6 +29,7 @@ impl Canvas {
         Self { width, height, rgb, depth: vec![f32::INFINITY; width * height] }
     }
 
+    /// Draws one pixel where nothing nearer stands.
     fn put(&mut self, x: usize, y: usize, depth: f32, colour: [f32; 3], opacity: f32) {
         let at = y * self.width + x;
         // At equal depth the later one wins, as lines along facets must show.
@@ -43,6 +44,7 @@ impl Canvas {
         }
     }
 
+    /// Draws a triangle given in pixels, with its depth.
     fn triangle(&mut self, [a, b, c]: [Vec3; 3], colour: [f32; 3], opacity: f32) {
         let [p, q, r] = [a.truncate(), b.truncate(), c.truncate()];
         let area = (q - p).perp_dot(r - p);
@@ -65,6 +67,7 @@ impl Canvas {
         }
     }
 
+    /// Draws a line given in pixels, as squares of its width.
     fn line(&mut self, a: Vec3, b: Vec3, width: f32, colour: [f32; 3], opacity: f32) {
         // A step a pixel; what runs far out of the picture is not followed for ever.
         let steps = (b - a).truncate().abs().max_element().ceil().clamp(1.0, 8000.0) as usize;
@@ -82,6 +85,7 @@ impl Canvas {
         }
     }
 
+    /// The picture, of which each pixel is the mean of its samples.
     fn picture(&self) -> Picture {
         let mut rgb = Vec::with_capacity(3 * WIDTH * HEIGHT);
         for y in 0..HEIGHT {

@@ -175,6 +175,7 @@ impl SimulationReport<'_> {
         Report { title: self.title.clone(), answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 
+    /// The section on light: notes, the map of each receiver, and facets with ray paths.
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
         let mut section = notes.fold(Section::new("Light"), |s, note| s.with_block(note.as_str()));
@@ -230,6 +231,7 @@ impl SimulationReport<'_> {
         maps
     }
 
+    /// The section on where the power went.
     fn energy(&self) -> Section {
         let p = &self.results.power;
         let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit), ("share", "%")])
@@ -330,6 +332,7 @@ impl SimulationReport<'_> {
         table
     }
 
+    /// The section on rays of this run that all intersectors were asked.
     fn cross_check(&self, check: &CrossCheck) -> Section {
         let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
@@ -344,6 +347,7 @@ impl SimulationReport<'_> {
         }
     }
 
+    /// The section on what was simulated and what not.
     fn effects(&self) -> Section {
         let used = &self.results.effects;
         let mut table = Table::new("effects", "Effects", &[("effect", ""), ("simulated", ""), ("because", "")])
@@ -359,6 +363,7 @@ impl SimulationReport<'_> {
         Section::new("What was simulated, what not, and why").with_block(table)
     }
 
+    /// The section on the model, its facets and times.
     fn cost(&self) -> Section {
         let s = &self.results.seconds;
         let mut table = Table::new("times", "Times", &[("step", ""), ("time", "s"), ("what", "")]);

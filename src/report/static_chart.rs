@@ -21,6 +21,7 @@ struct Scale {
 }
 
 impl Scale {
+    /// The scale of an axis from `from` to `to` in the drawing, around these values and, where `zero` is asked, from zero.
     fn new(values: impl Iterator<Item = f64>, axis: &AxisStyle, [from, to]: [f64; 2], zero: bool) -> Self {
         let usable = values.filter(|v| v.is_finite() && (!axis.log || *v > 0.0));
         let range =
@@ -55,6 +56,7 @@ impl Scale {
         value.is_finite() && (!self.log || value > 0.0)
     }
 
+    /// Values to be marked: decades, or steps of 1, 2 or 5 times a power of ten.
     fn ticks(&self) -> Vec<f64> {
         if self.log {
             let decades: Vec<f64> = (self.low.log10().ceil() as i32..=self.high.log10().floor() as i32)
@@ -110,6 +112,7 @@ fn label(text: String, place: Place, anchor: Anchor) -> Element {
     Element::Text { text, place, anchor, opacity: 1.0, turned: false, ink: Ink::Text }
 }
 
+/// Draws grid lines, marks and titles of both axes; bars have no scale along x.
 fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
     let [left, top, _, bottom] = AREA;
     for t in y.ticks() {
@@ -134,6 +137,7 @@ fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale
     });
 }
 
+/// Draws the names of series in their colours.
 fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     let [_, top, right, _] = AREA;
     // A single series is named by the title.
@@ -148,6 +152,7 @@ fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     }
 }
 
+/// Draws lines and points with axes and legend.
 fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     let [left, top, right, bottom] = AREA;
     let all = || series.iter().flat_map(|s| &s.points);
@@ -221,6 +226,7 @@ fn extra_height(chart: &Chart) -> f64 {
     LINE * lines.saturating_sub(1) as f64
 }
 
+/// Draws bars, their layers one on the other or side by side.
 fn bar_chart(
     elements: &mut Vec<Element>,
     chart: &Chart,
@@ -273,6 +279,7 @@ fn bar_chart(
     legend(elements, &names);
 }
 
+/// Draws a map in colours beside their bar; returns the scales on which it stands.
 fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) -> [Scale; 2] {
     let [left, top, right, bottom] = AREA;
     // Room for the colour bar.

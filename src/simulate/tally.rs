@@ -193,6 +193,7 @@ impl Moments {
         self.first[1] += i128::from(w as i64) * i128::from(nearest_integer(y * GRAIN));
         self.second[0] += u128::from(w) * u128::from(x2);
         self.second[1] += u128::from(w) * u128::from(y2);
+        // The largest and no sum: nothing is added up, which leaves room for finer units.
         self.farthest = self.farthest.max(quanta_as_integer(radius2 * (1u64 << 60) as f64));
     }
 

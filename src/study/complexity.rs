@@ -151,6 +151,7 @@ fn gather(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut
     });
 }
 
+/// Times what is ready on one lamp; the traditional method has as many rays as its time allows.
 fn race(
     lamp: &Lamp,
     bound: &BoundScene,
@@ -209,6 +210,7 @@ fn race(
     ready.iter().zip(&timings).zip(prepare).map(row).collect()
 }
 
+/// The answer of the study in words.
 fn sentence(rows: &[Row]) -> String {
     let of = |method: &str| -> Vec<&Row> { rows.iter().filter(|r| r.method == method).collect() };
     let (octree, exact) = (of("octree"), of("exact"));

@@ -248,6 +248,7 @@ impl Undecided<'_> {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
     }
 
+    /// The run's settings with the pilot's few rays.
     fn pilot_settings(&self) -> RunSettings {
         // No more rays than the run itself has.
         let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());

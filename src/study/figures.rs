@@ -171,6 +171,7 @@ impl<'a> Errors<'a> {
         }
     }
 
+    /// The figures of a receiver, each with both its errors.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
         let power = self.geometric(self.lost_power, |m| m.power.geometric());
         let power = Figure::new(r.power, unit, r.power_error, power);

@@ -27,6 +27,7 @@ pub(super) struct HitErrors {
 }
 
 impl HitErrors {
+    /// Errors of hits against the exact ones of the same rays; hits on another face are counted alone.
     pub(super) fn between(rays: &[Ray], hits: &[Option<Hit>], exact: &[Option<Hit>]) -> Self {
         let mut e = Self::default();
         for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {

@@ -113,6 +113,7 @@ pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMe
     meshed
 }
 
+/// Errors and times of all kinds of normals on one model.
 fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row> {
     let meshed = mesh_of(mesh_source, settings.facets);
     let (rays, truth) = hitting(mesh_source, &meshed, settings);

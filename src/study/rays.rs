@@ -133,6 +133,7 @@ impl<'a> Bounces<'a> {
         Self { first: Uniform::new(bounds, seed, count), guide, lift }
     }
 
+    /// The rays of one path, which bounce diffusely.
     fn path(&self, path: u64) -> Vec<Ray> {
         // Another stream than that of the first rays, which are keyed by the same numbers.
         let mut random = Random::new(self.first.seed ^ 0x5851_f42d_4c95_7f2d, path);

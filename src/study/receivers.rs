@@ -163,6 +163,7 @@ pub(super) fn receivers(
     rows
 }
 
+/// What facets change of a receiver beside what rays leave open, and which of the two limits it.
 fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
     let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
     let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);

@@ -60,6 +60,7 @@ struct Weld {
 }
 
 impl Weld {
+    /// The number of a position: that of an earlier one where both agree.
     fn position(&mut self, p: Point, positions: &mut Vec<Point>) -> u32 {
         let scaled = (p - self.origin) / (16.0 * self.cell);
         // A point near a cell's side is looked for in both cells.
@@ -92,6 +93,7 @@ fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
     inner.chain([b]).collect()
 }
 
+/// Adds a face as a grid of facets, `divisions` a side of each knot rectangle.
 fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, face: &Face, divisions: usize) {
     let (us, vs) = (breaks(&face.surface, 0, divisions), breaks(&face.surface, 1, divisions));
     let mirrored = placed.placement.is_mirrored();
@@ -131,6 +133,7 @@ fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, fac
     }
 }
 
+/// The largest distance of samples from the surface, with some room for what lies between them.
 fn sampled_sag(mesh: &FacetMesh, facet: usize, placed: &PlacedFace<'_>, face: &Face) -> f64 {
     let corners = mesh.corners(facet);
     let uv = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);

@@ -68,6 +68,7 @@ struct Pilot {
 }
 
 impl Pilot {
+    /// Seconds that the run would take on the spline and, at the tolerance `middle`, on facets.
     fn time(mesh_source: &dyn MeshSource, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
         let timed = |who: &dyn Intersector, rays: u64| {
             let few = RunSettings { rays, path_samples: 0, ..run.clone() };

@@ -104,6 +104,7 @@ impl ResultsFile {
         rays.ok_or_else(|| Failure::input(format!("{}: no number of rays", self.path.display())))
     }
 
+    /// The intensities of a far field, from the CSV file that the results name.
     fn intensities(&self, receiver: &Value) -> Result<IntensityMap, Failure> {
         let files = receiver["files"].as_array().into_iter().flatten();
         let csv = files.filter_map(Value::as_str).find(|f| f.ends_with(".csv"));

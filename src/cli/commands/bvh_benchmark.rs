@@ -296,6 +296,7 @@ struct Comparison {
 }
 
 impl Comparison {
+    /// Counts where hits differ from the octree's, and which of the two is wrong.
     fn new(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
         let same = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
             (None, None) => true,
@@ -316,6 +317,7 @@ impl Comparison {
     }
 }
 
+/// The answer of the benchmark in words.
 fn sentence(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);
     let kind = if rows.iter().any(|r| r["rays_kind"] == GIVEN) { GIVEN } else { "incoherent" };

@@ -64,6 +64,7 @@ fn part_text(part: &PartAccount, most: usize, selectors: &mut impl Iterator<Item
     text
 }
 
+/// A solid and at most `most` of its faces, one a line.
 fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let closed = if solid.closed { "closed" } else { "open" };
     let name = if solid.name.is_empty() { String::new() } else { format!(" {}", named(&solid.name)) };
@@ -82,6 +83,7 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     text
 }
 
+/// A face on one line: entity, kind, area, a point on it, colour, layer, name and selector.
 fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     let id = face.id.map_or_else(|| "–".to_owned(), |id| format!("#{id}"));
     let kind = face.kind.word();

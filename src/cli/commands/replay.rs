@@ -46,6 +46,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
     Ok(request)
 }
 
+/// Adds the rays of a ledger of lost rays, and the seed and number of rays of its run.
 fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
     let mut lines = text.lines();
     if lines.next() != Some(COLUMNS) {

@@ -32,6 +32,7 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
 }
 
+/// The cells of a row of the table.
 fn cells(row: &RowVerdict) -> [String; 8] {
     let read = |value: fn(crate::regulation::Reading) -> f64| {
         row.reading.map_or("–".to_owned(), |r| figures(value(r), DIGITS))

@@ -40,6 +40,7 @@ impl OutputPlace {
         Self::claim(&folder_of(path), path.with_file_name(format!(".{name}.lock")))
     }
 
+    /// Takes the lock file of a folder, or says who has it.
     fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
         let unwritable = |e: std::io::Error| {

@@ -42,6 +42,7 @@ impl ByteReader {
         Error::new(&self.path, ErrorKind::Malformed(message.into()))
     }
 
+    /// Fills `bytes` from the file; `field` is what they are, for the message when it ends too soon.
     pub(super) fn fill(&mut self, bytes: &mut [u8], field: &str) -> Result<(), Error> {
         // Kept for the message: it must name where the field began.
         let start = self.position;

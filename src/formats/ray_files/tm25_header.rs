@@ -330,6 +330,7 @@ fn bounded(file: &mut ByteReader, of: &str) -> Result<usize, Error> {
     Ok(count as usize)
 }
 
+/// Reads which columns the rays have; position and direction they must have.
 fn read_columns(file: &mut ByteReader) -> Result<Tm25Columns, Error> {
     let mut flags = [false; 8];
     for (number, flag) in flags.iter_mut().enumerate() {
@@ -348,6 +349,7 @@ fn read_columns(file: &mut ByteReader) -> Result<Tm25Columns, Error> {
     Ok(Tm25Columns { radiant, wavelength, luminous, stokes, tristimulus, spectrum_index })
 }
 
+/// Reads the tables of wavelength and weight, and the padding behind them.
 fn read_spectra(file: &mut ByteReader, tables: usize) -> Result<Vec<Vec<[f32; 2]>>, Error> {
     let start = file.position();
     let mut spectra = Vec::with_capacity(tables);

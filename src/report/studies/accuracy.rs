@@ -36,6 +36,7 @@ impl<'a> Point<'a> {
         }
     }
 
+    /// What a point stands for, in words.
     fn label(&self) -> String {
         let intersector = text(self.row, "intersector");
         if intersector == "exact" {
@@ -50,6 +51,7 @@ impl<'a> Point<'a> {
     }
 }
 
+/// Title, answer and sections of the accuracy study.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let model = distinct(rows, "model").join(", ");
     // Facts at the largest number of threads: that is what a user waits for.
@@ -67,6 +69,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     (title, answer(&points), vec![section, time])
 }
 
+/// The cheapest way to the wanted direction error, in words.
 fn answer(points: &[Point]) -> String {
     let best = (points.iter())
         .filter(|p| p.error <= WANTED_DEG && text(p.row, "intersector") != "exact")
@@ -163,6 +166,7 @@ fn front(points: &[Point]) -> Chart {
     Chart::series("front", "Cost–accuracy front", caption, axes, series)
 }
 
+/// The chart of direction error over sag, with the slopes that theory expects.
 fn slopes(rows: &[&Value]) -> Chart {
     // The median: an rms follows the few most grazing rays, whose error goes with the tangent of incidence. Where more than half of
     // the hits are on planes their median is rounding, and the 99th percentile stands in for it.
@@ -225,6 +229,7 @@ fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (logs.len() > 2 && sxx > 0.0).then(|| sxy / sxx)
 }
 
+/// The chart of the times that meshing, building and tracing take.
 fn stacked(rows: &[&Value]) -> Chart {
     let shown: Vec<&&Value> = (rows.iter())
         .filter(|r| {

@@ -16,6 +16,7 @@ fn label(row: &Value) -> String {
     }
 }
 
+/// Title, answer and sections of the effects study.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let categories: Vec<String> = rows.iter().map(|r| label(r)).collect();
     let times: Vec<Option<f64>> = rows.iter().map(|r| number(r, "seconds_trace_median")).collect();

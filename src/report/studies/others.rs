@@ -34,6 +34,7 @@ fn bars(
     Chart { content, ..Chart::series(name, title, caption, axes, Vec::new()) }
 }
 
+/// The interpolation study: a table and a chart of normal errors.
 pub(super) fn interpolation(rows: &[&Value]) -> Parts {
     let columns = [
         ("model", ""),
@@ -113,6 +114,7 @@ fn ratios(rows: &[&Value]) -> Table {
 /// The seed paper's table 1: share of time saved, percent.
 const PAPER_COMPLEXITY: [f64; 3] = [18.75, 25.45, 46.65];
 
+/// The complexity study, beside the figures of the paper.
 pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let mut table = Table::new(
         "complexity",
@@ -188,6 +190,7 @@ fn growth(rows: &[&Value]) -> Chart {
     Chart::series("growth", "How the time grows with the lamp", caption, axes, series)
 }
 
+/// The benchmark against obvhs: rates by kind of rays and number of facets.
 pub(super) fn bvh(rows: &[&Value]) -> Parts {
     let rate = |name: &str, kind: &str| {
         let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;

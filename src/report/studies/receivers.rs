@@ -12,6 +12,7 @@ pub(super) fn section(rows: &[&Value]) -> Section {
     section.with_block(table(rows))
 }
 
+/// The chart of what facets change of a receiver's map, by tolerance, beside the noise.
 fn chart(rows: &[&Value], receiver: &str) -> Chart {
     let own: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "receiver") == receiver).collect();
     let along = |normals: &str, key: &str| {
@@ -39,6 +40,7 @@ fn chart(rows: &[&Value], receiver: &str) -> Chart {
     Chart::series(&name, &format!("{}: what the facets change", receiver.replace('_', " ")), caption, axes, series)
 }
 
+/// The table of all receivers with both errors.
 fn table(rows: &[&Value]) -> Table {
     let columns = [
         ("receiver", ""),

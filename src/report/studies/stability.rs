@@ -4,6 +4,7 @@ use super::rows::{distinct, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, grouped};
 use serde_json::Value;
 
+/// Title, answer and sections of the stability study.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let sum = |name: &str, key: &str| -> u64 {
         rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()

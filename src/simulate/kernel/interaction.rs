@@ -100,7 +100,7 @@ impl SurfaceInteraction<'_> {
         self.hit.departure()
     }
 
-    /// The hit with a copy of its own, for what looks for faces at the same place.
+    /// The hit with its face and point, as the search for other faces at the same place wants it.
     pub(super) fn face_hit(&self) -> FaceHit {
         FaceHit { hit: *self.hit, face: self.face, point: self.point }
     }

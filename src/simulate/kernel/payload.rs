@@ -47,7 +47,7 @@ pub(crate) trait RayPayload: Copy + Send {
     fn stokes_mut(&mut self) -> Option<&mut Stokes> {
         None
     }
-    /// Gives it a colour and a polarisation.
+    /// Gives it a colour and a polarisation, where it carries either; what it does not carry is not computed.
     fn set_light(&mut self, _wavelength: Option<f64>, _stokes: impl FnOnce() -> Stokes) {}
 }
 

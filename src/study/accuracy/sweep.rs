@@ -123,6 +123,7 @@ struct Runner<'a> {
 }
 
 impl Sweep<'_> {
+    /// Times the runners in alternating rounds; each leaves its hits.
     fn race(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
         let mut rounds = Rounds::default();
         for runner in runners {
@@ -140,6 +141,7 @@ impl Sweep<'_> {
         Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
     }
 
+    /// Times the exact spline; its hits are the truth of all that follows.
     fn exact(&mut self) {
         let who = self.mesh_source.exact();
         let runners = [self.runner(who)];
@@ -182,6 +184,7 @@ impl Sweep<'_> {
         })
     }
 
+    /// The row of a tree on a mesh, without what tracing took.
     fn row(
         &self,
         tolerance: [f64; 2],

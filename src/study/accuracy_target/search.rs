@@ -229,6 +229,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Meshes by a plan, traces the reference rays, and holds the mirrored directions against the spline's.
     fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
         let meshed = self.mesh_source.mesh_plan(plan);
         let mut hits = vec![None; on.rays.len()];

@@ -42,6 +42,7 @@ const ENOUGH: usize = 100;
 const MANY: usize = 400;
 
 impl Survey {
+    /// Numbers the distinct faces of a model, and notes radius and tilt where rays hit them.
     pub(super) fn new(model: &Model, rays: &[Ray], truth: &[Option<Hit>]) -> Self {
         let placed: Vec<_> = model.placed_faces().collect();
         let mut names: FxHashMap<*const Face, usize> = FxHashMap::default();

@@ -22,6 +22,7 @@ pub(super) struct Border {
 }
 
 impl Border {
+    /// A border curve sampled so closely that it strays from no chord by more than a quarter of its length.
     pub(super) fn new(curve: UvCurve, surface: &Surface) -> Self {
         let breaks = curve.breakpoints();
         let mut samples = Vec::new();

@@ -32,6 +32,7 @@ pub(super) struct Classifier<'a> {
 }
 
 impl<'a> Classifier<'a> {
+    /// A classifier for a model and its mesh; `fallback`, mm, stands for the sag of facets that were not proved.
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
         // Surfaces are moved into place only for faces that differ: most never do.
         let placed: Vec<_> = model.placed_faces().collect();

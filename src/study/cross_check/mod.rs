@@ -119,6 +119,7 @@ struct Tally {
 }
 
 impl Tally {
+    /// The tally of some rays, of which `first` is the number of the first.
     fn of_rays(intersectors: &Intersectors<'_>, classifier: &Classifier<'_>, first: u64, rays: &[Ray]) -> Self {
         let ask = |who: &dyn Intersector| {
             let mut hits = vec![None; rays.len()];
@@ -133,6 +134,7 @@ impl Tally {
         tally
     }
 
+    /// Counts a ray with the answers of all three, and keeps it where they differ by more than the sag.
     fn add(&mut self, classifier: &Classifier<'_>, index: u64, ray: &Ray, [octree, bvh, exact]: [Option<Hit>; 3]) {
         self.check.hits += u64::from(octree.is_some());
         let facets_differ = match classifier.same_facets(ray, octree.as_ref(), bvh.as_ref()) {
@@ -161,6 +163,7 @@ impl Tally {
         }
     }
 
+    /// Counts how facets and spline differ, and the cause.
     fn count(&mut self, cause: Option<Cause>, octree: Option<Hit>, exact: Option<Hit>) {
         let found = &mut self.check.facets_vs_exact;
         match (octree, exact) {
@@ -190,6 +193,7 @@ impl Tally {
         *counter += 1;
     }
 
+    /// Adds another tally; of kept rays there are `keep` at most.
     fn absorb(&mut self, other: Self, keep: usize) {
         let (a, b) = (&mut self.check, &other.check);
         a.hits += b.hits;

@@ -109,6 +109,7 @@ impl PlacedSurface {
         best
     }
 
+    /// The surface at `uv` as seen from `p`, and how it bends along `direction`.
     fn describe(&self, p: Point, uv: Uv, direction: Vector) -> Foot {
         let d = self.surface.second_derivatives(uv);
         let normal = self.surface.normal(uv).map_or(Vector::ZERO, |n| n * self.sign);

@@ -161,6 +161,7 @@ pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -
     }
 }
 
+/// What facets change of receiver `k`, from paired runs on facets and on the spline.
 fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> ReceiverError {
     let result = &runs[1].results.receivers[k];
     let power = estimate::power(runs, k);

@@ -105,6 +105,7 @@ impl Variant {
         }
     }
 
+    /// Where a variant puts the case.
     fn frame(self) -> Frame {
         match self {
             Self::Home => Frame::IDENTITY,

@@ -31,6 +31,7 @@ pub(super) fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
     (Ray::new(target - d * t, d), t, -d.z)
 }
 
+/// Rays on a crease that lies inside of a face.
 fn crease() -> Case {
     // z = −0.8·|x| as one cubic with a triple knot, so that the crease lies inside the face.
     let side = |k: usize| 50.0 * k as f64 / 3.0;
@@ -54,6 +55,7 @@ fn crease() -> Case {
     }
 }
 
+/// Rays at a cusp, where the surface turns back and its normal is lost.
 fn cusp() -> Case {
     // (x, z) = 40·(s³, s²) for s in [−1, 1]: Bernstein coefficients of s² and s³ with s = 2u − 1.
     let points: Vec<_> = [(-1.0, 1.0), (1.0, -1.0 / 3.0), (-1.0, -1.0 / 3.0), (1.0, 1.0)]
@@ -93,6 +95,7 @@ fn cusp() -> Case {
     }
 }
 
+/// Rays through a surface that crosses itself.
 fn crossing_sheets() -> Case {
     // (x, z) = 20·(s³ − s, s²) for s in [−1.5, 1.5]: the curve crosses itself at s = ±1.
     let a: f64 = 1.5;
@@ -143,6 +146,7 @@ fn crossing_sheets() -> Case {
     }
 }
 
+/// Rays that run along a straight line of the surface.
 fn ruling() -> Case {
     // Rays in the surface itself, along its straight lines: whether they meet it is a matter of rounding.
     let questions = (0..100).map(|i| {
@@ -172,6 +176,7 @@ pub(super) fn paraboloid(a: f64, b: f64) -> Surface {
     Surface { degree: [2, 2], knots: [bezier_knots(2), bezier_knots(2)], points }
 }
 
+/// Rays along a bowl, a micrometre down to a picometre above or below touching.
 fn tangent() -> Case {
     let (a, b) = (0.01, 0.015);
     let mut questions = Vec::new();
@@ -208,6 +213,7 @@ fn tangent() -> Case {
     }
 }
 
+/// Rays near a corner into which one side of a patch has collapsed.
 fn collapsed() -> Case {
     // A plane triangle as a bilinear patch whose side u = 1 is one point.
     let tip = Point::new(50.0, 0.0, 0.0);
@@ -241,6 +247,7 @@ fn collapsed() -> Case {
     }
 }
 
+/// Rays at and beside the tip of a cone.
 fn apex() -> Case {
     // A cone with its tip at the origin, opening downwards: radius = −z.
     let cone = sweep::cone(&Frame::IDENTITY, 0.0, -PI / 4.0, [0.0, 2.0 * PI], [-50.0, 0.0]);
@@ -265,6 +272,7 @@ fn apex() -> Case {
     }
 }
 
+/// Rays on a surface of which the centre is a thousand kilometres off.
 fn huge_radius() -> Case {
     // A cylinder of radius 1e9 with its crest along y through the origin, ±50 mm wide; heights by half angles, without
     // the cancellation of R·cos − R.

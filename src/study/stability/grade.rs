@@ -151,6 +151,7 @@ impl Grader<'_> {
         truth.margin <= 8.0 * resolution + band
     }
 
+    /// Asks a question and grades the answer.
     fn grade(&self, question: &Question) -> Grade {
         match question {
             Question::First { ray, truth } => {
@@ -177,6 +178,7 @@ impl Grader<'_> {
         }
     }
 
+    /// The grade of a first hit where the spline is promised to the last digits.
     fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());
         let open = self.is_open(truth, resolution);
@@ -213,6 +215,7 @@ impl Grader<'_> {
         (self.scene.case.distance)(ray.point_at(t)).abs() <= self.band + slack
     }
 
+    /// Whether a first hit is right for facets: within their band, and not behind a surface that stands in the way.
     fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
         let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, truth.distance());
         let Some(h) = hit else { return truth.t.is_none() || truth.margin <= self.band + slack };
@@ -230,6 +233,7 @@ impl Grader<'_> {
         t <= true_t || !(1..STEPS).any(through)
     }
 
+    /// Asks for all crossings of a ray, one after the other.
     fn all(&self, ray: &Ray, truths: &[Truth]) -> Grade {
         let mut next = self.scene.ray(ray);
         let origin = next.origin;
@@ -271,6 +275,7 @@ impl Grader<'_> {
         }
     }
 
+    /// Asks for a hit inside a sphere and from there for the other end of a chord.
     fn chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
@@ -304,6 +309,7 @@ impl Grader<'_> {
         }
     }
 
+    /// Asks for a hit in a box and from there for the next wall.
     fn onward(&self, toward: &Ray, direction: Vector, size: Vector) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
@@ -328,6 +334,7 @@ impl Grader<'_> {
         4.0 * self.band / truth.cos.max(GRAZING)
     }
 
+    /// Follows reflections in a box, whose end is known by unfolding.
     fn guide(&self, ray: &Ray, size: Vector, reflections: usize) -> Grade {
         let frame = &self.scene.frame;
         let mut ray_here = self.scene.ray(ray);

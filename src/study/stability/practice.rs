@@ -19,6 +19,7 @@ pub(super) fn cases() -> Vec<Case> {
     ]
 }
 
+/// Rays beside the trim of a curved face.
 fn trimmed() -> Case {
     // A bowl z = a·x² + b·y² of which |x| + |y| < 40 is left: the loop runs in straight lines over the parameters.
     let (a, b, half) = (0.01, 0.015, 40.0);
@@ -58,6 +59,7 @@ fn trimmed() -> Case {
     }
 }
 
+/// Rays along a sheet that stands a hair aslant of an axis plane.
 fn almost_flat() -> Case {
     // A sheet of 100 mm that rises by 1e-12, and a wall behind: rays along the sheet meet it at x, or the wall where x is beyond its end.
     let (slope, pivot) = (1e-12, 20.0);
@@ -121,6 +123,7 @@ fn weighted(name: &'static str, weight: f64) -> Case {
     }
 }
 
+/// Rays that start on edges, diagonals and corners of facets.
 fn edge_starts() -> Case {
     // In a box, from edges, diagonals and corners of its facets, at sines down to 1e-9.
     let size = 64.0;

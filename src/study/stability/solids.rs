@@ -40,6 +40,7 @@ pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + 
     }
 }
 
+/// Rays in the walls and through the corners of a tree's cells.
 fn cell_walls() -> Case {
     let (min, max) = (Point::ZERO, Point::splat(64.0));
     let mut questions = Vec::new();
@@ -83,6 +84,7 @@ fn cell_walls() -> Case {
     }
 }
 
+/// Rays that meet two faces in one place.
 fn coincident() -> Case {
     // Two boxes that share the wall x = 10.
     let (a, b) = ((Point::ZERO, Point::splat(10.0)), (Point::new(10.0, 0.0, 0.0), Point::new(20.0, 10.0, 10.0)));
@@ -107,6 +109,7 @@ fn coincident() -> Case {
     }
 }
 
+/// Rays on facets a million times as long as wide.
 fn slivers() -> Case {
     // A bar of 1000 × 1e-3 × 1e-4 mm in facets as long as the bar.
     let (min, max) = (Point::ZERO, Point::new(1000.0, 1e-3, 1e-4));
@@ -129,6 +132,7 @@ fn slivers() -> Case {
     }
 }
 
+/// Rays through a thin gap of air.
 fn gap() -> Case {
     // 1 µm of air between two plates.
     let (a, b) = ((Point::ZERO, Point::splat(10.0)), (Point::new(10.001, 0.0, 0.0), Point::new(20.0, 10.0, 10.0)));
@@ -151,6 +155,7 @@ fn gap() -> Case {
     }
 }
 
+/// Rays that are reflected ten thousand times.
 fn guide() -> Case {
     let size = Vector::new(10.0, 7.0, 500.0);
     let questions = (0..6).map(|i| {

@@ -56,6 +56,7 @@ fn crossings(depth: f64) -> [Truth; 2] {
     [150.0 - half, 150.0 + half].map(|t| Truth::hit(t, half / R, depth))
 }
 
+/// Rays that touch a ball, or miss or cut it by ever less.
 fn graze() -> Case {
     let mut questions = Vec::new();
     for k in 1..=12 {
@@ -84,6 +85,7 @@ fn silhouette() -> Case {
     ball("near-silhouette entry", (0..400).map(question).collect())
 }
 
+/// Rays at and beside the poles of a ball.
 fn pole() -> Case {
     let mut questions = Vec::new();
     for (k, offset) in [0.0, 1e-12, 1e-9, 1e-6, 1e-3].into_iter().enumerate() {
@@ -118,6 +120,7 @@ fn torus_distance(major: f64, minor: f64) -> Box<dyn Fn(Point) -> f64 + Send + S
     Box::new(move |p| (p.x.hypot(p.y) - major).hypot(p.z) - minor)
 }
 
+/// Rays at knots and seams of a torus.
 fn knots() -> Case {
     let (major, minor) = (R, 15.0);
     let mut questions = Vec::new();
@@ -146,6 +149,7 @@ fn knots() -> Case {
     }
 }
 
+/// Rays that cut short chords of a ring as thin as a hair.
 fn thin_torus() -> Case {
     let (major, minor) = (R, 0.01);
     let question = |i: u64| {
@@ -196,6 +200,7 @@ fn weights() -> Case {
     Case { surfaces, divisions: 24, ..ball("weights up to 1e4", (0..400).map(question).collect()) }
 }
 
+/// Chords of a ball from a hit on it, some of them flat and short.
 fn on_surface() -> Case {
     let question = |i| {
         let mut random = Random::new(8, i);
@@ -228,6 +233,7 @@ fn far_origin() -> Case {
     ball("origin 1e6 mm away", (0..400).map(question).collect())
 }
 
+/// Rays from within a ball, a quarter of them along the axes.
 fn from_inside() -> Case {
     let question = |i| {
         let mut random = Random::new(10, i);
