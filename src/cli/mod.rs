@@ -5,8 +5,8 @@
 //! files are data: what a terminal would obey in them is written out. Known weakness: on Windows no signal saves a run.
 //!
 //! Inner modules, each of which sees only those before it: `interruption`, `failure`, `console` and `completion` (how a
-//! command is stopped, talks and ends), `arguments` (what is asked), `output` (how answers are shown and written), `work` (from files to facets,
-//! intersectors and runs) and `commands`, which put these together.
+//! command is stopped, talks and ends), `arguments` (what is asked), `output` (how answers are shown and written), `work` (from files to
+//! facets, intersectors and runs) and `commands`, which put these together.
 
 mod arguments;
 mod commands;

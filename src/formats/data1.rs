@@ -82,6 +82,7 @@ impl<'a> Lines<'a> {
         Ok(std::array::from_fn(|i| numbers[i] as usize))
     }
 
+    /// The rays behind their number.
     pub(super) fn rays(&mut self) -> Result<Vec<LightRay>, Error> {
         let [count] = self.counts("the number of rays")?;
         // No capacity from the count: a file may lie about it.
@@ -93,6 +94,7 @@ impl<'a> Lines<'a> {
         Ok(rays)
     }
 
+    /// Refuses what follows the last ray.
     pub(super) fn end(&mut self) -> Result<(), Error> {
         // More lines than promised mean that the count or the file is wrong; which, nobody can tell.
         match self.lines.next() {

@@ -19,6 +19,7 @@ struct Buffer {
 }
 
 impl Buffer {
+    /// Adds bytes as a view of the buffer for vertices or indices (`target`); returns its number.
     fn view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
         let start = self.bytes.len();
         self.bytes.extend(bytes);

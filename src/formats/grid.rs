@@ -168,8 +168,8 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
-/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, and an array of its name and `_geometric` is that
-/// of a layer, where they are known.
+/// of its errors; `statistical[j, i]` and `geometric[j, i]` are both errors of the values, and an array of its name and `_geometric` is
+/// that of a layer, where they are known.
 ///
 /// # Errors
 /// When the file cannot be written.

@@ -125,6 +125,7 @@ impl Numbers<'_> {
         Error::at_line(self.path, self.last_line, message)
     }
 
+    /// The next number; `what` names it in the message.
     fn next(&mut self, what: &str) -> Result<f64, Error> {
         let Some(&(line, word)) = self.words.get(self.at) else {
             return Err(self.error(format!("the file ends where the {what} should follow")));
@@ -137,6 +138,7 @@ impl Numbers<'_> {
         }
     }
 
+    /// The next number as a count.
     fn count(&mut self, what: &str) -> Result<usize, Error> {
         let x = self.next(what)?;
         // No count can exceed the numbers that are there: a lie about it costs no memory.
@@ -147,6 +149,7 @@ impl Numbers<'_> {
         }
     }
 
+    /// So many numbers.
     fn list(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
         // Asked before the loop, so that the message names what the file promises.
         let left = self.words.len() - self.at;
@@ -156,6 +159,7 @@ impl Numbers<'_> {
         (0..count).map(|_| self.next(what)).collect()
     }
 
+    /// So many numbers, each above the one before.
     fn ascending(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
         let list = self.list(count, what)?;
         // Interpolation divides by the steps.

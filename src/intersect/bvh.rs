@@ -338,6 +338,7 @@ fn wide_or_binary(boxes: &[Bounded], params: &BvhBuildParams) -> Tree {
     if depth(&wide) < 32 { Tree::Wide(wide) } else { Tree::Binary(binary) }
 }
 
+/// Levels of nodes below each other, the root's included.
 fn depth(tree: &CwBvh) -> u32 {
     let mut deepest = 0;
     let mut open = vec![(0, 1)];

@@ -12,8 +12,8 @@
 //! A start on the diagonal of a folded quad lies on the triangle that the departure names; where it names none, which triangle that is
 //! is a matter of rounding, and with it whether a ray at less than the angle of the fold meets the other at once.
 //! Weakness: folds lower than [`Surroundings::reach`] are taken for flat, so that a ray may pass under such a triangle: of those that left
-//! diagonals folded by 5 nm a kilometre from the origin, 2 in 1000 were lost. Two coincident sheets of different parts are two facets at the same
-//! place, and which of them a ray that leaves one meets at t = 0 is a matter of rounding.
+//! diagonals folded by 5 nm a kilometre from the origin, 2 in 1000 were lost. Two coincident sheets of different parts are two facets at
+//! the same place, and which of them a ray that leaves one meets at t = 0 is a matter of rounding.
 
 pub(crate) use super::facet_hit::{FacetHit, Nearest};
 pub(crate) use super::start_triangle::LONGEST_NUDGE;

@@ -5,10 +5,9 @@
 //! rule by O(h²), and for a slanted ray most of that is because it meets the facet beside the point where it would meet the surface.
 //! The cubic patch is met where the ray meets it, by two Newton steps from the facet hit. It is of order 2 as well, four times
 //! below the bilinear rule and more: its one twist is wrong by O(h³) where a facet is no parallelogram or the surface has third
-//! derivatives; without either the order is 3. The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its bicubic
-//! relative with the twist of the bilinear patch.
-//! Weakness: all but the flat normal are only as good as the vertex normals of the mesh; across a crease inside a facet, which no
-//! vertex tells of, the cubic patch is no better than the bilinear rule.
+//! derivatives; without either the order is 3. The patch is that of Vlachos et al., *Curved PN Triangles*, I3D 2001, and for quads its
+//! bicubic relative with the twist of the bilinear patch. Weakness: all but the flat normal are only as good as the vertex normals of the
+//! mesh; across a crease inside a facet, which no vertex tells of, the cubic patch is no better than the bilinear rule.
 
 use super::facet::FacetHit;
 use super::{Certainty, Hit, NormalMode};
@@ -94,6 +93,7 @@ fn bilinear_weights(p: Uv) -> [f64; 4] {
     [q.x * q.y, p.x * q.y, p.x * p.y, q.x * p.y]
 }
 
+/// The normal of the corner nearest to the hit.
 #[inline(never)]
 fn nearest(hit: &FacetHit, mesh: &FacetMesh, facet: &Facet) -> Vector {
     let vertices = facet.vertices.map(|v| &mesh.vertices[v as usize]);

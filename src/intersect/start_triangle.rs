@@ -18,8 +18,8 @@ pub(super) struct StartTriangle {
 impl StartTriangle {
     /// The triangle that the departure names; where it names none, the one over which the start lies.
     ///
-    /// On the diagonal rounding puts a start over either: of rays that left a folded quad there at a sine below 1e-3, one in sixteen was taken
-    /// to leave the other triangle, under whose plane it passed.
+    /// On the diagonal rounding puts a start over either: of rays that left a folded quad there at a sine below 1e-3, one in sixteen was
+    /// taken to leave the other triangle, under whose plane it passed.
     pub(super) fn new(corners: &[Point; 4], start: Point, named: Option<Triangle>) -> Self {
         let [a, b, c, d] = *corners;
         let second =

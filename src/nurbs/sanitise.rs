@@ -65,6 +65,7 @@ impl Repairs {
         *self != Self::default()
     }
 
+    /// What was mended in either.
     fn union(self, o: Self) -> Self {
         Self {
             clamped: self.clamped || o.clamped,

@@ -58,6 +58,7 @@ impl Abg {
         self.share_within(1.0)
     }
 
+    /// A direction by the lobe, from two numbers in [0, 1); `None` for the share that stays specular.
     pub(super) fn sample(&self, specular: Vector, n: Vector, u: [f64; 2]) -> Option<Vector> {
         let r = self.radius_of_share(u[0])?;
         let (s, c) = (2.0 * PI * u[1]).sin_cos();

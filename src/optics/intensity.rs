@@ -151,6 +151,7 @@ impl IntensitySampler {
         low * fall + slope * (x.sin() - a.sin() - (x - a) * x.cos())
     }
 
+    /// The direction at an angle from the pole and one about it, by the type's own axes.
     fn direction(&self, x: f64, turned: f64) -> Vector {
         let (h, v) = match self.kind {
             PhotometricType::C => (turned.to_degrees(), x.to_degrees()),

@@ -107,6 +107,7 @@ pub struct Mueller {
 }
 
 impl Mueller {
+    /// The matrix of complex amplitudes of s and p, its powers times `factor`.
     fn from_amplitudes(s: Complex, p: Complex, factor: f64) -> Self {
         let (ps, pp, cross) = (s.square(), p.square(), s.conjugate() * p);
         Self {

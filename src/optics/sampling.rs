@@ -33,6 +33,7 @@ pub fn sin_cos_turns(turns: f64) -> (f64, f64) {
 const SINE: [f64; 8] = inverse_factorials(3);
 const COSINE: [f64; 8] = inverse_factorials(2);
 
+/// Coefficients of the series of the sine (from 3!) or cosine (from 2!), with their signs.
 const fn inverse_factorials(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut factorial) = (0, if first == 3 { 6.0 } else { 2.0 });

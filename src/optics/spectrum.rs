@@ -140,6 +140,7 @@ enum Kind {
 }
 
 impl Wavelengths {
+    /// The spectrum of lines, each a wavelength in nm and a relative power.
     fn lines(lines: &[[f64; 2]]) -> Result<Self, Error> {
         let mut sum = 0.0;
         let mut sums = Vec::with_capacity(lines.len());

@@ -65,6 +65,7 @@ impl Table {
     }
 }
 
+/// Refuses what is not finite or does not increase, by its row.
 pub(super) fn check_increasing(what: &'static str, x: &[f64]) -> Result<(), Error> {
     for (i, &value) in x.iter().enumerate() {
         require(what, value, true, "a finite number")?;

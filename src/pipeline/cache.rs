@@ -258,6 +258,7 @@ fn remove(file: &Path) -> io::Result<()> {
     }
 }
 
+/// Writes an entry between its magic and its checksum.
 fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut to =
         HashingWriter { to: BufWriter::with_capacity(WRITTEN_AT_ONCE, file), sum: crc32fast::Hasher::new() };

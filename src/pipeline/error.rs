@@ -62,6 +62,7 @@ impl Error {
         self
     }
 
+    /// The error with a place in a file's text: file, text and range of bytes.
     pub(crate) fn excerpt_of(
         mut self,
         (file, text, span): (&str, &str, Range<usize>),

@@ -131,6 +131,7 @@ impl ErrorTarget {
         found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
     }
 
+    /// Traces what the settings ask for; returns it with the error it reached.
     fn attempt(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Option<f64>) {
         let settings = prepared.run_settings();
         prepared.with_intersector(monitor, |intersector, _| {

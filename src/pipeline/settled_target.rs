@@ -1,7 +1,7 @@
 //! As many rays as the verdicts of a scene's regulations need until no row is unsure.
 //!
-//! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of the
-//! rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
+//! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of
+//! the rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
 
 use super::monitor::Monitor;
 use super::prepared_scene::{PreparedScene, TraceRequest};
@@ -17,8 +17,8 @@ const MOST_RAYS: u64 = 10_000_000_000;
 const GROWTH_MARGIN: f64 = 1.1;
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
-/// Traces until no row of a verdict is unsure by the errors of the rays, the most rays are traced, or the monitor asks to stop: then not all
-/// is traced. Gives the sums and the number of rays.
+/// Traces until no row of a verdict is unsure by the errors of the rays, the most rays are traced, or the monitor asks to stop: then not
+/// all is traced. Gives the sums and the number of rays.
 pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, u64) {
     let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
     let mut rays = FIRST_RAYS.min(most);

@@ -9,7 +9,8 @@
 //! The tables (`tables/*.json`) hold one row a requirement with its source and whether a second source was compared. A verdict repeats
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
-//! Layers: `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `judgement` ← `verdict` ← `document`.
+//! Layers: `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `judgement` ←
+//! `verdict` ← `document`.
 
 mod aim;
 mod document;

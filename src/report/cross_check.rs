@@ -274,6 +274,7 @@ impl CheckReport<'_> {
         table
     }
 
+    /// The section on errors of facets and of the normals on them.
     fn distance(&self) -> Section {
         let who = if self.normals == "exact" { "facets' hits, moved to the spline," } else { "facets" };
         let section = Section::new("Facets against the spline")

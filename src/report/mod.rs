@@ -1,8 +1,9 @@
 //! One self-contained HTML file for any result: an answer on top, pictures first, tables that sort and copy, 3-D views that turn.
 //!
 //! A [`Report`] is plain data: sections of text, charts, 3-D views and tables. [`Report::write`] turns it into `report.html`
-//! (plotly.js embedded once, nothing loaded from elsewhere), a static PNG of every picture under `figures/`, for charts with an SVG beside it, and a CSV of
-//! every table under `tables/`. Every chart carries its static twin in the page, so that it shows without scripts or WebGL.
+//! (plotly.js embedded once, nothing loaded from elsewhere), a static PNG of every picture under `figures/`, for charts with an SVG beside
+//! it, and a CSV of every table under `tables/`. Every chart carries its static twin in the page, so that it shows without scripts or
+//! WebGL.
 //!
 //! Guarantee: the page stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
 //! WebGL to turn; without it their static picture remains.

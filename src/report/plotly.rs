@@ -38,6 +38,7 @@ fn indices(values: impl Iterator<Item = u32>) -> Value {
     json!({"dtype": "u4", "bdata": base64(&bytes)})
 }
 
+/// The map as plotly's list of stops.
 fn colour_scale(map: ColourMap) -> Value {
     let stop = |k: u32| {
         let [r, g, b] = map.colour(f64::from(k) / 16.0);
@@ -261,6 +262,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     }
 }
 
+/// Puts objects into one another, key by key; anything else is replaced.
 fn merge(into: &mut Value, from: Value) {
     match (into, from) {
         (Value::Object(into), Value::Object(from)) => {

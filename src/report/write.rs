@@ -13,8 +13,8 @@ impl Report {
         html::page(self, &drawn)
     }
 
-    /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; gives the files written,
-    /// the page first.
+    /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; gives the files
+    /// written, the page first.
     ///
     /// # Errors
     /// When the folder cannot be made or a file cannot be written.

@@ -26,6 +26,7 @@ impl Fnv {
         }
     }
 
+    /// Absorbs sums, with their number.
     fn sums(&mut self, sums: &[Sum]) {
         self.absorb(&(sums.len() as u64).to_le_bytes());
         // Empty cells are most, and are told by the indices of the others.

@@ -12,6 +12,7 @@ pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
     kernel_kind(bound, settings).name()
 }
 
+/// The kernel that a run takes: what the scene needs, or more where the settings ask for more.
 pub(crate) fn kernel_kind(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
     let required = Required::new(bound).kernel;
     match settings.kernel {

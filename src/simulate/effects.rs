@@ -182,6 +182,7 @@ fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
     }
 }
 
+/// A number of things, or that there are none.
 fn plural(n: usize, noun: &str, none: &str) -> String {
     match n {
         0 => none.into(),

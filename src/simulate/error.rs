@@ -93,6 +93,7 @@ impl Error {
         self.help.as_ref().map_or_else(String::new, |h| format!("; {h}"))
     }
 
+    /// File, line and column as far as they are known, before the message.
     fn place(&self) -> String {
         match (self.file.is_empty(), self.line()) {
             (true, None) => String::new(),

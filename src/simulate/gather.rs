@@ -91,6 +91,7 @@ impl<'a, 'g> ThreadSums<'a, 'g> {
         }
     }
 
+    /// Adds what this thread has gathered to the total.
     fn hand_over(&mut self) {
         if let Some(partial) = self.partial.take()
             && !partial.done.is_empty()

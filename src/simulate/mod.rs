@@ -11,8 +11,8 @@
 //! is moved by the glue distance only where two faces are one; every ray that is lost is kept with its cause.
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `receiver`, `seconds`, `settings`,
-//! `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `tallies`, `digest`, `kernel`,
+//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `receiver`, `seconds`,
+//! `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `tallies`, `digest`, `kernel`,
 //! `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `results`, `arrivals`, `run`, `verify`.
 
 mod arrivals;

@@ -202,6 +202,7 @@ impl Fingerprint {
     }
 }
 
+/// Whether tallies have the same receivers, faces and bodies, cell by cell.
 fn same_shape(a: &Tallies, b: &Tallies) -> bool {
     // The number of cells of each receiver tells scenes apart; that it is the same scene is told by the header's
     // fingerprint.
@@ -233,6 +234,7 @@ fn sums(out: &mut Vec<u8>, sums: &[Sum]) {
     }
 }
 
+/// Checks magic and checksum; returns the header and a reader of what follows.
 fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
     let (rest, sum) = rest.split_last_chunk::<16>().ok_or("the file is cut short")?;

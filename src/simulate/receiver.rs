@@ -41,6 +41,7 @@ impl Channels {
         }
     }
 
+    /// How many sums a cell has beside its power.
     pub(crate) fn count(&self) -> usize {
         match self {
             Self::None => 0,
@@ -263,6 +264,7 @@ impl Receiver {
         }
     }
 
+    /// The spot of a direction; `None` outside of the field.
     fn angular(&self, d: Vector, angles: FarFieldType, low: [f64; 2], high: [f64; 2]) -> Option<Spot> {
         let [h, v] = to_angles(d, angles);
         if !(low[0] <= h && h <= high[0] && low[1] <= v && v <= high[1]) {
@@ -320,6 +322,7 @@ pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
     }
 }
 
+/// Solid angle of cell (i, j), sr; angles in radians.
 fn solid_angle(angles: FarFieldType, low: [f64; 2], high: [f64; 2], cells: [u32; 2], [i, j]: [usize; 2]) -> f64 {
     let edge = |axis: usize, k: usize| low[axis] + (high[axis] - low[axis]) * k as f64 / f64::from(cells[axis]);
     let (h, v) = ([edge(0, i), edge(0, i + 1)], [edge(1, j), edge(1, j + 1)]);

@@ -107,6 +107,7 @@ impl ReplicateTally {
         self.absorbed.add(face.index(), quanta);
     }
 
+    /// Books a lost ray.
     #[cold]
     pub(crate) fn lose(&mut self, lost: LostRay) {
         self.ends.lost += lost.quanta;

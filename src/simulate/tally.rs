@@ -113,7 +113,8 @@ impl Grid {
     }
 
     /// The same for a grid larger than the nearest cache: asks for the memory of the cell, and adds when the next one comes. What
-    /// waits is part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of the kernel's time.
+    /// waits is part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of
+    /// the kernel's time.
     #[inline(always)]
     pub(crate) fn add_deferred(&mut self, cell: usize, quanta: f64) {
         prefetch(&self.cells, cell);

@@ -188,6 +188,7 @@ fn normals_of(intersector: &str) -> NormalMode {
     if intersector == "exact" { NormalMode::Exact } else { NormalMode::Bilinear }
 }
 
+/// What was tried, with the worst that facets changed of any figure.
 fn alternative(tolerance_mm: [f64; 2], intersector: &'static str, worst: &Worst, seconds: f64) -> Alternative {
     Alternative {
         tolerance_mm,
@@ -340,6 +341,7 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
+    /// What facets change at the worst, in words.
     fn in_words(&self) -> String {
         if self.figure.is_empty() {
             return "not at all".into();

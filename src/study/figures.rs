@@ -210,6 +210,7 @@ impl<'a> Errors<'a> {
         }
     }
 
+    /// The figures of the channels of a receiver.
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
             let measured = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());

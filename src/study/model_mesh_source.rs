@@ -37,6 +37,7 @@ impl<'a> ModelMeshSource<'a> {
         Self { mesher: tessellate::Settings { measure: true, ..product.mesher }, ..product }
     }
 
+    /// The mesh with its sag: sampled where it was measured, else proved.
     fn tessellate_with(&self, settings: &tessellate::Settings) -> MeasuredMesh {
         let made = tessellate(self.model, settings);
         let sag = made.report.sag_mm;

@@ -94,6 +94,7 @@ impl Uniform {
         Self { bounds: bounds.grown(margin), seed, count }
     }
 
+    /// The ray of a number: through a point of the box, evenly spread, from outside.
     fn ray(&self, index: u64) -> Ray {
         let mut random = Random::new(self.seed, index);
         let size = self.bounds.size();

@@ -82,6 +82,7 @@ impl Weld {
     }
 }
 
+/// Knots along a direction, each span divided.
 fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
     let [a, b] = surface.domain()[direction];
     // Knots stay grid lines: facets across a break would have the break's error.

@@ -95,8 +95,8 @@ impl Pilot {
         })
     }
 
-    /// Seconds for each of [`KINDS`] at a tolerance: tracing there, and an equal share of making facets, which goes with 1/tolerance; `slower` tells how much slower tracing is there than at the middle one, where
-    /// that is known.
+    /// Seconds for each of [`KINDS`] at a tolerance: tracing there, and an equal share of making facets, which goes with 1/tolerance;
+    /// `slower` tells how much slower tracing is there than at the middle one, where that is known.
     fn expected_seconds(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
         // Facets go with 1/tolerance, tracing grows by about a tenth per halving.
         let finer = self.middle / tolerance;

@@ -187,8 +187,8 @@ fn coarse_edges(
     coarse
 }
 
-/// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there, the
-/// faces beyond must have the same.
+/// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there,
+/// the faces beyond must have the same.
 pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
     let pairs: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.coincident.iter().copied()).collect();
     if pairs.is_empty() {
@@ -291,6 +291,7 @@ fn is_finite(face: &Face) -> bool {
     points && u0 < u1 && v0 < v1 && (u1 - u0).is_finite() && (v1 - v0).is_finite()
 }
 
+/// Tolerances and radii of a face at its places, by the last override that matches.
 fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> ([f64; 2], [f64; 2]) {
     let matches = |place: &FaceSelector| match place {
         FaceSelector::Part(name) => *name == part.name,

@@ -48,6 +48,7 @@ pub(super) fn fill_report(
     made.report = report;
 }
 
+/// The faces that were not meshed, with their entities.
 fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
     // Looked up only where there is something to name: models may have thousands of faces.
     if failed.is_empty() {

@@ -35,8 +35,8 @@ impl TakenChords {
     }
 }
 
-/// For faces of a part that have a diagonal where others of their shell have a chord: the faces, by number, and those diagonals. The last of
-/// several diagonals stays where no other chord is; `taken` are those that each face was asked to give up before.
+/// For faces of a part that have a diagonal where others of their shell have a chord: the faces, by number, and those diagonals. The last
+/// of several diagonals stays where no other chord is; `taken` are those that each face was asked to give up before.
 pub(super) fn doubled_chords(
     part: &Part,
     meshes: &[Option<FaceMesh>],

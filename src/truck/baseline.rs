@@ -128,6 +128,7 @@ fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Ve
     receive.recv_timeout(limit).ok()?
 }
 
+/// The mesh turned as its face is.
 fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh> {
     mesh.map(|mut m| {
         if !orientation {

@@ -12,6 +12,7 @@ pub struct ShapeError {
     pub(super) allowed: &'static str,
 }
 
+/// The value where it is finite and `good`, else an error that tells what is allowed.
 pub(super) fn checked(
     what: &'static str,
     value: f64,

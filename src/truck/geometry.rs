@@ -82,6 +82,7 @@ fn checked_curve(c: Curve) -> Result<Curve, String> {
     Ok(c.restricted(a, b))
 }
 
+/// Refuses control points that are not finite and weights that are not positive.
 fn check_points(points: &[Homogeneous]) -> Result<(), String> {
     if points.iter().any(|p| !p.is_finite()) {
         return Err("a control point that is no finite number".into());

@@ -66,6 +66,7 @@ struct Maker {
 }
 
 impl Maker {
+    /// Adds a shell with the faces that can be converted.
     fn shell(&mut self, shell: &modeling::Shell, closed: bool) {
         let at = self.part.shells.len();
         let mut faces = Vec::new();

@@ -83,6 +83,7 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// The largest distance of a trim from its edge, sampled between the points at `ts`.
     fn gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
         let off = |t: f64| (self.surface.evaluate(uv.evaluate(t)) - edge.evaluate(t)).length();
         ts.windows(2)

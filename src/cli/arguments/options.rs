@@ -150,6 +150,7 @@ fn angle(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("an angle is a number of degrees above 0 and below 90, not '{text}'"))
 }
 
+/// The name of a part and its range of tolerances, as NAME=MIN..MAX.
 fn part(text: &str) -> Result<(String, [f64; 2]), String> {
     // The last '=' parts the two, since names of parts may contain it.
     let (name, range) = text.rsplit_once('=').ok_or("write NAME=MIN..MAX, as in cover=0.01..0.05")?;

@@ -67,6 +67,7 @@ struct ResultsFile {
 }
 
 impl ResultsFile {
+    /// Reads results.json, or that of a folder.
     fn read(given: &Path) -> Result<Self, Failure> {
         let path = if given.is_dir() { given.join("results.json") } else { given.to_owned() };
         let help = "give the folder that `lampyris trace` wrote, or its results.json";

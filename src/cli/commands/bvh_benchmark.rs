@@ -206,6 +206,7 @@ impl BvhBenchmark {
         judged[0].1
     }
 
+    /// Whether such a row is there already, of whichever intersector.
     fn has_row(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
         self.rows.iter().any(|r| {
             r["facets"] == mesh.facets.len()

@@ -55,6 +55,7 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
     selectors
 }
 
+/// A part, how often it is placed, and its solids.
 fn part_text(part: &PartAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let placed = if part.instances == 1 { String::new() } else { format!(", placed {} times", part.instances) };
     let mut text = format!("part {}{placed}\n", named(&part.name));

@@ -105,6 +105,7 @@ fn reasons(results: &Results, prepared: &PreparedScene) -> String {
     format!("{counted}{}", reasons.join("; "))
 }
 
+/// What happened to rays that were lost so, to follow "rays".
 fn meaning(cause: LostCause) -> &'static str {
     match cause {
         LostCause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",

@@ -1,8 +1,8 @@
 //! Ray sets of measured light sources, as vendors publish them: IES TM-25 (read and written), Zemax binary and LightTools binary (read).
 //!
-//! A file is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things. Rays come in the unit of flux that
-//! the caller counts in where the file holds both. Where the header's total disagrees with the sum of the rays, as it does in files whose
-//! rays carry relative weights, the rays are scaled to the header's total and a note says so.
+//! A file is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things. Rays come in the unit of flux
+//! that the caller counts in where the file holds both. Where the header's total disagrees with the sum of the rays, as it does in files
+//! whose rays carry relative weights, the rays are scaled to the header's total and a note says so.
 //!
 //! Guarantee: a TM-25 file that is read and written again has the same bytes, unknown header values included.
 //! Known weakness: Stokes columns and tristimulus columns are kept by [`Tm25`] but not traced.

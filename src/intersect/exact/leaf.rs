@@ -185,6 +185,7 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
     }
 }
 
+/// Axes of an oriented box: along the longer derivative, across it, and the normal last.
 fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
     let longer = if sv.length() > su.length() { sv } else { su };
     let x = longer.try_normalize().unwrap_or(Vector::X);

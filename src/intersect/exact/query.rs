@@ -141,6 +141,7 @@ impl Query {
         }
     }
 
+    /// Keeps a root; where the nearest alone is asked for, the ray ends there.
     pub(super) fn accept(&mut self, root: Root) {
         if self.collects_all {
             self.all.push(root);

@@ -90,6 +90,7 @@ impl Node {
         // An empty box, with its planes turned inside out: every slab test fails on it.
         Self { planes: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]], child: [LEAF; WIDTH] };
 
+    /// Sets the box of child `k`, rounded outward about `center`.
     fn set(&mut self, k: usize, bounds: Aabb, center: Vector) {
         for axis in 0..3 {
             // One rounding in the shift, one to f32: two steps outward cover both.

@@ -324,8 +324,8 @@ fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     };
     let along_u = longest(nv, nu, &|j, i| point(i, j));
     let along_v = longest(nu, nv, &|i, j| point(i, j));
-    // As if parameters ran evenly along the longest row of control points. Clamped: of a face of no length the margin would be infinite, of a huge one below the digits of its
-    // parameters.
+    // As if parameters ran evenly along the longest row of control points. Clamped: of a face of no length the margin would be
+    // infinite, of a huge one below the digits of its parameters.
     let relative = |length: f64| (REACH_OF_BAND * band / length).clamp(LEAST_REACH, LARGEST_REACH);
     Uv::new(extent.x * relative(along_u), extent.y * relative(along_v))
 }

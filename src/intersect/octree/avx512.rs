@@ -1,8 +1,9 @@
 //! What the walk does in lanes, with AVX-512: what enters and what leaves a box, or both halves of the corners of a block, in one
 //! register.
 //!
-//! Sound because [`super::kernels`] takes it only where kernels may use the features, because loads stay inside the fixed-size arrays of [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and
-//! because octants are below eight and axes below three.
+//! Sound because [`super::kernels`] takes it only where kernels may use the features, because loads stay inside the fixed-size arrays of
+//! [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and because octants are below eight and axes below
+//! three.
 #![allow(unsafe_code)]
 
 use super::avx2::{Avx2, ORDERS};

@@ -85,6 +85,7 @@ impl Polygon {
         *self = kept;
     }
 
+    /// Adds a corner while there is room.
     fn push(&mut self, p: [f64; 3]) {
         // Rounding could in principle add a corner to a sliver; the hull of the first ten is kept then.
         if self.count < self.points.len() {

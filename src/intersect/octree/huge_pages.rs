@@ -18,6 +18,7 @@ pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
     vector
 }
 
+/// Asks for huge pages under the bytes from `start` on.
 #[cfg(target_os = "linux")]
 fn advise(start: usize, bytes: usize) {
     const PAGE: usize = 4096;

@@ -170,8 +170,8 @@ impl<'m> Octree<'m> {
         self.tree.boxes()
     }
 
-    /// Asks for what the hits after the `i`-th will be described with, but the corners, which were tested just now: without, describing cost 40 % of the time at 200k
-    /// facets.
+    /// Asks for what the hits after the `i`-th will be described with, but the corners, which were tested just now: without, describing
+    /// cost 40 % of the time at 200k facets.
     #[inline(always)]
     fn fetch_description(&self, found: &[Option<FacetHit>], i: usize) {
         let mesh = self.tree.surroundings.mesh;

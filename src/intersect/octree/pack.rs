@@ -51,6 +51,7 @@ fn sorted(facets: &[ClippedFacet], axis: usize) -> Vec<u32> {
     keys.into_iter().map(|key| key as u32).collect()
 }
 
+/// A block of up to eight facets; lanes that are left name none.
 fn block<'a>(bounds: Box32, facets: impl ExactSizeIterator<Item = &'a ClippedFacet>) -> Cell {
     let count = facets.len() as u8;
     let mut lanes = [u32::MAX; WIDTH];

@@ -25,6 +25,7 @@ impl ClearStart {
         expected.beams.iter().filter_map(|(beam, _)| Self::of_beam(beam, mesh, reach)).collect()
     }
 
+    /// The start of a beam's rays; `None` where a facet lies within `reach` mm behind it.
     fn of_beam(beam: &Beam, mesh: &FacetMesh, reach: f64) -> Option<Self> {
         let start = match beam {
             Beam::Point(origin) => Self::Point(*origin),

@@ -5,8 +5,8 @@ use crate::math::{FaceId, Ray, Uv};
 use crate::mesh::FacetMesh;
 use rustc_hash::FxHashMap;
 
-/// A ray whose sine to the facet that it leaves, times the facet's length, is above so many sags is told by the facet's own normal, which is
-/// off the spline's by four sags over that length where the curvature does not change: twice what a root may hide below.
+/// A ray whose sine to the facet that it leaves, times the facet's length, is above so many sags is told by the facet's own normal, which
+/// is off the spline's by four sags over that length where the curvature does not change: twice what a root may hide below.
 const CLEAR_OF_SAGS: f64 = 2.0 * super::HIDDEN_BELOW;
 /// And it is above this: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;

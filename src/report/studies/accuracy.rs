@@ -19,6 +19,7 @@ struct Point<'a> {
 }
 
 impl<'a> Point<'a> {
+    /// `None` for rows without a time or an error.
     fn from_row(row: &'a Value) -> Option<Self> {
         // The spline has no facets to make.
         let prepare = number(row, "seconds_tessellate").unwrap_or(0.0) + number(row, "seconds_build")?;

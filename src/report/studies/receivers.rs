@@ -4,6 +4,7 @@ use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Section, Series, Table, file_stem};
 use serde_json::Value;
 
+/// The section on receivers: a chart for each, and a table of all.
 pub(super) fn section(rows: &[&Value]) -> Section {
     let intro = "The same rays on facets and on the spline: what the facets change (geometric) beside the noise of the run \
         (statistical). Where geometry is the larger, finer facets or better normals help; else more rays.";

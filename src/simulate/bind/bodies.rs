@@ -75,6 +75,7 @@ pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[
     // Union–find with halved paths (Tarjan & van Leeuwen 1984), since touching goes on from body to body; the lowest number
     // stands for its group.
     let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
+    /// The number that stands for the group of a body; ways to it are halved as they are walked.
     fn first(united: &mut [u16], mut body: u16) -> u16 {
         while united[body as usize] != body {
             united[body as usize] = united[united[body as usize] as usize];

@@ -1,5 +1,5 @@
-//! What someone who reads the results must know about the scene: bodies that are open or too thin, and light of wavelengths that a table or a
-//! formula was not made for.
+//! What someone who reads the results must know about the scene: bodies that are open or too thin, and light of wavelengths that a table or
+//! a formula was not made for.
 
 use super::bound_scene::BoundScene;
 use super::chosen::ChosenRules;
@@ -41,6 +41,7 @@ pub(super) fn beyond_tables(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 
     known.iter().filter_map(|k| sentence(scene, k, light)).collect()
 }
 
+/// The sentence for a table that a source's light is beyond; `light` are the ends of each source's wavelengths.
 fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<String> {
     let [from, to] = known.range;
     let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
@@ -97,6 +98,7 @@ fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     known
 }
 
+/// Keys of a material's tables over wavelength, and from where to where they go.
 fn surface_ranges(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
     let coating = m.coating.as_ref().and_then(|rows| ends(rows.iter().filter_map(|r| r.get(1).copied())));
     let reflectance = match &m.reflectance {

@@ -127,6 +127,7 @@ struct Crossings {
 }
 
 impl Crossings {
+    /// Notes that the way crosses the border of a body.
     fn cross(&mut self, body: u16, entering: bool) {
         if body == AMBIENT {
             return;

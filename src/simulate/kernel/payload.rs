@@ -154,8 +154,8 @@ impl RayPayload for Clear {
 /// Deepest nesting of bodies.
 pub(crate) const DEPTH: usize = 7;
 
-/// The bodies that a ray is in, as a stack, the innermost last. A body may be left from below the top: so overlapping and touching solids hand light over
-/// in either order.
+/// The bodies that a ray is in, as a stack, the innermost last. A body may be left from below the top: so overlapping and touching solids
+/// hand light over in either order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nested {
     bodies: [u16; DEPTH],

@@ -36,6 +36,7 @@ fn directions(dimension: usize) -> [u32; 32] {
     v
 }
 
+/// What each value of each byte of the index contributes, in reverse order of bits.
 fn table(dimension: usize) -> Table {
     let v = directions(dimension);
     std::array::from_fn(|byte| {
@@ -57,6 +58,7 @@ pub fn scrambled(index: u32, dimension: usize, seed: u32) -> u32 {
     scramble(t[0][b[0] as usize] ^ t[1][b[1] as usize] ^ t[2][b[2] as usize] ^ t[3][b[3] as usize], seed)
 }
 
+/// Owen's scrambling of a number whose bits are reversed, by the hash that [`scrambled`] names.
 #[inline(always)]
 fn scramble(reversed: u32, seed: u32) -> u32 {
     let mut n = reversed;

@@ -91,6 +91,7 @@ impl Medium {
     }
 }
 
+/// A medium of the catalogue, or an error that names what there is.
 fn catalogued(name: &str) -> Result<optics::Medium, String> {
     catalogue::medium(name).ok_or_else(|| {
         let names: Vec<&str> = catalogue::names().collect();

@@ -26,6 +26,7 @@ pub(super) fn locate_cone(frame: &Frame, radius: f64, half_angle: f64, p: Point)
     Uv::new(longitude(q, signed), v)
 }
 
+/// Point and derivatives of a cone: u is the longitude, v the height along the axis.
 pub(super) fn cone(frame: &Frame, radius: f64, half_angle: f64, uv: Uv) -> Derivatives {
     let (s, c) = uv.x.sin_cos();
     let slope = half_angle.tan();
@@ -52,6 +53,7 @@ pub(super) fn minor_range(major: f64, minor: f64) -> Option<[f64; 2]> {
     Some([-v, v])
 }
 
+/// Parameters of the point of a torus that is nearest to `p`; `range` bounds v.
 pub(super) fn locate_torus(frame: &Frame, major: f64, range: [f64; 2], p: Point) -> Uv {
     let q = frame.local_point(p);
     let distance = q.x.hypot(q.y);
@@ -61,6 +63,7 @@ pub(super) fn locate_torus(frame: &Frame, major: f64, range: [f64; 2], p: Point)
     Uv::new(longitude(q, 1.0), v)
 }
 
+/// Point and derivatives of a torus: u is the longitude, v the angle about the tube.
 pub(super) fn torus(frame: &Frame, major: f64, minor: f64, uv: Uv) -> Derivatives {
     let (s, c) = uv.x.sin_cos();
     let (sv, cv) = uv.y.sin_cos();

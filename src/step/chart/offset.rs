@@ -2,8 +2,8 @@
 //! fitted, since the offset is an extrusion too and has no end.
 //!
 //! The fit interpolates position, both first and the mixed derivative (a bicubic Hermite spline) on a grid over the basis' own domain
-//! that is refined until the middles of all cells agree. At the knots of the basis it has derivatives of its own on each side. Known weakness: an offset beyond a radius of
-//! curvature folds; it is fitted as it is.
+//! that is refined until the middles of all cells agree. At the knots of the basis it has derivatives of its own on each side. Known
+//! weakness: an offset beyond a radius of curvature folds; it is fitted as it is.
 
 use super::tolerances::{
     CLOSED_SHARE, DIFFERENCE_STEP, PARALLEL_DERIVATIVES, POLE_STEP, SIDE_SHARE, VANISHING_RATIO, WORST_FIT_MM,
@@ -103,6 +103,7 @@ fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Cur
     Some((whole?, worst))
 }
 
+/// The rectangle of parameters of a basis, one period where it has no ends; `None` where it is endless.
 fn basis_domain(basis: &Chart) -> Option<[[f64; 2]; 2]> {
     let mut domain = basis.range;
     for d in 0..2 {

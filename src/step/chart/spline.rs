@@ -179,6 +179,7 @@ impl SplineChart {
         (uv, at)
     }
 
+    /// A step in parameters, around where the surface closes and held at its border elsewhere.
     fn wrap_step(&self, uv: Uv, step: Uv, domain: [[f64; 2]; 2]) -> Uv {
         let one = |d: usize| {
             let [a, b] = domain[d];

@@ -73,6 +73,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart::new(Kind::Cone { frame, radius, half_angle }, Analytic::Cone { frame, radius, half_angle }))
     }
 
+    /// The chart of a SPHERICAL_SURFACE: a torus whose circle is a point.
     fn sphere(&self, s: &Elementary<'f, 'a>) -> Outcome<Chart> {
         let radius = self.positive_size(s, 0, "radius")?;
         Ok(Chart::new(

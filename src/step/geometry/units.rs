@@ -100,6 +100,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
     (declared.is_none_or(|d| d == kind)).then_some((kind, factor, name))
 }
 
+/// An SI_UNIT of length or angle: its kind, its size in mm or rad, and its name.
 fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
     let prefix = args.word(0);
     let factor = prefix.map_or(Some(1.0), si_prefix)?;

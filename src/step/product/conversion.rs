@@ -224,6 +224,7 @@ fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     }
 }
 
+/// The curve of an edge, or the line between two points of a loop.
 fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge> {
     match key {
         EdgeKey::Entity(id) => geometry.edge(id),
@@ -285,8 +286,8 @@ fn face_edges<'e>(
     Ok(found)
 }
 
-/// Whether points of the edges are needed to choose the part of a surface that is meant: of every kind but planes, cylinders, cones, spheres
-/// and B-splines, told by keyword alone.
+/// Whether points of the edges are needed to choose the part of a surface that is meant: of every kind but planes, cylinders, cones,
+/// spheres and B-splines, told by keyword alone.
 fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     let simple = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE", "SPHERICAL_SURFACE", "B_SPLINE_SURFACE"];
     let known = |k: &str| simple.iter().any(|s| k.starts_with(s));

@@ -102,6 +102,7 @@ fn middle(face: &Face) -> Uv {
     Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))
 }
 
+/// The loops as polygons of a few points an edge.
 fn polygons(face: &Face) -> Vec<Vec<Uv>> {
     let points = |u: &crate::model::EdgeUse| {
         let ([a, b], reversed) = (u.uv.domain(), u.reversed);

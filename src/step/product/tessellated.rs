@@ -22,6 +22,7 @@ struct Layout {
     strips: bool,
 }
 
+/// The layout of a leaf by its keyword; `None` for what is no leaf.
 fn layout(keyword: &str) -> Option<Layout> {
     // A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
     Some(match keyword {

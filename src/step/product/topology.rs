@@ -139,6 +139,7 @@ impl ShapeItems {
         }
     }
 
+    /// Adds the shells around the hollows of a solid.
     fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
         for shell in shells {
             let before = self.shells.len();

@@ -44,6 +44,7 @@ impl Piece {
         self.curve.evaluate(0.5 * (a + b))
     }
 
+    /// The piece moved in the parameter plane.
     pub(crate) fn shifted(mut self, by: Uv) -> Self {
         if by != Uv::ZERO {
             for p in &mut self.curve.points {

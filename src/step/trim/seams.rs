@@ -56,6 +56,7 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         self.region.refit(piece, &seam.curve).map(|fit| fit.curve)
     }
 
+    /// The seams that were made, with their ends.
     pub(super) fn finish(self) -> Vec<Seam> {
         self.curves
             .into_iter()

@@ -218,6 +218,7 @@ impl Sweep<'_> {
         }
     }
 
+    /// Adds a row with the times of its rounds.
     fn push(&mut self, row: Row, timing: Timing, threads: usize) {
         self.rows.push(Row {
             model: self.name.into(),

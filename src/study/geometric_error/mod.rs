@@ -197,6 +197,7 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
     error
 }
 
+/// What facets change of one channel of receiver `k`.
 fn channel_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize, channel: usize) -> ChannelError {
     let result = &runs[1].results.receivers[k].channels[channel];
     let worth = bound.receivers[k].channels.worth();

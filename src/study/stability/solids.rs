@@ -32,6 +32,7 @@ pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
     faces
 }
 
+/// Signed distance from a box, negative inside.
 pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + Send + Sync + Clone {
     move |p| {
         let d = (p - 0.5 * (min + max)).abs() - 0.5 * (max - min);

@@ -28,6 +28,7 @@ pub(super) fn sphere(radius: f64) -> Surface {
     sweep::sphere(&Frame::IDENTITY, radius, FULL, [-FRAC_PI_2, FRAC_PI_2])
 }
 
+/// A case about a sphere of radius `R`.
 fn ball(name: &'static str, questions: Vec<Question>) -> Case {
     Case {
         name,
@@ -75,6 +76,7 @@ fn graze() -> Case {
     ball("grazing sphere", questions)
 }
 
+/// Rays that cut a ball near its outline.
 fn silhouette() -> Case {
     let question = |i| {
         let mut random = Random::new(3, i);
@@ -189,6 +191,7 @@ fn reweighted(patch: &BezierPatch, lambda: f64, mu: f64) -> Surface {
     Surface { degree: [p, q], knots: [knots(p), knots(q)], points: points.collect() }
 }
 
+/// Rays on a ball whose patches have weights four powers of ten apart.
 fn weights() -> Case {
     // λ²μ² = 1e4 between opposite corners of a biquadratic patch.
     let surfaces = sphere(R).bezier_patches().iter().map(|p| reweighted(p, 10.0, 10.0)).collect();
@@ -221,6 +224,7 @@ fn on_surface() -> Case {
     ball("start on the surface", (0..400).map(question).collect())
 }
 
+/// Rays on a ball from a kilometre off.
 fn far_origin() -> Case {
     let question = |i| {
         let mut random = Random::new(9, i);

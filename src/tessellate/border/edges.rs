@@ -87,8 +87,8 @@ fn positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     (divisions, positions)
 }
 
-/// Edges around a face that all are one chord between the same two places leave nothing of it, be they two or the seam of a sphere that runs
-/// from pole to pole: the one that bends most gets a corner.
+/// Edges around a face that all are one chord between the same two places leave nothing of it, be they two or the seam of a sphere that
+/// runs from pole to pole: the one that bends most gets a corner.
 fn open_lenses(part: &Part, faces: &[(&Face, &FaceSurface<'_>)], times: &mut [Vec<f64>]) {
     for trim in faces.iter().flat_map(|(face, _)| &face.loops).filter(|l| l.uses.len() <= MAX_LENS_SIDES) {
         let edges: SmallVec<[usize; 4]> = trim.uses.iter().filter_map(|u| Some(u.edge?.0 as usize)).collect();

@@ -253,6 +253,7 @@ impl OwnPoints {
         Position::Own(self.points.len() as u32 - 1)
     }
 
+    /// The position of a point: an own one that is near, or a new one.
     fn find_or_add(&mut self, p: Point) -> Position {
         // By place, not by parameters: both ends of a seam are one corner.
         match self.points.iter().position(|q| (*q - p).length() <= self.near) {

@@ -8,7 +8,8 @@ use crate::tessellate::proof::prover::Prover;
 use smallvec::SmallVec;
 
 /// Shares of the tolerance that the curve over the diagonal may stray from it in a cell that is proved as one quad. With hanging vertices
-/// the cell falls into triangles, which are held to such curves: without a limit 250 of 19,690 facets of a very rough surface are not proved.
+/// the cell falls into triangles, which are held to such curves: without a limit 250 of 19,690 facets of a very rough surface are not
+/// proved.
 const FARTHEST: f64 = 2.0;
 /// Share by which the second diagonal must be nearer to the surface to be taken: rounding does not decide.
 const NEARER: f64 = 1e-9;

@@ -7,8 +7,8 @@
 //! together get the samples of both, so that neighbours of either face still meet it.
 //!
 //! Guarantee: a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier by the glue
-//! distance; shells stay closed, as a guest that the carrier's facets do not cover up to its border keeps its own. Known weakness: faces that
-//! overlap only in part are faceted apart.
+//! distance; shells stay closed, as a guest that the carrier's facets do not cover up to its border keeps its own. Known weakness: faces
+//! that overlap only in part are faceted apart.
 
 mod detection;
 mod guest;
@@ -121,6 +121,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         instances.par_iter().filter_map(divide).collect()
     }
 
+    /// What meshing a face needs, with the divisions of its part.
     fn input<'i>(&'i self, face: &'i TrimmedFace<'m>, mesh: &'i PartMesh) -> FaceInput<'i, 'm> {
         FaceInput {
             part: face.part,
@@ -133,6 +134,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         }
     }
 
+    /// Meshes anew, group by group, the faces that touch others.
     fn mesh_carriers_and_guests(&self, meshes: &mut FxHashMap<usize, PartMesh>) {
         let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
         let now = &*meshes;

@@ -1,11 +1,11 @@
 //! The proof that most facets pass: how far a Bézier patch strays from the flat triangle between three of its points.
 //!
 //! Over a parameter triangle let L be the linear map onto the triangle in space, and A and W the patch's homogeneous position and
-//! weight. N = A − W·L vanishes at the corners, so Taylor's theorem as in `second_derivatives.rs` gives |N| ≤ (Muu + 2 Muv + Mvv)/8, with bounds of
-//! its second derivatives over the rectangle around the triangle, in that rectangle's own parameters. The distance
-//! |S − L| = |N|/W follows, for the inside and the three sides alike, as L lies on the triangle and on its sides. Subtracting
-//! W·L before norms are taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part
-//! included. Where second derivatives vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `simplex_net.rs` decides.
+//! weight. N = A − W·L vanishes at the corners, so Taylor's theorem as in `second_derivatives.rs` gives |N| ≤ (Muu + 2 Muv + Mvv)/8, with
+//! bounds of its second derivatives over the rectangle around the triangle, in that rectangle's own parameters. The distance |S − L| =
+//! |N|/W follows, for the inside and the three sides alike, as L lies on the triangle and on its sides. Subtracting W·L before norms are
+//! taken is what keeps the bound sharp on rational patches: to first order it is |S″|, tangential part included. Where second derivatives
+//! vary or jump, the control points of N itself are looked at. Where the tangential part matters, the hull of `simplex_net.rs` decides.
 
 use super::linear_map::LinearMap;
 use super::refine::halve_net;

@@ -8,9 +8,9 @@
 //! * P to T: at most δ = d + h. The distance to the convex Q is convex, so d is bounded by the hulls of the nets over all patches that the
 //!   cell meets; their distances are halved as a scalar function while that helps.
 //! * T to P: T is a graph over Q with slopes of at most tan θ. Where the projection of P along n covers that of a point x of T, the
-//!   piece has a point p above or below x; p is within δ of a point of T, so it is within δ/cos θ of x. Where it does not, the curves around P do not wind
-//!   around x in projection; drawn straight onto their chords they do, so one has crossed x on the way, and a point of that curve is
-//!   within e/cos θ of x.
+//!   piece has a point p above or below x; p is within δ of a point of T, so it is within δ/cos θ of x. Where it does not, the curves
+//!   around P do not wind around x in projection; drawn straight onto their chords they do, so one has crossed x on the way, and a point of
+//!   that curve is within e/cos θ of x.
 //!
 //! The curve over the diagonal plays no part, where the proof of each triangle by itself must hold it to the traced diagonal: on a surface
 //! that is uneven or twisted in its own plane that alone cuts cells. And one net takes the place of the nets of two triangles.

@@ -4,18 +4,18 @@
 //! into the pole, not for its own triangle of parameters: the straight line of parameters from `b` to another place on the pole
 //! bows sideways by a quarter of the facet's width, the parameter line does not. Neighbours around a pole share such lines, so
 //! their pieces meet; a triangle with two corners on one pole has no piece. On the tip of a cone of 10 m that is 320 facets in place
-//! of 160 000. A triangle from pole to pole and to a corner `x` stands for what lies between its own line from pole to pole and the parameter
-//! line through `x`.
+//! of 160 000. A triangle from pole to pole and to a corner `x` stands for what lies between its own line from pole to pole and the
+//! parameter line through `x`.
 //!
-//! Why the bound of `prover.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into curves
-//! between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole (or the
-//! poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P each
-//! boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its place onto
-//! its chord, and the side along the pole onto the one point that it is, which it leaves by no more than the size of the pole. A border that
-//! runs aslant into the pole ends the piece in place of the parameter line: its chord's deviation and the hull around what lies between chord and
-//! curve are in its own bound, and its foot is the pole's corner itself. Corners stay where they are while curves shrink, the file's gap between
-//! corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners lie in one direction from
-//! the pole the piece has no width and the sides decide alone.
+//! Why the bound of `prover.rs` holds: all it asks of a piece is that it is the image of a disc of parameters whose boundary falls into
+//! curves between the corners, and here the disc is the quadrilateral of corners and feet. It is convex, as its two sides along the pole
+//! (or the poles) are parallel, so the two parameter triangles that it is cut into cover it, and P to T is their larger bound. For T to P
+//! each boundary curve is shrunk onto its own edge: the lines into the pole onto the sides there, the base or what the trim puts in its
+//! place onto its chord, and the side along the pole onto the one point that it is, which it leaves by no more than the size of the pole. A
+//! border that runs aslant into the pole ends the piece in place of the parameter line: its chord's deviation and the hull around what lies
+//! between chord and curve are in its own bound, and its foot is the pole's corner itself. Corners stay where they are while curves shrink,
+//! the file's gap between corner and surface being in what `side` and `piece` measure, from the corner's place in space. Where two corners
+//! lie in one direction from the pole the piece has no width and the sides decide alone.
 
 use super::border_chord::BorderChord;
 use super::prover::Prover;

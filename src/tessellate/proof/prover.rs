@@ -12,7 +12,8 @@
 //!   the distance is at most the larger of P to T and the distance of the boundary curves to the lines of their edges.
 //!
 //! Cells are proved as one quad where that holds (`flat_quad.rs`), which their diagonal then is no boundary of.
-//! Both are tried by second derivatives first (`second_derivatives.rs`): the piece and its boundary are near the linear map onto the triangle.
+//! Both are tried by second derivatives first (`second_derivatives.rs`): the piece and its boundary are near the linear map onto the
+//! triangle.
 //!
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between
 //! edge and face) the offset is added. Rounding is covered by 1e-12 of the surface's size.
@@ -71,8 +72,8 @@ impl<'s, 'a> Prover<'s, 'a> {
 
     /// Bound of the distance from the surface over a parameter triangle to a triangle in space.
     ///
-    /// Stops refining as soon as the answer is at most `limit`, or clearly is not: above `limit` the value says only that nothing nearer was
-    /// shown, and may be a sample. With [`Acceptance::Sampled`] it is an estimate where the surface is not affine.
+    /// Stops refining as soon as the answer is at most `limit`, or clearly is not: above `limit` the value says only that nothing nearer
+    /// was shown, and may be a sample. With [`Acceptance::Sampled`] it is an estimate where the surface is not affine.
     pub(in crate::tessellate) fn triangle_bound(&mut self, uv: [Uv; 3], xyz: [Point; 3], limit: f64) -> f64 {
         // A flat piece is as far off as its corners are, the distance being convex.
         if self.surface.affine {
@@ -254,7 +255,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         Some(worst + off)
     }
 
-    /// A cubic for a patch of higher degree over the box around some local parameters: these in the cubic's, and the bound of its difference.
+    /// A cubic for a patch of higher degree over the box around some local parameters: these in the cubic's, and the bound of its
+    /// difference.
     fn reduced<const N: usize>(&mut self, patch: &BezierPatch, at: &[Uv; N], limit: f64) -> Option<([Uv; N], f64)> {
         if !cubic_reduction::is_high(patch) {
             return None;

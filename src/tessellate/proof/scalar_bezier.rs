@@ -100,6 +100,7 @@ impl ScalarBezier {
         if N == 2 { net[0].max(last) } else { net[0].max(net[n]).max(last) }
     }
 
+    /// Halves the polynomial of degree `n` on top of the stack: both halves stand there afterwards.
     fn halve_segment(&mut self, start: usize, n: usize) {
         self.stack.extend_from_within(start..);
         let (low, high) = self.stack[start..].split_at_mut(n + 1);

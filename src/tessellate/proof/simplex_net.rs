@@ -101,8 +101,8 @@ impl SimplexNets {
         &self.out
     }
 
-    /// Control points over half of the rectangle that a net of these degrees, 1 to [`MAX_HALVED`], stands for. Of cells cut along a diagonal it takes a
-    /// seventh of the time: each coefficient is a mean of few control points, with weights that are the same for all.
+    /// Control points over half of the rectangle that a net of these degrees, 1 to [`MAX_HALVED`], stands for. Of cells cut along a
+    /// diagonal it takes a seventh of the time: each coefficient is a mean of few control points, with weights that are the same for all.
     pub(in crate::tessellate) fn half_of_rectangle(
         &mut self,
         net: &[Homogeneous],

@@ -1,4 +1,5 @@
-//! Sharp creases of the surface through the transition: lines that no triangle and no quad crosses, so that each side keeps its own normals.
+//! Sharp creases of the surface through the transition: lines that no triangle and no quad crosses, so that each side keeps its own
+//! normals.
 
 use crate::math::Uv;
 use crate::tessellate::border::polygons::crosses_ray_from;

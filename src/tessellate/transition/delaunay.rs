@@ -214,6 +214,7 @@ pub(super) struct Refinement<'s, 'a> {
 }
 
 impl Refinement<'_, '_> {
+    /// Inserts the nodes of the transition; `None` where one has no usable parameters.
     fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
         // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it
         // crosses.

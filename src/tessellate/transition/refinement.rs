@@ -94,8 +94,8 @@ impl Refinement<'_, '_> {
     /// Whether more points can make a triangle hold.
     fn can_gain(&self, f: &ProvedFacet<3>, chords: &BorderChords) -> bool {
         let t = f.nodes;
-        // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which at
-        // a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
+        // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which
+        // at a cone's apex, where the tolerance tightens, takes a tenth of the facets that rings of places between took.
         let strays = |k: usize| {
             let chord = chords.get(&edge_key(t[k], t[(k + 1) % 3]));
             chord.is_some_and(|chord| chord.deviation > f.tolerance)

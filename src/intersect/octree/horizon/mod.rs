@@ -83,6 +83,7 @@ impl Cone {
         Self { axis: axis.to_array().map(|x| AtomicU32::new((x as f32).to_bits())), cosine: 2f32.to_bits().into() }
     }
 
+    /// Publishes the cone to other threads.
     fn set(&self, axis: Vector, cosine: f64) {
         for (own, x) in self.axis.iter().zip(axis.to_array()) {
             own.store((x as f32).to_bits(), Ordering::Relaxed);

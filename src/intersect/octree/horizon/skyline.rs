@@ -55,6 +55,7 @@ impl Skyline {
         Self { normal: zero, x: zero, y: zero, slope2: [never; SECTORS], steepest: never }
     };
 
+    /// Whether the skyline stays below a direction, so that nothing stands in its way.
     #[inline(always)]
     fn is_below(&self, d: [f32; 3]) -> bool {
         let dot = |a: [f32; 3]| a[0] * d[0] + a[1] * d[1] + a[2] * d[2];

@@ -244,6 +244,7 @@ struct Tile {
 }
 
 impl Tile {
+    /// Draws a window of `side` × `side` squares; `room` bounds its entries.
     fn draw(projections: &[Projection], window: &Window, side: usize, room: usize) -> Self {
         let tile = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
         let mut rasterizer = Rasterizer { tile, written: FxHashMap::default(), projections, room };
