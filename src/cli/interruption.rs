@@ -12,6 +12,7 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 pub(crate) struct SaveableRun(());
 
 impl SaveableRun {
+    /// Counts a run that can be saved, until it is dropped.
     pub(crate) fn begin() -> Self {
         SAVEABLE_RUNS.fetch_add(1, Ordering::SeqCst);
         Self(())

@@ -37,6 +37,7 @@ fn escape(text: &str) -> String {
     printable_line(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
+/// Writes the head of a file.
 fn open(w: &mut dyn Write, kind: &str) -> io::Result<()> {
     writeln!(w, r#"<?xml version="1.0"?>"#)?;
     writeln!(w, r#"<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)

@@ -84,6 +84,7 @@ impl Interval {
     }
 }
 
+/// The interval that holds all four, rounded outward.
 fn outward(candidates: [f64; 4]) -> Interval {
     let lo = candidates.iter().copied().fold(f64::INFINITY, f64::min);
     let hi = candidates.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -91,6 +91,7 @@ fn abscissa((a, b): (Uv, Uv), v: f64) -> f64 {
     a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)
 }
 
+/// Whether a polygon surrounds a point, by even and odd crossings.
 fn surrounds(polygon: &[Uv], p: Uv) -> bool {
     sides(polygon).filter(|&(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < abscissa((a, b), p.y)).count() % 2 == 1
 }

@@ -166,6 +166,7 @@ impl Wavelengths {
         Self::with_power(Kind::Continuous(points), sums)
     }
 
+    /// Refuses sums that end in no power.
     fn with_power(kind: Kind, sums: Vec<f64>) -> Result<Self, Error> {
         match sums.last() {
             Some(&total) if total > 0.0 && total.is_finite() => Ok(Self { kind, sums }),

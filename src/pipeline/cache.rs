@@ -203,6 +203,7 @@ impl CachedFacets<'_> {
         self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
     }
 
+    /// Keeps the facets for a later run.
     pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
         self.cache.keep(&self.name(KINDS[0]), self.monitor, |to| mesh.write_arrays(to));
     }

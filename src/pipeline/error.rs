@@ -42,17 +42,17 @@ impl Error {
         Self { kind, setting, message: message.into(), help: None, excerpt: None }
     }
 
-    /// About what was asked.
+    /// An error of the request itself.
     pub(crate) fn request(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Request, None, message)
     }
 
-    /// About the value of a setting; the message goes on after its name.
+    /// An error of a setting's value; the message goes on after its name.
     pub(crate) fn setting(setting: &'static str, message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Request, Some(setting), message)
     }
 
-    /// About a file.
+    /// An error of a file that is read.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, None, message)
     }

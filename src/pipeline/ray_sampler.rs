@@ -23,6 +23,7 @@ impl<'a> RaySampler<'a> {
         Self { inner, threshold: (share * u64::MAX as f64) as u64, sample: Mutex::new(Vec::new()) }
     }
 
+    /// Keeps the ray where its hash is among the chosen ones.
     fn note(&self, ray: &Ray) {
         let hash = hash(ray);
         if hash <= self.threshold {

@@ -127,6 +127,7 @@ impl Judgement {
     }
 }
 
+/// The reading of a comparison, and by how much it keeps its limit; negative where it does not.
 fn read(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
     let reading = photometer.map.read(&comparison.measurement);
     let margin =

@@ -35,6 +35,7 @@ impl PartialRun {
         Self { replicates, tallies: Tallies::new(bound), ..Self::default() }
     }
 
+    /// Adds a whole replicate.
     pub(crate) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, bound: &BoundScene) {
         // In order, so that looking for a replicate is a search by halves.
         let place = self.done.binary_search(&replicate).unwrap_or_else(|place| place);
@@ -217,6 +218,7 @@ fn bits(points: &[crate::math::Point]) -> Vec<[u64; 3]> {
     points.iter().map(|p| p.to_array().map(f64::to_bits)).collect()
 }
 
+/// Bytes behind their number.
 fn block(out: &mut Vec<u8>, bytes: &[u8]) {
     out.extend((bytes.len() as u64).to_le_bytes());
     out.extend(bytes);

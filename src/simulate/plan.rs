@@ -137,6 +137,7 @@ impl Plan {
         if self.grows() { rays * u64::from(self.replicates) } else { rays }
     }
 
+    /// Whether the path of a ray is kept.
     #[inline]
     pub(crate) fn records(&self, ray: u64) -> bool {
         self.record_mask.is_some_and(|m| ray & m == 0)

@@ -275,6 +275,7 @@ impl Receiver {
         Some(self.counted(at, at[0] * at[0] + at[1] * at[1]))
     }
 
+    /// The spot at a place given in half sides, with its cell.
     fn counted(&self, at: [f64; 2], radius2: f64) -> Spot {
         // The upper border belongs to the last cell.
         let index = |x: f64, n: u32| ((0.5 * (x + 1.0) * f64::from(n)) as u32).min(n - 1) as usize;
@@ -307,6 +308,7 @@ impl Receiver {
     }
 }
 
+/// Axes of directions: right, up and forward as seen by one who looks along the light.
 pub(crate) fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
     let side = Frame::from_axis(origin, forward, Some(up));
     // from_axis makes x the upward one; right, up, forward as seen by one who looks along the light is left-handed.

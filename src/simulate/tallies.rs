@@ -101,6 +101,7 @@ impl ReplicateTally {
         self.receivers[receiver].touched()
     }
 
+    /// Books power that a face takes.
     #[inline]
     pub(crate) fn absorb(&mut self, face: FaceId, quanta: f64) {
         self.ends.absorbed += quanta_as_integer(quanta);

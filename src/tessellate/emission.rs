@@ -68,6 +68,7 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         corner
     }
 
+    /// Adds a corner with the surface's normal on the side of `inside`.
     fn new_corner(&mut self, node: u32, uv: Uv, inside: Uv) -> u32 {
         let normal = self.surface.normal_towards(uv, inside).unwrap_or(NO_NORMAL);
         self.made.corners.push(Corner { position: self.nodes[node].position, normal, uv });

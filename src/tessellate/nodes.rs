@@ -60,6 +60,7 @@ impl Nodes {
         self.push(Node { uv, place, position: Position::Own(self.own.len() as u32 - 1) })
     }
 
+    /// The state to which `rewind` goes back.
     pub(super) fn mark(&self) -> Mark {
         Mark { nodes: self.all.len(), own: self.own.len() }
     }

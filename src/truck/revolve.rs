@@ -188,6 +188,7 @@ fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
     Ok(y.atan2(x))
 }
 
+/// Where a side ends as the loop runs.
 fn side_end(side: &Side) -> Point {
     let [t0, t1] = side.curve.domain();
     side.curve.evaluate(if side.reversed { t0 } else { t1 })

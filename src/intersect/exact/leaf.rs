@@ -204,6 +204,7 @@ fn tangent_jacobian(leaf: &Leaf, slopes: &Slopes) -> [f64; 4] {
     [p(&slopes.u, x), p(&slopes.v, x), p(&slopes.u, y), p(&slopes.v, y)]
 }
 
+/// How far derivatives of radii `a` stray along `e`; that of the weight counts times the leaf's radius.
 fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
     a[0] * e.x.abs() + a[1] * e.y.abs() + a[2] * e.z.abs() + a[3] * radius
 }

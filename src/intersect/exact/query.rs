@@ -134,6 +134,7 @@ impl Query {
         t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
     }
 
+    /// Remembers a root that a trim has cut away.
     pub(super) fn reject_at_trim(&mut self, t: f64) {
         self.nearest_rejected = self.nearest_rejected.min(t);
         if self.collects_all {

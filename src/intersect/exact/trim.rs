@@ -140,6 +140,7 @@ impl Trim {
             .sum()
     }
 
+    /// The cells of an axis that an interval meets, held to the grid.
     fn cell_range(&self, lo: f64, hi: f64, d: usize) -> std::ops::RangeInclusive<usize> {
         let at = |x: f64| (((x - self.origin[d]) * self.density[d]).max(0.0) as usize).min(self.count[d] - 1);
         at(lo)..=at(hi)
@@ -181,6 +182,7 @@ impl Trim {
         }
     }
 
+    /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.
     fn parity(&self, q: Uv, row: usize) -> bool {
         let crossings = self.rows[row].iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
         (crossings % 2 == 1) != self.outside_is_inside

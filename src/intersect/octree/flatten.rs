@@ -81,6 +81,7 @@ impl Draft {
         }
     }
 
+    /// Makes room for nodes; returns where it begins.
     fn reserve(&mut self, count: usize) -> usize {
         self.nodes.resize(self.nodes.len() + count, Node::EMPTY);
         self.nodes.len() - count

@@ -123,6 +123,7 @@ impl<'a> Polished<'a> {
         Self { facets, mesh, exact, sag, records, clear_starts: RwLock::default() }
     }
 
+    /// The proved sag of a facet, or the mesh's where there is none.
     fn sag_of(&self, facet: u32) -> f64 {
         self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite()).unwrap_or(self.sag)
     }

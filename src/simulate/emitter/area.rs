@@ -36,12 +36,14 @@ struct LuminousFace {
 }
 
 impl LuminousFace {
+    /// Lower corner and size of a cell of the domain.
     fn cell(&self, k: usize) -> [Uv; 2] {
         let [[u0, u1], [v0, v1]] = self.face.surface.domain();
         let size = Uv::new(u1 - u0, v1 - v0) / CELLS as f64;
         [Uv::new(u0, v0) + size * Uv::new((k / CELLS) as f64, (k % CELLS) as f64), size]
     }
 
+    /// Area per unit of parameters, mm².
     fn element(&self, uv: Uv) -> f64 {
         let d = self.face.surface.derivatives(uv);
         d.du.cross(d.dv).length() * self.placement.scale.powi(2)

@@ -140,6 +140,7 @@ impl Crossings {
         }
     }
 
+    /// The bodies that the way left without having entered them, the outermost first.
     fn bodies_around(mut self) -> Bodies {
         // A solid that is turned inside out is left before it is entered.
         self.left.retain(|b| !self.entered.contains(b));

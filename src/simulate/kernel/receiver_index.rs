@@ -118,6 +118,7 @@ impl ReceiverIndex {
     }
 }
 
+/// A box with room for the rounding of crossings.
 fn with_room(bounds: Aabb) -> Aabb {
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     bounds.grown(ROOM[0] * bounds.diagonal() + ROOM[1] * largest)

@@ -49,6 +49,7 @@ pub(super) fn trace_rays<C: RayPayload>(
     cost
 }
 
+/// Hands paths that have ended to who writes them.
 fn stream_paths(context: &Context<'_>, tally: &mut ReplicateTally) {
     if let Some(sink) = context.paths {
         tally.stream_paths(sink, &context.plan);

@@ -12,6 +12,7 @@ pub(crate) struct DirectedUse<T> {
 }
 
 impl<T> DirectedUse<T> {
+    /// Turns the use to run the other way.
     fn turn(&mut self) {
         self.reversed = !self.reversed;
         std::mem::swap(&mut self.from, &mut self.to);

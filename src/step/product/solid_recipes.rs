@@ -74,6 +74,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         self.primitive(e)
     }
 
+    /// An attribute as a length, mm.
     fn length(&self, a: Args<'f, 'a>, k: usize) -> Option<f64> {
         a.real(k).map(|x| x * self.units.length).filter(|x| x.is_finite())
     }
@@ -346,6 +347,7 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
     Some(solid)
 }
 
+/// Distance from an axis, mm.
 fn distance(axis: &Frame, p: Point) -> f64 {
     let q = axis.local_point(p);
     q.x.hypot(q.y)

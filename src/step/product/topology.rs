@@ -133,6 +133,7 @@ impl ShapeItems {
         }
     }
 
+    /// Notes a surface that stands in a set without a face, once.
     fn add_set_element(&mut self, file: &File<'_>, id: u64) {
         if !self.surfaces.contains(&id) && file.entity(id).is_some_and(is_surface) {
             self.surfaces.push(id);

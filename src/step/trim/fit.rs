@@ -25,6 +25,7 @@ impl Budget {
         Self(Cell::new(steps))
     }
 
+    /// Takes one evaluation; fails when none is left.
     fn spend(&self) -> Result<(), Overrun> {
         let left = self.0.get();
         self.0.set(left.saturating_sub(1));

@@ -191,6 +191,7 @@ struct Solution {
 }
 
 impl Solution {
+    /// Whether the target was reached.
     fn is_kept(&self, target: &AccuracyTarget) -> bool {
         self.reached <= target.degrees
     }

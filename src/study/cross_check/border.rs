@@ -48,7 +48,7 @@ impl Border {
         self.bounds.grown(enough).contains(p)
     }
 
-    /// Distance of `p`; some larger number where it is beyond `enough`, or one that is not the least where it is not.
+    /// The distance of `p` from some place of the border within `enough`, where there is one; else a number above `enough`.
     pub(super) fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
         // On parts smaller than the band every sample is near: one of them says all that is asked.
         if let Some(near) = self.samples.iter().map(|s| s.1.distance(p)).find(|&d| d <= enough) {

@@ -50,6 +50,7 @@ impl<'a> Classifier<'a> {
         Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
     }
 
+    /// A face's surface at its place, made when it is first asked for.
     fn surface(&self, face: FaceId) -> Option<&PlacedSurface> {
         let placed = self.placed.get(face.index())?;
         self.surfaces[face.index()].get_or_init(|| PlacedSurface::new(placed)).as_ref()

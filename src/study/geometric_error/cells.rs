@@ -100,6 +100,7 @@ impl<'r> CellPairs<'r> {
         Some(Self { grid, cells, unit, replicates, layer })
     }
 
+    /// Cells of a block, as far as the grid goes.
     fn inside(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
         let [nx, ny] = self.grid;
         let rows = block.y..(block.y + block.side).min(ny);

@@ -230,6 +230,7 @@ struct Builder<'b, 'f, 'm, 'c> {
     parameters: FxHashMap<Position, Vec<Uv>>,
 }
 
+/// A node's name: two nodes may share a position, as on a seam.
 fn name(position: Position, uv: Uv) -> (Position, [u64; 2]) {
     // Adding zero turns −0.0 into 0.0: as bits the two would be different names.
     (position, [(uv.x + 0.0).to_bits(), (uv.y + 0.0).to_bits()])

@@ -121,6 +121,7 @@ impl Limits {
         Self { usual: (corners * 6 + 4000).min(budget), budget }
     }
 
+    /// Corners that there may be, by whether those facets that do not hold become fewer.
     fn most(&self, falls: bool) -> usize {
         if falls { self.budget } else { self.usual + self.usual / 4 }
     }
@@ -241,6 +242,7 @@ impl Refinement<'_, '_> {
         Some(handle)
     }
 
+    /// Parameters as the triangulation has them; `None` where they are out of its range.
     fn scaled(&self, uv: Uv) -> Option<Point2<f64>> {
         // Spade refuses numbers so small that its exact predicates underflow.
         let clean = |x: f64| if x.abs() < COORDINATES[0] { 0.0 } else { x };

@@ -33,6 +33,7 @@ impl CandidatesOf {
         Self(of)
     }
 
+    /// The candidates of a triangle.
     pub(super) fn of(&self, triangle: usize) -> impl Iterator<Item = usize> + '_ {
         self.0[triangle].iter().flatten().map(|&c| c as usize)
     }

@@ -198,6 +198,7 @@ fn area(loops: &[TrimLoop]) -> f64 {
     .sum()
 }
 
+/// Corners of the box around control points.
 fn hull_corners(points: &[DVec3]) -> (DVec2, DVec2) {
     points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| {
         let at = p.truncate() / p.z;

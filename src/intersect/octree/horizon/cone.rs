@@ -59,6 +59,7 @@ impl Limit {
         Self { axis, sine, cosine }
     }
 
+    /// Narrows the cone to this sine.
     fn lower(&mut self, sine: f64) {
         if sine < self.sine {
             self.sine = sine.max(0.0);
