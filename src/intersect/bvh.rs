@@ -171,6 +171,7 @@ impl<'m> Bvh<'m> {
                 Kind::CwBvh => Tree::Wide(build_cwbvh_from_tris(&triangles, params, &mut core)),
             }
         };
+        // Leaves name places in the tree's own order of triangles.
         let order: &[u32] = match &tree {
             Tree::Empty => &[],
             Tree::Binary(b) => &b.primitive_indices,
@@ -279,6 +280,7 @@ impl<'m> Bvh<'m> {
                 ((hit.primitive_id != u32::MAX).then_some(hit.primitive_id as usize), hit.t)
             }
             Tree::Wide(tree) => {
+                // As the library's `ray_traverse`, but with nodes counted.
                 let mut ray = ray;
                 let mut found = None;
                 let mut state = tree.new_traversal(ray.direction);

@@ -53,6 +53,8 @@ impl Report {
                 Block::View(view) => {
                     let path = inside("figures", format!("{}.png", view.name))?;
                     match pictures.get(view.name.as_str()) {
+                        // A view that could not be drawn for the page is tried once more, so that its error reaches
+                        // the caller.
                         Some(Ok(png)) => write_atomic(&path, |w| w.write_all(png))?,
                         _ => write_png(&path, &raster::render(view))?,
                     }

@@ -171,6 +171,7 @@ impl PartialRun {
         t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
+        // Bits, not decimals: what was written comes back exactly.
         let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
         t.ledger = ledger
             .into_iter()

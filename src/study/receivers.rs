@@ -123,6 +123,7 @@ pub(super) fn receivers(
     let mut countdown = Countdown::since(begun, progress);
     let seconds = |of: &[Combination]| -> f64 { of.iter().map(|c| c.seconds).sum() };
     countdown.stage("receivers on the spline", Some(seconds_spline + seconds(combinations)));
+    // Once: the truth does not change with the tolerance.
     let truth = simulate(bound, mesh_source.exact(), settings, &|_| true);
     let start = Instant::now();
     let (mut rows, mut done) = (Vec::new(), 0);
@@ -136,6 +137,7 @@ pub(super) fn receivers(
         let ahead = pace * seconds(&combinations[done..]);
         countdown.stage(&format!("receivers at {tolerance} mm"), Some(ahead));
         done += of_one.len();
+        // One mesh serves all kinds of normals.
         let meshed = mesh_source.mesh([tolerance; 2]);
         let normals: Vec<NormalMode> = of_one.iter().map(|c| c.normals).collect();
         let found = with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &normals, |trees| {

@@ -148,7 +148,6 @@ fn settle<V: F64x8>(
     let mut patches = [first; LANES];
     for lane in 0..LANES {
         // Idle lanes repeat the first, so that they end when it does and divide by nothing that it does not.
-        // Idle lanes repeat the first.
         let index = if lane < group.count { group.seeds[lane] } else { group.seeds[0] };
         let seed = &seeds[index as usize];
         let (ray, patch) = (&rays[seed.ray as usize], &geometry.patches[seed.patch as usize]);
@@ -164,6 +163,7 @@ fn settle<V: F64x8>(
         let shortest = TRUSTED * patch.rounding;
         starts.trusted[lane] = shortest * shortest;
     }
+    // Control points side by side: those of eight patches in a register.
     let count = (usize::from(group.degree[0]) + 1) * (usize::from(group.degree[1]) + 1);
     for k in 0..count {
         let mut rows: [&V4; LANES] = [&first.net[k]; LANES];
@@ -173,6 +173,8 @@ fn settle<V: F64x8>(
         net[k] = V::transpose(rows);
     }
     let net = &net[..count];
+    // Degrees that are known at compile time need no loops over them; any others share a step written for the
+    // largest.
     let ends = match group.degree {
         [1, 1] => step_fixed::<V, 2, 2>(net, &starts),
         [2, 2] => step_fixed::<V, 3, 3>(net, &starts),

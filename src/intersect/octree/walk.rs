@@ -180,6 +180,7 @@ fn walk_batch<L: Lanes>(
     let mut queues = StepQueues::default();
     let mut live = order.len().min(WIDTH);
     let mut next = live;
+    // As many as fit are under way; whoever ends hands its place to the next.
     for (ray, (state, &place)) in states.iter_mut().zip(order).enumerate().take(live) {
         let place = usize::from(place);
         state.start(tree, root, &rays[place], place);
@@ -198,6 +199,7 @@ fn walk_batch<L: Lanes>(
         let queue = queues.take(BLOCK);
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
+            // The sieve knows rounded corners only; what it leaves asks for its true ones first.
             let (index, count) = s.next.as_block();
             cost.tests += count as u64;
             s.block = index as u32;
@@ -227,6 +229,7 @@ fn walk_batch<L: Lanes>(
             hits[s.index] = s.best.hit();
             if let Some(&place) = order.get(next) {
                 let place = usize::from(place);
+                // Long before its turn, for what is known of the facet that it leaves is not in the cache.
                 if let Some(from) = order.get(next + AHEAD).and_then(|&place| rays[usize::from(place)].departure) {
                     prefetch(&tree.slopes, from.primitive as usize);
                 }

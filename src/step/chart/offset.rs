@@ -21,6 +21,7 @@ const MAX_CELLS: usize = 256;
 /// The chart of the surface at `distance` along the normals of `basis`; `None` where nothing is left.
 pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     let mut chart = match &basis.kind {
+        // Elementary surfaces stay what they are, and exact.
         Kind::Plane { frame } => {
             let mut frame = *frame;
             frame.origin += distance * frame.z;
@@ -55,6 +56,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
             let kind = Kind::Extrusion { base, direction: *direction };
             Chart { error, ..Chart::new(kind, Analytic::Offset) }
         }
+        // The offset of a spline is no spline in general: it is fitted.
         _ => {
             let domain = basis_domain(basis)?;
             let (surface, error) = fit(&basis.surface(domain), distance)?;

@@ -50,6 +50,7 @@ fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     for i in 0..SAMPLES {
         let (mut lo, mut hi) = (sample(i), sample(i + 1));
         let (s_lo, s_hi) = (side(lo), side(hi));
+        // A change of sign counts only beyond rounding.
         if s_lo.abs().max(s_hi.abs()) > AXIS_SQUARE_SHARE * size * size && s_lo * s_hi < 0.0 {
             for _ in 0..100 {
                 let middle = 0.5 * (lo + hi);
@@ -66,6 +67,7 @@ fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     }
     if b - last > near {
         let tail = curve.restricted(last, b);
+        // The ends of a closed profile are one place: what lies before the first crossing goes on from what lies behind the last.
         let closed = (at(a) - at(b)).length() <= CLOSED_PROFILE * (1.0 + size);
         match parts.pop() {
             Some(head) if closed => parts.push(tail.joined_with(&head)),

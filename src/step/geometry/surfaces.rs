@@ -101,6 +101,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             None => None,
         };
         let form = knot_form(e, "SURFACE");
+        // A simple instance has one attribute more before its knots than a complex one: the name.
         let knots = match e.attributes("B_SPLINE_SURFACE_WITH_KNOTS", 7) {
             Some(a) => (
                 explicit_knots(a.list(if simple { 1 } else { 0 }), a.list(if simple { 3 } else { 2 })),
@@ -111,6 +112,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let (Some(ku), Some(kv)) = knots else {
             return Err(Refusal::new(e, "knots and multiplicities do not fit"));
         };
+        // Equal weights divide out: such a surface is told as a plain B-spline.
         let rational =
             weights.as_ref().is_some_and(|w| w.iter().any(|x| (x - w[0]).abs() > EQUAL_WEIGHTS * w[0].abs()));
         let (surface, _) = sanitise::surface(degree, [ku, kv], [nu, nv], &points, weights.as_deref())

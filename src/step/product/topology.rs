@@ -112,6 +112,7 @@ impl ShapeItems {
         ]) {
             self.add_shell(file, Some(id), &name, &[], false, e);
         } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE"]) {
+            // A face alone is an open shell of one face.
             self.shells.push(ShellPlan {
                 name,
                 closed: false,

@@ -69,6 +69,7 @@ pub fn meet_target_for_rays(
 ) -> AccuracyPlan {
     let start = Instant::now();
     let clock = Clock::new(progress);
+    // The spline's hits are the truth, and tell which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
     let pilots = ReferenceRays::new(mesh_source, rays(target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
@@ -79,6 +80,7 @@ pub fn meet_target_for_rays(
     let even =
         target.kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| search.candidate(normals, false));
     let mut kinds: Vec<Candidate> = local.chain(even).collect();
+    // The one that promises to be cheapest first: what it is measured to cost may rule out the others.
     kinds.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
     let mut trials: Vec<Trial> = Vec::new();
     let mut best: Option<Solution> = None;
