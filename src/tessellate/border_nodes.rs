@@ -188,8 +188,7 @@ impl BorderNodes {
                 c.lo[1 - d] - slack <= a[1 - d] && a[1 - d] <= c.hi[1 - d] + slack
             });
             // Cells reach the pole at their corners: there its side must be divided, or a facet's side would end on
-            // another's middle.
-            // Where cells end, and where an imprint has a node already.
+            // another's middle. An imprint may have a node there already.
             let place = self.nodes[from].position;
             let imprinted = self.imprinted.iter().flatten().filter(|&&n| self.nodes[n].position == place);
             let known = imprinted.map(|&n| (self.nodes[n].uv[d], Some(n)));

@@ -74,8 +74,8 @@ pub(super) fn border_alone(
     };
     let mut out = FaceMesh { own: border.own, ..FaceMesh::default() };
     for t in triangles {
-        // Corners are not shared: each triangle may be the only one that knows its normal.
-        // Where the surface has no normal the triangle's does; one without area shades nothing.
+        // Where the surface has no normal the triangle's does, so that corners are not shared; one without area shades
+        // nothing.
         let flat = (t[1].place - t[0].place).cross(t[2].place - t[0].place).try_normalize().unwrap_or(Vector::Z);
         let first = out.corners.len() as u32;
         out.corners.extend(t.map(|c| {

@@ -343,7 +343,6 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
             return;
         }
-        // Construction geometry and annotations hang on products as shapes do.
         if let Some(purpose) = purpose_besides_shape(self.file, id) {
             if self.reached.insert(id) {
                 self.left_out.push((id, purpose.into()));

@@ -234,8 +234,8 @@ impl CellFacets<'_, '_, '_, '_> {
             }
             moved = moved.max((n[k].place - proved.places[k]).length());
         }
-        // Four times: each of the two triangles and each of its sides moves by no more than a corner does.
-        // Lines and triangles through moved points move no farther; the rest covers parameters that differ in their last digits.
+        // Lines and triangles through moved points move no farther than these: four times as much is more than they need.
+        // What is added beside it covers parameters that differ in their last digits.
         let limit = tolerance * proved.slack;
         if moved > SAME_CORNER[1] * tolerance {
             return None;

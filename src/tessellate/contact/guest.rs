@@ -98,8 +98,7 @@ const ON_SEAM: f64 = 1e-6;
 fn beside(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     let surface = &face.surface;
     if let Some(across) = surface.pole(uv) {
-        // The nearest end: a projected place is only near the pole.
-        // All along the pole is one place.
+        // The nearest end, for a projected place is only near the pole; all along the pole is one place.
         let [a, b] = surface.spline.domain()[across];
         uv[across] = if uv[across] - a < b - uv[across] { a } else { b };
         uv[1 - across] = middle[1 - across];
@@ -195,9 +194,8 @@ fn prove_cell(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4], li
     }
     let places = corners.map(|c| surface.point(c));
     let moved = at.iter().zip(places).map(|(n, p)| (n.place - p).length()).fold(0.0, f64::max);
-    // Lines and triangles through moved points move no farther.
     let Some(bound) = prover.quad_bound([lo, hi], &places, start % 2, limit) else { return f64::INFINITY };
-    // Four times: the diagonal and the sides of both triangles move by no more than a corner each.
+    // Lines and triangles through moved points move no farther than these: four times as much is more than they need.
     let mut worst = bound + 4.0 * moved;
     let xyz = [0, 1, 2].map(|k| nodes[k].place);
     for k in 0..4 {
@@ -270,8 +268,8 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         let count = if triangle { 3 } else { 4 };
         let middle = places[..count].iter().sum::<Point>() / count as f64;
         let (uv, away) = self.guest.face.projector.project(middle);
-        // Both the facet's own sag and the glue distance lie between its middle and the guest.
-        // Beside the guest the nearest place is on its border, farther than the facet lies from its own surface.
+        // Both the facet's own sag and the glue distance lie between its middle and the guest. Beside the guest the
+        // nearest place is on its border, farther than that.
         let frame = self.guest.face.frame;
         let (_, sag) = self.carrier.project(frame.point(middle));
         if away * frame.scale.abs() > sag + self.glue || !self.guest.contains(uv) {

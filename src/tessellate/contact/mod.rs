@@ -171,7 +171,6 @@ impl<'j, 'm> Joiner<'j, 'm> {
             Ok((mut mesh, facets)) if facets.holds_imprint => {
                 // The facets were made tighter for the guests' sake; what was asked of this face is what they are
                 // measured by.
-                // What was asked, not what the guests are left a share of.
                 mesh.facets.iter_mut().for_each(|f| f.tolerance /= CARRIER_SHARE);
                 (Some(mesh), facets)
             }
