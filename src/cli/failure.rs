@@ -127,8 +127,7 @@ impl From<crate::formats::Error> for Failure {
 
 impl From<pipeline::Error> for Failure {
     fn from(e: pipeline::Error) -> Self {
-        // What a setting is called on the command line.
-        // Settings are named alike everywhere, but for the line in the middle.
+        // Settings are called on the command line as in the scene, but for the line in the middle.
         let option = e.setting_name().map_or_else(String::new, |name| format!("--{} ", name.replace('_', "-")));
         let message = option + e.message();
         let mut failure = match e.kind() {

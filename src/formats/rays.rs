@@ -253,8 +253,7 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
     if &start[..6] != b"\x93NUMPY" {
         return Err("not an NPY array".into());
     }
-    // Versions 2 and 3 have a header length of four bytes; a header of this kind never needs them.
-    // The two bytes are the upper half of that length, and zero.
+    // Versions 2 and 3 have a header length of four bytes. A header of this kind never needs the upper two, which are zero.
     if start[6] > 1 {
         entry.read_exact(&mut [0u8; 2]).map_err(cut)?;
     }

@@ -87,8 +87,7 @@ struct Edge {
 
 /// The steepest fall of log₁₀ E along a scan in the direction of `sign`; `None` where the map does not hold two steps of it.
 fn steepest(map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2], range: [f64; 2], sign: f64) -> Option<Edge> {
-    // As fine as the map allows: a wider opening would blunt the edge.
-    // Half an opening to each side of the scanned point.
+    // Half an opening to each side of the scanned point, as fine as the map allows: a wider one would blunt the edge.
     let sensor = Sensor { half_deg: 0.5 * map.coarsest_deg().max(STEP_DEG), round: false };
     let steps = ((range[1] - range[0]) / STEP_DEG).round() as usize;
     let positions = (0..=steps).map(|k| range[0] + STEP_DEG * k as f64);
@@ -101,8 +100,7 @@ fn steepest(map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2], range: [f64
         .collect();
     let brightest = readings.iter().map(|r| r.1).fold(0.0, f64::max);
     let dark = DARK_SHARE * brightest;
-    // A scan that meets no light at all is flat.
-    // The dark share bounds the logarithm, which has no end at zero.
+    // The dark share bounds the logarithm, which has no end at zero. A scan that meets no light at all is flat.
     let level = |value: f64| if dark > 0.0 { (value.max(0.0) + dark).log10() } else { 0.0 };
     let span = (GRADIENT_DEG / STEP_DEG).round() as usize;
     let gradients = readings.windows(span + 1).map(|w| {

@@ -133,8 +133,8 @@ fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     if det.high.abs() <= exact * scale || !one_sided(BAND) {
         return None;
     }
-    // The weights of the corners are the volumes; the distance is that along the main axis.
-    // Along the axis on which the direction is longest, its division loses least.
+    // The weights of the corners are the volumes; the distance is that along the axis on which the direction is longest, where its
+    // division loses least.
     let main = (0..3).fold(0, |m, k| if d[k].high.abs() > d[m].high.abs() { k } else { m });
     let along = a[main] * volumes[0] + b[main] * volumes[1] + c[main] * volumes[2];
     let t = along.high / det.high / d[main].high;

@@ -145,8 +145,8 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
         }
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };
-    // Chords that two faces have inside are taken from one of them.
-    // A further look after each, for a face meshed anew may have chosen another diagonal that is taken.
+    // Chords that two faces have inside are taken from one of them. Again and again, for a face meshed anew may have chosen another
+    // diagonal that is taken.
     let mut taken: Vec<TakenChords> = vec![TakenChords::default(); faces.len()];
     for _ in 0..MAX_ROUNDS {
         for (k, chords) in doubled_chords(part, &meshes, &taken) {

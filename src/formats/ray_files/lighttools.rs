@@ -59,8 +59,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
         return Err(file.malformed("polarised rays (Stokes vectors) are not read; write it without polarisation"));
     }
 
-    // The number of rays is not stated: it follows from the length.
-    // What the end mark takes is no ray.
+    // The number of rays is not stated: it follows from the length, of which the end mark is no ray.
     let bytes = file.length().saturating_sub(file.position() + END.len() as u64);
     let row = 4 * columns as u64;
     if bytes % row != 0 {

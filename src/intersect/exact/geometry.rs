@@ -77,8 +77,8 @@ impl Geometry {
             ..Self::default()
         };
         let gaps: Vec<Vec<f64>> = model.parts.iter().map(edge_gaps).collect();
-        // Instances share the trims and break lines of their part.
-        // By address, which names a face for as long as the model is borrowed.
+        // Instances share the trims and break lines of their part: found by the face's address, which names it for as long as the model
+        // is borrowed.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
         for placed in model.placed_faces() {
             match placed.face {

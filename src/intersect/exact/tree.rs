@@ -56,9 +56,8 @@ impl Tree {
         let mut tree = Self { nodes: vec![Node::EMPTY], center, bounds };
         let mut stack = vec![(0usize, 0usize)];
         while let Some((wide, from)) = stack.pop() {
-            // The root may be a leaf by itself; else open the largest child until there are eight.
-            // The child with the largest area is met most often: opening that one spares most visits (Wald, Benthin
-            // and Boulos 2008).
+            // The root may be a leaf by itself. Else the largest child is opened until there are eight: it is met most often, so that
+            // opening it spares most visits (Wald, Benthin and Boulos 2008).
             let mut children: SmallVec<[usize; WIDTH]> = smallvec![from];
             while children.len() < WIDTH {
                 let inner = (0..children.len()).filter(|&k| !binary[children[k]].is_leaf);
@@ -148,6 +147,7 @@ fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
     }
     for axis in (0..3).filter(|&axis| wide[axis]) {
         let bins = &all[axis];
+        // What lies right of each plane is gathered first, so that one sweep from the left prices all planes.
         let mut right = [(Aabb::EMPTY, 0usize); BINS + 1];
         for s in (0..BINS).rev() {
             right[s] = (right[s + 1].0.union(bins[s].0), right[s + 1].1 + bins[s].1);

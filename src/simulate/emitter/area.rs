@@ -82,8 +82,7 @@ impl Area {
         let mut last = None;
         for attempt in 0..MOST_ATTEMPTS {
             // The first try takes the pair of the low-discrepancy sequence, which then covers the area evenly; further ones are
-            // independent.
-            // Pairs from 10 on are the area's alone; the lower ones belong to the net and to lists.
+            // independent, and their pairs, from 10 on, are the area's alone.
             let [u, v] = if attempt == 0 { stream.pair(index, 0) } else { stream.random(index, 2 * attempt + 10) };
             let at = u * whole;
             let cell = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);

@@ -224,8 +224,8 @@ impl Emitter {
                 emission.from = Some((face, normal));
                 axes = [x, y, normal];
             }
-            // Systematic sampling: shares evenly spaced over the list take from every part what it has.
-            // A measured ray has a place and a direction of its own, and perhaps a wavelength.
+            // A measured ray has a place and a direction of its own, and perhaps a wavelength. Systematic sampling: shares evenly
+            // spaced over the list take from every part what it has.
             Shape::List(list) => {
                 let r = list.ray_at_share(stream.systematic(index));
                 *ray = Ray::new(f.point(r.origin), f.direction(r.direction));

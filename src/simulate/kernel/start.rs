@@ -24,8 +24,7 @@ pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector,
         let Some(mut hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
         let mut point = probe.point_at(hit.t);
         if hit.face != face {
-            // A face of a body that lies on it may come first.
-            // The own face lies behind that of a touching body, within the glue.
+            // A face of a body that lies on it may come first; the own face then lies behind it, within the glue.
             let behind =
                 Ray::new(point, -normal).with_range(0.0, context.glue_mm()).with_departure(hit.departure());
             let Some(next) = context.intersector.intersect(&behind, &mut Cost::default()) else { continue };

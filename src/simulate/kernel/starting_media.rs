@@ -48,8 +48,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
         let mut ray = Ray::new(Point::ZERO, Vector::Z);
         let index = ((to - from) * k / PROBED_RAYS) as u32;
         let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);
-        // One start on a face decides for all: the rays of such a source must each be asked.
-        // What is asked about here is where the ray starts; luminous faces find their own start.
+        // One start on a face decides for all: the rays of such a source must each be asked. Luminous faces find their own start.
         if emission.from.is_none() && start_clear_of_faces(context, &ray).is_some() {
             return StartingMedia::OnFace;
         }

@@ -88,8 +88,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     fn resolve_contact(&self, ray: &Ray, at: &mut SurfaceInteraction<'_>) -> Option<FaceHit> {
         let context = self.context;
         let FaceOptics { opaque_solid, medium_on_opaque, touches_body, body, .. } = at.face;
-        // Light that leaves its body into an opaque face on it meets that face.
-        // From within, since light that comes from outside meets the opaque face in any case.
+        // Light that leaves its body into an opaque face on it meets that face. Light that comes from outside meets the opaque one in
+        // any case.
         if !at.entering && (opaque_solid || medium_on_opaque && body != AMBIENT) {
             let opaque = opaque_contact(context, ray, &at.face_hit());
             if opaque.is_some() {

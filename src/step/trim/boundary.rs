@@ -346,6 +346,8 @@ fn join_winding_pair(
                 .ok_or("no seam between the two loops misses the holes")?
         }
     };
+    // Around the first loop, over the seam one turn further on, around the second, and back over the seam: what lies between
+    // both loops is bounded by one.
     let a = started_at(a, seam.start, displacement);
     let mut b = started_at(b, seam.goal, -displacement);
     b.shift(seam.points[seam.points.len() - 1] - b.pieces[0].start());

@@ -70,10 +70,10 @@ impl Obstacles<'_> {
     fn way_by(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives, corners: Vec<Uv>) -> Option<SeamPath> {
         let length = |a: Uv, b: Uv| (metric.du * (b.x - a.x) + metric.dv * (b.y - a.y)).length();
         let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
+        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
         let mut nodes: Vec<Node> = starts.iter().map(|p| node(*p, 0.0)).collect();
         nodes.extend(corners.into_iter().map(|p| node(p, f64::INFINITY)));
         // Shortest complete way so far: its length, last node, goal and end.
-        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
         let mut best: Option<(f64, usize, usize, Uv)> = None;
         loop {
             let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());

@@ -102,8 +102,8 @@ impl<'a> Classifier<'a> {
         if apart > self.rounding + self.sag(f.primitive) {
             return Some(self.explain(ray, facet, exact));
         }
-        // The spline passes within `apart` of the facet's hit, so the hit lies within the sag.
-        // At grazing incidence facets may turn their backs within their sag.
+        // The spline passes within `apart` of the facet's hit, so the hit lies within the sag. Only at grazing incidence may facets
+        // turn their backs within it.
         let steep = |h: &Hit| h.geometric_normal.dot(ray.direction).abs() > 0.3;
         if f.geometric_normal.dot(e.geometric_normal) < 0.0 && steep(f) && steep(e) {
             return Some(Cause::Unexplained(Defect::Orientation));

@@ -38,8 +38,7 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
         }
     }
     for (i, j) in open.iter().flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]) {
-        // Both triangles hold the diagonal.
-        // It is a side of both; once is enough.
+        // Both triangles hold the diagonal: once is enough.
         if (i, j) == (0, 2) && open.len() == 2 {
             continue;
         }

@@ -279,8 +279,7 @@ impl CellFacets<'_, '_, '_, '_> {
         if !face_each_other(&bottom, &top, 0) || !face_each_other(&left, &right, 1) {
             return None;
         }
-        // The nodes of the pieces, row by row; inner ones are new.
-        // Inner nodes are taken back when a piece does not hold.
+        // The nodes of the pieces, row by row; inner ones are new, and are taken back when a piece does not hold.
         let mark = nodes.mark();
         let mut at = vec![vec![0u32; ny + 1]; nx + 1];
         for i in 0..=nx {
@@ -349,8 +348,7 @@ impl CellFacets<'_, '_, '_, '_> {
         for gap in 2..n {
             for i in 0..n - gap {
                 let j = i + gap;
-                // Sides of the polygon are given, so that only diagonals cost.
-                // The side that closes the polygon is no diagonal.
+                // Sides of the polygon are given, the one that closes it too, so that only diagonals cost.
                 let chord = if i == 0 && j == n - 1 { 0.0 } else { off(i, j).powi(2) };
                 cost[i][j] = f64::INFINITY;
                 for k in i + 1..j {

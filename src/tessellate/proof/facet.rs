@@ -49,8 +49,8 @@ pub(in crate::tessellate) fn prove_triangle(
             return proved(worst);
         }
     }
-    // Inside and sides by one quick look, else each by its own hull.
-    // With two corners in one place the linear map has no inverse, and the quick look none to give.
+    // Inside and sides by one quick look, else each by its own hull. With two corners in one place the linear map has no inverse, and
+    // there is no quick look.
     if !collapsed && let Some(bound) = prover.facet_bound(uv, xyz, false, limit) {
         return proved(worst.max(bound));
     }

@@ -115,8 +115,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         self.max_over_patches(&uv, |this, a, b, polygon| {
             let patch = this.surface.patch(a, b);
             let mut worst = 0f64;
-            // Over a whole patch its own net is the hull, without any cutting.
-            // Of the triangle's own hull it is the coarsest; where it does, all others are spared.
+            // Over a whole patch its own net is a hull, without any cutting. It is the coarsest; where it will do, the triangle's own
+            // is spared.
             if is_rectangle(polygon, patch.domain) {
                 let hull = patch.points.iter().map(|p| flat.distance(p.project())).fold(0.0, f64::max);
                 if hull <= limit {
@@ -241,9 +241,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         let mut worst = self.scalar.bound::<3>(net.iter().map(|c| (flat.distance(c.project()), c.w)), n, limit)?;
         for k in 0..3 {
             let chord = [xyz[k], xyz[(k + 1) % 3]];
-            // Places in the net's order of the coefficients along a side.
-            // Coefficients stand in rows of a triangle, row m from m(m+1)/2 on: its sides are the first and the last of each row, and the
-            // last row.
+            // Places of the coefficients along a side. They stand in rows of a triangle, row m from m(m+1)/2 on: its sides are the
+            // first and the last of each row, and the last row.
             let row = (0..=n).map(|m| match k {
                 0 => m * (m + 1) / 2,
                 1 => n * (n + 1) / 2 + m,

@@ -147,8 +147,7 @@ pub(in crate::tessellate) fn triangulate(
     // All points first: constraints between points that come later would have to be split.
     mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_all(&segments);
-    // Crossed twice, a line bounds nothing.
-    // Twice, so that what the flood fill counts is even.
+    // Twice: for the flood fill a line that is crossed twice bounds nothing.
     let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) && mesh.constrain(a, b));
     for &[a, b] in &creases {
         mesh.keep_crease(a, b);

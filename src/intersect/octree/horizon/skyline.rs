@@ -61,8 +61,8 @@ impl Skyline {
         let dot = |a: [f32; 3]| a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
         let (up, x, y) = (dot(self.normal), dot(self.x), dot(self.y));
         let flat2 = x * x + y * y;
-        // Nearly upright the sector is a matter of rounding.
-        // A sector told wrongly would be another's slope; the steepest of all is right for any.
+        // Nearly upright the sector is a matter of rounding, and one told wrongly would give another's slope: the steepest of all is
+        // right for any.
         let upright = flat2 < UPRIGHT;
         let slope2 = if upright { self.steepest } else { self.slope2[sector(x, y)] };
         up > 0.0 && up * up > slope2 * flat2 && slope2 < f32::INFINITY
