@@ -2,6 +2,7 @@
 
 use super::maps::spoken;
 use super::{Cell, Table, figures, grouped, seconds};
+use crate::intersect::NormalMode;
 use crate::simulate::Results;
 use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{Figure, Limit, ReceiverFigures, halving};
@@ -98,10 +99,15 @@ pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) ->
 
 /// Why the run was traced as it was.
 pub(super) fn choice(chosen: &Chosen) -> String {
-    let how = if chosen.intersector == "exact" { "on the true surfaces" } else { "on facets" };
     let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
-    let facets = if chosen.intersector == "exact" { String::new() } else { format!(" of {low} to {high} mm") };
-    format!("Traced **{how}**{facets}, because {}. ", chosen.because)
+    let how = match (chosen.intersector, chosen.normals) {
+        ("exact", _) => "**on the true surfaces**".to_owned(),
+        (_, NormalMode::Exact) => {
+            format!("**on facets** of {low} to {high} mm with hits **moved to the true surfaces**")
+        }
+        _ => format!("**on facets** of {low} to {high} mm"),
+    };
+    format!("Traced {how}, because {}. ", chosen.because)
 }
 
 /// Every figure with both its errors.

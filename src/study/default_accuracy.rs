@@ -2,21 +2,21 @@
 //! of rays on every figure that is printed.
 //!
 //! A pilot traces a few per cent of the run's rays on facets and on the spline ([`super::geometric_error`]) and foretells the
-//! standard errors of the whole run. Facets are taken where their error stays below these on every figure, else finer ones where
-//! they are cheaper than the spline by counted work and pass a pilot of their own, else the spline.
+//! standard errors of the whole run. Facets are taken where their error stays below these on every figure, else finer ones or the hits
+//! on them moved to the spline, whichever is cheaper by counted work and passes a pilot of its own, else the spline.
 //!
 //! Guarantee: the choice follows from model, scene, seed, number of rays and counted work, never from a clock, so that every
 //! machine, number of threads and shard makes the same one, and so does every range of a run that grows.
 //! Known weakness: errors that the pilot is too short to tell from none count as large, so that the spline is taken where facets
 //! might have done.
 
-use super::geometric_error::{GeometricError, MOST_CELLS, ReceiverError, ReplicatedRun, compare, trace_replicates};
+use super::geometric_error::{GeometricError, MOST_CELLS, ReplicatedRun, compare, trace_replicates};
 use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource};
+use super::worst_figure::{Worst, worst_figure};
 use crate::intersect::NormalMode;
 use crate::math::Uv;
 use crate::mesh::FacetMesh;
 use crate::model::{Face, Model};
-use crate::simulate::scene::Sampling;
 use crate::simulate::{BoundScene, RunSettings};
 use serde::Serialize;
 use std::time::Instant;
@@ -32,15 +32,8 @@ const SHORT_RUN: u64 = 32_768;
 const GROWN_RAYS: u64 = 100_000_000;
 /// Replicates of a pilot, which tell the standard error of a difference within 9 %.
 const REPLICATES: u32 = 64;
-/// Standard errors of sums over a scrambled net fall with the number of rays to this power: 0.52 to 0.68 for power, positions and
-/// widths on the three scenes of the fixtures from 2¹⁴ to 2²⁰ rays.
-const NET_ORDER: f64 = 0.6;
-/// The same of independent random numbers, and of cells, each of which few rays reach.
-const RANDOM_ORDER: f64 = 0.5;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
-/// Errors below this share of a figure are nobody's concern.
-const NEGLIGIBLE: f64 = 1e-6;
 /// Corners this near to one plane, as a share of their distances, span one: rounding of a file's twelve digits.
 const PLANE: f64 = 1e-10;
 /// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
@@ -50,10 +43,18 @@ const MARGIN: f64 = 1.5;
 /// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
 /// three scenes of the fixtures, as are the others.
 const FACET_HIT: f64 = 350.0;
+/// The same with the hit moved to the spline: 1.6 to 2.2 times that on facets alone, of which the spline takes 2.6 to 2.8 (the same three
+/// scenes, one thread, AMD EPYC of 2024).
+const POLISHED_HIT: f64 = 630.0;
 /// The same on the spline.
 const SPLINE_HIT: f64 = 850.0;
 /// Work of making one facet and sorting it into the octree.
 const FACET: f64 = 15_000.0;
+
+/// Intersector and normals of a run on facets, of one whose facet hits are moved to the spline, and of one on the spline.
+const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
+const POLISHED: (&str, NormalMode) = ("octree", NormalMode::Exact);
+const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
 
 /// What a run is traced with, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -120,36 +121,36 @@ pub struct Undecided<'a> {
     pub tolerance: [f64; 2],
 }
 
-/// The figure that facets get most wrong.
-#[derive(Clone, Debug, Default)]
-struct Worst {
-    /// Geometric over allowed error.
-    ratio: f64,
-    share: Option<f64>,
-    figure: String,
+/// A way to trace between facets of the default tolerance and the spline.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    /// Facets so many times finer.
+    Finer(f64),
+    /// Hits on the facets moved to the spline.
+    Polished,
 }
 
 /// Chooses; with the finer facets, where these are taken.
 pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
     let start = Instant::now();
-    let Undecided { bound, facets, tolerance, .. } = *undecided;
+    let Undecided { bound, tolerance, .. } = *undecided;
     if let Some(chosen) = undecided.without_pilot() {
         return (chosen, None);
     }
     let settings = undecided.pilot_settings();
     // Standard errors are foretold for as many rays as the run has, or will have grown to.
     let scale = undecided.judged_rays() as f64 / settings.rays as f64;
-    // Once: both facets and finer facets are compared with the same rays of the spline.
+    // Once: every way is compared with the same rays of the spline.
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
-    let error = undecided.measure(facets, &settings, &spline);
+    let error = compare(bound, [&undecided.trace_facets(undecided.facets, &settings), &spline]);
     let worst = worst_figure(&error, &settings, scale);
     let mut alternatives = vec![
-        alternative(tolerance, "octree", &worst, error.seconds[0] * scale),
-        alternative(tolerance, "exact", &Worst::default(), error.seconds[1] * scale),
+        alternative(tolerance, ON_FACETS, &worst, error.seconds[0] * scale),
+        alternative(tolerance, ON_SPLINE, &Worst::default(), error.seconds[1] * scale),
     ];
-    let chosen = |intersector, tolerance_mm, because, alternatives, geometric| Chosen {
+    let chosen = |(intersector, normals), tolerance_mm, because, alternatives, geometric| Chosen {
         tolerance_mm,
-        normals: normals_of(intersector),
+        normals,
         intersector,
         because,
         pilot_rays: settings.rays,
@@ -160,39 +161,70 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
     // Facets go first wherever they are good enough: they are faster.
     if worst.ratio <= 1.0 {
         let because = format!("facets change no figure by more than its statistical error ({})", worst.in_words());
-        return (chosen("octree", tolerance, because, alternatives, Some(error)), None);
+        return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
     // What the spline loses is an error too, and one that more rays do not mend.
     if error.lost[1] > error.lost[0] + LOST {
         let because = "the spline loses more light than facets do".to_owned();
-        return (chosen("octree", tolerance, because, alternatives, Some(error)), None);
+        return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
-    if let Some(factor) = undecided.finer(&worst, &error) {
-        let finer = tolerance.map(|t| t / factor);
-        let meshed = undecided.source.mesh(finer);
-        let error = undecided.measure(&meshed.mesh, &settings, &spline);
-        let finer_worst = worst_figure(&error, &settings, scale);
-        // Between the two that are always there, in the order of accuracy.
-        alternatives
-            .insert(1, alternative(finer, "octree", &finer_worst, error.seconds[0] * scale + meshed.seconds));
-        if finer_worst.ratio <= 1.0 {
-            let because = format!("at the default tolerance facets are too coarse ({})", worst.in_words());
-            return (chosen("octree", finer, because, alternatives, Some(error)), Some(meshed));
+    // The cheapest first; each must pass a pilot of its own.
+    for way in undecided.ways_before_spline(&worst, &error) {
+        let tried = undecided.try_way(way, &settings, &spline);
+        let tried_worst = worst_figure(&tried.error, &settings, scale);
+        let seconds = tried.error.seconds[0] * scale + tried.meshed.as_ref().map_or(0.0, |meshed| meshed.seconds);
+        // Between the two that are always there.
+        alternatives.insert(
+            alternatives.len() - 1,
+            alternative(tried.tolerance_mm, way.traced_with(), &tried_worst, seconds),
+        );
+        if tried_worst.ratio <= 1.0 {
+            let because = format!("{} ({})", way.reason(), worst.in_words());
+            let error = Some(tried.error);
+            return (chosen(way.traced_with(), tried.tolerance_mm, because, alternatives, error), tried.meshed);
         }
     }
     let because = format!("facets change the answer by more than its statistical error ({})", worst.in_words());
-    (chosen("exact", tolerance, because, alternatives, None), None)
+    (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
-fn normals_of(intersector: &str) -> NormalMode {
-    if intersector == "exact" { NormalMode::Exact } else { NormalMode::Bilinear }
+impl Way {
+    fn traced_with(self) -> (&'static str, NormalMode) {
+        match self {
+            Self::Finer(_) => ON_FACETS,
+            Self::Polished => POLISHED,
+        }
+    }
+
+    /// Why it is taken; what facets of the default tolerance get wrong comes after it.
+    fn reason(self) -> &'static str {
+        match self {
+            Self::Finer(_) => "at the default tolerance facets are too coarse",
+            Self::Polished => {
+                "facets change the answer by more than its statistical error until their hits are moved to the spline"
+            }
+        }
+    }
 }
 
-/// What was tried, with the worst that facets changed of any figure.
-fn alternative(tolerance_mm: [f64; 2], intersector: &'static str, worst: &Worst, seconds: f64) -> Alternative {
+/// What came of the pilot of a [`Way`].
+struct TriedWay {
+    tolerance_mm: [f64; 2],
+    error: GeometricError,
+    /// Facets finer than the default ones.
+    meshed: Option<MeasuredMesh>,
+}
+
+/// What was tried, with the worst that it changes of any figure.
+fn alternative(
+    tolerance_mm: [f64; 2],
+    (intersector, normals): (&'static str, NormalMode),
+    worst: &Worst,
+    seconds: f64,
+) -> Alternative {
     Alternative {
         tolerance_mm,
-        normals: normals_of(intersector),
+        normals,
         intersector,
         seconds,
         geometric_share: worst.share,
@@ -205,32 +237,32 @@ impl Undecided<'_> {
     /// What can be said without a pilot.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
-        let (intersector, because) = if self.facets.facets.is_empty() {
-            ("octree", "there is no surface to meet")
+        let ((intersector, normals), because) = if self.facets.facets.is_empty() {
+            (ON_FACETS, "there is no surface to meet")
         } else if self.model.placed_faces().any(|p| p.face.is_none()) {
-            ("octree", "the model holds ready meshes, which have no true surface")
+            (ON_FACETS, "the model holds ready meshes, which have no true surface")
         } else if self.is_flat() {
-            ("octree", "all faces are flat, so that facets are the surface itself")
+            (ON_FACETS, "all faces are flat, so that facets are the surface itself")
         } else if self.judged_rays() <= SHORT_RUN {
-            ("exact", "the run is so short that the spline costs less than to find out whether facets do")
+            (ON_SPLINE, "the run is so short that the spline costs less than to find out whether facets do")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
-            ("exact", "a source has so many rays of its own that a pilot would trace most of the run")
+            (ON_SPLINE, "a source has so many rays of its own that a pilot would trace most of the run")
         } else if self.has_huge_map() {
-            ("exact", "a map of so many cells takes longer to compare than the spline to trace")
+            (ON_SPLINE, "a map of so many cells takes longer to compare than the spline to trace")
         } else {
             return None;
         };
         let because = because.to_owned();
         Some(Chosen {
             tolerance_mm: self.tolerance,
-            normals: normals_of(intersector),
+            normals,
             intersector,
             because,
             pilot_rays: 0,
             pilot_seconds: 0.0,
             alternatives: Vec::new(),
             // On flat faces nothing is changed, and that needs no rays to know.
-            geometric: (intersector == "octree").then(|| GeometricError::of_exact_facets(self.bound)),
+            geometric: (intersector == ON_FACETS.0).then(|| GeometricError::of_exact_facets(self.bound)),
         })
     }
 
@@ -265,22 +297,42 @@ impl Undecided<'_> {
         }
     }
 
-    /// Compares facets with the spline's run of the same rays.
-    fn measure(&self, mesh: &FacetMesh, settings: &RunSettings, spline: &ReplicatedRun) -> GeometricError {
+    fn trace_facets(&self, mesh: &FacetMesh, settings: &RunSettings) -> ReplicatedRun {
         let octree = self.source.build(mesh, FacetTree::Octree, NormalMode::Bilinear);
-        let facets = trace_replicates(self.bound, &*octree, settings);
-        compare(self.bound, [&facets, spline])
+        trace_replicates(self.bound, &*octree, settings)
     }
 
-    /// How much finer facets would have to be, where they would be cheaper than the spline.
-    fn finer(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
-        let factor = MARGIN * worst.ratio;
+    /// The ways that counted work foretells to be cheaper than the spline, the cheapest first.
+    fn ways_before_spline(&self, worst: &Worst, error: &GeometricError) -> Vec<Way> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
-        // Tracing on finer facets takes about a tenth longer for each halving of the tolerance.
-        let saved = hits * (SPLINE_HIT - FACET_HIT * (1.0 + 0.1 * factor.log2()));
-        // The number of facets goes with the inverse of the tolerance.
-        let spent = factor * self.facets.facets.len() as f64 * FACET;
-        (factor <= MOST_FINER && spent < saved).then_some(factor)
+        let factor = MARGIN * worst.ratio;
+        // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
+        let finer =
+            factor * self.facets.facets.len() as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
+        let mut ways = vec![(Way::Polished, hits * POLISHED_HIT)];
+        if factor <= MOST_FINER {
+            ways.push((Way::Finer(factor), finer));
+        }
+        ways.retain(|(_, work)| *work < hits * SPLINE_HIT);
+        ways.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        ways.into_iter().map(|(way, _)| way).collect()
+    }
+
+    /// Traces the pilot so.
+    fn try_way(&self, way: Way, settings: &RunSettings, spline: &ReplicatedRun) -> TriedWay {
+        let (tolerance_mm, run, meshed) = match way {
+            Way::Finer(factor) => {
+                let finer = self.tolerance.map(|t| t / factor);
+                let meshed = self.source.mesh(finer);
+                (finer, self.trace_facets(&meshed.mesh, settings), Some(meshed))
+            }
+            Way::Polished => {
+                let octree = self.source.build(self.facets, FacetTree::Octree, NormalMode::Exact.on_facets());
+                let polished = self.source.polish(&*octree, self.facets);
+                (self.tolerance, trace_replicates(self.bound, &*polished, settings), None)
+            }
+        };
+        TriedWay { tolerance_mm, error: compare(self.bound, [&run, spline]), meshed }
     }
 }
 
@@ -297,56 +349,4 @@ fn is_polygon(face: &Face) -> bool {
     let is_plane = (b - a).dot(normal).abs() <= PLANE * size * normal.length();
     let is_straight = face.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.degree == 1);
     surface.degree == [1, 1] && surface.points.len() == 4 && is_plane && is_straight
-}
-
-/// The figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have.
-fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> Worst {
-    let order = if settings.sampling == Sampling::Sobol { NET_ORDER } else { RANDOM_ORDER };
-    let mut worst = Worst::default();
-    for r in &error.receivers {
-        let mut weigh = |figure: &str, geometric: f64, allowed: f64, value: f64| {
-            // No figure is asked for beyond a millionth of itself.
-            let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
-            if ratio > worst.ratio {
-                let share = (value != 0.0).then(|| geometric / value.abs());
-                worst = Worst { ratio, share, figure: format!("{}: {figure}", r.name) };
-            }
-        };
-        each_figure(r, [scale.powf(-order), scale.powf(-RANDOM_ORDER)], &mut weigh);
-    }
-    worst
-}
-
-/// Hands every figure of a receiver to `weigh`: its name, its geometric error, the statistical one of the whole run, its value.
-fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut(&str, f64, f64, f64)) {
-    let s = &r.statistical;
-    weigh("power", r.power.geometric(), s.power * sums, r.power.spline);
-    for c in &r.channels {
-        weigh(&c.name, c.total.geometric(), c.statistical * sums, c.total.spline);
-    }
-    // Without a unit there are no cells: absorbed power alone is counted.
-    if r.unit.is_empty() {
-        return;
-    }
-    let size = r.rms[0].spline.hypot(r.rms[1].spline);
-    for (axis, name) in ["1", "2"].into_iter().enumerate() {
-        let (rms, centroid) = (&r.rms[axis], &r.centroid[axis]);
-        weigh(&format!("rms_{name}"), rms.geometric(), s.rms[axis] * sums, rms.spline);
-        // A position has no size of its own: what is negligible goes by that of the light.
-        weigh(&format!("centroid_{name}"), centroid.geometric(), s.centroid[axis] * sums, size);
-    }
-    // One cell of the whole run, whose error falls with its own rays.
-    weigh("max", r.peak.geometric(), s.peak * cells, r.peak.spline);
-    weigh("cells", r.map.geometric.hypot(r.map.noise), s.map * cells, 1.0);
-}
-
-impl Worst {
-    /// What facets change at the worst, in words.
-    fn in_words(&self) -> String {
-        if self.figure.is_empty() {
-            return "not at all".into();
-        }
-        let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {s:.1e} of it"));
-        format!("{} {by}, {:.2} of its standard error", self.figure, self.ratio)
-    }
 }

@@ -34,6 +34,7 @@ pub mod stability;
 pub mod surface_rays;
 mod timing;
 mod tolerance_plan;
+mod worst_figure;
 
 pub use mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 pub use model_mesh_source::ModelMeshSource;

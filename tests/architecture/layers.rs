@@ -362,6 +362,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "effects",
             "geometric_error",
             "figures",
+            "worst_figure",
             "default_accuracy",
             "interpolation",
             "complexity",

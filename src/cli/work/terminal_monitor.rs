@@ -3,6 +3,7 @@
 use super::path_file::PathFile;
 use crate::cli::console::{Console, show_progress};
 use crate::cli::interruption::{self, SaveableRun};
+use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
 use crate::report::{figures, grouped};
 use crate::study;
@@ -92,8 +93,9 @@ impl Monitor for TerminalMonitor<'_> {
 
     fn chosen(&self, chosen: &Chosen) {
         let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
-        let how = match chosen.intersector {
-            "exact" => "on the spline".to_owned(),
+        let how = match (chosen.intersector, chosen.normals) {
+            ("exact", _) => "on the spline".to_owned(),
+            (_, NormalMode::Exact) => format!("on facets of {low}..{high} mm with hits moved to the spline"),
             _ => format!("on facets of {low}..{high} mm with {} normals", chosen.normals),
         };
         self.console.say(format_args!("tracing {how}: {}", chosen.because));
