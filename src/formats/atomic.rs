@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+/// Tells files that one process writes at a time apart.
 static SERIAL: AtomicU32 = AtomicU32::new(0);
 
 /// Files that this process has begun and not finished.

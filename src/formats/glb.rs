@@ -11,6 +11,7 @@ use std::path::Path;
 /// glTF counts in metres.
 const METRES_PER_MM: f64 = 1e-3;
 
+/// The binary chunk and what describes it.
 #[derive(Default)]
 struct Buffer {
     bytes: Vec<u8>,

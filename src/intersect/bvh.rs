@@ -114,17 +114,20 @@ pub struct Bvh<'m> {
     build_seconds: f64,
 }
 
+/// The tree of obvhs, binary or of eight.
 enum Tree {
     Empty,
     Binary(Bvh2),
     Wide(CwBvh),
 }
 
+/// What is tested at a leaf, in the tree's order.
 enum Leaves {
     Shipped(Vec<RtTriangle>),
     Cured(Vec<[Point; 4]>),
 }
 
+/// A box as obvhs asks for it.
 struct Bounded(Box32);
 
 impl Boundable for Bounded {

@@ -23,6 +23,7 @@ struct Side {
     sign: f64,
 }
 
+/// The sides of a box, each with its axis and the way it looks.
 const SIDES: [Side; 6] = [
     Side { axis: 0, sign: -1.0 },
     Side { axis: 0, sign: 1.0 },

@@ -169,6 +169,7 @@ fn amplitudes(cos_i: f64, eta: f64) -> [Complex; 2] {
     [s, p]
 }
 
+/// A complex amplitude.
 #[derive(Clone, Copy, Debug)]
 struct Complex {
     re: f64,

@@ -133,6 +133,7 @@ pub struct Wavelengths {
     sums: Vec<f64>,
 }
 
+/// Wavelengths of lines, nm; or points of wavelength, nm, and power between which it is linear.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Lines(Vec<f64>),

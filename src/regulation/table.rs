@@ -176,6 +176,7 @@ impl Regulation {
     }
 }
 
+/// A table as it stands in its file.
 #[derive(Deserialize)]
 struct File {
     title: String,

@@ -4,11 +4,13 @@ use super::view::{Shape, View};
 use crate::formats::Picture;
 use glam::{Vec2, Vec3};
 
+/// Size of the picture, pixels.
 const WIDTH: usize = 1200;
 const HEIGHT: usize = 800;
 /// Samples a pixel in each direction.
 const FINE: usize = 2;
 
+/// Samples of a picture with the depth of what they show.
 struct Canvas {
     width: usize,
     height: usize,

@@ -6,6 +6,7 @@ use super::drawing::{Anchor, Drawing, Element, Ink, Place};
 use super::number::figures;
 use crate::formats::{ColourMap, Grid, Picture};
 
+/// Size of a chart in the drawing's units.
 const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 470.0;
 /// Plot area: left, top, right, bottom.

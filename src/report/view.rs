@@ -209,6 +209,7 @@ impl View {
     }
 }
 
+/// Points, and triangles by their numbers.
 type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// Triangles whose points know their faces.

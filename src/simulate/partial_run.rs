@@ -28,6 +28,7 @@ pub struct PartialRun {
     pub seconds: f64,
 }
 
+/// Begins a file of this version.
 const MAGIC: &[u8] = b"lampyris tally 5\n";
 
 impl PartialRun {
@@ -249,6 +250,7 @@ fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
     Ok((header, reader))
 }
 
+/// What is left of a file.
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

@@ -86,6 +86,7 @@ impl Channels {
     }
 }
 
+/// Where a receiver stands; lengths in mm, `half` are half sides.
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
     Plane {

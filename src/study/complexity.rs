@@ -94,6 +94,7 @@ pub struct Complexity {
 const PAPER: [(&str, f64); 3] =
     [("paper: simple", 0.1875), ("paper: moderate", 0.2545), ("paper: intricate", 0.4665)];
 
+/// A method that is prepared to trace a lamp.
 #[derive(Clone, Copy)]
 struct Ready<'r> {
     name: &'static str,

@@ -67,6 +67,7 @@ pub struct Interpolation {
 /// The paper's rows: algorithm, mean error, seconds.
 const PAPER: [(&str, f64, f64); 3] = [("nearest", 0.015, 5.2), ("bilinear", 0.008, 6.8), ("cubic", 0.005, 12.4)];
 
+/// Those of the paper, and the true normals.
 const ALGORITHMS: [NormalMode; 4] =
     [NormalMode::Nearest, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
 

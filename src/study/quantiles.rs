@@ -6,6 +6,7 @@ use serde::Serialize;
 const PER_OCTAVE: f64 = 64.0;
 /// Values below `2^LOWEST` count as zero.
 const LOWEST: f64 = -80.0;
+/// Bins of a histogram: 120 octaves.
 const BINS: usize = 64 * 120;
 
 /// Counts of non-negative values in logarithmic bins: quantiles of any number of values in fixed memory, the same for

@@ -18,6 +18,7 @@ pub struct Random {
     state: u64,
 }
 
+/// SplitMix64's step: 2⁶⁴ over the golden ratio, odd.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 fn mix(mut z: u64) -> u64 {

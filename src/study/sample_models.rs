@@ -53,6 +53,7 @@ pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
     mesh
 }
 
+/// Finds positions that agree by the cells that they lie in.
 struct Weld {
     origin: Point,
     cell: f64,

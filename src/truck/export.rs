@@ -37,6 +37,7 @@ pub fn faces_to_truck(part: &Part, placement: &Frame) -> (Vec<TruckFace>, Vec<Re
     (faces, refused)
 }
 
+/// A part at its place, with what of it is made in truck already.
 struct Exporter<'a> {
     part: &'a Part,
     placement: &'a Frame,

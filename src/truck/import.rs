@@ -57,6 +57,7 @@ pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     made.finish(name)
 }
 
+/// The part under construction, with what is known by truck's ids.
 #[derive(Default)]
 struct Maker {
     part: Part,

@@ -6,6 +6,7 @@ use crate::nurbs::{Curve, Surface, UvCurve};
 
 /// Wanted distance between the edge and its uv curve on the surface, mm, and the largest that is accepted.
 const WANTED: f64 = 1e-9;
+pub(super) const ACCEPTED: f64 = 1e-5;
 
 /// Length of a derivative, as a share of the surface's size, below which its parameter moves nothing: a pole.
 const POLE: f64 = 1e-9;
@@ -18,7 +19,6 @@ const STANDSTILL: f64 = 1e-15;
 
 /// Squared sine between two derivatives below which they count as parallel: the determinant is then rounding.
 const PARALLEL_SQUARED: f64 = 1e-20;
-pub(super) const ACCEPTED: f64 = 1e-5;
 /// Most Hermite pieces of a uv curve.
 const MAX_PIECES: usize = 512;
 

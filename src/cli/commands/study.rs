@@ -193,6 +193,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
     })
 }
 
+/// Where progress is told.
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
 fn study_accuracy(

@@ -17,6 +17,7 @@ const STEPS: usize = 12;
 /// Newton's method has converged at a step of this size, as a share of a patch: the next is below 32 digits.
 const LAST_STEP: f64 = 1e-20;
 
+/// What the reference computes in.
 type Number = DoubleDouble;
 type Point4 = [Number; 4];
 type Point3 = [Number; 3];

@@ -53,6 +53,7 @@ pub struct Traditional<'a> {
     build_seconds: f64,
 }
 
+/// A face's surface with the samples from which Newton's method starts.
 #[derive(Debug)]
 struct SampledSurface {
     face: FaceId,

@@ -10,6 +10,7 @@ use smallvec::{SmallVec, smallvec};
 
 /// From this depth on splits are at the median, which bounds the depth of any tree.
 const MEDIAN_DEPTH: usize = 40;
+/// Bins of centres along each axis, of which the borders are the planes that are priced.
 const BINS: usize = 16;
 /// Marks a child that is a leaf.
 pub(super) const LEAF: u32 = 1 << 31;

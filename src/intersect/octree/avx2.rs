@@ -45,6 +45,7 @@ unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: 
 #[repr(align(64))]
 pub(super) struct Orders(pub(super) [[u32; 8]; 8]);
 
+/// By octant: the slots of children in the order in which they are pushed, so that the one met first is popped first.
 pub(super) static ORDERS: Orders = {
     let mut orders = [[0; 8]; 8];
     let mut octant = 0;

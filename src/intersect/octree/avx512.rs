@@ -37,6 +37,7 @@ static BOUNDS: BoundOrders = {
     BoundOrders(orders)
 };
 
+/// Aligned to a register, so that an order is one load.
 #[repr(align(64))]
 struct BoundOrders([[u8; 64]; 8]);
 

@@ -29,6 +29,7 @@ pub(super) enum Target {
 }
 
 impl Link {
+    /// The bit that tells blocks from nodes.
     const BLOCK: u32 = 1 << 31;
     /// Blocks that a link can tell apart; the last name is taken by [`Self::END`].
     pub(super) const MOST_BLOCKS: usize = (1 << 29) - 1;

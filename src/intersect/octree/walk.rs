@@ -67,6 +67,7 @@ impl Queue {
     }
 }
 
+/// Rays under way.
 type States = [RayState; WIDTH];
 
 thread_local! {

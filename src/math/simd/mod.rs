@@ -109,6 +109,7 @@ pub(crate) fn has_avx512_vbmi() -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Level(Width);
 
+/// The sets that kernels are compiled for.
 #[derive(Clone, Copy, Debug)]
 enum Width {
     Portable,

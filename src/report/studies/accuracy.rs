@@ -10,6 +10,7 @@ const ROUNDING_DEG: f64 = 1e-7;
 /// The direction error that the answer speaks about, degrees.
 const WANTED_DEG: f64 = 0.05;
 
+/// A row as a point of cost against error, seconds and degrees.
 struct Point<'a> {
     row: &'a Value,
     /// Of the whole job, and of it for the rays alone.

@@ -6,6 +6,7 @@ use crate::study::interpolation::{Ratios, Row};
 use serde::Deserialize;
 use serde_json::Value;
 
+/// Title, answer and sections.
 type Parts = (String, String, Vec<Section>);
 
 /// Bars of one value: a category for every text of `by`, a layer for every text of `split`; the last row of a pair counts.

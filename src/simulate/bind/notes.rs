@@ -21,7 +21,9 @@ struct KnownRange {
     beyond: &'static str,
 }
 
+/// What happens beyond a table.
 const ENDS: &str = "its first and last values are used there";
+/// What happens beyond a formula's range.
 const FORMULA: &str = "the formula is used all the same there";
 
 /// One sentence for each table in use that some source's light lies outside of.

@@ -25,6 +25,7 @@ pub(crate) struct Area {
     sums: Vec<f64>,
 }
 
+/// A face that emits, at its place, with its trims as polygons.
 #[derive(Clone, Debug)]
 struct LuminousFace {
     id: FaceId,

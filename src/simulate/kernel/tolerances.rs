@@ -31,6 +31,7 @@ pub(super) fn way_through_glue(glue_mm: f64, cosine: f64) -> f64 {
     glue_mm / cosine.abs().max(LEAST_COSINE)
 }
 
+/// See [`way_through_glue`].
 const LEAST_COSINE: f64 = 1e-3;
 
 /// Cosine above which two normals at one place look the same way, and below whose negative they look at each other: 60°, between

@@ -14,6 +14,7 @@ const JOE_KUO: [(u32, u32, &[u32]); DIMENSIONS - 1] =
 /// reverse order, as the scramble wants them.
 type Table = [[u32; 256]; 4];
 
+/// Made when first asked for.
 static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(table).collect());
 
 /// The direction numbers of a dimension, counted from 0, each as 32 binary places.

@@ -22,6 +22,7 @@ pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>,
     d.deserialize_any(Range).map(Some)
 }
 
+/// Reads a whole number.
 struct Count;
 
 impl Visitor<'_> for Count {
@@ -44,6 +45,7 @@ impl Visitor<'_> for Count {
     }
 }
 
+/// Reads a pair of numbers, or one for both.
 struct Range;
 
 impl<'de> Visitor<'de> for Range {

@@ -35,6 +35,7 @@ pub(crate) struct Refusal {
     pub(crate) reason: String,
 }
 
+/// What was read, or why not.
 pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {

@@ -60,6 +60,7 @@ pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
     assigned
 }
 
+/// What a unit measures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Length,

@@ -63,6 +63,7 @@ pub(crate) struct Fit {
     pub(crate) gap: f64,
 }
 
+/// An end of a fitted piece.
 #[derive(Clone, Copy)]
 struct Node {
     t: f64,

@@ -21,6 +21,7 @@ pub(super) struct Seams<'r, 't, 'e> {
     curves: Vec<SeamCurve>,
 }
 
+/// A seam in space.
 struct SeamCurve {
     curve: Curve,
     /// The parameter that varies, when the seam is an isoline.

@@ -106,6 +106,7 @@ impl Forecast {
     }
 }
 
+/// The study under way: rays, their truth, and the rows so far.
 struct Sweep<'a> {
     name: &'a str,
     mesh_source: &'a dyn MeshSource,

@@ -220,6 +220,7 @@ struct Measured {
     flips: u64,
 }
 
+/// What all candidates are judged with.
 struct Search<'a> {
     mesh_source: &'a dyn MeshSource,
     target: &'a AccuracyTarget,

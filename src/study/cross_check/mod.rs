@@ -110,6 +110,7 @@ pub(super) fn angle_deg(a: crate::math::Vector, b: crate::math::Vector) -> f64 {
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
 }
 
+/// What the rays of a task have shown.
 #[derive(Default)]
 struct Tally {
     check: CrossCheck,

@@ -60,6 +60,7 @@ pub(super) struct BandInterval {
     pub(super) complete: bool,
 }
 
+/// Steps in which a ray is followed through the band; longer ones from the half on.
 const STEPS: usize = 1000;
 
 impl PlacedSurface {

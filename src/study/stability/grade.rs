@@ -115,6 +115,7 @@ impl Scene<'_> {
     }
 }
 
+/// Who is asked, and by how much facets may be off.
 struct Grader<'a> {
     scene: &'a Scene<'a>,
     who: &'a dyn Intersector,

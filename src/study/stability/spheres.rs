@@ -6,7 +6,9 @@ use crate::nurbs::{BezierPatch, Surface, sweep};
 use crate::study::Random;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Radius of the balls, mm.
 const R: f64 = 50.0;
+/// All around.
 const FULL: [f64; 2] = [0.0, 2.0 * PI];
 
 pub(super) fn cases() -> Vec<Case> {

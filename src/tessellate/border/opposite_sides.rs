@@ -68,6 +68,7 @@ pub(in crate::tessellate) fn equalise<'f>(
     }
 }
 
+/// The edges of a part with their samples and the pairs of opposite ones.
 struct Equaliser<'w, 'f, 's, 'a> {
     part: &'w Part,
     sides: &'w [Vec<EdgeSide<'s, 'a>>],

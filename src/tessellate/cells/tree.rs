@@ -30,6 +30,7 @@ const MAX_DEPTH: u32 = 60;
 /// Share of a cell's size that a preferred cut keeps from its sides.
 const CUT_CLEARANCE: f64 = 1e-3;
 
+/// What cells of a face are split by.
 struct Tree<'s, 'a> {
     surface: &'s FaceSurface<'a>,
     acceptance: Acceptance,

@@ -48,6 +48,7 @@ pub(super) fn join(model: &Model, settings: &Settings, parts: &[Option<PartMesh>
     meshes.into_iter().map(|(i, mesh)| (i, with_coincident_vertices_joined(mesh))).collect()
 }
 
+/// The parts with the faces that touch.
 struct Joiner<'j, 'm> {
     model: &'m Model,
     settings: &'j Settings,

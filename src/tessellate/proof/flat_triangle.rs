@@ -3,6 +3,7 @@
 use crate::math::{Point, Uv, Vector};
 use smallvec::SmallVec;
 
+/// A triangle cut by a rectangle has seven corners at most.
 type Polygon = SmallVec<[Uv; 8]>;
 
 /// The part of a segment or convex polygon inside a rectangle.

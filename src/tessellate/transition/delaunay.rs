@@ -76,6 +76,7 @@ impl Transition {
     }
 }
 
+/// A node in the triangulation, at its scaled parameters.
 #[derive(Clone, Copy)]
 struct Vertex {
     at: Point2<f64>,
@@ -89,6 +90,7 @@ impl HasPosition for Vertex {
     }
 }
 
+/// The triangulation of the library.
 type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
 
 /// Rounds of refinement.

@@ -11,12 +11,14 @@ pub(super) struct Boxes {
     nodes: Vec<Node>,
 }
 
+/// A box with what lies in it.
 #[derive(Debug)]
 struct Node {
     bounds: Aabb,
     content: Content,
 }
 
+/// What lies in a node's box.
 #[derive(Clone, Copy, Debug)]
 enum Content {
     /// The second child, the first being the next node.

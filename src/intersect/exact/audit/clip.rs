@@ -8,6 +8,7 @@ use crate::nurbs::BezierPatch;
 use glam::DVec3;
 use smallvec::SmallVec;
 
+/// A part of the patch, as the ray sees it, that may hold a root.
 struct Piece {
     net: Net,
     depth: u32,

@@ -35,6 +35,7 @@ pub struct Audit {
     boxes: Boxes,
 }
 
+/// A face with its trims as Bézier pieces.
 #[derive(Debug)]
 struct AuditFace {
     id: FaceId,

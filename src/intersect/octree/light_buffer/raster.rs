@@ -273,6 +273,7 @@ impl Tile {
     }
 }
 
+/// Draws one tile, square by square.
 struct Rasterizer<'a> {
     /// The nearest first.
     projections: &'a [Projection],
