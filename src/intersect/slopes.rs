@@ -15,6 +15,7 @@ const LEAST_COSINE: f64 = 0.5;
 /// Above which slope a ray that leaves a facet is known not to meet it again.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slopes {
+    /// Mean normal of both triangles, and the sine over the plane across it that is enough.
     axis: [f32; 3],
     sine: f32,
 }

@@ -17,8 +17,11 @@ use rayon::prelude::*;
 
 /// A part's faces, in the order of its shells.
 pub(super) struct PartMesh {
+    /// Of each edge.
     pub(super) divisions: Vec<Division>,
+    /// Places of vertices and of samples of edges, in the part's coordinates.
     pub(super) shared: Vec<Point>,
+    /// None for a face that could not be meshed.
     pub(super) faces: Vec<Option<FaceMesh>>,
 }
 
@@ -224,6 +227,7 @@ struct PreviousRound {
 
 /// Where shared positions are now, and which edges have others.
 pub(super) struct Renumbering {
+    /// By edge; and the new positions, by the old.
     changed: Vec<bool>,
     to: Vec<u32>,
 }

@@ -24,6 +24,7 @@ const SAME_SIDE: f64 = 0.1;
 /// The border of a face.
 pub(super) struct BorderNodes {
     pub(super) nodes: Nodes,
+    /// Pairs of nodes, loop by loop.
     pub(super) segments: Vec<[u32; 2]>,
     pub(super) chords: BorderChords,
     /// The edge that a segment follows.

@@ -17,7 +17,9 @@ pub(super) struct Corner {
 /// A facet of corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MeshedFacet {
+    /// A triangle repeats its last corner.
     pub(super) corners: [u32; 4],
+    /// As of [`super::nodes::ProvedFacet`].
     pub(super) bound: f64,
     pub(super) tolerance: f64,
 }

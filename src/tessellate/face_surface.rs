@@ -34,12 +34,14 @@ const OFF_SYMMETRY: f64 = 0.37;
 /// A face's surface with its Bézier patches laid out for quick evaluation.
 pub(super) struct FaceSurface<'a> {
     pub(super) spline: &'a Surface,
+    /// Its tolerance from place to place.
     pub(super) field: ToleranceField,
     /// Whether the outward normal is `-(Su × Sv)`.
     flip: bool,
     /// Whether the surface is an affine image of its parameters, so that any facet lies in it.
     pub(super) affine: bool,
     patches: Vec<BezierPatch>,
+    /// How much it bends, patch by patch.
     pub(super) curving: SecondDerivativeBounds,
     /// Distinct knots in u and v.
     pub(super) breaks: [Vec<f64>; 2],

@@ -16,6 +16,7 @@ pub(super) enum Position {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub(super) uv: Uv,
+    /// In the part's coordinates.
     pub(super) place: Point,
     pub(super) position: Position,
 }

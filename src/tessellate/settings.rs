@@ -113,6 +113,7 @@ impl Settings {
 /// The tolerance as a function of curvature, for one face in its part's own lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ToleranceField {
+    /// Tightest and loosest, and the radii of curvature at which they are reached, mm.
     range: [f64; 2],
     radii: [f64; 2],
     law: ToleranceLaw,

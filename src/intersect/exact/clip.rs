@@ -46,7 +46,9 @@ const BICUBIC_WORK: usize = 96;
 /// A box of parameters with the net over it.
 struct Node {
     net: Net,
+    /// In the leaf's parameters.
     rect: [[f64; 2]; 2],
+    /// The least t that its hull leaves.
     near: f64,
 }
 

@@ -16,6 +16,7 @@ const STALLED_STEP: f64 = 1e-8;
 
 /// What a net's hull says of the ray.
 pub(super) struct Hull {
+    /// Bounds of t, mm.
     pub(super) near: f64,
     pub(super) far: f64,
     /// Largest distance from the ray, mm.

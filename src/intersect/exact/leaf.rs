@@ -41,6 +41,7 @@ pub(super) struct Leaf {
     pub(super) reach: [[f64; 2]; 2],
     /// First control point in the pool.
     pub(super) net: u32,
+    /// Indices into [`Geometry::patches`] and [`Geometry::faces`].
     pub(super) patch: u32,
     pub(super) face: u32,
     pub(super) degree: [u8; 2],

@@ -15,6 +15,7 @@ pub(super) type Net = SmallVec<[V4; 16]>;
 /// Value and first derivatives with respect to the local parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jet {
+    /// Homogeneous, as its derivatives are.
     pub(super) s: V4,
     pub(super) su: V4,
     pub(super) sv: V4,

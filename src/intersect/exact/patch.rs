@@ -12,6 +12,7 @@ const NET_ROUNDING: f64 = 16.0;
 /// Break lines of a surface's patches.
 #[derive(Debug)]
 pub(super) struct PatchGrid {
+    /// Distinct knots of the domain, between which patches lie.
     pub(super) breaks: [Vec<f64>; 2],
     /// Whether the surface closes on itself in u and in v.
     pub(super) closed: [bool; 2],
@@ -29,6 +30,7 @@ pub(super) struct Patch {
     pub(super) net: Net,
     /// Error of the control points, and of derivatives got from them, mm.
     pub(super) rounding: f64,
+    /// In the world.
     pub(super) center: Point,
     /// The rectangle of the surface's domain.
     pub(super) domain: [[f64; 2]; 2],

@@ -22,6 +22,7 @@ const BORDER: f64 = 1e-6;
 /// A point of the spline on the ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Root {
+    /// mm along the ray.
     pub(super) t: f64,
     pub(super) leaf: u32,
     /// Local parameters of the leaf.
@@ -36,6 +37,7 @@ pub(super) struct Root {
 /// The surface point that the ray leaves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DeparturePoint {
+    /// Indices into [`Geometry::faces`] and [`Geometry::patches`], and parameters of the surface.
     pub(super) face: u32,
     patch: u32,
     uv: Uv,
@@ -56,6 +58,7 @@ pub(super) struct Query {
     pub(super) n2: Vector,
     /// What the hierarchy needs of it.
     pub(super) slabs: RaySlabs,
+    /// The ray's own least t.
     pub(super) t_min: f64,
     /// Roots beyond are of no interest; shrinks with each root found in a search for the first.
     pub(super) t_max: f64,
@@ -63,6 +66,7 @@ pub(super) struct Query {
     pub(super) limit: f64,
     /// The point that the ray leaves.
     pub(super) departure: Option<DeparturePoint>,
+    /// The nearest root so far, in a search for the first.
     pub(super) best: Option<Root>,
     /// Whether every root is looked for, not the first alone.
     pub(super) collects_all: bool,
@@ -76,6 +80,7 @@ pub(super) struct Query {
     pub(super) all_rejected: Vec<f64>,
     /// Clipping steps left.
     pub(super) budget: u32,
+    /// What it has cost so far.
     pub(super) leaves_tested: u32,
     pub(super) nodes: u32,
     pub(super) clips: u32,

@@ -70,6 +70,7 @@ pub struct Exact {
     pub(super) linearizations: Vec<Linearization>,
     /// Of each leaf.
     pub(super) labels: Vec<HitLabel>,
+    /// Control points of all leaves.
     pub(super) pool: Vec<V4>,
     /// First control point of each leaf, and the pool's length.
     pub(super) starts: Vec<u32>,

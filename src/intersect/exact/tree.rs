@@ -31,6 +31,7 @@ pub(super) struct Node {
 #[derive(Debug)]
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
+    /// About which boxes are kept in single precision.
     pub(super) center: Vector,
     /// Around everything, in the world.
     pub(super) bounds: Aabb,

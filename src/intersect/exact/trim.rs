@@ -54,6 +54,7 @@ pub(super) struct Near {
 #[derive(Debug)]
 pub(super) struct Trim {
     pieces: Vec<TrimPiece>,
+    /// What pieces belong to; they name it by its index.
     pub(super) uses: Vec<EdgeUse>,
     /// Low corner of the grid of cells.
     origin: Uv,
@@ -61,6 +62,7 @@ pub(super) struct Trim {
     ends: [[bool; 2]; 2],
     /// Cells per unit of u and v.
     density: Uv,
+    /// Cells along u and v; they are listed along u first.
     count: [usize; 2],
     cells: Vec<Region>,
     /// Pieces that touch each row and rise or fall, for the parity.

@@ -18,6 +18,7 @@ pub(super) struct Frame {
 
 /// Where a ray enters and leaves the mesh, wide enough for the rounding.
 pub(super) struct Passage {
+    /// mm along the ray.
     pub(super) near: f64,
     pub(super) far: f64,
 }

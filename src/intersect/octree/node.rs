@@ -88,9 +88,11 @@ pub(super) struct Node {
     pub(super) bounds: [[u8; 8]; 6],
     pub(super) origin: [f32; 4],
     pub(super) step: [f32; 4],
+    /// Links, by slot.
     pub(super) children: [u32; 8],
     /// One bit for each child in use: a box slack can be wider than the whole node, then even an empty box is met.
     pub(super) used: u32,
+    /// Fills two lines of the cache.
     pub(super) padding: [u32; 3],
 }
 
@@ -153,6 +155,7 @@ pub(super) struct Block {
     pub(super) corners: [[u16; 16]; 3],
     pub(super) origin: [f32; 3],
     pub(super) step: f32,
+    /// Indices in the mesh; lanes that are not used name none.
     pub(super) facets: [u32; 4],
     /// Indices of the exact corners in the mesh.
     pub(super) positions: [[u32; 4]; 4],

@@ -40,18 +40,22 @@ pub(super) struct RayState {
     pub(super) unmet_facet: u32,
     /// Triangles of `block` that the sieve left, to be tested.
     pub(super) candidates: u32,
+    /// Index of the block that was sifted.
     pub(super) block: u32,
     /// Where box distances start, mm along the ray.
     shift: f64,
+    /// Which of the batch's rays it is.
     pub(super) index: usize,
     pub(super) facets: FacetRay,
     pub(super) quads: QuadRay,
     /// The facet that the ray leaves, else one that no block has.
     pub(super) departed: u32,
     pub(super) best: Nearest,
+    /// Where the stack ends; of each entry, where the ray enters and what is there.
     top: usize,
     enters: [f32; STACK],
     links: [u32; STACK],
+    /// Makes the size what is said above.
     spread: [u64; 40],
 }
 

@@ -34,6 +34,7 @@ struct ParameterRun<'f> {
     direction: usize,
     /// From where to where, ascending, in shares of the domain.
     range: [f64; 2],
+    /// The other parameter, in shares of the domain.
     level: f64,
 }
 

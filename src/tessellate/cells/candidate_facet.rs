@@ -52,6 +52,7 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
 
 /// A cell seen at nine points.
 pub(in crate::tessellate) struct CandidateFacet {
+    /// Places at the corners, sides and middle: three by three.
     p: [[Point; 3]; 3],
     /// Largest distance of a middle from its chord, for lines along u and along v.
     pub(in crate::tessellate) sag: [f64; 2],

@@ -42,7 +42,9 @@ struct Tree<'s, 'a> {
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
     resolution: Uv,
+    /// Parameters at which cells are cut rather than elsewhere, in u and v.
     preferred: [Vec<f64>; 2],
+    /// Between a facet and its normals, radians.
     max_angle: Option<f64>,
 }
 
@@ -50,6 +52,7 @@ struct Tree<'s, 'a> {
 struct Branch<'s, 'a> {
     prover: Prover<'s, 'a>,
     cells: Subdivision,
+    /// Cells that it may have.
     budget: usize,
     /// What cells are held to, in tolerances.
     slack: f64,

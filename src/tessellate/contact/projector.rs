@@ -17,6 +17,7 @@ pub(super) struct Projector<'s> {
     spline: &'s Surface,
     /// Places to start from: none at poles, where no step leads anywhere.
     seeds: Vec<(Uv, Point)>,
+    /// Places at poles.
     poles: Vec<(Uv, Point)>,
 }
 

@@ -19,6 +19,7 @@ pub(in crate::tessellate) fn is_high(patch: &BezierPatch) -> bool {
 pub(in crate::tessellate) struct CubicReduction {
     /// The last one, over the parameters from 0 to 1.
     pub(in crate::tessellate) patch: BezierPatch,
+    /// One line of the net, and the net after the first direction.
     line: Vec<Homogeneous>,
     cubic: Vec<Homogeneous>,
 }

@@ -24,6 +24,7 @@ enum Measure {
 
 /// A linear map L from parameters into space, and a convex region of parameters within a rectangle.
 pub(in crate::tessellate) struct LinearMap {
+    /// The rectangle around the region.
     pub(in crate::tessellate) lo: Uv,
     pub(in crate::tessellate) hi: Uv,
     /// Corners of the region, as shares of the rectangle.

@@ -206,6 +206,7 @@ fn sorted(mut t: [u32; 3]) -> [u32; 3] {
 pub(super) struct Refinement<'s, 'a> {
     pub(super) surface: &'s FaceSurface<'a>,
     pub(super) nodes: Nodes,
+    /// From parameters to coordinates of the triangulation.
     scale: Uv,
     pub(super) taken: &'s TakenChords,
     cdt: Cdt,

@@ -45,6 +45,7 @@ const MAX_PATH: u32 = 200;
 /// A matching that is augmented.
 struct Matching<'c> {
     candidates: &'c [Candidate],
+    /// The candidates of each triangle.
     of: CandidatesOf,
     /// The candidate that a triangle is paired by.
     pair: Vec<Option<usize>>,

@@ -123,6 +123,7 @@ fn is_sector(f: &TransitionFacet) -> bool {
 /// Two sectors that become one quad.
 #[derive(Clone, Copy)]
 struct Join {
+    /// The other facet, and the parameters of the pole between both.
     second: usize,
     pole: Uv,
     /// What the other parameters of the pole add to the bound.

@@ -74,6 +74,7 @@ struct Base {
     normal: Vector,
     /// Directions in its plane away from it, across its sides and at its corners, and where the lines are.
     lines: Lines,
+    /// Middle and radius of a ball around it.
     middle: Point,
     radius: f64,
     reach: f64,

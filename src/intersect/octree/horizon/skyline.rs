@@ -40,6 +40,7 @@ pub(super) struct Horizon([Skyline; 2]);
 /// Whether a ray rises faster over a triangle than anything stands.
 #[derive(Clone, Copy, Debug)]
 struct Skyline {
+    /// The facet's frame: normal, and two directions in its plane between which sectors lie.
     normal: [f32; 3],
     x: [f32; 3],
     y: [f32; 3],

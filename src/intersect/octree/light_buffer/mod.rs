@@ -47,6 +47,7 @@ const DIVIDED: u32 = 1 << 31;
 /// The facets of a square, or where its own squares begin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Square {
+    /// Where its entries or squares begin, and how many there are.
     first: u32,
     count: u32,
 }
@@ -85,6 +86,7 @@ pub(super) struct LightBuffer {
 /// Where a ray looks.
 #[derive(Clone, Copy)]
 struct Lookup {
+    /// Which ray it is, which buffer has its beam, and which square of it the ray passes.
     index: u16,
     buffer: u16,
     square: u32,
