@@ -10,6 +10,8 @@ pub struct Aim {
     pub h_deg: f64,
     /// Degrees up.
     pub v_deg: f64,
+    /// The gradient G of the cut-off where its scan is steepest; absent where none was looked for or the map does not hold the scan.
+    pub gradient: Option<f64>,
     /// How the two were found, for people.
     pub how: String,
 }
@@ -38,7 +40,7 @@ const DARK_SHARE: f64 = 0.01;
 impl Aim {
     /// The beam as it was placed.
     pub(super) fn unchanged(how: &str) -> Self {
-        Self { h_deg: 0.0, v_deg: 0.0, how: how.to_owned() }
+        Self { h_deg: 0.0, v_deg: 0.0, gradient: None, how: how.to_owned() }
     }
 
     /// Brings the cut-off of a passing beam to its line, then its elbow to line A.
@@ -53,8 +55,9 @@ impl Aim {
                 "as placed: the steepest place at {}° is G = {:.3}, no cut-off (G of {LEAST_GRADIENT} and more)",
                 rule.scan_h_deg, edge.gradient
             );
-            return Self::unchanged(&how);
+            return Self { gradient: Some(edge.gradient), ..Self::unchanged(&how) };
         }
+        let gradient = Some(edge.gradient);
         let v_deg = edge.position - rule.line_v_deg;
         let vertical = format!(
             "cut-off found at {:.2}° on H = {}° (G = {:.2}) and read as {}°",
@@ -66,16 +69,19 @@ impl Aim {
             Some(elbow) if elbow.gradient >= LEAST_ELBOW_GRADIENT => {
                 let how =
                     format!("{vertical}; elbow found at {:.2}° and read as {}°", elbow.position, rule.elbow_h_deg);
-                Self { h_deg: elbow.position - rule.elbow_h_deg, v_deg, how }
+                Self { h_deg: elbow.position - rule.elbow_h_deg, v_deg, gradient, how }
             }
-            _ => Self { h_deg: 0.0, v_deg, how: format!("{vertical}; no elbow on 0.2° down, sideways as placed") },
+            _ => {
+                let how = format!("{vertical}; no elbow on 0.2° down, sideways as placed");
+                Self { h_deg: 0.0, v_deg, gradient, how }
+            }
         }
     }
 
     /// The same aim turned a little more, as a regulation allows where a row fails.
     pub(super) fn realigned(&self, h_deg: f64, v_deg: f64) -> Self {
         let how = format!("{}; realigned by {h_deg}° and {v_deg}°", self.how);
-        Self { h_deg: self.h_deg + h_deg, v_deg: self.v_deg + v_deg, how }
+        Self { h_deg: self.h_deg + h_deg, v_deg: self.v_deg + v_deg, gradient: self.gradient, how }
     }
 }
 

@@ -22,7 +22,7 @@ impl Assessment {
         });
         json!({
             "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
-            "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "how": self.aim.how},
+            "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient, "how": self.aim.how},
             "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
         })
     }

@@ -2,6 +2,7 @@
 
 use super::chart::Chart;
 use super::drawing::{Anchor, DASH, Drawing, Element, Ink, Place, TYPE_SIZE};
+use super::number::NARROW_SPACE;
 use super::static_chart;
 use crate::formats::Picture;
 use ab_glyph::{Font, FontRef, OutlineCurve};
@@ -122,7 +123,14 @@ fn outline(text: &str, anchor: Anchor, font: &FontRef) -> Option<Path> {
     let mut along = 0.0;
     // Kerning belongs to pairs: the first letter has none.
     let mut before = None;
-    for id in text.chars().map(|c| font.glyph_id(c)) {
+    // The font has no narrow space, which sets thousands apart; its thin box would stand in the number.
+    let narrow = 0.5 * font.h_advance_unscaled(font.glyph_id(' '));
+    for id in text.chars().map(|c| (c != NARROW_SPACE).then(|| font.glyph_id(c))) {
+        let Some(id) = id else {
+            along += narrow;
+            before = None;
+            continue;
+        };
         along += before.map_or(0.0, |b| font.kern_unscaled(b, id));
         before = Some(id);
         // Outlines come piece by piece, upward; where one does not go on from the last, a new contour begins.
@@ -198,6 +206,19 @@ mod tests {
         // Half of it lies outside, and nothing breaks.
         let beside = Element::Rectangle { corner: [50.0, -5.0], size: [1e6, 10.0], radius: 0.0, ink: BLACK };
         close(area(beside), 50.0);
+    }
+
+    #[test]
+    fn thousands_are_set_apart_by_nothing_but_room() {
+        let ink = |text: &str| {
+            let (text, anchor, ink) = (text.to_owned(), Anchor::Start, Ink::Text);
+            let element = Element::Text { text, place: [5.0, 20.0], anchor, opacity: 1.0, turned: false, ink };
+            let made = drawn([200.0, 30.0], &[element]);
+            let right = (0..made.rgb.len() / 3).filter(|k| made.rgb[3 * k] < 128).map(|k| k % 400).max().unwrap();
+            (inked(&made), right)
+        };
+        let [(together, end), (apart, later)] = ["11111", "11\u{202f}111"].map(ink);
+        assert!((apart / together - 1.0).abs() < 0.03 && later > end, "{together} {apart} {end} {later}");
     }
 
     #[test]

@@ -63,7 +63,8 @@ pub(super) fn table(
         table.row(["HV".into(), Cell::Number(value, 5), "cd".into(), "H 0°, V 0° as placed".into()]);
     }
     if let Some(assessment) = assessment {
-        table.row(["cut-off and gradient G".into(), Cell::Empty, "".into(), assessment.aim.how.as_str().into()]);
+        let gradient = assessment.aim.gradient.map_or(Cell::Empty, |g| Cell::Number(g, 3));
+        table.row(["cut-off and gradient G".into(), gradient, "".into(), assessment.aim.how.as_str().into()]);
         for row in assessment.rows.iter().filter(|r| r.reading.is_some()) {
             let value = row.reading.map_or(Cell::Empty, |r| Cell::Number(r.value, 5));
             let place = row.direction.map_or(String::new(), degrees);

@@ -6,6 +6,9 @@ const KILO: f64 = 1e3;
 const MEGA: f64 = 1e6;
 const GIGA: f64 = 1e9;
 
+/// Sets thousands apart (ISO 80000-1, 7.3.1), without a line breaking there.
+pub(super) const NARROW_SPACE: char = '\u{202f}';
+
 /// A number with so many significant digits, without exponent where that stays short, thousands apart: `0.0123`, `1 234`, `3.2e-9`.
 ///
 /// ```
@@ -85,7 +88,7 @@ fn apart(whole: &str) -> String {
     let mut text = String::from(sign);
     for (k, c) in digits.chars().enumerate() {
         if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            text.push('\u{202f}');
+            text.push(NARROW_SPACE);
         }
         text.push(c);
     }

@@ -24,10 +24,14 @@
     const twin = [...box.childNodes];
     const figure = JSON.parse(data.textContent);
     box.replaceChildren();
+    // Paper gets the static picture: browsers print what WebGL drew as nothing, and charts as wide as the screen was.
+    const printed = Object.assign(document.createElement("div"), { className: "printed" });
+    printed.append(...twin);
+    box.before(printed);
     figure.data.forEach(label);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
       .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); })
-      .catch(() => { box.replaceChildren(...twin); });
+      .catch(() => { printed.remove(); box.replaceChildren(...twin); });
   };
 
   // Each point of a mesh belongs to one face, whose selector it shows.
@@ -41,13 +45,19 @@
   const pick = (box) => {
     const shown = Object.assign(document.createElement("output"), { className: "selector", textContent: "Click a face for the selector that a rule of the scene can name it by." });
     box.after(shown);
-    box.on("plotly_click", ({ points: [point] }) => {
-      const faces = point.data.meta;
-      if (!faces?.selectors) return;
-      const selector = faces.selectors[faces.first.findLastIndex((first) => first <= point.pointNumber)];
+    // What lies under the pointer is known from its last move. A press that does not turn the view is a click, even one so short that
+    // no frame is drawn in it, which the library misses.
+    let under = null, pressed = null;
+    box.on("plotly_hover", ({ points: [point] }) => { under = point; });
+    box.on("plotly_unhover", () => { under = null; });
+    box.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY, under]; }, true);
+    box.addEventListener("click", (event) => {
+      const faces = pressed?.[2]?.data.meta;
+      if (!faces?.selectors || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
+      const selector = faces.selectors[faces.first.findLastIndex((first) => first <= pressed[2].pointNumber)];
       shown.textContent = selector;
       navigator.clipboard?.writeText(selector).then(() => { shown.textContent = `${selector}  (copied)`; }, () => {});
-    });
+    }, true);
   };
 
   // Maps of light on a linear or a logarithmic scale of colours, over four decades below the peak.

@@ -88,8 +88,9 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
 
     // What the facets change of the light, which only a scene has.
     let facets: &dyn Intersector = if normals == NormalMode::Exact { &polish } else { octree };
-    let receivers = match scene {
-        Some(scene) => paired_receivers::trace_both(scene, &scene.bind(model)?, [facets, exact], &tracing, console),
+    let bound = scene.map(|s| s.bind(model)).transpose()?;
+    let receivers = match scene.zip(bound.as_ref()) {
+        Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [facets, exact], &tracing, console),
         None => Vec::new(),
     };
     let text = json_text(&document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
@@ -98,7 +99,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         let report = CheckReport {
             title: file_name(&command.file),
             check: &found,
-            facets: &appearance::grouped_facets(model, mesh, scene),
+            facets: &appearance::grouped_facets(model, mesh, bound.as_ref()),
             normals: &normals.to_string(),
             tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers)] },
             also: reached.iter().map(|a| a.answer.clone()).collect(),

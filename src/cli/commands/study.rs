@@ -230,7 +230,8 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
     let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;
     let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
     let (errors, _) = super::facet::normal_errors(&loaded.model, &made.mesh);
-    let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, scene.as_ref());
+    let bound = scene.as_ref().map(|s| s.bind(&loaded.model)).transpose()?;
+    let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, bound.as_ref());
     let [low, high] = settings.tolerance;
     let text = format!(
         "Largest angle between the bilinear normal and the spline's on each of {} facets within {low}..{high} mm.",

@@ -91,7 +91,7 @@ pub(crate) fn write(
     let bounds = mesh.bounds();
     // Rays that leave go to infinity and would make the model a speck.
     let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
-    let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.job.scene));
+    let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.bound));
     facets.paths = Some(&near);
     write_facets(&folder.join("facets.glb"), &facets)?;
     // The page shows paths as lines of its own.
