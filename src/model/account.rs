@@ -30,6 +30,23 @@ pub struct SolidAccount {
     pub faces: Vec<FaceAccount>,
 }
 
+impl SolidAccount {
+    /// Lower and upper corner of the box around its faces, mm; `None` without faces.
+    pub fn bbox_mm(&self) -> Option<[[f64; 3]; 2]> {
+        self.faces.iter().map(|f| f.bbox_mm).reduce(|a, b| {
+            let lower = std::array::from_fn(|k| a[0][k].min(b[0][k]));
+            let upper = std::array::from_fn(|k| a[1][k].max(b[1][k]));
+            [lower, upper]
+        })
+    }
+
+    /// The colour that all its faces show; `None` where they differ or one has none.
+    pub fn colour(&self) -> Option<Colour> {
+        let first = self.faces.first()?.colour?;
+        self.faces.iter().all(|f| f.colour == Some(first)).then_some(first)
+    }
+}
+
 /// A face. Lengths are mm, and places are where the part's first instance stands (the part's own coordinates without one).
 #[derive(Clone, Debug, Serialize)]
 pub struct FaceAccount {

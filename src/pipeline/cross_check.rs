@@ -145,6 +145,7 @@ fn facet_effects(
     let settings = RunSettings {
         rays: rays.min(run.rays),
         first_ray: 0,
+        sequences: false,
         grows: false,
         replicates: FACETING_REPLICATES,
         path_samples: 0,

@@ -157,7 +157,7 @@ impl PreparedScene {
 
     /// Takes the facets or the spline that a pilot of the run's own rays finds sufficient.
     fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
-        let run = self.run_settings();
+        let run = RunSettings { sequences: false, ..self.run_settings() };
         let facets = (&self.tessellation.mesh, &self.mesh_settings);
         let model = (&self.job.loaded.model, self.spline());
         let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);

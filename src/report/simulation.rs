@@ -38,6 +38,8 @@ pub struct SimulationReport<'a> {
     pub chosen: Option<&'a Chosen>,
     /// What regulations say of receivers, by their index.
     pub verdicts: &'a [(usize, Assessment)],
+    /// More sections, after that of the light.
+    pub sections: Vec<Section>,
     /// More 3-D views: of the facets, of the octree.
     pub views: Vec<View>,
     /// More tables: of the model, of the facets.
@@ -163,6 +165,7 @@ impl SimulationReport<'_> {
     /// The whole report.
     pub fn report(&self) -> Report {
         let mut sections = vec![self.light()];
+        sections.extend(self.sections.iter().cloned());
         for (receiver, assessment) in self.verdicts {
             let grid = self.results.receivers.get(*receiver).and_then(receiver_grid);
             sections.extend(grid.map(|grid| verdicts::section(assessment, &grid)));

@@ -12,8 +12,9 @@
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 //!
 //! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `receiver`, `seconds`,
-//! `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `tallies`, `digest`, `kernel`,
-//! `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `results`, `arrivals`, `run`, `verify`.
+//! `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `sequence`, `tallies`,
+//! `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`, `sequence_results`, `results`,
+//! `arrivals`, `run`, `verify`.
 
 mod arrivals;
 mod assemble;
@@ -38,6 +39,9 @@ mod run;
 mod run_notes;
 pub mod scene;
 mod seconds;
+mod sequence;
+mod sequence_recorder;
+mod sequence_results;
 mod settings;
 mod surfaces;
 mod tallies;
@@ -58,6 +62,8 @@ pub use results::{Absorbed, ChannelResult, EffectsUsed, Power, ReceiverResult, R
 pub use run::{grows, replay, replicate_range, replicates, simulate, trace};
 pub use scene::Scene;
 pub use seconds::{MergedSeconds, Seconds};
+pub use sequence::{MOST_STEPS, RecordedWay, Sequence, SequenceStep, SequenceSums, recorded_ways};
+pub use sequence_results::{ReceiverSequences, SequenceResult};
 pub use settings::{KernelChoice, RunSettings};
 pub use tallies::{ReplicateTally, Tallies};
 pub use tally::{MomentSpread, Moments, QUANTA, Sum};

@@ -71,6 +71,9 @@ pub struct PathVertex {
     pub power: f64,
     /// What happens here.
     pub event: Event,
+    /// The placed face where it happens, if it is at one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub face: Option<u32>,
 }
 
 /// Takes vertices of paths as they come, from any thread.

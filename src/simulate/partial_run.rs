@@ -7,6 +7,7 @@
 use super::bind::BoundScene;
 use super::digest::Fnv;
 use super::outcome::{Counts, LostRay, PathVertex};
+use super::sequence::Sequence;
 use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
 use serde::Serialize;
@@ -29,7 +30,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 5\n";
+const MAGIC: &[u8] = b"lampyris tally 6\n";
 
 impl PartialRun {
     pub(crate) fn empty(bound: &BoundScene, replicates: u32) -> Self {
@@ -111,6 +112,8 @@ impl PartialRun {
         let bare = |v: &PathVertex| PathVertex { point: zero, power: 0.0, ..v.clone() };
         let paths: Vec<_> = t.paths.iter().map(|v| (bare(v), bits(&[v.point]), v.power.to_bits())).collect();
         block(&mut out, &serde_json::to_vec(&paths)?);
+        let sequences: Vec<_> = t.sequences.iter().collect();
+        block(&mut out, &serde_json::to_vec(&sequences)?);
         to.write_all(&out)?;
         // The hash over all that stands before: a file that was cut or damaged on its way is refused, not added up.
         to.write_all(&Fnv::hash(&[&out]).to_le_bytes())
@@ -172,6 +175,7 @@ impl PartialRun {
         t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
+        t.sequences = r.json::<Vec<(Sequence, Sum)>>()?.into_iter().collect();
         // Bits, not decimals: what was written comes back exactly.
         let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
         t.ledger = ledger

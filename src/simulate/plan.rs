@@ -131,6 +131,14 @@ impl Plan {
         if self.grows() { [0, 1] } else { [replicate, self.replicates] }
     }
 
+    /// The rays of a replicate, each with its source.
+    pub(super) fn rays_of_replicate(&self, replicate: u32) -> impl Iterator<Item = (usize, u64)> {
+        (0..self.shares.len()).flat_map(move |source| {
+            let [from, to] = self.range(source, replicate);
+            (from..to).map(move |ray| (source, ray))
+        })
+    }
+
     /// Rays of a source in the whole run.
     pub(crate) fn rays_of_source(&self, source: usize) -> u64 {
         let rays = self.shares[source].rays;

@@ -10,6 +10,7 @@ use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::seconds::Seconds;
+use super::sequence_results::ReceiverSequences;
 use super::settings::RunSettings;
 use super::tallies::Tallies;
 use super::tally::Sum;
@@ -57,6 +58,9 @@ pub struct Results {
     pub absorbed: Vec<Absorbed>,
     /// The receivers in the order of the scene.
     pub receivers: Vec<ReceiverResult>,
+    /// For each receiver the ways that light took to it, where that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sequences: Vec<ReceiverSequences>,
     /// Lost rays of the lowest index, at most 1000.
     #[serde(skip)]
     pub ledger: Vec<LostRay>,
@@ -255,6 +259,7 @@ impl Results {
                 .enumerate()
                 .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum, bound.scene.run.unit))
                 .collect(),
+            sequences: sequences(bound, &tallies, quantum),
             ledger: std::mem::take(&mut tallies.ledger),
             paths: std::mem::take(&mut tallies.paths),
             cost,
@@ -263,6 +268,12 @@ impl Results {
             digest,
         }
     }
+}
+
+/// The tables of sequences, one a receiver; none where they were not asked for.
+fn sequences(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<ReceiverSequences> {
+    let receivers = if bound.scene.run.sequences > 0 { bound.receivers.len() } else { 0 };
+    (0..receivers as u32).map(|r| ReceiverSequences::new(bound, tallies, r, quantum)).collect()
 }
 
 /// Student's t for 95 % with 1 to 10 degrees of freedom.

@@ -11,6 +11,7 @@ use super::partial_run::PartialRun;
 use super::plan::Plan;
 use super::recorder::Recorder;
 use super::results::Results;
+use super::sequence_recorder::SequenceRecorder;
 use super::settings::RunSettings;
 use super::tallies::ReplicateTally;
 use crate::intersect::{Cost, ExpectedRays, Intersector};
@@ -50,6 +51,9 @@ pub fn trace(
     } else {
         context.plan.recording().map(|plan| context.with_plan(plan, &single))
     };
+    let mut all = context.plan.clone();
+    all.record_all();
+    let grouping = settings.sequences.then(|| context.with_plan(all, &single).without_path_sink());
     let mut before = from.unwrap_or_else(|| PartialRun::empty(bound, context.plan.replicates));
     // What was traced of a run that has grown since is a part of the larger one.
     before.grows = context.plan.grows();
@@ -65,6 +69,7 @@ pub fn trace(
     let work = Work {
         context: &context,
         recording: recording.as_ref(),
+        grouping: grouping.as_ref(),
         kind: kernel_kind(bound, settings),
         hooks,
         start,
@@ -101,6 +106,8 @@ struct Work<'w, 'a> {
     context: &'w Context<'a>,
     /// For the rays that are traced once more to record their paths.
     recording: Option<&'w Context<'a>>,
+    /// For the rays that are traced once more to group their light by sequence.
+    grouping: Option<&'w Context<'a>>,
     kind: KernelKind,
     hooks: &'w Hooks<'w>,
     start: Instant,
@@ -120,12 +127,16 @@ impl Work<'_, '_> {
         let mut tally = ReplicateTally::new(bound);
         let mut sums = ThreadSums::new(gathering, bound, self.context.plan.replicates);
         let mut recorder = self.recording.map(|context| Recorder::new(context, self.kind));
+        let mut sequences = self.grouping.map(|context| SequenceRecorder::new(context, self.kind));
         // Whole replicates alone: which thread has which then changes no sum.
         while !self.stop.load(Ordering::Relaxed) {
             let Some(&replicate) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else { break };
             let cost = dispatch::trace(self.kind, self.context, RaySelection::Replicate(replicate), &mut tally);
             if let Some(recorder) = &mut recorder {
                 recorder.record(replicate, &mut tally);
+            }
+            if let Some(sequences) = &mut sequences {
+                sequences.record(replicate, &mut tally);
             }
             tally.finish(bound);
             if let Some(hook) = self.hooks.replicate {

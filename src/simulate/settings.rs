@@ -58,6 +58,8 @@ pub struct RunSettings {
     pub batch: usize,
     /// About how many paths to record.
     pub path_samples: u64,
+    /// Whether light is grouped by the faces it met; each ray is then traced twice. Changes no bit of a digest.
+    pub sequences: bool,
     /// Which kernel to use: the smallest that the scene needs, or the one that can do everything. Changes no bit of a result.
     pub kernel: KernelChoice,
     /// Which part of the replicates to run: the `i`-th of `n`, from 0.
@@ -93,6 +95,7 @@ impl From<&Run> for RunSettings {
             threads: 0,
             batch: WAVEFRONT,
             path_samples: 0,
+            sequences: r.sequences > 0,
             kernel: KernelChoice::Pruned,
             shard: [0, 1],
         }

@@ -4,6 +4,7 @@ use super::bind::BoundScene;
 use super::outcome::{Counts, LostRay, PathSink, PathVertex};
 use super::plan::Plan;
 use super::receiver::Shape;
+use super::sequence::{Deposit, SequenceSums, SequenceTally};
 use super::tally::{Grid, MomentSpread, Moments, Sum, quanta_as_integer};
 use crate::math::FaceId;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,10 @@ pub struct ReplicateTally {
     pub(crate) paths: Vec<PathVertex>,
     /// What is kept of the paths when all of them are streamed.
     pub(crate) sample: Vec<PathVertex>,
+    /// Where the light of recorded paths was counted, for those who ask.
+    pub(crate) deposits: Option<Vec<Deposit>>,
+    /// Power by sequence, where that is asked for.
+    pub(crate) sequences: SequenceTally,
 }
 
 /// Power by how it ended, quanta of one replicate.
@@ -51,6 +56,8 @@ impl ReplicateTally {
             ledger: Vec::new(),
             paths: Vec::new(),
             sample: Vec::new(),
+            deposits: None,
+            sequences: SequenceTally::new(),
         }
     }
 
@@ -65,6 +72,8 @@ impl ReplicateTally {
         self.ledger.clear();
         self.paths.clear();
         self.sample.clear();
+        self.deposits.iter_mut().for_each(Vec::clear);
+        self.sequences.clear();
     }
 
     /// Brings it into the state in which it can be read: receivers of absorbed power are filled, and nothing waits to be added.
@@ -156,6 +165,9 @@ pub struct Tallies {
     pub ledger: Vec<LostRay>,
     /// Vertices of the recorded paths.
     pub paths: Vec<PathVertex>,
+    /// Power by sequence, where that was asked for.
+    #[serde(skip)]
+    pub sequences: SequenceSums,
 }
 
 impl Tallies {
@@ -208,6 +220,9 @@ impl Tallies {
         self.counts.add(&std::mem::take(&mut replicate.counts));
         self.ledger.append(&mut replicate.ledger);
         trim_ledger(&mut self.ledger);
+        for (sequence, quanta) in std::mem::take(&mut replicate.sequences) {
+            self.sequences.entry(sequence).or_default().add_replicate(quanta);
+        }
         self.paths.append(&mut replicate.sample);
         self.paths.append(&mut replicate.paths);
     }
@@ -227,6 +242,9 @@ impl Tallies {
         self.counts.add(&o.counts);
         self.ledger.extend(o.ledger.iter().cloned());
         trim_ledger(&mut self.ledger);
+        for (sequence, sum) in &o.sequences {
+            self.sequences.entry(sequence.clone()).or_default().merge(sum);
+        }
         self.paths.extend(o.paths.iter().cloned());
         self.sort_paths();
     }

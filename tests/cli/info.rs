@@ -117,3 +117,13 @@ fn the_schema_of_a_scene_is_a_json_schema() {
     assert!(code == 0 && schema["$schema"].as_str().unwrap().contains("json-schema.org"));
     assert!(schema["properties"]["receiver"].is_object() && schema["properties"]["source"].is_object());
 }
+
+/// The page in docs is what `lampyris schema --text > docs/scene.md` writes.
+#[test]
+fn the_page_of_scenes_is_that_of_the_program() {
+    let (code, out, _) = lampyris(&["schema", "--text"]);
+    assert!(code == 0 && out == include_str!("../../docs/scene.md"), "{out}");
+    for words in ["## `[[receiver]]`", "## `on = { … }`", "| `sequences` |", "`far_field`: All light"] {
+        assert!(out.contains(words), "{words}");
+    }
+}

@@ -19,6 +19,7 @@ mod polished;
 mod refusals;
 mod scenes;
 mod selectors;
+mod sequences;
 mod sources;
 mod support;
 mod touching;

@@ -169,8 +169,12 @@ pub(crate) enum Command {
     Media,
     /// Print the licences of what the binary holds
     Licences,
-    /// Print the JSON Schema of the scene file
-    Schema,
+    /// Print the JSON Schema of the scene file, or every key of it in words
+    Schema {
+        /// A page for people, in Markdown
+        #[arg(long)]
+        text: bool,
+    },
     /// Print a completion script
     Completions {
         /// Shell to complete in
@@ -269,6 +273,10 @@ pub(crate) struct TraceOptions {
     /// received, escaped, cut off, lost
     #[arg(long, value_name = "FILE.npz", conflicts_with_all = ["resume", "verify_pruning"])]
     pub(crate) paths: Option<PathBuf>,
+    /// Group the light of each receiver by the faces it met and what happened there, and list the N ways of most power, each with its
+    /// error; each ray is then traced twice, and no other figure changes
+    #[arg(long, value_name = "N", conflicts_with = "verify_pruning")]
+    pub(crate) sequences: Option<u32>,
     /// Trace one ray again and show its path; a lost_rays.csv for all the rays in it; may be given several times
     #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "verify_pruning", "paths"])]
     pub(crate) replay: Vec<String>,

@@ -11,6 +11,9 @@ use serde_json::json;
 /// Faces of a solid that are listed without -v; of more, the first ones and how many there are.
 const SHOWN_FACES: usize = 60;
 
+/// Coordinates below this are rounding of what the file has as 0, mm.
+const ROUNDING_MM: f64 = 1e-9;
+
 /// Prints the tree; with `--json` the document that holds the same.
 pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
@@ -71,7 +74,12 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     let name = if solid.name.is_empty() { String::new() } else { format!(" {}", named(&solid.name)) };
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
     let count = grouped(solid.faces.len() as u64);
-    let mut text = format!("  solid {}{name}: {closed}, {count} faces, {} mm²\n", solid.index, figures(area, 5));
+    let [low, high] = solid.bbox_mm().unwrap_or_default();
+    let size = [0, 1, 2].map(|k| figures(high[k] - low[k], 4)).join(" × ");
+    let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
+    let area = figures(area, 5);
+    let mut text =
+        format!("  solid {}{name}: {closed}, {count} faces, {area} mm², in {size} mm{colour}\n", solid.index);
     // Every selector is taken, shown or not, or the next solid would get those of this one.
     for (k, (face, selector)) in solid.faces.iter().zip(selectors).enumerate() {
         if k < most {
@@ -89,7 +97,7 @@ fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     let id = face.id.map_or_else(|| "–".to_owned(), |id| format!("#{id}"));
     let kind = face.kind.word();
     let radius = face.radius_mm.map_or(String::new(), |r| format!(" r {} mm", figures(r, 5)));
-    let point = face.at.map(|x| figures(x, 6)).join(", ");
+    let point = face.at.map(|x| figures(if x.abs() < ROUNDING_MM { 0.0 } else { x }, 6)).join(", ");
     let colour = face.colour.map_or(String::new(), |c| format!("  {c}"));
     let name = if face.name.is_empty() { String::new() } else { format!("  {}", named(&face.name)) };
     let layer = face.layer.as_ref().map_or(String::new(), |l| format!("  layer {}", named(l)));

@@ -8,14 +8,14 @@ use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::formats::{file_name, printable_line, write_atomic};
-use crate::model::{Model, Part};
+use crate::model::{Model, PartAccount, SolidAccount};
 use crate::pipeline::LoadedModel;
 use crate::report::figures;
 use serde_json::json;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Parts that get a rule of their own; of more, a comment says how many there are.
+/// Solids that get a rule of their own; of more, a comment says how many there are.
 const MOST_RULES: usize = 40;
 /// Distance of source and receiver from the model, and margin of the beam, as shares of the box' diagonal.
 const DISTANCE: f64 = 0.5;
@@ -77,36 +77,58 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
         quoted(&name),
         quoted(reference)
     );
-    text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, face, entity (the #id of\n\
-        # the file), colour or at (a point near the face); a later rule wins. `lampyris media` lists the media that have names.\n";
-    for part in model.parts.iter().filter(|p| p.face_count() > 0).take(MOST_RULES) {
-        text += &rule(part);
-    }
-    let rest = model.parts.len().saturating_sub(MOST_RULES);
+    text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
+        # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
+        # shows what selects each face, `lampyris media` lists the media that have names.\n";
+    let rules: Vec<String> = model.account().iter().flat_map(rules).collect();
+    text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
+    let rest = rules.len().saturating_sub(MOST_RULES);
     if rest > 0 {
-        text += &format!("# … and {rest} more parts: `lampyris info` names them\n\n");
+        text += &format!("# … and {rest} more solids: `lampyris info --faces` names them\n\n");
     }
     text + &light(model)
 }
 
-/// A rule for one part, with what may be said of it.
-fn rule(part: &Part) -> String {
-    let closed = part.shells.iter().filter(|s| s.closed).count();
-    let bodies = match (closed, part.shells.len() - closed) {
-        (n, 0) => format!("{n} closed"),
-        (0, n) => format!("{n} open: a medium would have a gap"),
-        (n, m) => format!("{n} closed, {m} open"),
+/// A rule for a part, or one for each of its solids where it has several.
+fn rules(part: &PartAccount) -> Vec<String> {
+    let name = if part.name.is_empty() { "\"*\"".to_owned() } else { quoted(&part.name) };
+    let solids = part.solids.iter().filter(|s| !s.faces.is_empty());
+    let is_one = solids.clone().count() < 2;
+    let selector = |solid: &SolidAccount| match is_one {
+        true => format!("part = {name}"),
+        false => format!("part = {name}\nsolid = {}", solid.index),
     };
-    let selector = if part.name.is_empty() { "\"*\"".to_owned() } else { quoted(&part.name) };
+    solids.map(|solid| rule(&selector(solid), solid)).collect()
+}
+
+/// A rule for one solid, with what may be said of it.
+fn rule(selector: &str, solid: &SolidAccount) -> String {
+    let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
+    let [low, high] = solid.bbox_mm().unwrap_or_default();
+    let size = [0, 1, 2].map(|k| short(high[k] - low[k])).join(" × ");
+    let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     format!(
         "[[material]]\n\
-         part = {selector}  # {} faces; shells: {bodies}\n\
+         {selector}  # {closed}, {} faces, {size} mm{colour}\n\
          surface = \"absorber\"  # or \"mirror\" with reflectance = 0.9; or, in place of surface: medium = \"PMMA\"\n\n",
-        part.face_count()
+        solid.faces.len()
     )
 }
 
-/// A beam along z that covers the model, and a plane behind it.
+/// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
+const EQUAL_SIDES: f64 = 0.01;
+
+/// The axis about which the box is square, as that of a lens or a reflector is; z where none is alone in that.
+fn optical_axis(half: [f64; 3]) -> usize {
+    let is_square = |k: &usize| {
+        let [a, b] = [half[(k + 1) % 3], half[(k + 2) % 3]];
+        (a - b).abs() < EQUAL_SIDES * a.max(b)
+    };
+    let square: Vec<usize> = (0..3).filter(is_square).collect();
+    if let [axis] = square[..] { axis } else { 2 }
+}
+
+/// A beam along the axis of the model that covers it, a plane behind it, and all directions.
 fn light(model: &Model) -> String {
     let bounds = model.bounds();
     // A model without faces still gets a scene that can be read.
@@ -117,17 +139,28 @@ fn light(model: &Model) -> String {
     // A middle that is off by rounding alone stands at 0.
     let middle =
         [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])).map(|x| if x.abs() < ROUNDING * diagonal { 0.0 } else { x });
-    // A model that is a rod along z still gets a beam.
-    let radius = BEAM_MARGIN * half[0].hypot(half[1]).max(DISTANCE * diagonal / 10.0);
-    let at = |z: f64| format!("[{}, {}, {}]", short(middle[0]), short(middle[1]), short(z));
+    let axis = optical_axis(half);
+    let across = half[(axis + 1) % 3].hypot(half[(axis + 2) % 3]);
+    // A model that is a rod along the axis still gets a beam.
+    let radius = BEAM_MARGIN * across.max(DISTANCE * diagonal / 10.0);
+    let at = |along: f64| {
+        let place: [String; 3] = std::array::from_fn(|k| short(if k == axis { along } else { middle[k] }));
+        format!("[{}]", place.join(", "))
+    };
+    let direction = ["[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"][axis];
+    let up = ["[0, 0, 1]", "[0, 0, 1]", "[0, 1, 0]"][axis];
+    let letter = ["x", "y", "z"][axis];
     let width = short(RECEIVER_WIDTHS * radius);
     let parts = model.parts.len();
     format!(
         "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm.\n\n\
-         # A parallel beam along z that covers it. Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays.\n\
-         [[source]]\nkind = \"collimated\"\nat = {}\ndirection = [0, 0, 1]\nradius = {}\npower = 1\n\n\
-         # What comes out on the other side, cell by cell; `kind = \"far_field\"` collects directions instead.\n\
-         [[receiver]]\nname = \"behind\"\nkind = \"plane\"\nat = {}\nnormal = [0, 0, 1]\nsize = [{width}, {width}]\ncells = [100, 100]\n",
+         # A parallel beam along {letter} that covers it. Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays. A source that\n\
+         # is a face of the model has `on = {{ entity = 17 }}` in place of at, direction and radius: kind = \"lambertian\" is an LED's chip.\n\
+         [[source]]\nkind = \"collimated\"\nat = {}\ndirection = {direction}\nradius = {}\npower = 1\n\n\
+         # What comes out on the other side, cell by cell.\n\
+         [[receiver]]\nname = \"behind\"\nkind = \"plane\"\nat = {}\nnormal = {direction}\nsize = [{width}, {width}]\ncells = [100, 100]\nabsorbs = false\n\n\
+         # The light distribution: intensity by direction, of all that leaves the model, with its polar diagram and IES file.\n\
+         [[receiver]]\nname = \"distribution\"\nkind = \"far_field\"\nnormal = {direction}\nup = {up}\nangles = \"C\"\ncells = [72, 90]\n",
         if parts == 1 { "" } else { "s" },
         short(low[0]),
         short(high[0]),
@@ -135,9 +168,9 @@ fn light(model: &Model) -> String {
         short(high[1]),
         short(low[2]),
         short(high[2]),
-        at(low[2] - DISTANCE * diagonal),
+        at(low[axis] - DISTANCE * diagonal),
         short(radius),
-        at(high[2] + DISTANCE * diagonal),
+        at(high[axis] + DISTANCE * diagonal),
     )
 }
 
@@ -156,6 +189,12 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_axis_is_that_about_which_the_box_is_square() {
+        let halves = [[3.0, 5.0, 5.01], [5.0, 3.0, 5.0], [5.0, 5.0, 3.0], [5.0, 5.0, 5.0], [1.0, 2.0, 3.0]];
+        assert_eq!(halves.map(optical_axis), [0, 1, 2, 2, 2]);
+    }
 
     #[test]
     fn numbers_and_names_are_toml() {

@@ -5,8 +5,8 @@ use crate::cli::arguments::options::CacheOption;
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::cli::output::closing;
 use crate::cli::output::json::json_value;
+use crate::cli::output::{closing, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::output_place::OutputPlace;
@@ -47,10 +47,11 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let header: TallyHeader = PartialRun::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
     // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
-    let (scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
+    let (mut scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
         Some(_) => Failure::from(error),
         None => Failure::from(error).with_help("where the scene has moved since, --scene FILE says where it is"),
     })?;
+    scene.run.sequences = header.sequences;
     set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let cache = cache_folder::cache(command.cache)?;
@@ -100,6 +101,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
+    sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console);
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)

@@ -2,6 +2,7 @@
 
 use crate::cli::arguments::command::Arguments;
 use crate::cli::console::{Console, print};
+use crate::cli::output::schema_page::schema_page;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::write_atomic;
 use clap::CommandFactory;
@@ -14,8 +15,9 @@ pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Completion, Fai
     Ok(Completion::Complete)
 }
 
-pub(crate) fn schema() -> Result<Completion, Failure> {
-    print(&format!("{:#}\n", crate::simulate::Scene::schema()))?;
+pub(crate) fn schema(as_text: bool) -> Result<Completion, Failure> {
+    let schema = crate::simulate::Scene::schema();
+    print(&if as_text { schema_page(&schema) } else { format!("{schema:#}\n") })?;
     Ok(Completion::Complete)
 }
 

@@ -83,7 +83,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             };
             assess::run(&command, console)
         }
-        Command::Schema => meta::schema(),
+        Command::Schema { text } => meta::schema(text),
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), console),
     }

@@ -5,10 +5,10 @@ use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
-use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::rule_table::{rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
+use crate::cli::output::{closing, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
@@ -48,7 +48,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     let monitor = TerminalMonitor::new(console);
-    let (scene, loaded) = read_scene(command.scene, &monitor)?;
+    let (mut scene, loaded) = read_scene(command.scene, &monitor)?;
+    scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
     let accuracy = extra.precision.accuracy;
     if accuracy.is_some() && (shard.is_some() || extra.resume) {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
@@ -169,6 +170,7 @@ fn trace_whole(
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say(&run, prepared, console)?;
+    sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();

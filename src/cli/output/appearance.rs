@@ -81,7 +81,8 @@ mod tests {
     #[test]
     fn glass_is_clear_whichever_selector_named_it() {
         let scene = Scene::read("fixtures/headlamp/low_beam.toml".as_ref()).unwrap();
-        let model = step::read("fixtures/headlamp/low_beam.stp".as_ref(), &step::Settings::default()).unwrap().model;
+        let model =
+            step::read("fixtures/headlamp/low_beam.stp".as_ref(), &step::Settings::default()).unwrap().model;
         let mesh = tessellate::tessellate(&model, &tessellate::Settings::default()).mesh;
         // The rule is `on = { solid = "lens" }`; another makes the lens's edge black.
         let bound = scene.bind(&model).unwrap();

@@ -6,7 +6,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table};
+use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
@@ -99,6 +99,7 @@ pub(crate) fn write(
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
+    sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     document["provenance"] = json_value(&provenance)?;
     let verdicts = run.verdicts(prepared).map_err(Failure::running)?;
     if !verdicts.is_empty() {
@@ -145,6 +146,14 @@ fn page<'a>(
         geometric: run.geometric.as_ref(),
         chosen: prepared.chosen.as_ref(),
         verdicts,
+        sections: sequence_tables::sequence_section(
+            &run.results,
+            &prepared.job.loaded.model,
+            facets,
+            prepared.power_unit(),
+        )
+        .into_iter()
+        .collect(),
         views: Vec::new(),
         tables: [
             (!prepared.bound.rules().is_empty())

@@ -37,6 +37,9 @@ pub(crate) struct TallyHeader {
     intersector: Option<String>,
     normals: Option<String>,
     pub(crate) shard: Option<[u32; 2]>,
+    /// Sequences that are listed for each receiver; 0 where light is not grouped.
+    #[serde(default)]
+    pub(crate) sequences: u32,
     pub(crate) command: String,
     /// What it took.
     #[serde(default)]
@@ -74,6 +77,7 @@ impl TallyHeader {
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
             shard,
+            sequences: prepared.job.scene.run.sequences,
             command: console.command.clone(),
             usage: Usage::default(),
         })

@@ -83,6 +83,11 @@ impl<'a> Context<'a> {
         Self { plan, settings, ..self.clone() }
     }
 
+    /// The same for vertices that stay in the tally.
+    pub(crate) fn without_path_sink(self) -> Self {
+        Self { paths: None, ..self }
+    }
+
     /// Whether nothing is asked about a ray on its way but where it ends.
     pub(crate) fn asks_ends_only(&self) -> bool {
         let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;

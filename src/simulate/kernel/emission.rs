@@ -135,7 +135,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             });
         }
         path.payload = payload;
-        self.record(path, ray.origin, Event::Emitted);
+        self.record(path, ray.origin, Event::Emitted, None);
         clip_segment(context, path, ray);
         true
     }

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::payload::RayPayload;
-use crate::simulate::random::Key;
+use crate::simulate::random::{Key, split_branch};
 
 /// Which rays to trace.
 #[derive(Clone, Copy, Debug)]
@@ -80,11 +80,6 @@ impl<C: RayPayload> Path<C> {
     /// The number of the path that splits off at its present vertex; it depends on the splits before alone, not on the order of
     /// tracing.
     pub(super) fn split_branch(&self) -> u32 {
-        // Odd constants of good mixing (the golden ratio, and murmur's finaliser), so that branches of neighbouring
-        // splits share no random numbers. Zero is the unsplit path's.
-        let mixed = (self.branch ^ self.bounce.wrapping_mul(0x9e37_79b9))
-            .wrapping_add(0x7f4a_7c15)
-            .wrapping_mul(0x85eb_ca6b);
-        (mixed ^ mixed >> 15).max(1)
+        split_branch(self.branch, self.bounce)
     }
 }

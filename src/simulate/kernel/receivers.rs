@@ -10,6 +10,7 @@ use crate::intersect::Hit;
 use crate::math::{Point, Ray};
 use crate::simulate::random::Purpose;
 use crate::simulate::receiver::{Receiver, Spot};
+use crate::simulate::sequence::DepositPlace;
 use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
 /// How far in front of a face a receiver that lies in it is met, mm: more than both are off by rounding.
@@ -135,6 +136,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         tally.receivers[r].add_deferred(spot.cell, path.quanta);
         tally.receiver_totals[r] += quanta_as_integer(path.quanta);
         tally.moments[r].add(path.quanta, spot.at, spot.radius2);
+        if !C::ENDS_ONLY {
+            self.note_deposit(path, DepositPlace::Receiver(r as u32), quanta_as_integer(path.quanta));
+        }
+        let tally = &mut *self.tally;
         if !C::ENDS_ONLY && receiver.channels.count() > 0 {
             let cells = receiver.cell_count();
             let nm = path.payload.wavelength().unwrap_or(self.context.bound.light.wavelength);

@@ -59,7 +59,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
         // From inside an opaque solid nothing can be seen: the ray got in by a gap.
         if at.face.opaque_solid && !at.entering {
-            self.record(path, at.point, Event::Lost);
+            self.record(path, at.point, Event::Lost, Some(at.hit.face));
             self.lose(path, ray, LostCause::InsideSolid, Some(at.hit.face));
             return false;
         }
@@ -119,7 +119,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // all.
         let direction = match interact(self.context, path, ray, at) {
             Interaction::Absorb => {
-                self.record(path, at.point, Event::Absorbed);
+                self.record(path, at.point, Event::Absorbed, Some(at.hit.face));
                 self.absorb_in_face(path, at.hit.face, 0.0);
                 None
             }
@@ -129,14 +129,14 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             }
             Interaction::Reflect { kept, direction, payload } => {
                 path.release();
-                self.record(path, at.point, Event::Reflected);
+                self.record(path, at.point, Event::Reflected, Some(at.hit.face));
                 self.absorb_in_face(path, at.hit.face, kept);
                 path.payload = payload;
                 Some(direction)
             }
             // Nothing is absorbed and the path is not released: light in a block without end must be seen going round.
             Interaction::ReflectTotally { direction, payload } => {
-                self.record(path, at.point, Event::Reflected);
+                self.record(path, at.point, Event::Reflected, Some(at.hit.face));
                 path.payload = payload;
                 Some(direction)
             }
@@ -146,7 +146,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 None
             }
             Interaction::Lose(cause) => {
-                self.record(path, at.point, Event::Lost);
+                self.record(path, at.point, Event::Lost, Some(at.hit.face));
                 self.lose(path, ray, cause, Some(at.hit.face));
                 None
             }
@@ -188,10 +188,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             path.key(context).unit(Purpose::Interface) < division.share
         };
         if reflects {
-            self.record(path, at.point, Event::Reflected);
+            self.record(path, at.point, Event::Reflected, Some(at.hit.face));
             division.reflect(context, path, ray.direction, at)
         } else {
-            self.record(path, at.point, Event::Transmitted);
+            self.record(path, at.point, Event::Transmitted, Some(at.hit.face));
             division.transmit(context, path, ray.direction, at)
         }
     }
@@ -211,7 +211,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             // The branch number keys the child's random numbers: its stream is its own, whichever thread traces it and when.
             let mut child = Path { quanta: reflected, branch: path.split_branch(), ..*path };
             let mut child_ray = *ray;
-            self.record(&child, at.point, Event::Split);
+            self.record(&child, at.point, Event::Split, Some(at.hit.face));
             let direction = division.reflect(self.context, &mut child, ray.direction, at);
             if self.leave_face(&mut child, &mut child_ray, at, direction) {
                 // Last in, first out, and before new rays: what a ray splits into is finished first, so that little waits.
@@ -272,7 +272,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // Light that was held by total reflection has another direction now, and may get out.
         path.release();
         path.bounce += 1;
-        self.record(path, point, Event::Scattered);
+        self.record(path, point, Event::Scattered, None);
         let direction = scatter.sample(ray.direction, numbers);
         if let Some(stokes) = path.payload.stokes_mut() {
             *stokes = Stokes::unpolarised(1.0, direction);
@@ -302,10 +302,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             let point = ray.point_at(ray.t_max);
             // Light that reaches a receiver while its payload is still inside a body came out by a gap.
             if C::MEDIA && has_left_by_opening(context, &path.payload, ray, point) {
-                self.record(path, point, Event::Lost);
+                self.record(path, point, Event::Lost, None);
                 return self.lose(path, ray, LostCause::NoExit, None);
             }
-            self.record(path, point, Event::Received);
+            self.record(path, point, Event::Received, None);
             self.tally.ends.received += quanta_as_integer(path.quanta);
             self.count_at(path, path.receiver, point);
             return;
@@ -315,13 +315,13 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             match recover_media(context, &path.payload, ray, f64::INFINITY, false) {
                 Some(recovered) if recovered.body() == AMBIENT => path.payload = recovered,
                 _ => {
-                    self.record(path, ray.point_at(1.0), Event::Lost);
+                    self.record(path, ray.point_at(1.0), Event::Lost, None);
                     return self.lose(path, ray, LostCause::NoExit, None);
                 }
             }
         }
         let received = self.count_far(path, ray);
-        self.record(path, ray.point_at(context.plan.drawn_length), Event::Escaped);
+        self.record(path, ray.point_at(context.plan.drawn_length), Event::Escaped, None);
         let end = if received { &mut self.tally.ends.received } else { &mut self.tally.ends.escaped };
         *end += quanta_as_integer(path.quanta);
     }

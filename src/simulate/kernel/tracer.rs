@@ -5,6 +5,7 @@ use super::path::Path;
 use super::payload::RayPayload;
 use crate::math::{FaceId, Point, Ray};
 use crate::simulate::outcome::{Event, LostCause, LostRay, PathVertex};
+use crate::simulate::sequence::{Deposit, DepositPlace};
 use crate::simulate::tallies::ReplicateTally;
 use crate::simulate::tally::{QUANTA, quanta_as_integer, round_quanta};
 
@@ -19,11 +20,12 @@ pub(super) struct Tracer<'t, 'a, C> {
 impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Notes a vertex of a path that is recorded.
     #[inline(always)]
-    pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event) {
+    pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event, face: Option<FaceId>) {
         // Only sampled paths are recorded, and asking costs next to nothing.
         if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
             let Path { ray, branch, bounce, .. } = *path;
-            self.tally.paths.push(PathVertex { ray, branch, bounce, point, power: path.quanta / QUANTA, event });
+            let (power, face) = (path.quanta / QUANTA, face.map(|f| f.0));
+            self.tally.paths.push(PathVertex { ray, branch, bounce, point, power, event, face });
         }
     }
 
@@ -31,7 +33,20 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     #[inline(always)]
     pub(super) fn absorb_in_face(&mut self, path: &mut Path<C>, face: FaceId, kept: f64) {
         self.tally.absorb(face, path.quanta - kept);
+        if !C::ENDS_ONLY {
+            self.note_deposit(path, DepositPlace::Face(face.0), quanta_as_integer(path.quanta - kept));
+        }
         path.quanta = kept;
+    }
+
+    /// Notes where light was counted, for those who group it by sequence.
+    #[inline(always)]
+    pub(super) fn note_deposit(&mut self, path: &Path<C>, place: DepositPlace, quanta: u64) {
+        if let Some(deposits) = &mut self.tally.deposits
+            && quanta > 0
+        {
+            deposits.push(Deposit { branch: path.branch, bounce: path.bounce, place, quanta });
+        }
     }
 
     /// Beer's law over the segment, for bodies that absorb.
@@ -56,7 +71,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if path.quanta > 0.0 {
             self.tally.ends.cut_off += quanta_as_integer(path.quanta);
             self.tally.counts.cut_off += 1;
-            self.record(path, point, Event::CutOff);
+            self.record(path, point, Event::CutOff, None);
         }
     }
 

@@ -81,6 +81,12 @@ fn unit(a: u32, b: u32) -> f64 {
     ((u64::from(a) << 32 | u64::from(b)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
+/// The number of the path that splits off another at its hit of this number.
+pub(crate) fn split_branch(branch: u32, bounce: u32) -> u32 {
+    let mixed = (branch ^ bounce.wrapping_mul(0x9e37_79b9)).wrapping_add(0x7f4a_7c15).wrapping_mul(0x85eb_ca6b);
+    (mixed ^ mixed >> 15).max(1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -68,6 +68,9 @@ pub struct Run {
     /// Independent parts the run is divided into; errors are computed from how much they differ. At least 16 rays go into each.
     #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 65536)))]
     pub replicates: u32,
+    /// Group light by the faces it met and what happened there, and list so many of these sequences for each receiver; 0 for none. Each
+    /// ray is then traced twice.
+    pub sequences: u32,
 }
 
 impl Default for Run {
@@ -87,6 +90,7 @@ impl Default for Run {
             power_floor: POWER_FLOOR,
             glue_mm: GLUE_MM,
             replicates: 128,
+            sequences: 0,
         }
     }
 }

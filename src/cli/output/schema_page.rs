@@ -1,0 +1,81 @@
+//! The JSON Schema of a scene as a page for people: every table, every key, what it means and what it is where it is not given.
+
+use serde_json::{Map, Value};
+
+const OPENING: &str = "# Scene files\n\n\
+    A scene is a TOML file: what is traced, what it is made of, where light comes from and where it is counted. `lampyris init FILE.stp` \
+    writes one to begin with. Lengths are mm, angles degrees, powers those of `unit`. Paths are relative to the scene file. \
+    `lampyris schema --text` prints this page, `lampyris schema` the JSON Schema for editors.\n";
+
+/// The definition that a property refers to, as itself, as one of several forms or as the items of a list.
+fn definition<'s>(schema: &'s Value, property: &Value) -> Option<&'s Value> {
+    let forms = property["anyOf"].as_array().into_iter().flatten();
+    let of = |p: &Value| p["$ref"].as_str().map(str::to_owned);
+    let reference = of(property).or_else(|| of(&property["items"])).or_else(|| forms.into_iter().find_map(of))?;
+    schema["$defs"].get(reference.rsplit('/').next()?)
+}
+
+/// The keys of a table, if the definition is one.
+fn keys(definition: &Value) -> Option<&Map<String, Value>> {
+    definition["properties"].as_object().filter(|keys| !keys.is_empty())
+}
+
+/// The words that a definition allows, each with its meaning.
+fn words(definition: &Value) -> Vec<String> {
+    let forms = definition["oneOf"].as_array().into_iter().flatten();
+    forms.filter_map(|w| Some(format!("`{}`: {}", w["const"].as_str()?, text(w).trim_end_matches('.')))).collect()
+}
+
+fn text(value: &Value) -> String {
+    value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn row(schema: &Value, key: &str, property: &Value) -> String {
+    let allowed = definition(schema, property).map(words).unwrap_or_default();
+    let allowed = if allowed.is_empty() { String::new() } else { format!(" {}.", allowed.join("; ")) };
+    let default = match &property["default"] {
+        Value::Null => String::new(),
+        Value::String(s) if s.is_empty() => String::new(),
+        Value::Array(list) if list.is_empty() => String::new(),
+        Value::Object(_) => String::new(),
+        // Numbers are of double precision there, and some are whole.
+        other => {
+            format!("`{other}`").replace(".0`", "`").replace(".0,", ",").replace(".0]", "]").replace(',', ", ")
+        }
+    };
+    format!("| `{key}` | {}{allowed} | {default} |\n", text(property)).replace("  ", " ")
+}
+
+fn table<'s>(schema: &'s Value, keys: impl Iterator<Item = (&'s String, &'s Value)>) -> String {
+    let rows: String = keys.map(|(key, property)| row(schema, key, property)).collect();
+    format!("\n| key | what it says | unless given |\n| --- | --- | --- |\n{rows}")
+}
+
+/// The page, as Markdown.
+pub(crate) fn schema_page(schema: &Value) -> String {
+    let Some(top) = keys(schema) else { return OPENING.to_owned() };
+    let is_table = |property: &Value| definition(schema, property).and_then(keys).is_some();
+    let mut page = OPENING.to_owned();
+    page += "\n## At the top\n";
+    page += &table(schema, top.iter().filter(|(_, p)| !is_table(p)));
+    let mut inner: Vec<(String, &Value)> = Vec::new();
+    for (key, property) in top.iter().filter(|(_, p)| is_table(p)) {
+        let heading = if property["type"] == "array" { format!("[[{key}]]") } else { format!("[{key}]") };
+        let Some(table) = definition(schema, property) else { continue };
+        page += &section(schema, &heading, table);
+        for (key, property) in keys(table).into_iter().flatten() {
+            let found = definition(schema, property).filter(|d| keys(d).is_some());
+            // A table that several others hold is explained once.
+            if let Some(found) = found.filter(|d| inner.iter().all(|(_, known)| known != d)) {
+                inner.push((format!("{key} = {{ … }}"), found));
+            }
+        }
+    }
+    inner.iter().for_each(|(heading, table)| page += &section(schema, heading, table));
+    page
+}
+
+fn section(schema: &Value, heading: &str, definition: &Value) -> String {
+    let rows = table(schema, keys(definition).into_iter().flatten());
+    format!("\n## `{heading}`\n\n{}\n{rows}", text(definition))
+}

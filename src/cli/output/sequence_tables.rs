@@ -1,0 +1,139 @@
+//! The ways that light took, as tables, in the document of the results and as a view.
+
+use super::rule_table::face_labels;
+use crate::cli::console::{Console, print};
+use crate::cli::output::terminal_tables::table_text;
+use crate::formats::{Facets, Polylines};
+use crate::model::Model;
+use crate::report::{Cell, Section, Table, View, figures, file_stem, grouped};
+use crate::simulate::{Event, Results, SequenceResult, recorded_ways};
+use serde_json::Value;
+use std::io;
+
+/// Sequences whose paths are drawn, and their colours.
+const DRAWN: [[f64; 3]; 6] = [
+    [1.0, 0.72, 0.12],
+    [0.23, 0.51, 0.96],
+    [0.85, 0.30, 0.30],
+    [0.16, 0.65, 0.38],
+    [0.66, 0.33, 0.85],
+    [0.05, 0.6, 0.65],
+];
+
+/// Most paths of a sequence that are drawn.
+const MOST_DRAWN: usize = 60;
+
+/// Share of a receiver's power, per cent, is shown with so many digits.
+const SHARE_DIGITS: usize = 4;
+
+/// Names of faces as ways have them: what selects each, without the braces around it.
+fn face_names(model: &Model) -> Vec<String> {
+    let bare = |label: String| {
+        let inner = label.strip_prefix("on = { ").and_then(|l| l.strip_suffix(" }"));
+        inner.map_or(label.clone(), str::to_owned)
+    };
+    face_labels(model).into_iter().map(bare).collect()
+}
+
+/// A sequence in words.
+fn way(sequence: &SequenceResult, names: &[String]) -> String {
+    let step = |face: Option<u32>, event: Event| {
+        let verb = match event {
+            Event::Reflected => "reflected by",
+            Event::Transmitted => "through",
+            Event::Absorbed => "absorbed by",
+            _ => "scattered by",
+        };
+        match face {
+            None => "scattered inside".to_owned(),
+            Some(f) => {
+                let name = names.get(f as usize).cloned().unwrap_or_else(|| format!("face {f}"));
+                format!("{verb} {name}")
+            }
+        }
+    };
+    let mut words = vec![sequence.source_name.clone()];
+    words.extend(sequence.steps.iter().map(|s| step(s.face, s.event)));
+    if sequence.steps.is_empty() {
+        words.push("straight".into());
+    }
+    if sequence.more {
+        words.push("and on".into());
+    }
+    words.join(" → ")
+}
+
+/// A table for each receiver that light was grouped for.
+fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
+    let names = face_names(model);
+    let columns = [("", ""), ("power", unit), ("± (1σ)", unit), ("share", "%"), ("way", "")];
+    let table = |(k, found): (usize, &crate::simulate::ReceiverSequences)| {
+        let receiver = &results.receivers[k];
+        let share = |power: f64| Cell::Number(100.0 * power / receiver.power, SHARE_DIGITS);
+        let name = format!("{}-sequences", file_stem(&receiver.name));
+        let caption = format!(
+            "{} ways were found; all others together brought {} {unit}.",
+            grouped(found.count as u64),
+            figures(found.rest, SHARE_DIGITS)
+        );
+        let title = format!("{}: ways of its light", receiver.name);
+        let mut table = Table::new(&name, &title, &columns).caption(caption);
+        for (rank, s) in found.first.iter().enumerate() {
+            let power = Cell::Number(s.power, 6);
+            table.row([(rank + 1).into(), power, s.power_error.into(), share(s.power), way(s, &names).into()]);
+        }
+        table
+    };
+    results.sequences.iter().enumerate().filter(|(_, found)| found.count > 0).map(table).collect()
+}
+
+/// The section of a page; `None` where light was not grouped.
+pub(crate) fn sequence_section(results: &Results, model: &Model, facets: &Facets, unit: &str) -> Option<Section> {
+    let tables = sequence_tables(results, model, unit);
+    if tables.is_empty() {
+        return None;
+    }
+    let section = Section::new("Ways of light").with_block(sequence_view(results, facets));
+    Some(tables.into_iter().fold(section, Section::with_block))
+}
+
+/// Recorded paths of the first sequences of each receiver, a colour for each.
+fn sequence_view(results: &Results, facets: &Facets) -> View {
+    let ways = recorded_ways(&results.paths);
+    let mut view = View::of_facets("sequences", "Paths of the first ways", facets).faded(0.35);
+    let first = (0..DRAWN.len()).flat_map(|rank| {
+        let of_rank = results.sequences.iter().enumerate();
+        of_rank.filter_map(move |(r, found)| Some((r, rank, found.first.get(rank)?)))
+    });
+    for ((receiver, rank, sequence), colour) in first.zip(DRAWN) {
+        let mut lines = Polylines::default();
+        let same = ways.iter().filter(|w| w.steps == sequence.steps);
+        same.take(MOST_DRAWN).for_each(|w| lines.push(w.points.iter().copied()));
+        let bounds = facets.mesh.bounds();
+        let near = lines.inside(&bounds.grown(0.35 * bounds.diagonal().max(1.0)));
+        let name = format!("{} {}", results.receivers[receiver].name, rank + 1);
+        view = view.lines(&name, &near, colour);
+    }
+    view.caption("Numbers are those of the tables; a way too rare to be among the recorded paths has no line.")
+}
+
+/// Puts each sequence in words into the document of the results.
+pub(crate) fn add_ways(document: &mut Value, results: &Results, model: &Model) {
+    if results.sequences.is_empty() {
+        return;
+    }
+    let names = face_names(model);
+    for (r, found) in results.sequences.iter().enumerate() {
+        for (k, s) in found.first.iter().enumerate() {
+            document["sequences"][r]["first"][k]["way"] = way(s, &names).into();
+        }
+    }
+}
+
+/// Prints the tables on the terminal.
+pub(crate) fn print_sequences(results: &Results, model: &Model, unit: &str, console: &Console) -> io::Result<()> {
+    if console.json {
+        return Ok(());
+    }
+    sequence_tables(results, model, unit).iter().try_for_each(|t| print(&table_text(t, console.width())))
+}

@@ -1,0 +1,39 @@
+//! The sequences of a run: each ray is traced once more, by itself, by a kernel that records.
+//!
+//! Random numbers are keyed by ray, so it takes the same path again, bit by bit: what the run counts does not depend on whether
+//! sequences are asked for, and a run without them pays nothing.
+
+use super::dispatch;
+use super::effects::KernelKind;
+use super::kernel::{Context, RaySelection};
+use super::sequence;
+use super::tallies::ReplicateTally;
+
+/// Traces the rays of a replicate again and groups their light.
+pub(super) struct SequenceRecorder<'c, 'a> {
+    context: &'c Context<'a>,
+    kind: KernelKind,
+    /// Where their light ends, which was counted already.
+    tally: ReplicateTally,
+}
+
+impl<'c, 'a> SequenceRecorder<'c, 'a> {
+    /// For a context whose plan records every ray.
+    pub(super) fn new(context: &'c Context<'a>, kind: KernelKind) -> Self {
+        let tally = ReplicateTally { deposits: Some(Vec::new()), ..ReplicateTally::new(context.bound) };
+        Self { context, kind, tally }
+    }
+
+    /// Adds the sequences of a replicate to its tally.
+    pub(super) fn record(&mut self, replicate: u32, tally: &mut ReplicateTally) {
+        for (source, ray) in self.context.plan.rays_of_replicate(replicate) {
+            dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
+            let deposits = self.tally.deposits.as_deref().unwrap_or(&[]);
+            let vertices = &self.tally.paths;
+            sequence::add_ray(self.context.bound, source as u32, vertices, deposits, &mut tally.sequences);
+            self.tally.paths.clear();
+            self.tally.deposits.iter_mut().for_each(Vec::clear);
+        }
+        self.tally.discard();
+    }
+}

@@ -1,0 +1,62 @@
+//! What a run found out about the ways of light, in the units of the scene.
+
+use super::bind::BoundScene;
+use super::sequence::{Sequence, SequenceStep};
+use super::tallies::Tallies;
+use super::tally::Sum;
+use serde::Serialize;
+
+/// One sequence in a table of results.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SequenceResult {
+    /// Power that came to the receiver this way, in the unit of the sources.
+    pub power: f64,
+    /// Its standard error.
+    pub power_error: f64,
+    /// The source, by its place in the scene.
+    pub source: u32,
+    /// Its name, or its number from 1 where it has none.
+    pub source_name: String,
+    /// What happened on the way.
+    pub steps: Vec<SequenceStep>,
+    /// Whether more steps followed than are told apart.
+    pub more: bool,
+}
+
+/// The sequences of a receiver.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ReceiverSequences {
+    /// How many there are.
+    pub count: usize,
+    /// Those of most power, most first.
+    pub first: Vec<SequenceResult>,
+    /// Power of all others together.
+    pub rest: f64,
+}
+
+impl ReceiverSequences {
+    /// The `most` sequences of the most power to one receiver.
+    pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, receiver: u32, quantum: f64) -> Self {
+        let most = bound.scene.run.sequences as usize;
+        let mut of_receiver: Vec<(&Sequence, &Sum)> =
+            tallies.sequences.iter().filter(|(s, _)| s.receiver == receiver).collect();
+        // Equal powers stay in the order of the sequences, so that the table is the same however the run was divided.
+        of_receiver.sort_by(|a, b| b.1.total.cmp(&a.1.total));
+        let count = of_receiver.len();
+        let rest = of_receiver.iter().skip(most).map(|(_, sum)| sum.total).sum::<u128>() as f64 * quantum;
+        let result = |(s, sum): (&Sequence, &Sum)| SequenceResult {
+            power: sum.total as f64 * quantum,
+            power_error: sum.error(tallies.replicates) * quantum,
+            source: s.source,
+            source_name: source_name(bound, s.source),
+            steps: s.steps.clone(),
+            more: s.more,
+        };
+        Self { count, first: of_receiver.into_iter().take(most).map(result).collect(), rest }
+    }
+}
+
+fn source_name(bound: &BoundScene, source: u32) -> String {
+    let name = bound.scene.sources.get(source as usize).map_or("", |s| s.name.as_str());
+    if name.is_empty() { format!("source {}", source + 1) } else { name.to_owned() }
+}

@@ -1,0 +1,113 @@
+//! Light grouped by the faces it met: against closed forms, to the last quantum, and in parts.
+
+use crate::support::World;
+use lampyris::math::Point;
+use lampyris::simulate::{Event, Hooks, PartialRun, Results, RunSettings, Scene, SequenceResult, trace};
+use std::path::Path;
+
+const GLASS: &str = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'\n";
+
+/// Faces of the first cuboid of a world, below and above.
+const BELOW: u32 = 4;
+const ABOVE: u32 = 5;
+
+fn steps(sequence: &SequenceResult) -> Vec<(u32, Event)> {
+    sequence.steps.iter().map(|s| (s.face.unwrap(), s.event)).collect()
+}
+
+/// The first orders of a plate at normal incidence: R = ((n − 1)/(n + 1))² = 0.04 and T = 0.96 at each face.
+#[test]
+fn orders_of_a_plate_have_the_powers_of_fresnel() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+    let text = [
+        "[run]\nrays = 2000\ninterfaces = 'split'\nsplit_floor = 0\nsequences = 2\n",
+        GLASS,
+        "[[source]]\nname = 'beam'\nkind = 'collimated'\nat = [0, 0, -10]\ndirection = [0, 0, 1]\nradius = 5\n",
+        "[[receiver]]\nname = 'behind'\nat = [0, 0, 20]\nsize = [20, 20]\n",
+        "[[receiver]]\nname = 'before'\nat = [0, 0, -20]\nsize = [20, 20]\n",
+    ]
+    .concat();
+    let found = world.run(&text, |_| ()).sequences;
+    use Event::{Reflected, Transmitted};
+    let (r, t) = (0.04, 0.96);
+    let [behind, before] = [&found[0].first, &found[1].first];
+    let expected =
+        [(behind, vec![(BELOW, Transmitted), (ABOVE, Transmitted)], t * t), (before, vec![(BELOW, Reflected)], r)];
+    for (first, way, power) in expected {
+        assert_eq!((steps(&first[0]), first[0].source_name.as_str()), (way, "beam"));
+        assert!((first[0].power / power - 1.0).abs() < 1e-9, "{} {power}", first[0].power);
+    }
+    let ghost = vec![(BELOW, Transmitted), (ABOVE, Reflected), (BELOW, Reflected), (ABOVE, Transmitted)];
+    assert_eq!(steps(&behind[1]), ghost);
+    assert!((behind[1].power / (t * t * r * r) - 1.0).abs() < 1e-6, "{}", behind[1].power);
+    assert_eq!(steps(&before[1]), [(BELOW, Transmitted), (ABOVE, Reflected), (BELOW, Transmitted)]);
+    assert!((before[1].power / (t * t * r) - 1.0).abs() < 1e-6, "{}", before[1].power);
+}
+
+/// A ball and a mirror, a source of parallel light and a point, and every kind of receiver.
+fn world() -> (World, String) {
+    let mut world = World::default();
+    world.sphere("glass", Point::ZERO, 5.0).cuboid("plate", Point::new(-9.0, -9.0, 8.0), Point::new(9.0, 9.0, 9.0));
+    let text = [
+        "[run]\nrays = 20000\nreplicates = 8\nsequences = 5\n",
+        GLASS,
+        "[[material]]\npart = 'plate'\nsurface = 'mirror'\nreflectance = 0.9\n",
+        "[[source]]\nkind = 'collimated'\nat = [0, 0, -20]\ndirection = [0, 0, 1]\nradius = 6\n",
+        "[[source]]\nkind = 'point'\nat = [20, 0, 0]\npower = 0.5\n",
+        "[[receiver]]\nname = 'behind'\nat = [0, 0, 30]\nsize = [50, 50]\n",
+        "[[receiver]]\nname = 'passed'\nat = [0, 0, -7]\nsize = [50, 50]\nabsorbs = false\n",
+        "[[receiver]]\nname = 'ball'\nkind = 'sphere'\nat = [0, 0, 0]\nradius = 40\n",
+        "[[receiver]]\nname = 'mirror'\nkind = 'absorbed'\npart = 'plate'\n",
+    ];
+    (world, text.concat())
+}
+
+#[test]
+fn sequences_add_up_to_their_receiver_and_change_nothing_else() {
+    let (world, text) = world();
+    for interfaces in ["roulette", "split"] {
+        let text = text.replace("[run]", &format!("[run]\ninterfaces = '{interfaces}'\nsplit_floor = 0.01"));
+        let with = world.run(&text, |_| ());
+        let without = world.run(&text.replace("sequences = 5", ""), |_| ());
+        assert_eq!((&with.digest, with.segments), (&without.digest, without.segments));
+        assert!(without.sequences.is_empty() && with.sequences.len() == 4);
+        for (k, sum) in with.tallies.receivers.iter().enumerate() {
+            let parts = with.tallies.sequences.iter().filter(|(s, _)| s.receiver == k as u32);
+            assert_eq!(
+                parts.map(|(_, p)| p.total).sum::<u128>(),
+                sum.total,
+                "{} {interfaces}",
+                with.receivers[k].name
+            );
+            let listed: f64 = with.sequences[k].first.iter().map(|s| s.power).sum();
+            assert!((listed + with.sequences[k].rest - with.receivers[k].power).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn parts_of_a_run_have_the_sequences_of_the_whole() {
+    let (world, text) = world();
+    let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let part = |shard: [u32; 2], threads: usize| -> PartialRun {
+        let settings = RunSettings { threads, shard, ..RunSettings::from(&scene.run) };
+        let partial = trace(&bound, &world, &settings, None, &Hooks::with_progress(&|_| true)).partial;
+        // By way of its file.
+        let mut bytes = Vec::new();
+        partial.write(&"", &mut bytes).unwrap();
+        PartialRun::read::<String>(&bytes, |_| Ok(()), &bound).unwrap()
+    };
+    let whole = part([0, 1], 3);
+    let mut sum = part([2, 3], 1);
+    sum.merge(&part([0, 3], 2)).unwrap();
+    sum.merge(&part([1, 3], 1)).unwrap();
+    assert!(whole.tallies.sequences.len() > 20, "{}", whole.tallies.sequences.len());
+    assert_eq!(whole.tallies.sequences, sum.tallies.sequences);
+    let results = |partial: PartialRun| {
+        let traced = lampyris::simulate::Traced { partial, ..Default::default() };
+        Results::new(&bound, &RunSettings::from(&scene.run), traced).sequences
+    };
+    assert_eq!(results(whole), results(sum));
+}
