@@ -8,6 +8,7 @@
 //! never sees half of one; `f64` values survive CSV, NPZ, VTU, VTP, VTI, PLY and OBJ bit for bit (shortest text that reads back
 //! the same, or raw little-endian). Known weakness: STL and GLB are single precision by their own definition.
 
+mod agf;
 mod atomic;
 mod base64;
 mod data1;
@@ -35,6 +36,7 @@ mod stl;
 mod stream;
 mod vtk;
 
+pub use agf::{AgfGlass, read_agf};
 pub use atomic::{file_stem, remove_unfinished_files, write_atomic};
 pub use base64::base64;
 pub use data1::{read_data1, write_data1};

@@ -37,6 +37,7 @@ pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
     let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
     // By their bytes: a file that changed changes the run.
     let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
+    let files = files.chain(scene.media.iter().filter_map(|m| m.file.as_ref()));
     for file in files {
         let path = scene.resolve(file);
         let read = read_bytes(&path).map_err(|e| Error::input(format!("{}: {e}", path.display())))?;

@@ -134,6 +134,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "input",
             "printable",
             "mod",
+            "agf",
             "npz",
             "grid",
             "photometry",

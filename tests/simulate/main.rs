@@ -9,6 +9,7 @@ mod far_sources;
 #[path = "../support/files.rs"]
 mod files;
 mod fixture_scenes;
+mod glass_catalogues;
 mod growing;
 mod hard;
 mod imaging;

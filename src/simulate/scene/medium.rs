@@ -1,6 +1,7 @@
 //! The key `[[medium]]`: transparent media.
 
 use super::{Key, Scene, suggest};
+use crate::formats::{AgfGlass, read_agf};
 use crate::optics::{self, Absorption, BulkScatter, Index, Table, catalogue};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
@@ -15,8 +16,14 @@ pub struct Medium {
     /// Refractive index, the same for every wavelength.
     #[cfg_attr(feature = "schema", schemars(range(min = 0.1, max = 10)))]
     pub index: Option<f64>,
-    /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`.
+    /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`; or in the one of `file`.
     pub catalogue: Option<String>,
+    /// Glass catalogue in AGF form that `catalogue` is a name in, relative to the scene file. The glass absorbs by its internal
+    /// transmittances there unless `absorption_per_mm` says otherwise.
+    pub file: Option<String>,
+    /// What the file says of the glass.
+    #[serde(skip)]
+    pub(crate) glass: Option<AgfGlass>,
     /// Pairs `[B, C]` of `n² = 1 + Σ B λ²/(λ² − C)`, λ in µm, C in µm².
     pub sellmeier: Option<Vec<[f64; 2]>>,
     /// `[A, B, C, …]` of `n = A + B/λ² + C/λ⁴ + …`, λ in µm.
@@ -53,7 +60,11 @@ impl Medium {
         let mut ways = Vec::new();
         ways.extend(self.index.map(Index::Constant));
         if let Some(name) = &self.catalogue {
-            ways.push(catalogued(name).map_err(|e| ("catalogue", e))?.index);
+            let index = match &self.glass {
+                Some(glass) => agf_index(glass),
+                None => catalogued(name).map(|medium| medium.index),
+            };
+            ways.push(index.map_err(|e| ("catalogue", e))?);
         }
         ways.extend(self.sellmeier.clone().map(Index::Sellmeier));
         ways.extend(self.cauchy.clone().map(Index::Cauchy));
@@ -68,7 +79,7 @@ impl Medium {
         }
         let mut medium = optics::Medium::clear(self.name.clone(), ways.remove(0));
         medium.absorption = match &self.absorption_per_mm {
-            None => Absorption::None,
+            None => self.glass.as_ref().map_or(Ok(Absorption::None), agf_absorption).map_err(|e| ("file", e))?,
             Some(ByWavelength::Constant(a)) => {
                 Absorption::per_mm(*a).map_err(|e| ("absorption_per_mm", e.to_string()))?
             }
@@ -89,6 +100,66 @@ impl Medium {
         }
         Ok(medium)
     }
+}
+
+/// The index of a glass by the formula of its catalogue (OpticStudio's numbers of them).
+fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
+    /// Formulas of n² − 1 as a sum of `K λ²/(λ² − L)`: of three, four and five terms.
+    const SELLMEIER: [(u32, usize); 3] = [(2, 3), (6, 4), (11, 5)];
+    let AgfGlass { name, formula, coefficients, .. } = glass;
+    // Makers leave out the zeros at the end of a line.
+    let coefficient = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
+    if let Some((_, terms)) = SELLMEIER.iter().find(|(number, _)| number == formula) {
+        let pairs = (0..*terms).map(|k| [coefficient(2 * k), coefficient(2 * k + 1)]);
+        return Ok(Index::Sellmeier(pairs.filter(|[k, _]| *k != 0.0).collect()));
+    }
+    // Extended 2 adds powers to Schott's formula, which most of its glasses leave at 0.
+    let is_schott = *formula == 1 || *formula == 12 && coefficient(6) == 0.0 && coefficient(7) == 0.0;
+    if is_schott {
+        return Ok(Index::Schott(std::array::from_fn(coefficient)));
+    }
+    Err(format!(
+        "'{name}' has dispersion formula {formula}; 1 (Schott), 2, 6 and 11 (Sellmeier) are read: give its `index_table`"
+    ))
+}
+
+fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
+    let points = glass.absorption();
+    if points.len() < 2 {
+        return Ok(Absorption::None);
+    }
+    Absorption::table(points.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>()).map_err(|e| e.to_string())
+}
+
+/// Reads the glasses that media name in files.
+pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error> {
+    let mut glasses = Vec::with_capacity(scene.media.len());
+    for (i, medium) in scene.media.iter().enumerate() {
+        let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
+        let Some(file) = &medium.file else {
+            glasses.push(None);
+            continue;
+        };
+        let Some(name) = &medium.catalogue else {
+            let error =
+                scene.error(ErrorKind::Value, &at("file"), "a catalogue's file needs the name of a glass in it");
+            return Err(error.help("add `catalogue = \"N-SF6\"`, say"));
+        };
+        let all = read_agf(&scene.resolve(file))
+            .map_err(|e| scene.error(ErrorKind::Unreadable, &at("file"), e.to_string()))?;
+        // Makers write capitals, people do not.
+        let Some(glass) = all.iter().find(|g| g.name.eq_ignore_ascii_case(name)) else {
+            let message = format!("no glass of {file} is called '{name}'");
+            let error = scene.error(ErrorKind::NoMatch, &at("catalogue"), message);
+            let near = suggest::nearest(name, all.iter().map(|g| g.name.as_str()));
+            return Err(match near {
+                Some(near) => error.help(format!("did you mean '{near}'?")),
+                None => error.help(format!("it has {} glasses, the first {}", all.len(), all[0].name)),
+            });
+        };
+        glasses.push(Some(glass.clone()));
+    }
+    Ok(glasses)
 }
 
 /// A medium of the catalogue, or an error that names what there is.

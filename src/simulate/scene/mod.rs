@@ -130,6 +130,8 @@ impl Scene {
         if let Some((span, message)) = locate::lengths(text, &understood) {
             return Err(Error::new(ErrorKind::Syntax, message).located(file_name, &shared, Some(span)));
         }
+        let glasses = medium::read_glasses(&scene)?;
+        scene.media.iter_mut().zip(glasses).for_each(|(medium, glass)| medium.glass = glass);
         scene.check()?;
         Ok(scene)
     }

@@ -1,0 +1,65 @@
+//! Glass catalogues in AGF form: what a data sheet says comes out of a scene.
+
+use crate::support::World;
+use lampyris::math::Point;
+use lampyris::simulate::Scene;
+use std::path::Path;
+
+/// Two glasses of Schott's in the layout of the form, one with the older formula, and one of a formula that is not read.
+const CATALOGUE: &str = "CC a catalogue of three glasses\n\
+    NM N-BK7 2 517642.251 1.5168 64.17 0 1\n\
+    ED 7.1 8.3 2.51 -0.0009 0\n\
+    CD 1.03961212E+000 6.00069867E-003 2.31792344E-001 2.00179144E-002 1.01046945E+000 1.03560653E+002\n\
+    LD 3.0000E-001 2.5000E+000\n\
+    IT 4.00000E-001 9.97000E-001 1.00000E+001\n\
+    IT 7.00000E-001 9.98000E-001 1.00000E+001\n\
+    NM BK7 1 517642.251 1.5168 64.17 0 1\n\
+    CD 2.2718929E+000 -1.0108077E-002 1.0592509E-002 2.0816965E-004 -7.6472538E-006 4.9240991E-007\n\
+    LD 3.6500E-001 1.0140E+000\n\
+    NM ODD 5 0 1.5 60\n\
+    CD 1.5 0.01 0.0005\n";
+
+fn scene(medium: &str) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("glasses.agf"), CATALOGUE).unwrap();
+    let text = format!("[[medium]]\nname = 'glass'\nfile = 'glasses.agf'\n{medium}\n");
+    Scene::parse(&text, "test.toml", folder.path()).map_err(|e| e.to_string())
+}
+
+/// R = ((n − 1)/(n + 1))² at both faces of a plate 10 mm thick, T = 0.997 inside at 400 nm: the first way through brings (1 − R)² T.
+#[test]
+fn a_plate_of_a_catalogue_transmits_what_its_data_sheet_says() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("glasses.agf"), CATALOGUE).unwrap();
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 10.0));
+    // n at 400 nm by the data sheet's coefficients, worked out beside this program.
+    for (name, nm, n, inside) in [("n-bk7", 400.0, 1.530849, 0.997), ("BK7", 587.5618, 1.516800, 1.0)] {
+        let text = format!(
+            "[run]\nrays = 2000\nwavelength_nm = {nm}\ninterfaces = 'split'\nsplit_floor = 0\nsequences = 1\n\
+             [[medium]]\nname = 'glass'\nfile = '{}'\ncatalogue = '{name}'\n[[material]]\npart = 'plate'\nmedium = 'glass'\n\
+             [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\ndirection = [0, 0, 1]\nradius = 2\n\
+             [[receiver]]\nname = 'behind'\nat = [0, 0, 20]\nsize = [9, 9]\n",
+            folder.path().join("glasses.agf").display()
+        );
+        let found = world.run(&text, |_| ());
+        let r = ((n - 1.0) / (n + 1.0f64)).powi(2);
+        let power = found.sequences[0].first[0].power;
+        assert!((power - (1.0 - r).powi(2) * inside).abs() < 2e-6, "{name}: {power}");
+    }
+}
+
+#[test]
+fn what_a_catalogue_does_not_hold_is_named() {
+    assert!(scene("catalogue = 'N-BK7'").is_ok());
+    for (medium, words) in [
+        ("catalogue = 'N-BK8'", "N-BK7"),
+        ("", "the name of a glass"),
+        ("catalogue = 'ODD'", "dispersion formula 5"),
+    ] {
+        let message = scene(medium).unwrap_err();
+        assert!(message.contains(words), "{message}");
+    }
+    let missing = Scene::parse("[[medium]]\nname = 'x'\nfile = 'none.agf'\ncatalogue = 'y'\n", "t", Path::new("."));
+    assert!(missing.unwrap_err().to_string().contains("none.agf"));
+}
