@@ -41,7 +41,7 @@ impl ReceiverSequences {
         let mut of_receiver: Vec<(&Sequence, &Sum)> =
             tallies.sequences.iter().filter(|(s, _)| s.receiver == receiver).collect();
         // Equal powers stay in the order of the sequences, so that the table is the same however the run was divided.
-        of_receiver.sort_by(|a, b| b.1.total.cmp(&a.1.total));
+        of_receiver.sort_by_key(|(_, sum)| std::cmp::Reverse(sum.total));
         let count = of_receiver.len();
         let rest = of_receiver.iter().skip(most).map(|(_, sum)| sum.total).sum::<u128>() as f64 * quantum;
         let result = |(s, sum): (&Sequence, &Sum)| SequenceResult {
