@@ -65,6 +65,7 @@ pub(super) struct Decisive {
     pub(super) direction: [f64; 2],
     /// How far the reading is on the good side of its limit.
     margin: f64,
+    /// Standard errors that the margin must have.
     sigmas: f64,
 }
 

@@ -9,6 +9,7 @@ const LEAST_COSINE: f64 = 1e-3;
 /// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
 #[derive(Clone, Debug)]
 pub struct IntensityMap {
+    /// Borders of the cells, degrees.
     h_edges: Vec<f64>,
     v_edges: Vec<f64>,
     /// Row after row, V slow: candela, its statistical and its geometric standard error.

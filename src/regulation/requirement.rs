@@ -19,6 +19,7 @@ pub(super) struct Comparison {
 #[derive(Clone, Debug)]
 pub(super) struct Requirement {
     pub(super) comparisons: Vec<Comparison>,
+    /// Whether one that holds is enough.
     pub(super) any: bool,
     /// Directions of the row that the far field does not hold.
     pub(super) unseen: usize,

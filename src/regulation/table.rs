@@ -80,20 +80,24 @@ pub struct Row {
     pub h: Option<f64>,
     /// Direction, degrees up.
     pub v: Option<f64>,
+    /// Ends of a line, degrees.
     pub(super) h0: Option<f64>,
     pub(super) v0: Option<f64>,
     pub(super) h1: Option<f64>,
     pub(super) v1: Option<f64>,
     /// Corners of a zone, degrees.
     pub polygon: Option<Vec<[f64; 2]>>,
+    /// Directions of a sum, degrees.
     pub(super) points: Option<Vec<[f64; 2]>>,
     /// Least intensity, candela.
     pub min: Option<f64>,
     /// Greatest intensity, candela.
     pub max: Option<f64>,
+    /// Of a relative row: `min` or `max`, the factor, and the row that it is a multiple of, or `imax`.
     pub(super) bound: Option<String>,
     pub(super) factor: Option<f64>,
     pub(super) of: Option<String>,
+    /// Rows of one group are weighed together.
     pub(super) group: Option<u32>,
     /// The condition under which the row holds.
     pub when: Option<String>,

@@ -62,8 +62,10 @@ pub(super) struct ThreadSums<'a, 'g> {
     bound: &'g BoundScene,
     /// None where one set of sums has to do.
     partial: Option<PartialRun>,
+    /// Those of the run.
     replicates: u32,
     cost: Cost,
+    /// When it last handed its sums over.
     handed: Instant,
 }
 

@@ -26,6 +26,7 @@ const FEWEST_GROWING: u64 = 128;
 /// The rays of one source: in the whole run, or in each replicate of one that can grow.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SourceShare {
+    /// Number of its first ray, how many it has, and the quanta of each.
     first: u64,
     rays: u64,
     pub(crate) quanta: f64,
@@ -34,6 +35,7 @@ pub(crate) struct SourceShare {
 /// How the rays of a run are divided among sources and replicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
+    /// Of each source.
     pub(crate) shares: Vec<SourceShare>,
     /// Rays of each replicate of a run that can grow.
     replicate_rays: Option<u64>,
@@ -44,6 +46,7 @@ pub(crate) struct Plan {
     pub(crate) rays: u64,
     /// Power of a quantum, in the unit of the sources.
     pub(crate) quantum: f64,
+    /// Power of all sources, in their unit.
     pub(crate) emitted: f64,
     /// Every 2ᵏ-th ray is recorded; none when absent.
     record_mask: Option<u64>,

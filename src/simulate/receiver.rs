@@ -10,7 +10,9 @@ use std::f64::consts::TAU;
 pub(crate) struct Receiver {
     pub(crate) name: String,
     pub(crate) cells: [u32; 2],
+    /// Whether light ends here.
     pub(crate) absorbs: bool,
+    /// Counts light after so many bounces alone.
     pub(crate) interactions: Option<u32>,
     pub(crate) shape: Shape,
     pub(crate) channels: Channels,

@@ -15,9 +15,11 @@ pub(crate) const LEDGER: usize = 1000;
 /// What one replicate gathered.
 #[derive(Debug)]
 pub struct ReplicateTally {
+    /// Of each receiver the cells, those of its channels behind them.
     pub(crate) receivers: Vec<Grid>,
     pub(crate) receiver_totals: Vec<u64>,
     pub(crate) moments: Vec<Moments>,
+    /// By face, and by body.
     pub(crate) absorbed: Grid,
     pub(crate) bulk: Grid,
     pub(crate) ends: Ends,

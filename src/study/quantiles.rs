@@ -22,6 +22,7 @@ const BINS: usize = 64 * 120;
 #[derive(Clone, Debug)]
 pub struct Quantiles {
     bins: Vec<u64>,
+    /// Values below the lowest bin.
     zeros: u64,
     count: u64,
     max: f64,

@@ -41,6 +41,7 @@ impl RaySource for Vec<Ray> {
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     eye: Point,
+    /// From the eye to a corner of the picture, and its two sides from there.
     corner: Vector,
     across: Vector,
     up: Vector,

@@ -111,6 +111,7 @@ pub(super) struct Countdown<'a> {
     start: Instant,
     report: &'a (dyn Fn(Progress) + Sync),
     stage: String,
+    /// When the stage began, and the seconds then forecast.
     since: Instant,
     ahead: Option<f64>,
 }

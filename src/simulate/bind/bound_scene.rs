@@ -25,8 +25,11 @@ pub struct RuleFaces {
 #[derive(Clone, Debug)]
 pub struct BoundScene {
     pub(crate) scene: Scene,
+    /// By placed face.
     pub(crate) faces: Vec<FaceOptics>,
+    /// Those that faces name by index.
     pub(crate) surfaces: Vec<Surface>,
+    /// The surroundings first.
     pub(crate) bodies: Vec<Body>,
     pub(crate) light: SceneLight,
     /// Whether bodies may touch or lie inside each other, so that paths need a stack of media.

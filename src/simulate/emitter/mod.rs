@@ -35,7 +35,9 @@ pub(crate) use stream::{RayIndex, Stream};
 /// A source ready to emit.
 #[derive(Clone, Debug)]
 pub(crate) struct Emitter {
+    /// In the unit of the run.
     pub(crate) power: f64,
+    /// A number of its own, where the scene gives one.
     pub(crate) rays: Option<u64>,
     /// Bodies around it, outermost first.
     pub(crate) inside: SmallVec<[u16; 4]>,

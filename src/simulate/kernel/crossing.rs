@@ -12,6 +12,7 @@ use crate::simulate::outcome::LostCause;
 pub(super) struct Crossing<C> {
     /// Before the face: what it came with, unless it was found to be somewhere else.
     pub(super) here: C,
+    /// Behind it.
     pub(super) across: C,
 }
 

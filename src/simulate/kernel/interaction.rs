@@ -16,6 +16,7 @@ use crate::simulate::surfaces::FaceOptics;
 pub(super) struct SurfaceInteraction<'a> {
     pub(super) hit: &'a Hit,
     pub(super) face: FaceOptics,
+    /// Whether the ray runs against the outward normal.
     pub(super) entering: bool,
     pub(super) point: Point,
     /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
@@ -57,6 +58,7 @@ pub(super) struct Division<'s, C> {
     /// The payload before the face, and the media behind it.
     pub(super) payload: C,
     pub(super) across: C,
+    /// Direction of what goes through.
     pub(super) transmitted: Vector,
     pub(super) scatter: Option<&'s Scatter>,
     /// Whether light that is guided by total reflection is released here: not where it passes between bodies of one index.

@@ -23,7 +23,9 @@ const MAX_PATCHES_SEARCHED: usize = 200;
 #[derive(Debug)]
 pub(in crate::step) struct SplineChart {
     pub(in crate::step) surface: Surface,
+    /// Diagonal of its box, mm.
     pub(super) size: f64,
+    /// By direction.
     closed: [bool; 2],
     /// Collapsed sides: `[direction][low, high]`.
     collapsed: [[bool; 2]; 2],

@@ -238,6 +238,7 @@ fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge>
 
 /// The edges of a face, in the order of its loops.
 struct FaceEdges<'e> {
+    /// By number.
     curves: FxHashMap<usize, &'e Curve>,
     /// Number of the edge, and whether the loop runs against it.
     loops: Vec<Vec<(usize, bool)>>,

@@ -18,7 +18,9 @@ pub(crate) struct TessellatedItems {
 
 /// Where a kind of leaf keeps its indices, and how triangles are listed.
 struct Layout {
+    /// Place of the attribute of this name.
     pnindex: usize,
+    /// Whether triangles are listed as strips and fans.
     strips: bool,
 }
 

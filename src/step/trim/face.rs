@@ -25,7 +25,9 @@ pub(crate) struct BuiltFace {
     pub(crate) reversed: bool,
     pub(crate) loops: Vec<Vec<FaceUse>>,
     pub(crate) seams: Vec<Seam>,
+    /// Largest distance between edges and surface, mm.
     pub(crate) gap: f64,
+    /// What was done to it, in words.
     pub(crate) repairs: Vec<String>,
 }
 

@@ -175,6 +175,7 @@ struct Candidate {
     plan: TolerancePlan,
     /// Order of the error in the sag.
     order: f64,
+    /// Facets and seconds that are expected.
     facets: f64,
     predicted: f64,
 }
@@ -184,10 +185,13 @@ struct Solution {
     normals: NormalMode,
     plan: TolerancePlan,
     facets: usize,
+    /// Seconds of meshing and building, and of the job's rays.
     prepare: f64,
     trace: f64,
+    /// The 99th percentile and the largest error, degrees.
     reached: f64,
     largest: f64,
+    /// Rays that have an angle, and those that have none as they met another face.
     checked: u64,
     flips: u64,
 }
@@ -214,8 +218,10 @@ impl Solution {
 struct Measured {
     /// The face of each facet.
     made: Vec<FaceId>,
+    /// Seconds of meshing and building, and of a ray.
     prepare: f64,
     per_ray: f64,
+    /// Degrees, with the face.
     errors: Vec<(FaceId, f64)>,
     flips: u64,
 }
@@ -227,6 +233,7 @@ struct Search<'a> {
     rays: &'a RayGenerator<'a>,
     pilots: ReferenceRays,
     survey: Survey,
+    /// Tolerance of facets that only find the face, mm.
     coarse: f64,
     /// Sets of fresh rays used so far: none is used twice for the same candidate.
     fresh: std::cell::Cell<u64>,

@@ -25,6 +25,7 @@ const STRAIGHT: f64 = 1e-6;
 /// A placed face with a geometry of its own, apart from the intersectors: its surface, and its border in space.
 pub(super) struct PlacedSurface {
     surface: Surface,
+    /// −1 where the outward normal is `-(Su × Sv)`.
     sign: f64,
     size: f64,
     /// Largest distance between an edge in space and its uv curve, mm.

@@ -70,6 +70,7 @@ pub(super) struct CellPairs<'r> {
     cells: Vec<Cell>,
     /// From quanta to the receiver's unit, cell by cell.
     unit: Vec<f64>,
+    /// Of the run on facets, then on the spline.
     replicates: [Vec<&'r ReplicateSums>; 2],
     /// 0 for power, then the further channels.
     layer: usize,

@@ -14,6 +14,7 @@ struct Influence {
 /// The sums of a receiver over all replicates of a run, along one axis.
 #[derive(Clone, Copy)]
 struct Means {
+    /// Quanta; mean and mean square of the place, in half sides.
     power: f64,
     mean: f64,
     square: f64,
