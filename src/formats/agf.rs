@@ -52,7 +52,7 @@ pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
         let fault = |message: String| Error::at_line(path, number + 1, message);
         if kind == "NM" {
             let name = words.next().ok_or_else(|| fault("a glass without a name".into()))?;
-            // The number is written as a real one by some.
+            // The number is written as a real one by some; a word in its place becomes no number and is refused below.
             let formula = words.next().and_then(|w| w.parse::<f64>().ok()).unwrap_or(f64::NAN);
             if !(1.0..=99.0).contains(&formula) {
                 return Err(fault(format!("{name} has no number of a dispersion formula")));
@@ -60,6 +60,7 @@ pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
             glasses.push(AgfGlass { name: name.into(), formula: formula as u32, ..AgfGlass::default() });
             continue;
         }
+        // What stands before the first glass is about the catalogue.
         let Some(glass) = glasses.last_mut() else { continue };
         if !matches!(kind, "CD" | "LD" | "IT") {
             continue;

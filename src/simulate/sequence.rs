@@ -109,6 +109,7 @@ pub(crate) fn add_ray(
     if deposits.is_empty() {
         return;
     }
+    // Light that is counted several times on its way, as by receivers that let it pass, is in a sequence of each.
     let paths = RayPaths::new(vertices);
     for deposit in deposits {
         let mut steps = paths.steps(deposit.branch, deposit.bounce);
@@ -120,6 +121,7 @@ pub(crate) fn add_ray(
         match deposit.place {
             DepositPlace::Receiver(receiver) => add(receiver, steps),
             DepositPlace::Face(face) => {
+                // A way that was cut does not tell how it ended.
                 if !more {
                     steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
                 }

@@ -34,6 +34,7 @@ impl<'c, 'a> SequenceRecorder<'c, 'a> {
             self.tally.paths.clear();
             self.tally.deposits.iter_mut().for_each(Vec::clear);
         }
+        // All of it was counted when the rays were traced first.
         self.tally.discard();
     }
 }

@@ -56,6 +56,7 @@ impl ReceiverSequences {
     }
 }
 
+/// A source as tables name it.
 fn source_name(bound: &BoundScene, source: u32) -> String {
     let name = bound.scene.sources.get(source as usize).map_or("", |s| s.name.as_str());
     if name.is_empty() { format!("source {}", source + 1) } else { name.to_owned() }

@@ -189,6 +189,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
 }
 
 impl Way {
+    /// Intersector and normals.
     fn traced_with(self) -> (&'static str, NormalMode) {
         match self {
             Self::Finer(_) => ON_FACETS,
@@ -297,6 +298,7 @@ impl Undecided<'_> {
         }
     }
 
+    /// Traces the pilot on facets.
     fn trace_facets(&self, mesh: &FacetMesh, settings: &RunSettings) -> ReplicatedRun {
         let octree = self.source.build(mesh, FacetTree::Octree, NormalMode::Bilinear);
         trace_replicates(self.bound, &*octree, settings)

@@ -17,6 +17,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 pub(super) struct Worst {
     /// Geometric over allowed error.
     pub(super) ratio: f64,
+    /// Geometric error as a share of the figure, and its name.
     pub(super) share: Option<f64>,
     pub(super) figure: String,
 }

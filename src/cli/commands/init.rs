@@ -94,9 +94,8 @@ fn rules(part: &PartAccount) -> Vec<String> {
     let name = if part.name.is_empty() { "\"*\"".to_owned() } else { quoted(&part.name) };
     let solids = part.solids.iter().filter(|s| !s.faces.is_empty());
     let is_one = solids.clone().count() < 2;
-    let selector = |solid: &SolidAccount| match is_one {
-        true => format!("part = {name}"),
-        false => format!("part = {name}\nsolid = {}", solid.index),
+    let selector = |solid: &SolidAccount| {
+        if is_one { format!("part = {name}") } else { format!("part = {name}\nsolid = {}", solid.index) }
     };
     solids.map(|solid| rule(&selector(solid), solid)).collect()
 }

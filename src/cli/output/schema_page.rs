@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value};
 
+/// Begins the page.
 const OPENING: &str = "# Scene files\n\n\
     A scene is a TOML file: what is traced, what it is made of, where light comes from and where it is counted. `lampyris init FILE.stp` \
     writes one to begin with. Lengths are mm, angles degrees, powers those of `unit`. Paths are relative to the scene file. \
@@ -26,10 +27,12 @@ fn words(definition: &Value) -> Vec<String> {
     forms.filter_map(|w| Some(format!("`{}`: {}", w["const"].as_str()?, text(w).trim_end_matches('.')))).collect()
 }
 
+/// What the schema says of something, on one line.
 fn text(value: &Value) -> String {
     value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// A key with what it means, the words that it may be, and what it is unless given.
 fn row(schema: &Value, key: &str, property: &Value) -> String {
     let allowed = definition(schema, property).map(words).unwrap_or_default();
     let allowed = if allowed.is_empty() { String::new() } else { format!(" {}.", allowed.join("; ")) };
@@ -46,6 +49,7 @@ fn row(schema: &Value, key: &str, property: &Value) -> String {
     format!("| `{key}` | {}{allowed} | {default} |\n", text(property)).replace("  ", " ")
 }
 
+/// The keys as a table of Markdown.
 fn table<'s>(schema: &'s Value, keys: impl Iterator<Item = (&'s String, &'s Value)>) -> String {
     let rows: String = keys.map(|(key, property)| row(schema, key, property)).collect();
     format!("\n| key | what it says | unless given |\n| --- | --- | --- |\n{rows}")
@@ -75,6 +79,7 @@ pub(crate) fn schema_page(schema: &Value) -> String {
     page
 }
 
+/// A section about one table of the file.
 fn section(schema: &Value, heading: &str, definition: &Value) -> String {
     let rows = table(schema, keys(definition).into_iter().flatten());
     format!("\n## `{heading}`\n\n{}\n{rows}", text(definition))

@@ -101,6 +101,7 @@ pub(crate) fn sequence_section(results: &Results, model: &Model, facets: &Facets
 fn sequence_view(results: &Results, facets: &Facets) -> View {
     let ways = recorded_ways(&results.paths);
     let mut view = View::of_facets("sequences", "Paths of the first ways", facets).faded(0.35);
+    // Rank by rank, so that every receiver has its first way drawn before any has its second.
     let first = (0..DRAWN.len()).flat_map(|rank| {
         let of_rank = results.sequences.iter().enumerate();
         of_rank.filter_map(move |(r, found)| Some((r, rank, found.first.get(rank)?)))
@@ -109,6 +110,7 @@ fn sequence_view(results: &Results, facets: &Facets) -> View {
         let mut lines = Polylines::default();
         let same = ways.iter().filter(|w| w.steps == sequence.steps);
         same.take(MOST_DRAWN).for_each(|w| lines.push(w.points.iter().copied()));
+        // Rays that leave go to infinity: they are cut a little outside of the model.
         let bounds = facets.mesh.bounds();
         let near = lines.inside(&bounds.grown(0.35 * bounds.diagonal().max(1.0)));
         let name = format!("{} {}", results.receivers[receiver].name, rank + 1);
