@@ -3,6 +3,7 @@
 use super::view::{Shape, View};
 use crate::formats::Picture;
 use glam::{Vec2, Vec3};
+use std::ops::Range;
 
 /// Size of the picture, pixels.
 const WIDTH: usize = 1200;
@@ -22,12 +23,11 @@ impl Canvas {
     fn new() -> Self {
         let (width, height) = (WIDTH * FINE, HEIGHT * FINE);
         // A background that reads on a white and on a dark page.
-        let rgb = (0..width * height)
-            .map(|k| {
-                let shade = (k / width) as f32 / height as f32;
-                [0.10 + 0.05 * shade, 0.11 + 0.05 * shade, 0.14 + 0.06 * shade]
-            })
-            .collect();
+        let mut rgb = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let shade = y as f32 / height as f32;
+            rgb.resize((y + 1) * width, [0.10 + 0.05 * shade, 0.11 + 0.05 * shade, 0.14 + 0.06 * shade]);
+        }
         Self { width, height, rgb, depth: vec![f32::INFINITY; width * height] }
     }
 
@@ -57,14 +57,18 @@ impl Canvas {
         let (low, high) = (p.min(q).min(r), p.max(q).max(r));
         // A triangle far outside has an empty range: both ends are cut to the picture.
         let range = |lo: f32, hi: f32, n: usize| (lo.max(0.0) as usize)..((hi.max(-1.0) + 1.0) as usize).min(n);
+        let columns = range(low.x, high.x, self.width);
+        // Two barycentric coordinates and the depth change by the same step from each sample of a row to the next.
+        let [u_step, v_step] = [(r.y - p.y) / area, (p.y - q.y) / area];
+        let [to_b, to_c] = [b.z - a.z, c.z - a.z];
         for y in range(low.y, high.y, self.height) {
-            for x in range(low.x, high.x, self.width) {
-                let s = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let (u, v) = ((s - p).perp_dot(r - p) / area, (q - p).perp_dot(s - p) / area);
-                if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-                    let depth = a.z + u * (b.z - a.z) + v * (c.z - a.z);
-                    self.put(x, y, depth, colour, opacity);
-                }
+            let s = Vec2::new(columns.start as f32 + 0.5, y as f32 + 0.5);
+            let (u, v) = ((s - p).perp_dot(r - p) / area, (q - p).perp_dot(s - p) / area);
+            let inside =
+                span_of_positive([[u, u_step], [v, v_step], [1.0 - u - v, -u_step - v_step]], columns.len());
+            for k in inside {
+                let (u, v) = (u + k as f32 * u_step, v + k as f32 * v_step);
+                self.put(columns.start + k, y, a.z + u * to_b + v * to_c, colour, opacity);
             }
         }
     }
@@ -102,6 +106,23 @@ impl Canvas {
         }
         Picture { width: WIDTH as u32, height: HEIGHT as u32, rgb }
     }
+}
+
+/// The indices below `n` at which all of some linear functions, each given by its value at 0 and its step, are positive or zero.
+fn span_of_positive<const N: usize>(functions: [[f32; 2]; N], n: usize) -> Range<usize> {
+    let (mut first, mut last) = (0.0f32, n as f32 - 1.0);
+    for [value, step] in functions {
+        let root = -value / step;
+        if step > 0.0 {
+            first = first.max(root.ceil());
+        } else if step < 0.0 {
+            last = last.min(root.floor());
+        } else if value < 0.0 {
+            return 0..0;
+        }
+    }
+    // A sum below zero becomes zero: an empty range.
+    first as usize..(last + 1.0) as usize
 }
 
 /// Where the camera stands, as a direction towards it: the same as that of the interactive view.
@@ -190,4 +211,38 @@ pub(super) fn common_range(shapes: &[Shape]) -> [f32; 2] {
     finite
         .fold(None, |r, v| Some(r.map_or([v, v], |[lo, hi]: [f32; 2]| [lo.min(v), hi.max(v)])))
         .unwrap_or([0.0, 1.0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two triangles tile a square without a gap and do not leave it; of two, the nearer is seen.
+    #[test]
+    fn triangles_cover_their_samples_and_no_others() {
+        let mut canvas = Canvas::new();
+        let empty = canvas.rgb.clone();
+        let corners = [[100.2, 50.7], [140.2, 50.7], [140.2, 90.7], [100.2, 90.7]];
+        let [a, b, c, d] = corners.map(|[x, y]| Vec3::new(x, y, 1.0));
+        for (z, colour) in [(0.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 1.0, 0.0])] {
+            for triangle in [[a, b, c], [c, a, d]] {
+                canvas.triangle(triangle.map(|p| p.with_z(z)), colour, 1.0);
+            }
+        }
+        let (mut red, mut changed) = (0, 0);
+        for (sample, before) in canvas.rgb.iter().zip(&empty) {
+            red += usize::from(*sample == [1.0, 0.0, 0.0]);
+            changed += usize::from(sample != before);
+        }
+        assert_eq!([red, changed], [40 * 40; 2]);
+    }
+
+    #[test]
+    fn spans_of_linear_functions() {
+        assert_eq!(span_of_positive([[-2.0, 1.0], [5.0, -1.0]], 10), 2..6);
+        assert_eq!(span_of_positive([[-2.5, 1.0], [5.5, -1.0]], 5), 3..5);
+        assert!(span_of_positive([[-3.0, 1.0], [1.0, -1.0]], 10).is_empty());
+        assert!(span_of_positive([[-1.0, 0.0]], 10).is_empty());
+        assert_eq!(span_of_positive([[1.0, 0.0]], 10), 0..10);
+    }
 }

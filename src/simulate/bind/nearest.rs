@@ -103,11 +103,16 @@ fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
         let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
         Uv::new(at(i / SAMPLES, u0, u1), at(i % SAMPLES, v0, v1))
     });
-    let start = grid
-        .filter(|&uv| is_inside(loops, uv))
-        .map(|uv| (away(uv), uv))
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .or_else(|| loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)));
+    // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
+    let mut start: Option<(f64, Uv)> = None;
+    for uv in grid {
+        let distance = away(uv);
+        if start.is_none_or(|(nearest, _)| distance.total_cmp(&nearest).is_lt()) && is_inside(loops, uv) {
+            start = Some((distance, uv));
+        }
+    }
+    let start =
+        start.or_else(|| loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)));
     let Some((mut best, mut uv)) = start else { return border };
     // Gauss–Newton towards the foot; only what lies inside counts on the way.
     for _ in 0..MOST_STEPS {
