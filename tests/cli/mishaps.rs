@@ -92,6 +92,27 @@ fn results_that_cannot_be_written_where_they_should_are_written_elsewhere() {
     assert_eq!(digest(&path.join(rescued)), digest(&path.join("whole")));
 }
 
+/// Started where nothing can be written: the sums alone are left, with the facets that an accuracy had come to.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_sums_of_a_run_with_an_accuracy_are_merged() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    fs::create_dir_all(path.join("out/facets.glb/full")).unwrap();
+    let output = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir("/proc")
+        .envs([("HOME", "/proc/none"), ("TMPDIR", "/proc/none")])
+        .args(["trace", "--accuracy", "0.2deg", "-o"])
+        .args([path.join("out"), path.join("scene.toml")])
+        .output()
+        .unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(1) && err.contains("lampyris merge"), "{err}");
+    let (code, _, err) = lampyris_in(path, &["merge", "out/checkpoint.tally", "-o", "merged"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(path.join("merged/report.html").is_file());
+}
+
 #[test]
 fn what_an_interrupted_run_saved_is_not_written_over() {
     let folder = lens(|s| s);

@@ -4,9 +4,11 @@ use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::intersect::NormalMode;
+use crate::math::FaceId;
 use crate::pipeline::{
     IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, RayRange, TracingSettings, fingerprint,
 };
+use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -26,6 +28,9 @@ pub(crate) struct TallyHeader {
     face: Vec<(String, [u64; 2])>,
     #[serde(default)]
     role: Vec<(String, [u64; 2])>,
+    /// Local tolerances that an accuracy came to: measured times decided them, so that they cannot be found again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    plan: Option<StoredPlan>,
     rays: Option<u64>,
     /// The first ray, where the run was asked for as a range of rays.
     #[serde(default)]
@@ -69,6 +74,7 @@ impl TallyHeader {
             part: m.part.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             face: m.face.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
             role: m.role.iter().map(|(n, t)| (n.clone(), bits(*t))).collect(),
+            plan: m.plan.as_ref().map(StoredPlan::new),
             // As many as were traced, whichever way they were asked for.
             rays: prepared.rays.or(t.rays()),
             first_ray: t.ray_range.and_then(|range| range.first),
@@ -107,8 +113,7 @@ impl TallyHeader {
             part: self.part.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             face: self.face.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
             role: self.role.iter().map(|(n, t)| (n.clone(), back(*t))).collect(),
-            // Parts are not traced with an accuracy asked for.
-            plan: None,
+            plan: self.plan.as_ref().map(StoredPlan::restore),
         }
     }
 
@@ -123,6 +128,62 @@ impl TallyHeader {
         }
     }
 }
+
+/// A [`TolerancePlan`] in a file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct StoredPlan {
+    places: Vec<StoredTolerance>,
+    other: StoredTolerance,
+    coarsest: u64,
+    finest: u64,
+}
+
+/// A [`RelativeTolerance`] in a file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct StoredTolerance {
+    faces: Vec<u32>,
+    of_radius: u64,
+    radii: [u64; 2],
+}
+
+impl StoredPlan {
+    fn new(plan: &TolerancePlan) -> Self {
+        Self {
+            places: plan.places.iter().map(StoredTolerance::new).collect(),
+            other: StoredTolerance::new(&plan.other),
+            coarsest: plan.coarsest_mm.to_bits(),
+            finest: plan.finest_mm.to_bits(),
+        }
+    }
+
+    fn restore(&self) -> TolerancePlan {
+        TolerancePlan {
+            places: self.places.iter().map(StoredTolerance::restore).collect(),
+            other: self.other.restore(),
+            coarsest_mm: f64::from_bits(self.coarsest),
+            finest_mm: f64::from_bits(self.finest),
+        }
+    }
+}
+
+impl StoredTolerance {
+    fn new(tolerance: &RelativeTolerance) -> Self {
+        Self {
+            faces: tolerance.faces.iter().map(|f| f.0).collect(),
+            of_radius: tolerance.of_radius.to_bits(),
+            radii: tolerance.radii_mm.map(f64::to_bits),
+        }
+    }
+
+    fn restore(&self) -> RelativeTolerance {
+        RelativeTolerance {
+            faces: self.faces.iter().map(|f| FaceId(*f)).collect(),
+            of_radius: f64::from_bits(self.of_radius),
+            radii_mm: self.radii.map(f64::from_bits),
+        }
+    }
+}
+
 /// The options that ask for the facets, normals and intersector of a run.
 fn accuracy_options(prepared: &PreparedScene) -> String {
     let [low, high] = prepared.mesh_settings.tolerance;
