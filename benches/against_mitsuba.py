@@ -102,6 +102,8 @@ def trace(peer, seed, n):
         si = scene.ray_intersect(ray, mi.RayFlags.Minimal | mi.RayFlags.ShadingFrame, False, active)
         segments += dr.select(active, U(1), U(0))
         hit, received = active & si.is_valid(), active & ~si.is_valid() & meets
+        if dr.hint(peer.interactions is not None, mode="scalar"):
+            received &= bounce == U(peer.interactions)
         x_end, y_end = dr.select(received, x, x_end), dr.select(received, y, y_end)
         end = dr.select(received, weight, end)
         i = U(dr.clip((x / half + 1) * (cells / 2), 0, cells - 1))
@@ -131,9 +133,11 @@ def trace(peer, seed, n):
 class Mitsuba:
     """A scene in Mitsuba, with a loop that does what it asks for and nothing else."""
 
-    def __init__(self, name, ply, threads):
+    def __init__(self, name, ply, threads, interactions=None):
+        """Counts all light, or only what met so many surfaces."""
         import numpy as np
 
+        self.interactions = interactions
         mi.set_variant("llvm_ad_rgb")
         dr.set_thread_count(threads)
         self.name, self.scene = name, SCENES[name]

@@ -28,7 +28,7 @@ class Run:
         self.messages = tempfile.TemporaryFile()
         variables = {**os.environ, "NO_COLOR": "1", "COLUMNS": "400", **environment}
         self.child = subprocess.Popen(command, cwd=folder, env=variables, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.messages)
-        self.pid, self.usage = self.child.pid, None
+        self.pid, self.usage, self.is_starved = self.child.pid, None, False
 
     def is_running(self):
         if self.usage is None:
@@ -54,6 +54,7 @@ class Run:
     def limit_memory(self):
         """No more address space than it has."""
         size = int(Path(f"/proc/{self.pid}/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+        self.is_starved = True
         resource.prlimit(self.pid, resource.RLIMIT_AS, (size, size))
 
     def peak_bytes(self):
