@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rays a second of the three peer scenes against Mitsuba 3, on the same facets, in turns.
+"""Rays a second of the three peer scenes against Mitsuba 3, on the same facets, in turns; with `--scenes demo` the peak candela of the lamp.
 
 Needs Python with numpy and mitsuba (PyPI) and an LLVM library; none is a dependency of lampyris. Without them it says so and ends well.
 
@@ -31,15 +31,21 @@ PARABOLOIDS = ((-95.0, 18.0), (0.0, 24.0), (95.0, 30.0))  # middle in x and foca
 class Scene:
     """What Mitsuba is told of a scene; lampyris reads the scene file."""
 
-    def __init__(self, file, model, index, receiver, half, fine):
+    def __init__(self, file, model, index, receiver, half, fine, lumens=None):
         self.file, self.model, self.index, self.fine = file, model, index, fine
-        self.receiver, self.half = receiver, half  # plane z, half side
+        self.receiver, self.half = receiver, half  # plane z, half sides; without a plane half angles in degrees
+        self.lumens = lumens  # of a far field
+
+
+FAR_CELLS = 120, 90
+PLANE_CELLS = 200, 200
 
 
 SCENES = {
-    "s1": Scene("s1_lens", "lens_planoconvex_nurbs", 1.5168, 107.026853, 20.0, 5e-5),
-    "s2": Scene("s2_lamp", "lamp_multicavity", 1.4906, 25000.0, 10000.0, 4.2e-4),
-    "s3": Scene("s3_reflector", "reflector_freeform_trimmed", 1.0, 1000.0, 1000.0, 1.4e-4),
+    "s1": Scene("s1_lens", "lens_planoconvex_nurbs", 1.5168, 107.026853, (20.0, 20.0), 5e-5),
+    "s2": Scene("s2_lamp", "lamp_multicavity", 1.4906, 25000.0, (10000.0, 10000.0), 4.2e-4),
+    "s3": Scene("s3_reflector", "reflector_freeform_trimmed", 1.0, 1000.0, (1000.0, 1000.0), 1.4e-4),
+    "demo": Scene("demo", "lamp_multicavity", 1.4906, None, (6.0, 4.5), 1e-3, 300.0),
 }
 
 
@@ -70,7 +76,7 @@ def groups_of(name, vertices, triangles, owner):
         return {"dielectric": np.ones(len(triangles), bool)}
     face, part = owner[:, 0], owner[:, 1]
     mirror = np.zeros(len(triangles), bool)
-    if name == "s2":
+    if name in ("s2", "demo"):
         for k in np.unique(face[part == 0]):
             x, y, z = vertices[triangles[face == k].ravel(), :3].T
             on = [np.abs(((x - xc) ** 2 + y**2) / (4 * f) - z).max() < 1e-3 for xc, f in PARABOLOIDS]
@@ -85,19 +91,27 @@ def groups_of(name, vertices, triangles, owner):
 
 def trace(peer, seed, n):
     """The loop itself; `dr` and `mi` are global, as `dr.syntax` takes every local name for state of the loop."""
-    scene, pointer, receiver, half, index, cells = peer.world, peer.pointer, peer.scene.receiver, peer.scene.half, peer.scene.index, 200
+    scene, pointer, receiver, half, index = peer.world, peer.pointer, peer.scene.receiver, peer.scene.half, peer.scene.index
+    cells = PLANE_CELLS if receiver is not None else FAR_CELLS
     F, U, B = mi.Float, mi.UInt32, mi.Bool
     rng = mi.PCG32(size=n, initstate=seed)
     origin, direction = peer.emit(rng, n)
     ray = mi.Ray3f(origin, direction)
     weight, active = dr.full(F, 1.0, n), dr.full(B, True, n)
     bounce, segments = dr.zeros(U, n), dr.zeros(U, n)
-    grid = dr.zeros(F, cells * cells)
+    grid = dr.zeros(F, cells[0] * cells[1])
     x_end, y_end, end = dr.zeros(F, n), dr.zeros(F, n), dr.zeros(F, n)
     while active:
-        t = (receiver - ray.o.z) / ray.d.z
-        x, y = dr.fma(ray.d.x, t, ray.o.x), dr.fma(ray.d.y, t, ray.o.y)
-        meets = (t > 0) & (abs(x) <= half) & (abs(y) <= half)
+        if dr.hint(receiver is not None, mode="scalar"):
+            t = (receiver - ray.o.z) / ray.d.z
+            x, y = dr.fma(ray.d.x, t, ray.o.x), dr.fma(ray.d.y, t, ray.o.y)
+            ahead = t > 0
+        else:
+            # Light that escapes is counted by direction: H and V of type A, degrees.
+            t = dr.full(F, dr.inf, 1)
+            x, y = dr.rad2deg(dr.atan2(ray.d.x, ray.d.z)), dr.rad2deg(dr.asin(ray.d.y))
+            ahead = ray.d.z > 0
+        meets = ahead & (abs(x) <= half[0]) & (abs(y) <= half[1])
         ray.maxt = dr.select(meets, t, dr.largest(F))
         si = scene.ray_intersect(ray, mi.RayFlags.Minimal | mi.RayFlags.ShadingFrame, False, active)
         segments += dr.select(active, U(1), U(0))
@@ -106,9 +120,9 @@ def trace(peer, seed, n):
             received &= bounce == U(peer.interactions)
         x_end, y_end = dr.select(received, x, x_end), dr.select(received, y, y_end)
         end = dr.select(received, weight, end)
-        i = U(dr.clip((x / half + 1) * (cells / 2), 0, cells - 1))
-        j = U(dr.clip((y / half + 1) * (cells / 2), 0, cells - 1))
-        dr.scatter_reduce(dr.ReduceOp.Add, grid, weight, j * cells + i, received)
+        i = U(dr.clip((x / half[0] + 1) * (cells[0] / 2), 0, cells[0] - 1))
+        j = U(dr.clip((y / half[1] + 1) * (cells[1] / 2), 0, cells[1] - 1))
+        dr.scatter_reduce(dr.ReduceOp.Add, grid, weight, j * cells[0] + i, received)
         normal = si.sh_frame.n
         cos_i = -dr.dot(ray.d, normal)
         going, on = ray.d, dr.full(B, False, 1)
@@ -182,14 +196,25 @@ class Mitsuba:
         return origin + 0.31 * normal + across * a + other * b, across * (sine * c) + other * (sine * s) + normal * dr.sqrt(1 - u)
 
     def run(self, seed, rays):
-        """Seconds, power received, RMS along x and y, segments a ray."""
+        """Seconds, power received, RMS along x and y, segments a ray, peak candela of a far field."""
         start = time.perf_counter()
         grid, x, y, w, segments = self.loop(self, dr.opaque(mi.UInt64, seed), rays)
         power, xx, yy, n = dr.sum(w), dr.sum(w * x * x), dr.sum(w * y * y), dr.sum(mi.Float64(segments))
         dr.eval(grid, power, xx, yy, n)
         dr.sync_thread()
         seconds = time.perf_counter() - start
-        return seconds, power[0] / rays, [math.sqrt(xx[0] / power[0]), math.sqrt(yy[0] / power[0])], n[0] / rays
+        return seconds, power[0] / rays, [math.sqrt(xx[0] / power[0]), math.sqrt(yy[0] / power[0])], n[0] / rays, self.peak(grid, rays)
+
+    def peak(self, grid, rays):
+        if self.scene.lumens is None:
+            return None
+        columns, lines = FAR_CELLS
+        wide, high = (math.radians(2 * half / cells) for half, cells in zip(self.scene.half, FAR_CELLS))
+        best = 0.0
+        for j, line in enumerate(grid.numpy().reshape(lines, columns)):
+            low = math.radians(-self.scene.half[1]) + j * high
+            best = max(best, float(line.max()) / (wide * (math.sin(low + high) - math.sin(low))))
+        return best * self.scene.lumens / rays
 
 
 def lampyris(program, scene, options, folder, seed):
@@ -197,8 +222,8 @@ def lampyris(program, scene, options, folder, seed):
     line = [program, "trace", str(FIXTURES / "scenes" / f"{scene.file}.toml"), "--json", "-q", "-o", folder, "--seed", str(seed)]
     line += ["--rays", str(options.rays), "--threads", str(options.threads), "--tolerance", str(options.tolerance_now)]
     out = json.loads(subprocess.run(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True).stdout)
-    receiver = out["receivers"][0]
-    return out["seconds"]["trace"], receiver["power"], receiver["rms"], out["segments"] / out["rays"]
+    receiver = out["receivers"][-1]
+    return out["seconds"]["trace"], receiver["power"], receiver["rms"], out["segments"] / out["rays"], receiver["figures"]["max"]["value"]
 
 
 def row(seconds, last, rays):
@@ -211,6 +236,7 @@ def row(seconds, last, rays):
         "power": last[1],
         "rms": last[2],
         "segments_per_ray": last[3],
+        "peak_candela": last[4],
     }
 
 
@@ -262,7 +288,8 @@ def main():
         print(
             f"{name}  {peer.triangles} triangles  lampyris {rate['lampyris']['median']:.2f} (best {rate['lampyris']['best']:.2f})"
             f"  mitsuba {rate['mitsuba']['median']:.2f} (best {rate['mitsuba']['best']:.2f}) Mrays/s"
-            f"  ratio {ratio['median_of_pairs']:.2f} ({ratio['least']:.2f}-{ratio['most']:.2f})"
+            + (f"  peak {last['lampyris'][4]:.0f} and {last['mitsuba'][4]:.0f} cd" if scene.lumens else "")
+            + f"  ratio {ratio['median_of_pairs']:.2f} ({ratio['least']:.2f}-{ratio['most']:.2f})"
         )
     if options.output:
         Path(options.output).write_text(json.dumps(result, indent=1) + "\n")

@@ -82,7 +82,7 @@ def mitsuba(options):
     mitsuba.set_variant("llvm_ad_rgb")
     against_mitsuba.dr, against_mitsuba.mi = drjit, mitsuba
     peer = against_mitsuba.Mitsuba(options.scene, options.ply, options.threads, INTERACTIONS[options.scene])
-    seconds, _, (x, y), _ = peer.run(options.seed, options.rays)
+    _, _, (x, y), *_ = peer.run(options.seed, options.rays)
     answered = time.time()
     warm = peer.run(options.seed + 1000, options.rays)[0]
     return options.rays, [math.hypot(x, y)] if options.scene == "s1" else [x, y], warm, answered

@@ -79,9 +79,13 @@ class Soak:
             place = self.folder / name
             if name.endswith(".tally"):
                 shutil.move(place, Path(self.folder, out, "checkpoint.tally"))
-            else:
+                continue
+            # A process that ended while it wrote them leaves no results there, and its checkpoint where it was.
+            whole = (place / "results.json").exists()
+            if whole:
                 self.compare(place)
-                shutil.rmtree(place)
+            shutil.rmtree(place)
+            if whole:
                 return True
         return code == 0
 
