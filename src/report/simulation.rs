@@ -18,6 +18,9 @@ use crate::study::geometric_error::GeometricError;
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
 
+/// Statistical error of the brightest cell, as a share of it, beyond which no direction is called the brightest.
+const MOST_UNCERTAIN_PEAK: f64 = 0.3;
+
 /// Everything that the report of a traced scene speaks of.
 pub struct SimulationReport<'a> {
     /// Title of the scene.
@@ -98,7 +101,9 @@ impl SimulationReport<'_> {
         text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };
         text += ". ";
         let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
-        for (grid, max) in directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?))) {
+        let brightest = directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?)));
+        // The largest of many cells that few rays met says nothing of the lamp.
+        for (grid, max) in brightest.filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value) {
             if let Some(([h, v], _)) = grid.peak() {
                 text += &format!(
                     "The brightest direction is {} {}°, {} {}° with **{}**. ",

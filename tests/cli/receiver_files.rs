@@ -142,6 +142,29 @@ fn the_flux_of_an_ies_file_is_that_of_its_receiver() {
     assert!((flux(kind, &angles, &candela) / expected - 1.0).abs() < 1e-4);
 }
 
+/// A luminaire that shines down has no upper half: γ ends at 90, where every plane has a value of its own.
+#[test]
+fn half_a_distribution_is_written_for_luminaires() {
+    let far = "[[receiver]]\nname = 'down'\nkind = 'far_field'\nangles = 'C'\nv_deg = [0, 90]\ncells = [24, 20]\n\
+        [[receiver]]\nname = 'up'\nkind = 'far_field'\nangles = 'C'\nv_deg = [90, 180]\ncells = [24, 20]\n\
+        [[receiver]]\nname = 'part'\nkind = 'far_field'\nangles = 'C'\nv_deg = [0, 60]\ncells = [24, 20]\n";
+    let (folder, found) = trace("lm", far);
+    for (k, name, ends) in [(0, "down", [0.0, 90.0]), (1, "up", [90.0, 180.0])] {
+        let expected = found["receivers"][k]["power"].as_f64().unwrap();
+        let (kind, angles, candela) = ies(&folder.path().join(format!("out/{name}.ies")));
+        assert_eq!([angles[1][0], angles[1][angles[1].len() - 1]], ends);
+        if expected == 0.0 {
+            continue;
+        }
+        let flux = flux(kind, &angles, &candela);
+        assert!((flux / expected - 1.0).abs() < 1e-4, "{name}: {flux} lm of {expected}");
+        let ldt = lampyris::formats::read_eulumdat(&folder.path().join(format!("out/{name}.ldt"))).unwrap();
+        // Six decimals of candela per kilolumen.
+        assert!((ldt.flux() / expected - 1.0).abs() < 1e-4, "{name}: {} lm of {expected}", ldt.flux());
+    }
+    assert!(!folder.path().join("out/part.ies").exists() && !folder.path().join("out/part.ldt").exists());
+}
+
 #[test]
 fn the_rays_of_data_3_are_those_that_arrived() {
     let (folder, found) = trace(

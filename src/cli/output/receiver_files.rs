@@ -2,8 +2,8 @@
 
 use crate::cli::failure::Failure;
 use crate::formats::{
-    Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_grid_csv,
-    write_grid_npz, write_grid_png, write_ies, write_tm25, write_vti,
+    Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
+    write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_tm25, write_vti,
 };
 use crate::report::{file_stem, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
@@ -51,10 +51,14 @@ pub(crate) fn write(
         "cd" => Some((grid, receiver.power)),
         _ => photometric_grid(receiver).zip(receiver.photometric().map(|c| c.total)),
     };
-    // LM-63 holds whole distributions alone.
+    // Both formats hold whole distributions alone, and those of half a sphere.
     if let Some(photometry) = candela.and_then(|(grid, lumens)| photometry(receiver, &grid, lumens)) {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;
+        if photometry.kind == PhotometricType::C {
+            names.push(format!("{stem}.ldt"));
+            write_eulumdat(&folder.join(format!("{stem}.ldt")), &photometry)?;
+        }
     }
     Ok(names)
 }
@@ -79,16 +83,20 @@ const ADDITIONAL: usize = 7;
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
 /// 1, so that their flux is the receiver's.
 fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
-    let (kind, whole) = match receiver.angles? {
-        FarFieldType::A => (PhotometricType::A, [[-90.0, 90.0], [-90.0, 90.0]]),
-        FarFieldType::B => (PhotometricType::B, [[-90.0, 90.0], [-90.0, 90.0]]),
-        FarFieldType::C => (PhotometricType::C, [[0.0, 360.0], [0.0, 180.0]]),
+    let half_turn = [-90.0, 90.0];
+    // Light of a luminaire may go up or down alone (LM-63-2002, 5.11).
+    let (kind, wholes) = match receiver.angles? {
+        FarFieldType::A => (PhotometricType::A, vec![[half_turn; 2]]),
+        FarFieldType::B => (PhotometricType::B, vec![[half_turn; 2]]),
+        FarFieldType::C => {
+            (PhotometricType::C, [[0.0, 180.0], [0.0, 90.0], [90.0, 180.0]].map(|v| [[0.0, 360.0], v]).to_vec())
+        }
     };
-    let same = |k: usize| (0..2).all(|e| (grid.axes[k].range[e] - whole[k][e]).abs() < WHOLE_RANGE_DEG);
-    // Part of a far field has no flux that a file of a luminaire could claim.
-    if !same(0) || !same(1) {
-        return None;
-    }
+    let near = |a: f64, b: f64| (a - b).abs() < WHOLE_RANGE_DEG;
+    // Any other part of a far field has no flux that a file of a luminaire could claim.
+    let whole = wholes
+        .into_iter()
+        .find(|whole| (0..2).all(|k| (0..2).all(|e| near(grid.axes[k].range[e], whole[k][e]))))?;
     let [h, v] = &grid.axes;
     let ends = |k: usize, axis: &crate::formats::Axis| -> Vec<f64> {
         let middle = (0..axis.cells).map(|i| axis.center(i));
@@ -97,11 +105,16 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
     // Index of the cell behind each angle: the ends repeat their neighbours.
     let cell = |i: usize, n: usize| i.saturating_sub(1).min(n - 1);
     let is_end = |i: usize, n: usize| i == 0 || i == n + 1;
+    // All planes meet at 0° and 180° of γ, and at 90° up and down; not on the horizon of a luminaire.
+    let is_pole = |j: usize| {
+        let angle = whole[1][usize::from(j > 0)];
+        is_end(j, v.cells) && !(kind == PhotometricType::C && angle == 90.0)
+    };
     let cells = |i: usize, j: usize| grid.values[cell(j, v.cells) * h.cells + cell(i, h.cells)];
     let mean = |of: &mut dyn Iterator<Item = f64>, n: usize| of.sum::<f64>() / n as f64;
     let value = |i: usize, j: usize| match kind {
         PhotometricType::B if is_end(i, h.cells) => mean(&mut (1..=v.cells).map(|j| cells(i, j)), v.cells),
-        PhotometricType::A | PhotometricType::C if is_end(j, v.cells) => {
+        PhotometricType::A | PhotometricType::C if is_pole(j) => {
             mean(&mut (1..=h.cells).map(|i| cells(i, j)), h.cells)
         }
         // C 0 and C 360 are one plane, between the first and the last cell.

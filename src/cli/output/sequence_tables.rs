@@ -4,7 +4,7 @@ use super::rule_table::face_labels;
 use crate::cli::console::{Console, print};
 use crate::cli::output::terminal_tables::table_text;
 use crate::formats::{Facets, Polylines};
-use crate::model::Model;
+use crate::model::{Model, PlacedFace};
 use crate::report::{Cell, Section, Table, View, figures, file_stem, grouped};
 use crate::simulate::{Event, Results, SequenceResult, recorded_ways};
 use serde_json::Value;
@@ -26,13 +26,16 @@ const MOST_DRAWN: usize = 60;
 /// Share of a receiver's power, per cent, is shown with so many digits.
 const SHARE_DIGITS: usize = 4;
 
-/// Names of faces as ways have them: what selects each, without the braces around it.
+/// Names of faces as ways have them: what selects each, without the braces around it, behind its instance where there are several.
 fn face_names(model: &Model) -> Vec<String> {
-    let bare = |label: String| {
-        let inner = label.strip_prefix("on = { ").and_then(|l| l.strip_suffix(" }"));
-        inner.map_or(label.clone(), str::to_owned)
+    let name = |(face, label): (PlacedFace<'_>, String)| {
+        let bare = label.strip_prefix("on = { ").and_then(|l| l.strip_suffix(" }")).unwrap_or(&label);
+        if model.instances.len() < 2 || bare.starts_with("instance") {
+            return bare.to_owned();
+        }
+        format!("{} ({bare})", model.label(face.instance))
     };
-    face_labels(model).into_iter().map(bare).collect()
+    model.placed_faces().zip(face_labels(model)).map(name).collect()
 }
 
 /// A sequence in words.

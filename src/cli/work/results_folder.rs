@@ -135,7 +135,10 @@ fn page<'a>(
     provenance: Provenance,
 ) -> SimulationReport<'a> {
     let scene = &prepared.job.scene;
-    let title = if scene.title.is_empty() { prepared.job.loaded.model.name.clone() } else { scene.title.clone() };
+    // A page without a title says nothing to those who only hear it.
+    let file = crate::formats::file_name(Path::new(&scene.origin.file));
+    let titles = [scene.title.as_str(), prepared.job.loaded.model.name.as_str(), file.as_str()];
+    let title = titles.into_iter().find(|t| !t.trim().is_empty()).unwrap_or("light through a scene").to_owned();
     SimulationReport {
         title,
         results: &run.results,
