@@ -40,6 +40,15 @@ impl SolidAccount {
         })
     }
 
+    /// Sides of that box, mm; 0 where rounding alone makes a flat one thick.
+    pub fn size_mm(&self) -> [f64; 3] {
+        /// The rounding of places up to 100 m.
+        const ROUNDING_MM: f64 = 1e-9;
+        let [low, high] = self.bbox_mm().unwrap_or_default();
+        let side = |k: usize| high[k] - low[k];
+        std::array::from_fn(|k| if side(k) < ROUNDING_MM { 0.0 } else { side(k) })
+    }
+
     /// The colour that all its faces show; `None` where they differ or one has none.
     pub fn colour(&self) -> Option<Colour> {
         let first = self.faces.first()?.colour?;
@@ -292,6 +301,29 @@ mod tests {
     use std::f64::consts::PI;
 
     const TURN: [f64; 2] = [0.0, 2.0 * PI];
+
+    #[test]
+    fn a_flat_solid_has_no_thickness() {
+        let face = |colour: Option<Colour>| FaceAccount {
+            id: None,
+            name: String::new(),
+            colour,
+            layer: None,
+            kind: SurfaceKind::Plane,
+            radius_mm: None,
+            area_mm2: 16.0,
+            bbox_mm: [[-2.0, -2.0, 7.0], [2.0, 2.0, 7.000_000_000_000_002]],
+            at: [0.0; 3],
+        };
+        let grey = Some(Colour([0.5; 3]));
+        let solid = |faces: Vec<FaceAccount>| SolidAccount { index: 0, name: String::new(), closed: false, faces };
+        assert_eq!(solid(vec![face(grey)]).size_mm(), [4.0, 4.0, 0.0]);
+        assert_eq!(
+            [solid(vec![face(grey), face(grey)]), solid(vec![face(grey), face(None)])].map(|s| s.colour()),
+            [grey, None]
+        );
+        assert_eq!(solid(Vec::new()).size_mm(), [0.0; 3]);
+    }
 
     #[test]
     fn areas_of_whole_surfaces_are_those_of_their_formulas() {

@@ -74,8 +74,7 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     let name = if solid.name.is_empty() { String::new() } else { format!(" {}", named(&solid.name)) };
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
     let count = grouped(solid.faces.len() as u64);
-    let [low, high] = solid.bbox_mm().unwrap_or_default();
-    let size = [0, 1, 2].map(|k| figures(high[k] - low[k], 4)).join(" × ");
+    let size = solid.size_mm().map(|x| figures(x, 4)).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     let area = figures(area, 5);
     let mut text =

@@ -103,8 +103,7 @@ fn rules(part: &PartAccount) -> Vec<String> {
 /// A rule for one solid, with what may be said of it.
 fn rule(selector: &str, solid: &SolidAccount) -> String {
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
-    let [low, high] = solid.bbox_mm().unwrap_or_default();
-    let size = [0, 1, 2].map(|k| short(high[k] - low[k])).join(" × ");
+    let size = solid.size_mm().map(short).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     format!(
         "[[material]]\n\
