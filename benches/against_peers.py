@@ -34,7 +34,7 @@ TRUTH = {"s1": [0.800607], "s3": [81.3350, 37.0787]}
 WITHIN = 0.01
 # Tolerance of the facets, mm: pvtrace has flat normals only.
 FACETS = {"mitsuba": 0.01, "raysect": 0.01, "pvtrace": 0.001}
-SHARE = {"raysect": 5, "pvtrace": 200}  # of the rays, one in so many is traced
+SHARE = {"raysect": 1, "pvtrace": 200}  # of the rays, one in so many is traced
 GLASS, MIRROR = 1.5168, 0.95
 START_OFFSET = 1e-4  # mm: Raysect keeps positions in f32 and meets the facet that it leaves again
 
