@@ -38,6 +38,20 @@ fn a_beam_from_the_sun_casts_the_shadow_of_a_ball() {
     }
 }
 
+/// A cone of 1e-8 rad, whose cosine is 1 in an `f64`, fills its disc evenly: a black ball of half the disc's radius takes a quarter.
+#[test]
+fn a_star_in_a_narrow_cone_casts_the_shadow_of_a_ball() {
+    let half_angle_deg = 1e-8f64.to_degrees();
+    let mut world = World::default();
+    world.sphere("ball", Point::ZERO, 5.0);
+    let text = format!(
+        "[run]\nrays = 20_000\n[[material]]\npart = 'ball'\nsurface = 'absorber'\n[[source]]\nkind = 'cone'\n\
+         half_angle_deg = {half_angle_deg:e}\nat = [0, 0, -1e9]\n"
+    );
+    let power = world.run(&text, |_| ()).power;
+    assert!((power.absorbed - 0.25).abs() < 5e-3, "{power:?}");
+}
+
 /// The focus of a lens is the same for the sun as for a beam that begins before it.
 #[test]
 fn a_lens_on_facets_focuses_the_sun() {

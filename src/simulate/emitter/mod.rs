@@ -28,8 +28,12 @@ use far::NearStart;
 pub(crate) use measured::{Loaded, load};
 pub(crate) use ray_list::RayList;
 pub(crate) use sampler::RaySampler;
-use shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, direction_about_axis, point_on_rectangle, radius_on_disc};
+use shape::{
+    LAMBERTIAN, Lobe, Shape, direction_about_axis, point_on_rectangle, radius_on_disc, sine_from_cosine,
+    sine_from_versine, versine, versine_in_cone,
+};
 use smallvec::SmallVec;
+use std::f64::consts::PI;
 pub(crate) use stream::{RayIndex, Stream};
 
 /// A source ready to emit.
@@ -85,12 +89,12 @@ impl Emitter {
         }
         let mut frame = Frame::from_axis(at, direction, s.x.map(Vector::from_array));
         let mut lobe = match s.kind {
-            SourceKind::Cone => Lobe::Cone(s.half_angle_deg.unwrap_or(180.0).to_radians().cos()),
+            SourceKind::Cone => Lobe::Cone(versine(s.half_angle_deg.unwrap_or(180.0).to_radians())),
             SourceKind::Collimated => Lobe::Collimated,
             SourceKind::Lambertian => Lobe::Cosine(LAMBERTIAN),
             // The power that inverts cosⁿ is kept in place of n: one root or power a ray.
             SourceKind::Cosine => Lobe::Cosine(1.0 / (s.exponent.unwrap_or(1.0) + 1.0)),
-            _ => Lobe::Cone(-1.0),
+            _ => Lobe::Cone(versine(PI)),
         };
         let mut own_power = 1.0;
         // Drawn where the scene gives no spectrum; without, by the rays' own wavelengths or the run's.
@@ -237,15 +241,17 @@ impl Emitter {
         }
         ray.direction = match &self.lobe {
             Lobe::Collimated => axes[2],
-            Lobe::Cone(limit) => {
+            Lobe::Cone(rim) => {
                 let [u, v] = stream.pair(index, 1);
-                direction_about_axis(axes, cosine_in_cone(*limit, u), v)
+                let versine = versine_in_cone(*rim, u);
+                direction_about_axis(axes, [1.0 - versine, sine_from_versine(versine)], v)
             }
             Lobe::Cosine(exponent) => {
                 let [u, v] = stream.pair(index, 1);
                 // From (0, 1], as the power of zero would be grazing light; for a Lambertian source cos θ is √u (Malley).
                 let u = 1.0 - u;
-                direction_about_axis(axes, if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) }, v)
+                let cosine = if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) };
+                direction_about_axis(axes, [cosine, sine_from_cosine(cosine)], v)
             }
             Lobe::Measured(sampler) => f.direction(sampler.sample(stream.pair(index, 1))),
         };

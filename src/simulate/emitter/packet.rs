@@ -1,7 +1,10 @@
 //! Rays of a source made many at a time: the arithmetic of one, in loops over arrays that run in vectors.
 
 use super::Emitter;
-use super::shape::{LAMBERTIAN, Lobe, Shape, cosine_in_cone, point_on_rectangle, radius_on_disc, sine_from_cosine};
+use super::shape::{
+    LAMBERTIAN, Lobe, Shape, point_on_rectangle, radius_on_disc, sine_from_cosine, sine_from_versine,
+    versine_in_cone,
+};
 use super::stream::{PACKET, PacketNumbers, Stream};
 use crate::math::{Point, Vector};
 use crate::optics::sampling::sin_cos_turns;
@@ -116,27 +119,26 @@ impl Emitter {
     #[inline(always)]
     fn fill_directions(&self, [u, v]: [PacketNumbers; 2], directions: &mut [PacketNumbers; 3]) {
         let f = self.frame;
-        let mut cos_theta = u;
+        let [mut cos_theta, mut sin_theta] = [u; 2];
         match self.lobe {
-            Lobe::Cone(limit) => {
+            Lobe::Cone(rim) => {
                 // Plain loops over whole arrays: the compiler makes vectors of them under the caller's instruction set.
                 for k in 0..PACKET {
-                    cos_theta[k] = cosine_in_cone(limit, u[k]);
+                    let versine = versine_in_cone(rim, u[k]);
+                    cos_theta[k] = 1.0 - versine;
+                    sin_theta[k] = sine_from_versine(versine);
                 }
             }
             Lobe::Cosine(_) => {
                 for k in 0..PACKET {
                     cos_theta[k] = (1.0 - u[k]).sqrt();
+                    sin_theta[k] = sine_from_cosine(cos_theta[k]);
                 }
             }
             Lobe::Collimated | Lobe::Measured(_) => {
                 *directions = [[f.z.x; PACKET], [f.z.y; PACKET], [f.z.z; PACKET]];
                 return;
             }
-        }
-        let mut sin_theta = cos_theta;
-        for k in 0..PACKET {
-            sin_theta[k] = sine_from_cosine(cos_theta[k]);
         }
         let [sin, cos] = sines_and_cosines(&v);
         let [x, y] = [products(&sin_theta, &cos), products(&sin_theta, &sin)];
@@ -159,7 +161,7 @@ mod tests {
     fn a_single_ray_is_that_of_the_batch() {
         let frame = Frame::from_axis(Point::new(1.0, -2.0, 3.0), Vector::new(0.36, 0.48, -0.8), None);
         let shapes = [Shape::Point, Shape::Disc(15.0), Shape::Rectangle([0.5, 2.0])];
-        let lobes = [Lobe::Cone(-1.0), Lobe::Cone(0.7), Lobe::Collimated, Lobe::Cosine(0.5), Lobe::Cosine(0.2)];
+        let lobes = [Lobe::Cone(2.0), Lobe::Cone(0.3), Lobe::Collimated, Lobe::Cosine(0.5), Lobe::Cosine(0.2)];
         for (shape, lobe) in shapes.iter().flat_map(|s| lobes.iter().map(move |l| (s.clone(), l.clone()))) {
             let (wavelengths, polarised, inside) = (None, None, SmallVec::new());
             let emitter = Emitter {

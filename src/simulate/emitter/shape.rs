@@ -23,7 +23,8 @@ pub(super) enum Shape {
 #[derive(Clone, Debug)]
 pub(super) enum Lobe {
     Measured(IntensitySampler),
-    /// Uniform within a cone of that cosine; -1 for all directions.
+    /// Uniform within a cone: `1 − cos` of its half angle, which keeps the digits that the cosine of a narrow cone has lost; 2 for all
+    /// directions.
     Cone(f64),
     Collimated,
     /// Intensity ∝ cosⁿ; `1/(n+1)` is kept.
@@ -52,10 +53,20 @@ pub(super) fn point_on_rectangle([a, b]: [f64; 2], [u, v]: [f64; 2]) -> [f64; 2]
     [a * (2.0 * u - 1.0), b * (2.0 * v - 1.0)]
 }
 
-/// Cosine to the axis of a cone whose rim has the cosine `limit`: equal solid angles are equally likely.
+/// `1 − cos` of a cone's half angle.
+pub(super) fn versine(angle: f64) -> f64 {
+    2.0 * (0.5 * angle).sin().powi(2)
+}
+
+/// `1 − cos` of the angle to the axis of a cone whose rim has `rim`: equal solid angles are equally likely.
 #[inline(always)]
-pub(super) fn cosine_in_cone(limit: f64, u: f64) -> f64 {
-    1.0 - u * (1.0 - limit)
+pub(super) fn versine_in_cone(rim: f64, u: f64) -> f64 {
+    u * rim
+}
+
+#[inline(always)]
+pub(super) fn sine_from_versine(versine: f64) -> f64 {
+    (versine * (2.0 - versine)).max(0.0).sqrt()
 }
 
 #[inline(always)]
@@ -63,9 +74,8 @@ pub(super) fn sine_from_cosine(cosine: f64) -> f64 {
     ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
 }
 
-/// The direction with this cosine to the last of three axes, at azimuth `v` of a whole turn.
-pub(super) fn direction_about_axis(axes: [Vector; 3], cos_theta: f64, v: f64) -> Vector {
-    let sin_theta = sine_from_cosine(cos_theta);
+/// The direction with this cosine and sine to the last of three axes, at azimuth `v` of a whole turn.
+pub(super) fn direction_about_axis(axes: [Vector; 3], [cos_theta, sin_theta]: [f64; 2], v: f64) -> Vector {
     let (sin, cos) = sin_cos_turns(v);
     axes[0] * (sin_theta * cos) + axes[1] * (sin_theta * sin) + axes[2] * cos_theta
 }
