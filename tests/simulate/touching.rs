@@ -139,9 +139,11 @@ fn light_passes_from_a_die_into_its_dome() {
         dome.extend(profile(&[[1.0, 0.4], [1.0, 0.0], [5.0, 0.0]]));
         dome.push(cap(0.0, 5.0, 0.0));
         let model = assembly(vec![turned("die", &die, 0.0), turned("dome", &dome, 0.9)]);
-        let facets = on_facets(&model, &text);
-        assert!(facets.power.lost <= 1e-6 * facets.power.emitted, "{name}: {:?}", facets.ledger.first());
-        assert!(facets.notes.is_empty(), "{name}: {:?}", facets.notes);
-        assert!(facets.receivers[0].power > 0.04 * facets.power.emitted, "{name}: {:?}", facets.power);
+        for (surface, found) in [("facets", on_facets(&model, &text)), ("spline", on_spline(&model, &text))] {
+            let power = &found.power;
+            assert!(power.lost <= 1e-6 * power.emitted, "{name}, {surface}: {:?}", found.ledger.first());
+            assert!(found.notes.is_empty(), "{name}, {surface}: {:?}", found.notes);
+            assert!(found.receivers[0].power > 0.04 * power.emitted, "{name}, {surface}: {power:?}");
+        }
     }
 }

@@ -91,15 +91,22 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
 /// Where the segment of light starts that has met both of two faces at one place, mm: past all faces along them within `reach`,
 /// but not past a face that stands across, as beside an edge. Without that, 4 % of what is trapped in eight touching bricks got out
 /// between their faces in 200 times their length.
+///
+/// What has been passed is passed by its rounding, as the spline gives a root once more where it is asked from next to it: light that
+/// was reflected within the glue distance of an edge met the second face there, and 9 % of that in a square die was lost.
 #[inline(never)]
 pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
+    let rounding = rounding_at(next.origin);
     let mut passed = 0.0;
+    let mut start = 0.0;
     for (found, _) in faces_along(context, next.with_range(0.0, reach)) {
         // A face across ends the contact: beyond it the ray is beside the pair.
         if found.geometric_normal.dot(normal).abs() <= ALIGNED {
-            return passed;
+            // Nearer than rounding to the face across, the start lies between both.
+            return f64::min(start, 0.5 * (passed + found.t));
         }
         passed = found.t.next_up();
+        start = found.t + rounding;
     }
     reach
 }
