@@ -39,6 +39,9 @@ pub struct SceneJob {
     pub tracing: TracingSettings,
     /// How an accuracy that was asked for was reached.
     pub accuracy: Option<AccuracyPlan>,
+    /// What another part of the same run chose. The spline is taken from it; facets come with an error that only a pilot of this
+    /// process measures.
+    pub chosen: Option<Chosen>,
     /// Where facets and octree are kept for other runs; built anew where there is none.
     pub cache: Option<Cache>,
 }
@@ -52,6 +55,7 @@ impl SceneJob {
             meshing: MeshingSettings::default(),
             tracing: TracingSettings::default(),
             accuracy: None,
+            chosen: None,
             cache: None,
         }
     }
@@ -157,6 +161,11 @@ impl PreparedScene {
 
     /// Takes the facets or the spline that a pilot of the run's own rays finds sufficient.
     fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
+        if let Some(chosen) = self.job.chosen.take_if(|chosen| chosen.intersector == "exact") {
+            self.choice = IntersectorChoice { intersector: IntersectorKind::Exact, normals: chosen.normals };
+            self.chosen = Some(chosen);
+            return;
+        }
         let run = RunSettings { sequences: false, ..self.run_settings() };
         let facets = (&self.tessellation.mesh, &self.mesh_settings);
         let model = (&self.job.loaded.model, self.spline());

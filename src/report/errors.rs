@@ -5,7 +5,7 @@ use super::{Cell, Table, figures, grouped, seconds};
 use crate::intersect::NormalMode;
 use crate::simulate::Results;
 use crate::study::default_accuracy::Chosen;
-use crate::study::figures::{Figure, Limit, ReceiverFigures, halving};
+use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 
 /// A figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
@@ -26,6 +26,22 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
         ),
         Some(_) => format!("{value} ± {} {unit}", figures(figure.combined(), 2)),
     }
+}
+
+/// Channels whose totals a sentence tells; of more the table tells.
+const SPOKEN_CHANNELS: usize = 6;
+
+/// The totals of a receiver's further channels, in parentheses; nothing where there are none.
+pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
+    if all.channels.is_empty() {
+        return String::new();
+    }
+    let total = |c: &ChannelFigure| format!("{} {}", c.name, with_errors(&c.figure, 4));
+    let mut told: Vec<String> = all.channels.iter().take(SPOKEN_CHANNELS).map(total).collect();
+    if let Some(more @ 1..) = all.channels.len().checked_sub(SPOKEN_CHANNELS) {
+        told.push(format!("{more} more in the table"));
+    }
+    format!(" ({})", told.join(", "))
 }
 
 /// Where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces.

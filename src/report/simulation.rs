@@ -95,7 +95,8 @@ impl SimulationReport<'_> {
         let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
             .map(|(x, f)| {
                 let power = errors::with_errors(&f.power, 4);
-                format!("**{power}** ({}) reach {}", self.share(x.power), spoken(&x.name))
+                let channels = errors::channel_totals(f);
+                format!("**{power}** ({}) reach {}{channels}", self.share(x.power), spoken(&x.name))
             })
             .collect();
         text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };

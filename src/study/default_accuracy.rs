@@ -18,7 +18,7 @@ use crate::math::Uv;
 use crate::mesh::FacetMesh;
 use crate::model::{Face, Model};
 use crate::simulate::{BoundScene, RunSettings};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::time::Instant;
 
 /// The pilot traces one ray in so many.
@@ -56,16 +56,20 @@ const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
 const POLISHED: (&str, NormalMode) = ("octree", NormalMode::Exact);
 const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
 
+/// `octree` or `exact`. An alias, as serde takes a reference in a struct for one into the text that it reads.
+pub type IntersectorName = &'static str;
+
 /// What a run is traced with, and why.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chosen {
     /// Smallest and largest tolerance of the facets, mm; of those that are drawn, where the run is on the spline.
     pub tolerance_mm: [f64; 2],
     /// Normals at the hits.
-    #[serde(serialize_with = "by_name")]
+    #[serde(serialize_with = "by_name", deserialize_with = "normals_named")]
     pub normals: NormalMode,
     /// `octree`, or `exact` for the spline.
-    pub intersector: &'static str,
+    #[serde(deserialize_with = "intersector_named")]
+    pub intersector: IntersectorName,
     /// One sentence.
     pub because: String,
     /// Rays of the pilot; 0 where none was needed.
@@ -80,15 +84,16 @@ pub struct Chosen {
 }
 
 /// One way to trace the run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// Smallest and largest tolerance of the facets, mm.
     pub tolerance_mm: [f64; 2],
     /// Normals at the hits.
-    #[serde(serialize_with = "by_name")]
+    #[serde(serialize_with = "by_name", deserialize_with = "normals_named")]
     pub normals: NormalMode,
     /// `octree` or `exact`.
-    pub intersector: &'static str,
+    #[serde(deserialize_with = "intersector_named")]
+    pub intersector: IntersectorName,
     /// Seconds of tracing the whole run so, from those of the pilot.
     pub seconds: f64,
     /// What it gets wrong of the figure that it gets most wrong, as a share of that figure;
@@ -102,6 +107,18 @@ pub struct Alternative {
 
 fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
     s.serialize_str(n.name())
+}
+
+fn normals_named<'d, D: Deserializer<'d>>(from: D) -> Result<NormalMode, D::Error> {
+    let name = String::deserialize(from)?;
+    let found = NormalMode::ALL.into_iter().find(|mode| mode.name() == name);
+    found.ok_or_else(|| serde::de::Error::custom(format!("there are no {name} normals")))
+}
+
+fn intersector_named<'d, D: Deserializer<'d>>(from: D) -> Result<IntersectorName, D::Error> {
+    let name = String::deserialize(from)?;
+    let found = ["octree", "exact"].into_iter().find(|known| *known == name);
+    found.ok_or_else(|| serde::de::Error::custom(format!("no run chooses {name}")))
 }
 
 /// A run that has to be given tolerance, normals and intersector.

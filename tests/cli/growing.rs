@@ -69,6 +69,24 @@ fn ranges_of_rays_merge_to_the_bits_of_one_run() {
     assert!(code == 3 && err.contains("rays 200000..420000"), "{err}");
 }
 
+/// A merge takes what its parts chose and has no pilot of its own, whose seconds would differ from theirs.
+#[test]
+fn merge_takes_the_choice_of_its_parts() {
+    let folder = lens("40_000");
+    let path = folder.path();
+    for shard in ["1/2", "2/2"] {
+        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", shard, "-o", "parts"]);
+        assert_eq!(code, 0, "{err}");
+    }
+    let [once, again] = ["once", "again"].map(|to| {
+        merge(path, &["parts"], to);
+        let text = std::fs::read_to_string(path.join(to).join("results.json")).unwrap();
+        serde_json::from_str::<Value>(&text).unwrap()["chosen"].clone()
+    });
+    assert_eq!((&once["intersector"], &once), (&"exact".into(), &again));
+    assert!(once["pilot_seconds"].as_f64().unwrap() > 0.0);
+}
+
 /// What merge says is missing, traced and merged again, reaches the error; until then the exit code is 4.
 #[test]
 fn merged_ranges_grow_until_the_error_is_reached() {

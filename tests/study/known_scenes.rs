@@ -275,6 +275,26 @@ pub(crate) fn plate() -> KnownScene {
     KnownScene { name: "plate at 45°".into(), model, text, figures, half: 20.0 }
 }
 
+/// A ball of glass with a point source in its centre, which shines alike in all directions: the flux of a cone of half angle `gamma` and
+/// of a rectangle of `h` × `v` about the axis, degrees.
+pub(crate) fn zones(radius: f64, gamma: f64, [h, v]: [f64; 2]) -> [KnownScene; 2] {
+    let cone = 0.5 * (1.0 - gamma.to_radians().cos());
+    // Of type A: H turns about the polar axis, V is the elevation.
+    let rectangle = 2.0 * h.to_radians() * 2.0 * v.to_radians().sin() / (4.0 * PI);
+    let zones = [
+        ("cone", format!("angles = 'C'\nh_deg = [0, 360]\nv_deg = [0, {gamma:?}]\n"), cone),
+        ("rectangle", format!("h_deg = [{:?}, {h:?}]\nv_deg = [{:?}, {v:?}]\n", -h, -v), rectangle),
+    ];
+    zones.map(|(name, range, flux)| {
+        let centred = ball(radius, 1.5);
+        let text = format!(
+            "{}[[source]]\nkind = 'point'\npower = 1\n[[receiver]]\nname = 'zone'\nkind = 'far_field'\ncells = [1, 1]\n{range}",
+            glass(1.5)
+        );
+        KnownScene { name: format!("zone, {name}"), text, figures: vec![("power", flux)], half: h, ..centred }
+    })
+}
+
 /// All of them.
 pub(crate) fn all() -> Vec<KnownScene> {
     let sphere = Conic::sphere;
@@ -287,7 +307,10 @@ pub(crate) fn all() -> Vec<KnownScene> {
     let asphere =
         Lens { front: Conic { radius: 3.0, conic: -0.6 }, back: sphere(-20.0), thickness: 2.0, half_aperture: 2.0 };
     let biconvex = Lens { front: sphere(500.0), back: sphere(-500.0), thickness: 60.0, half_aperture: 120.0 };
+    let [cone, rectangle] = zones(5.0, 30.0, [20.0, 10.0]);
     vec![
+        cone,
+        rectangle,
         parabolic_lamp(25.0, 1.0),
         parabolic_lamp(25.0, 0.2),
         parabolic_lamp(25.0, 3.0),

@@ -56,7 +56,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let cache = cache_folder::cache(command.cache)?;
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
-    let job = SceneJob { meshing, tracing, cache, ..SceneJob::new(scene, loaded) };
+    let job = SceneJob { meshing, tracing, cache, chosen: header.chosen(), ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
     let (mut whole, mut usage) = sum(command, &header, &prepared)?;
     // Looked at again as a whole: parts may grow while they are waited for.

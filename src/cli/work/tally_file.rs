@@ -3,12 +3,14 @@
 use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::cli::output::json::json_value;
 use crate::intersect::NormalMode;
 use crate::math::FaceId;
 use crate::pipeline::{
     IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, RayRange, TracingSettings, fingerprint,
 };
 use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
+use crate::study::default_accuracy::Chosen;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -38,6 +40,9 @@ pub(crate) struct TallyHeader {
     /// The options that ask for what was chosen, where the command line did not.
     #[serde(default)]
     pub(crate) accuracy: String,
+    /// What was chosen and why, where nobody asked; as JSON, so that a choice of another form costs a pilot and not the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    chosen: Option<serde_json::Value>,
     seed: Option<u64>,
     intersector: Option<String>,
     normals: Option<String>,
@@ -79,6 +84,7 @@ impl TallyHeader {
             rays: prepared.rays.or(t.rays()),
             first_ray: t.ray_range.and_then(|range| range.first),
             accuracy: accuracy_options(prepared),
+            chosen: prepared.chosen.as_ref().map(json_value).transpose()?,
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
@@ -102,6 +108,11 @@ impl TallyHeader {
             return PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
         }
         PathBuf::from(&self.scene)
+    }
+
+    /// What the part chose where nobody asked.
+    pub(crate) fn chosen(&self) -> Option<Chosen> {
+        serde_json::from_value(self.chosen.clone()?).ok()
     }
 
     /// The options that decided the facets.
