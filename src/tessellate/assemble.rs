@@ -6,14 +6,17 @@ use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
+use super::limits;
 use super::nodes::Position;
-use super::report::Repair;
-use super::settings::{FaceSelector, Settings, ToleranceField};
+use super::placed_part::PlacedPart;
+use super::report::{FailureCause, Repair};
+use super::settings::Settings;
 use super::taken_chords::{NO_CHORDS, TakenChords, doubled_chords};
 use super::triangulator::guarded;
-use crate::math::{FaceId, Point};
+use crate::math::Point;
 use crate::model::{EdgeId, Face, Model, Part, PartId};
 use rayon::prelude::*;
+use rustc_hash::FxHashMap;
 
 /// A part's faces, in the order of its shells.
 pub(super) struct PartMesh {
@@ -23,6 +26,8 @@ pub(super) struct PartMesh {
     pub(super) shared: Vec<Point>,
     /// None for a face that could not be meshed.
     pub(super) faces: Vec<Option<FaceMesh>>,
+    /// Why faces that could have been meshed were not.
+    pub(super) causes: FxHashMap<usize, FailureCause>,
 }
 
 /// Times that borders are sampled more densely where facets beside them are not proved, and that doubled chords are looked for.
@@ -44,39 +49,11 @@ pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartM
         // coarse.
         part.scale = part.scale.max(instance.placement.scale.abs());
     }
-    let mesh = |part: &PlacedPart<'_>| (!part.firsts.is_empty()).then(|| mesh_part(part, settings));
-    placed.par_iter().map(mesh).collect()
-}
-
-/// A part in its places.
-struct PlacedPart<'m> {
-    part: &'m Part,
-    /// The first placed face of each instance.
-    firsts: Vec<u32>,
-    /// Largest scale of a placement.
-    scale: f64,
-}
-
-impl<'m> PlacedPart<'m> {
-    fn new(model: &'m Model, part: PartId) -> Self {
-        let uses = (0..model.instances.len()).filter(|&i| model.instances[i].part == part);
-        let scale = uses.clone().map(|i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
-        Self { part: model.part(part), firsts: uses.map(|i| model.first_face(i).0).collect(), scale }
-    }
-
-    /// The surface of the `k`th face with its tolerance; `None` where it has numbers that are none.
-    fn surface(&self, settings: &Settings, k: usize, face: &'m Face) -> Option<FaceSurface<'m>> {
-        let placed: Vec<FaceId> = self.firsts.iter().map(|first| FaceId(first + k as u32)).collect();
-        let (tolerance, radii) = tolerance(settings, self.part, face, &placed);
-        is_finite(face).then(|| {
-            let field =
-                ToleranceField::new(tolerance, radii, settings.law, self.scale).with_angle(settings.angle_deg);
-            // Faces that were not read from a file have a gap of zero whether it was measured or not.
-            let mut surface = FaceSurface::new(&face.surface, face.reversed, field);
-            surface.gap = Some(face.gap).filter(|&g| g > 0.0);
-            surface
-        })
-    }
+    let too_large = limits::faces_beyond(&placed, settings);
+    let mesh = |(i, part): (usize, &PlacedPart<'_>)| {
+        part.is_placed().then(|| mesh_part(part, settings, |k| too_large.get(&(i, k)).copied()))
+    };
+    placed.par_iter().enumerate().map(mesh).collect()
 }
 
 /// One of a part's faces with its surface.
@@ -91,11 +68,17 @@ pub(super) fn face_with_surface<'m>(
     Some((face, placed.surface(settings, k, face)?))
 }
 
-/// Meshes a part once: divides its edges, meshes its faces, and goes on with denser edges while repairs ask for them.
-fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
+/// Meshes a part once: divides its edges, meshes its faces, and goes on with denser edges while repairs ask for them. `too_large` tells of
+/// faces that are left out the cells they would need.
+fn mesh_part(
+    placed: &PlacedPart<'_>,
+    settings: &Settings,
+    too_large: impl Fn(usize) -> Option<f64> + Sync,
+) -> PartMesh {
     let part = placed.part;
     let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-    let with_surface = |(k, face)| (face, placed.surface(settings, k, face));
+    let with_surface =
+        |(k, face)| (face, if too_large(k).is_some() { None } else { placed.surface(settings, k, face) });
     let faces: Vec<(&Face, Option<FaceSurface<'_>>)> =
         faces.into_par_iter().enumerate().map(with_surface).collect();
     let known: Vec<(&Face, &FaceSurface<'_>)> =
@@ -159,7 +142,13 @@ fn mesh_part(placed: &PlacedPart<'_>, settings: &Settings) -> PartMesh {
             meshes[k] = mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken });
         }
     }
-    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes })
+    let cause = |(k, (_, surface)): (usize, &(&Face, Option<FaceSurface<'_>>))| {
+        let over_steps = surface.as_ref().is_some_and(|s| s.steps.are_too_many());
+        let cells = too_large(k).map(FailureCause::TooManyFacets);
+        Some((k, cells.or(over_steps.then_some(FailureCause::TooManySteps))?))
+    };
+    let causes = faces.iter().enumerate().filter_map(cause).collect();
+    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes })
 }
 
 /// Edges that should have shorter chords: those that faces ask for, and all of a face that came to nothing or to its border alone, where
@@ -174,7 +163,7 @@ fn coarse_edges(
     for ((face, surface), mesh) in faces.iter().zip(meshes) {
         let repaired = mesh.as_ref().map(|m| m.repaired);
         let came_to_little = match repaired {
-            None => surface.is_some(),
+            None => surface.as_ref().is_some_and(|s| !s.steps.are_too_many()),
             // Of the other repairs shorter chords would mend nothing.
             Some(how) => matches!(how, Some(Repair::BorderOnly | Repair::TriangulationFailed)),
         };
@@ -281,29 +270,9 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
         Ok(mesh) => return Some(mesh),
         Err(Unmeshed::Empty) => Repair::BorderOnly,
         Err(Unmeshed::GaveUp) => Repair::TriangulationFailed,
+        Err(Unmeshed::TooManySteps) => return None,
     };
     // The same library may give up on the border too.
     let border = guarded(|| fallback::border_alone(part, face, surface, divisions, shared)).ok().flatten();
     border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
-}
-
-/// Whether all numbers of a face are numbers.
-fn is_finite(face: &Face) -> bool {
-    let s = &face.surface;
-    let [[u0, u1], [v0, v1]] = s.domain();
-    let points = s.points.iter().all(|p| p.is_finite() && p.w > 0.0);
-    points && u0 < u1 && v0 < v1 && (u1 - u0).is_finite() && (v1 - v0).is_finite()
-}
-
-/// Tolerances and radii of a face at its places, by the last override that matches.
-fn tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> ([f64; 2], [f64; 2]) {
-    let matches = |place: &FaceSelector| match place {
-        FaceSelector::Part(name) => *name == part.name,
-        FaceSelector::Face(name) => *name == face.name,
-        FaceSelector::Entity(id) => face.entity == Some(*id),
-        FaceSelector::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
-    };
-    // The last override that matches counts, as with rules in a style sheet.
-    let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
-    last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
 }

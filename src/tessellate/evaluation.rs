@@ -1,6 +1,6 @@
 //! Counts and measures what came out.
 
-use super::report::{FailedFace, NotCertified, Percentiles, Repair, Report, ToleranceRange};
+use super::report::{FailedFace, FailureCause, NotCertified, Percentiles, Repair, Report, ToleranceRange};
 use super::tessellation::{FacetQuality, Tessellation};
 use super::{angles, repairs, sample, settings::Settings};
 use crate::math::FaceId;
@@ -55,7 +55,9 @@ fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
         return Vec::new();
     }
     let entities: Vec<Option<u64>> = model.placed_faces().map(|f| f.entity()).collect();
-    failed.iter().map(|id| FailedFace { face: id.0, entity: entities[id.index()] }).collect()
+    let named =
+        |id: &FaceId| FailedFace { face: id.0, entity: entities[id.index()], cause: FailureCause::default() };
+    failed.iter().map(named).collect()
 }
 
 /// Lists the faces with facets that are not certified, with their entity and the file's gap.

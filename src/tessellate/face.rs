@@ -42,6 +42,8 @@ pub(super) enum Unmeshed {
     Empty,
     /// The triangulation library gave up on it.
     GaveUp,
+    /// Its proofs took more steps than any face may take.
+    TooManySteps,
 }
 
 impl From<GaveUp> for Unmeshed {
@@ -102,6 +104,9 @@ pub(super) fn mesh_with_imprint(
         taken,
     };
     let mut grid = grid::build(&mut prover, &cells, input);
+    if surface.steps.are_too_many() {
+        return Err(Unmeshed::TooManySteps);
+    }
     border.divide_poles(&cells);
     // What is left between them and the border is triangulated. Where cells reach the border, both are done.
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
@@ -116,6 +121,10 @@ pub(super) fn mesh_with_imprint(
     let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
     let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
     let mut transition = guarded(triangulate)?.ok_or(Unmeshed::Empty)?;
+    // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.
+    if surface.steps.are_too_many() {
+        return Err(Unmeshed::TooManySteps);
+    }
     transition.triangles.extend(&grid.triangles);
     // What covers more or less than the border bounds proves nothing, however near to the surface each of its facets lies.
     let is_covered = covers_border(&transition, &grid.quads, &polygons);

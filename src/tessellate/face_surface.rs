@@ -1,5 +1,6 @@
 //! A face's surface laid out for quick evaluation, with what meshing asks of it: tolerance, normals, creases, poles.
 
+use super::proof_steps::ProofSteps;
 use super::second_derivatives::SecondDerivativeBounds;
 use super::settings::ToleranceField;
 use crate::math::{Point, Uv, Vector};
@@ -59,6 +60,8 @@ pub(super) struct FaceSurface<'a> {
     pub(super) gap: Option<f64>,
     /// Farthest that such a side strays from a point, mm.
     pub(super) pole_size: f64,
+    /// What the proofs on it have taken.
+    pub(super) steps: ProofSteps,
 }
 
 impl<'a> FaceSurface<'a> {
@@ -104,6 +107,7 @@ impl<'a> FaceSurface<'a> {
             closed,
             gap: None,
             pole_size,
+            steps: ProofSteps::new(u64::MAX),
         }
     }
 

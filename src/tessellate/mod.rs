@@ -27,9 +27,12 @@ mod face_mesh;
 mod face_surface;
 mod fallback;
 mod imprint;
+mod limits;
 mod nodes;
+mod placed_part;
 mod placement;
 mod proof;
+mod proof_steps;
 mod repairs;
 mod report;
 mod sample;
@@ -44,8 +47,8 @@ use crate::model::Model;
 pub use angles::SteepFace;
 pub use evaluation::sampled_sag;
 pub use report::{
-    FaceCounts, FailedFace, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag, ShellCounts,
-    ToleranceRange,
+    FaceCounts, FailedFace, FailureCause, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag,
+    ShellCounts, ToleranceRange,
 };
 pub use settings::{Acceptance, FaceSelector, Settings, ToleranceLaw, ToleranceOverride};
 pub use tessellation::{FacetQuality, Tessellation};
@@ -79,5 +82,6 @@ pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let placement::Placed { mut made, failed, repairs } = placement::place_instances(model, &parts, &joined);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
     evaluation::fill_report(&mut made, model, settings, &failed, &repairs);
+    limits::name_causes(&mut made.report, model, |part, k| parts[part].as_ref()?.causes.get(&k).copied());
     made
 }

@@ -121,12 +121,42 @@ pub struct FaceCounts {
 }
 
 /// A face without facets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FailedFace {
     /// Index of the placed face.
     pub face: u32,
     /// The `#id` in the file.
     pub entity: Option<u64>,
+    /// Why.
+    pub cause: FailureCause,
+}
+
+/// Why a face has no facets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum FailureCause {
+    /// Nothing can be made of its border and its surface.
+    #[default]
+    NothingToMesh,
+    /// At its tolerance it needs at least so many facets, with which the model would have more than
+    /// [`super::Settings::most_cells`].
+    TooManyFacets(f64),
+    /// Its surface is so wild that the proofs of its facets took more steps than any face may take.
+    TooManySteps,
+}
+
+impl std::fmt::Display for FailureCause {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NothingToMesh => f.write_str("nothing can be made of its border and its surface"),
+            Self::TooManyFacets(count) => write!(
+                f,
+                "it needs more than {count:.0e} facets, beyond what a model may have: ask for a larger tolerance, or check the file's unit"
+            ),
+            Self::TooManySteps => f.write_str("its surface is too wild to be proved: ask for a larger tolerance"),
+        }
+    }
 }
 
 /// Times in seconds.

@@ -24,6 +24,12 @@ pub struct Settings {
     /// Most cells of one face that are held to its tolerance; beyond it, cells are coarser, a few times as many at most, counted as
     /// not certified, and the face as repaired.
     pub budget: usize,
+    /// Most cells that the faces of all parts together may be sure to need, beside some for each; the largest of a model that needs more
+    /// are left without facets ([`super::FailureCause::TooManyFacets`]).
+    pub most_cells: u64,
+    /// Most steps that the proofs of one face may take, each a sum of two control points; a face of a surface so wild that they take more
+    /// is left without facets ([`super::FailureCause::TooManySteps`]).
+    pub most_steps: u64,
     /// What decides whether a facet is good enough.
     pub acceptance: Acceptance,
     /// Distance, mm, within which faces of two solids are one interface, and are faceted once: where one lies wholly on the other, both
@@ -89,6 +95,8 @@ impl Default for Settings {
             angle_deg: None,
             overrides: Vec::new(),
             budget: 400_000,
+            most_cells: 4_000_000,
+            most_steps: 4_000_000_000,
             acceptance: Acceptance::Proved,
             glue_mm: 0.0,
             measure: false,

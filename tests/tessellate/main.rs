@@ -9,6 +9,7 @@ mod field;
 mod files;
 mod fixtures;
 mod folder;
+mod limits;
 mod poles;
 mod promises;
 mod proof;

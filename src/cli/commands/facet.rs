@@ -17,6 +17,9 @@ use crate::tessellate::{Report, sampled_sag};
 use crate::truck::baseline;
 use serde::Serialize;
 
+/// Faces without facets that are named with their cause; `--json` has all of them.
+const NAMED_FAILURES: usize = 10;
+
 pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
     if let Some(path) = command.output.iter().find(|p| !is_facet_file(p)) {
@@ -78,6 +81,10 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     let placed = made.report.faces.meshed + made.report.faces.failed;
     if made.report.faces.failed > 0 {
         console.say(format_args!("{} of {placed} faces got no facets", made.report.faces.failed));
+        for face in made.report.failed.iter().take(NAMED_FAILURES) {
+            let entity = face.entity.map_or(format!("face {}", face.face), |id| format!("#{id}"));
+            console.say(format_args!("  {entity}: {}", face.cause));
+        }
     }
     let over = made.report.faces.failed as f64 > command.limits.max_refused * placed as f64;
     Ok(refused.and(Completion::incomplete_if(over)))

@@ -66,6 +66,10 @@ impl<'s, 'a> Branch<'s, 'a> {
 
     /// Whether splitting may go on: once the share of the budget is used up, with coarser cells.
     fn may_split(&mut self, depth: u32) -> bool {
+        if self.prover.gives_up() {
+            self.cells.exhausted = true;
+            return false;
+        }
         let used_up = self.cells.len() >= self.budget;
         self.cells.exhausted |= used_up;
         self.cells.out_of_share |= used_up;
@@ -124,7 +128,11 @@ pub(in crate::tessellate) fn split(
         let mut branch = Branch::new(&tree, share);
         tree.visit(&mut branch, Visit { cell: root, near: &all, inside: false, depth: 0 });
         let cells = branch.cells;
-        if !cells.out_of_share || cells.len() >= budget || share >> PARALLEL >= budget {
+        if !cells.out_of_share
+            || surface.steps.are_too_many()
+            || cells.len() >= budget
+            || share >> PARALLEL >= budget
+        {
             return cells;
         }
         share *= 2;

@@ -116,7 +116,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
-            Some((i, PartMesh { divisions, shared, faces: meshes }))
+            let causes = before.causes.clone();
+            Some((i, PartMesh { divisions, shared, faces: meshes, causes }))
         };
         // Instances, not parts: another instance of the same part may touch nothing.
         instances.par_iter().filter_map(divide).collect()

@@ -29,6 +29,9 @@ pub(in crate::tessellate) fn prove_triangle(
     };
     let proved = |bound: f64| ProvedFacet { nodes: t, bound, tolerance };
     let limit = tolerance * slack;
+    if prover.gives_up() {
+        return proved(f64::INFINITY);
+    }
     let sides = [0, 1, 2].map(|k| chords.get(&edge_key(t[k], t[(k + 1) % 3])));
     // Poles first: what stands for a facet there is no parameter triangle, so that what follows would be about
     // another piece.

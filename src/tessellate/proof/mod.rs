@@ -5,6 +5,7 @@
 pub(in crate::tessellate) mod border_chord;
 mod cubic_reduction;
 pub(in crate::tessellate) mod deviation;
+mod effort;
 pub(in crate::tessellate) mod facet;
 mod flat_quad;
 pub(in crate::tessellate) mod flat_triangle;

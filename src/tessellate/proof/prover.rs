@@ -47,7 +47,7 @@ const PROBES: [[f64; 3]; 4] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]
 pub(in crate::tessellate) struct Prover<'s, 'a> {
     pub(in crate::tessellate) surface: &'s FaceSurface<'a>,
     pub(super) acceptance: Acceptance,
-    nets: SimplexNets,
+    pub(super) nets: SimplexNets,
     pub(super) deviation: DeviationBounds,
     reduction: CubicReduction,
     pub(super) scalar: ScalarBezier,

@@ -25,6 +25,8 @@ pub(in crate::tessellate) struct SimplexNets {
     shares: Vec<f64>,
     /// Corners and degree that these belong to.
     shares_for: (usize, usize),
+    /// Sums of two control points that were taken so far.
+    pub(in crate::tessellate) steps: u64,
 }
 
 /// Degree up to which halves of rectangles have tables.
@@ -97,6 +99,7 @@ impl SimplexNets {
             self.shares_for = (N, degree);
             multinomials::<N>(degree, &mut self.shares);
         }
+        self.steps += steps_of_expansion(N, patch.degree);
         simd::dispatch(Expansion { nets: self, patch, corners });
         &self.out
     }
@@ -164,6 +167,13 @@ impl SimplexNets {
         // Back from plain powers to Bernstein coefficients.
         self.out.extend(self.work[last][..all].iter().zip(&self.shares).map(|(&c, &s)| c * s));
     }
+}
+
+/// Sums that an expansion over a simplex takes, a little fewer than there are: its cost grows with the fourth power of the degree.
+fn steps_of_expansion(corners: usize, [p, q]: [usize; 2]) -> u64 {
+    let first: usize = (0..p).map(|d| (p - d) * size(corners, d)).sum();
+    let second: usize = (0..q).map(|d| (q - d) * size(corners, p + d)).sum();
+    ((q + 1) * first + second) as u64
 }
 
 /// All de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result

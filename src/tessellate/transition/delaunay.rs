@@ -187,6 +187,7 @@ pub(in crate::tessellate) fn triangulate(
         }
         // Also when the work of all rounds is used up: what then does not hold is counted as not proved.
         let ended = failing.is_empty()
+            || surface.steps.are_too_many()
             || round == MAX_ROUNDS
             || (round + 1) * triangles.len() > MAX_WORK
             || corners >= limits.most(falls);

@@ -1,0 +1,146 @@
+//! What a model may cost to mesh, in counted work: facets that its faces are expected to need, and steps of their proofs.
+//!
+//! A number in a file can ask for any number of facets: a lens whose unit is the kilometre, a ball of a million kilometres. Faces that are
+//! sure to need more than the model may have are not begun, the largest first, and the rest goes on. What cannot be foreseen, such as a wild
+//! patch of degree 25, ends when its proofs have taken more steps than any real face takes. Nothing looks at a clock, so the outcome is
+//! the same on any machine and for any number of threads.
+
+use super::border::polygons::{self, crosses_ray_from};
+use super::face_surface::FaceSurface;
+use super::placed_part::PlacedPart;
+use super::report::{FailureCause, Report};
+use super::settings::Settings;
+use crate::math::Uv;
+use crate::model::{Face, Model};
+use crate::nurbs::FundamentalForms;
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Places along each side of a face's parameter box at which its curvature is asked.
+const PLACES: usize = 12;
+/// Share of the places, those of sharpest curvature, that are left out: near a pole or a kink one place says nothing of its surroundings.
+const SHARPEST_PLACES: f64 = 0.1;
+/// Largest size of a face in tolerances up to which it is not looked at: a ball of this size needs half as many
+/// cells. Each face of a file has that much to itself, so that the limit grows with the file.
+const FREE_SIZE: f64 = 20_000.0;
+/// Pieces in which a curve of a trim is looked at.
+const TRIM_STEPS: u32 = 8;
+
+/// Faces of parts that are not begun, with the cells they would need: by part, and by the face's place in the part.
+pub(super) type TooLarge = FxHashMap<(usize, usize), f64>;
+
+/// The faces that are left out so that the rest stays within [`Settings::most_cells`].
+pub(super) fn faces_beyond(parts: &[PlacedPart<'_>], settings: &Settings) -> TooLarge {
+    let faces = parts.iter().enumerate().filter(|(_, p)| p.is_placed()).flat_map(|(i, part)| {
+        let faces = part.part.shells.iter().flat_map(|s| &s.faces).enumerate();
+        faces.map(move |(k, face)| (i, part, k, face))
+    });
+    let large: Vec<(usize, &PlacedPart<'_>, usize, &Face)> = faces
+        .filter(|(_, part, k, face)| {
+            let tightest = part.tightest_tolerance(settings, *k, face);
+            face.surface.bounds().diagonal() > FREE_SIZE * tightest
+        })
+        .collect();
+    let mut expected: Vec<((usize, usize), f64)> = large
+        .into_par_iter()
+        .filter_map(|(i, part, k, face)| {
+            let surface = part.surface(settings, k, face)?;
+            Some(((i, k), expected_cells(face, &surface)))
+        })
+        .collect();
+    let mut all: f64 = expected.iter().map(|(_, cells)| cells).sum();
+    // The largest go first; of equal ones the last.
+    expected.sort_by(|a, b| b.1.total_cmp(&a.1).then(b.0.cmp(&a.0)));
+    let mut beyond = TooLarge::default();
+    for (key, cells) in expected {
+        if all <= settings.most_cells as f64 {
+            break;
+        }
+        all -= cells;
+        beyond.insert(key, cells);
+    }
+    beyond
+}
+
+/// Cells that a face surely needs, from its curvature at a grid of places inside its border: where a surface bends by k over a length L, a
+/// chord sags by k·L²/8.
+pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
+    if surface.affine {
+        return 1.0;
+    }
+    let border: Vec<[Uv; 2]> = polygons::loops(face)
+        .iter()
+        .flat_map(|l| &l.uses)
+        .flat_map(|u| {
+            let [t0, t1] = u.uv.domain();
+            let at = move |i: u32| u.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(TRIM_STEPS));
+            (0..TRIM_STEPS).map(move |i| [at(i), at(i + 1)]).collect::<Vec<_>>()
+        })
+        .collect();
+    let ends = border.iter().flatten();
+    let (lo, hi) = ends.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+    let [[u0, u1], [v0, v1]] = surface.spline.domain();
+    let (lo, hi) = (lo.max(Uv::new(u0, v0)), hi.min(Uv::new(u1, v1)));
+    let size = hi - lo;
+    // How many cells the whole box would take if it were everywhere as it is at one place.
+    let cells_if_alike = |uv: Uv| -> Option<f64> {
+        let d = surface.second_derivatives(uv);
+        let forms = FundamentalForms::new(&d)?;
+        let tolerance = surface.tolerance(uv);
+        let chords = |k: f64, length: f64| ((k.abs() / (8.0 * tolerance)).sqrt() * length).max(1.0);
+        let along_u = chords(forms.normal_curvature(Uv::X), d.du.length() * size.x);
+        let along_v = chords(forms.normal_curvature(Uv::Y), d.dv.length() * size.y);
+        Some(along_u * along_v).filter(|cells| cells.is_finite())
+    };
+    let inside = |uv: &Uv| border.iter().filter(|s| crosses_ray_from(*uv, **s)).count() % 2 == 1;
+    let place = |k: usize| lo + (Uv::new((k / PLACES) as f64, (k % PLACES) as f64) + 0.5) / PLACES as f64 * size;
+    let places = (0..PLACES * PLACES).map(place).filter(inside);
+    let mut cells: Vec<f64> = places.filter_map(cells_if_alike).collect();
+    cells.sort_by(f64::total_cmp);
+    let kept = cells.len() - (SHARPEST_PLACES * cells.len() as f64) as usize;
+    cells[..kept].iter().sum::<f64>() / (PLACES * PLACES) as f64
+}
+
+/// Says of faces without facets why they have none.
+pub(super) fn name_causes(
+    report: &mut Report,
+    model: &Model,
+    cause: impl Fn(usize, usize) -> Option<FailureCause>,
+) {
+    if report.failed.is_empty() {
+        return;
+    }
+    let firsts = model.first_faces();
+    for failed in &mut report.failed {
+        // Instances are in the order of their faces.
+        let after = firsts.partition_point(|first| first.0 <= failed.face);
+        if let Some(i) = after.checked_sub(1) {
+            let k = (failed.face - firsts[i].0) as usize;
+            failed.cause = cause(model.instances[i].part.0 as usize, k).unwrap_or_default();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use crate::tessellate::settings::ToleranceField;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    #[test]
+    fn cells_of_a_ball_and_a_tube_are_those_of_their_chords() {
+        let (radius, tolerance) = (1000.0, 0.01);
+        let field = ToleranceField::new([tolerance; 2], [1.0, 10.0], Default::default(), 1.0);
+        let ball = Face::whole(sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]));
+        let cells = expected_cells(&ball, &FaceSurface::new(&ball.surface, false, field));
+        // Squares of side s sag by s²/8R along each side: 4πR² / 8Rξ of them.
+        let exact = FRAC_PI_2 * radius / tolerance;
+        assert!(cells > 0.7 * exact && cells < 1.1 * exact, "{cells} {exact}");
+        let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, radius, [0.0, PI], [0.0, 1e4]));
+        let cells = expected_cells(&tube, &FaceSurface::new(&tube.surface, false, field));
+        let exact = PI * radius / (8.0 * radius * tolerance).sqrt();
+        assert!(cells > 0.7 * exact && cells < 1.1 * exact, "{cells} {exact}");
+    }
+}

@@ -1,0 +1,28 @@
+//! Counts what proofs take, so that a surface too wild for them costs its face and not the run.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Steps that the proofs of one face have taken. A step is one sum of two control points, about two nanoseconds.
+#[derive(Debug)]
+pub(super) struct ProofSteps {
+    taken: AtomicU64,
+    most: u64,
+}
+
+impl ProofSteps {
+    /// None so far, and so many at most.
+    pub(super) fn new(most: u64) -> Self {
+        Self { taken: AtomicU64::new(0), most }
+    }
+
+    /// Adds some.
+    pub(super) fn add(&self, steps: u64) {
+        // Order does not matter: a face that is over the limit is given up whenever that is seen, and all of it.
+        self.taken.fetch_add(steps, Ordering::Relaxed);
+    }
+
+    /// Whether they are more than a face may take.
+    pub(super) fn are_too_many(&self) -> bool {
+        self.taken.load(Ordering::Relaxed) > self.most
+    }
+}
