@@ -60,7 +60,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let (tessellation, _) = tessellate_model(model, &settings, &monitor);
     let mesh = &tessellation.mesh;
     let normals = IntersectorChoice::new(&tracing, scene)?.normals;
-    let contenders = Contenders::build(mesh, model, normals.on_facets(), console);
+    let count = given.as_ref().map_or(tracing.rays().unwrap_or(RAYS), |rays| rays.len() as u64);
+    let contenders = Contenders::build(mesh, model, normals.on_facets(), count, console);
     let Contenders { octree, exact, .. } = &contenders;
     let polish = Polished::new(octree, mesh, exact);
 

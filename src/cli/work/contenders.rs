@@ -2,7 +2,7 @@
 
 use crate::cli::console::Console;
 use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::exact::Exact;
+use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
@@ -28,8 +28,14 @@ pub(crate) struct Contenders<'a> {
 }
 
 impl<'a> Contenders<'a> {
-    /// Builds them all.
-    pub(crate) fn build(mesh: &'a FacetMesh, model: &Model, normals: NormalMode, console: &Console) -> Self {
+    /// Builds them all; the spline's structure is cut for so many rays.
+    pub(crate) fn build(
+        mesh: &'a FacetMesh,
+        model: &Model,
+        normals: NormalMode,
+        rays: u64,
+        console: &Console,
+    ) -> Self {
         let spinner = console.spinner("building octree, BVHs and spline");
         let cwbvh = bvh::Settings { normals, ..Default::default() };
         let contenders = Self {
@@ -37,7 +43,7 @@ impl<'a> Contenders<'a> {
             bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
             cwbvh: Bvh::build(mesh, &cwbvh),
             cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
-            exact: Exact::build(model, &Default::default()),
+            exact: Exact::build(model, &exact::Settings::for_rays(model, rays)),
         };
         spinner.finish_and_clear();
         contenders

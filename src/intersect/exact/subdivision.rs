@@ -30,6 +30,10 @@ const LARGE: f64 = 1e-3;
 const TIGHTER: f64 = 0.75;
 /// How often a flat leaf may be halved for the sake of its box.
 const BOX_HALVINGS: u32 = 8;
+/// Deviation from which a part has no tangent plane to speak of, and how often in a row it is halved in spite of it. Beside a pole the deviation is a
+/// few units however small the part is; a patch that is a line or a point stays without one, and was cut into a million leaves.
+const NO_TANGENT_PLANE: f64 = 1e6;
+const VAIN_HALVINGS: u32 = 4;
 /// Largest ratio of two weights of a flat leaf.
 const WEIGHT_RATIO: f64 = 1.5;
 
@@ -59,6 +63,8 @@ struct SubPatch {
     depth: u32,
     /// How many more times a coordinate was rounded.
     crop_roundings: u32,
+    /// How many of the last parts that it is a half of had no tangent plane.
+    vain: u32,
 }
 
 /// One patch under subdivision.
@@ -74,7 +80,8 @@ struct Subdivision<'a> {
 
 /// Cuts every patch into leaves.
 pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> Vec<PatchLeaves> {
-    let whole = |p: &Patch| SubPatch { net: p.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0 };
+    let whole =
+        |p: &Patch| SubPatch { net: p.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0, vain: 0 };
     let parts: Vec<Option<SubPatch>> =
         geometry.patches.par_iter().map(|p| crop(geometry.trim_of(p), p, whole(p))).collect();
     // Only now, from what the trims leave: a small face on a large surface must not make the scene look large.
@@ -132,14 +139,16 @@ impl Subdivision<'_> {
             if region == Region::Outside {
                 continue;
             }
-            let SubPatch { net: piece, rect, depth, crop_roundings } = part;
+            let SubPatch { net: piece, rect, depth, crop_roundings, vain } = part;
             let described = describe(self.patch, &piece, rect, depth + crop_roundings);
             let area = described.leaf.bounds().half_area();
-            let deepest = depth >= self.flatness.depth;
+            let has_plane = deviation(&described.leaf, &described.slopes) < NO_TANGENT_PLANE;
+            let vain = if has_plane { 0 } else { vain + 1 };
+            let deepest = depth >= self.flatness.depth || vain > VAIN_HALVINGS;
             let flat = self.is_flat(&described, area, deepest);
             // The box of a slanted leaf is mostly empty and met by many rays in vain: a large one is halved beyond what flatness asks,
             // where that shrinks the boxes.
-            let large = area > LARGE * self.scene_area && depth < self.flatness.depth + BOX_HALVINGS;
+            let large = has_plane && area > LARGE * self.scene_area && depth < self.flatness.depth + BOX_HALVINGS;
             let tighter = if large { tightening_direction(&piece, degree, TIGHTER * area) } else { None };
             let direction = match tighter {
                 None if flat || deepest => {
@@ -159,8 +168,8 @@ impl Subdivision<'_> {
             high_rect[direction][0] = middle;
             // The low half comes off the stack first, so that leaves that follow each other in memory follow each
             // other on the patch.
-            stack.push(SubPatch { net: high, rect: high_rect, depth: depth + 1, crop_roundings });
-            stack.push(SubPatch { net: low, rect: low_rect, depth: depth + 1, crop_roundings });
+            stack.push(SubPatch { net: high, rect: high_rect, depth: depth + 1, crop_roundings, vain });
+            stack.push(SubPatch { net: low, rect: low_rect, depth: depth + 1, crop_roundings, vain });
         }
         out
     }
