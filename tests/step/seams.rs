@@ -142,3 +142,25 @@ fn the_flank_of_a_thread_has_as_many_turns_as_the_thread() {
         close(area(&import(&flank(turns))), 0.5 * 2.0 * 2.0 * PI * f64::from(turns), 1e-4);
     }
 }
+
+/// Half of a band of a cylinder of radius 10 between two half circles `width` apart that both stand on the vertices of the first: a file
+/// without the band's straight sides.
+fn half_band(width: f64) -> String {
+    points(&[(10, [0., 0., 0.]), (11, [0., 0., width]), (12, [10., 0., 0.]), (13, [-10., 0., 0.])])
+        + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n\
+           #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=CYLINDRICAL_SURFACE('',#30,10.);\n#32=CIRCLE('',#30,10.);\n\
+           #33=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#34=CIRCLE('',#33,10.);\n\
+           #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n\
+           #50=EDGE_CURVE('',#40,#41,#32,.T.);\n#51=EDGE_CURVE('',#40,#41,#34,.T.);\n\
+           #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+           #70=EDGE_LOOP('',(#60,#61));\n#80=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#80),#31,.T.);\n"
+}
+
+#[test]
+fn edges_whose_ends_lie_apart_by_the_width_of_their_face_keep_it() {
+    for width in [0.9, 3.0] {
+        let import = import(&half_band(width));
+        close(area(&import), PI * 10.0 * width, 1e-6);
+        assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
+    }
+}

@@ -28,12 +28,17 @@ pub(crate) fn bound_region(
     let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
     // In the unwrapped plane a loop around a closed surface ends whole periods from its start: alone it bounds no region.
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
+    // A seam that the file runs forth and back bounds nothing by intent, other edges do not.
+    let has_edges = plain.iter().any(|c| !c.is_cut_open());
     // Loops without extent: a vertex, or an edge run forth and back.
     let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
     plain.retain(|c| signed_area(&c.polygon()).abs() > EMPTY_LOOP_SHARE * scale);
     // Nothing winds around: without any loop the face is the whole surface, else the loops bound it by themselves.
     if winding.is_empty() {
         if plain.is_empty() {
+            if has_edges {
+                out.repairs.push("its loops enclose nothing: the whole of its surface is taken");
+            }
             out.loops.push(natural_boundary(chart, &[], &mut out.seams)?);
             return Ok(out);
         }

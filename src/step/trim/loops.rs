@@ -1,6 +1,6 @@
 //! Loops in the unwrapped parameter plane: edge uses chained end to end, poles closed by their sides.
 
-use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK};
+use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK, WIDE_STEP};
 use crate::math::Uv;
 use crate::nurbs::{ControlPoint, UvCurve};
 use crate::step::chart::{Chart, Pole};
@@ -180,61 +180,89 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
 
 /// Puts uses one behind the other by whole periods, and counts how often the loop winds around.
 fn chain_uses(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
+    let connection = Connection { chart, tolerance, turned, extent: extent(&uses) };
     let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
     for (i, next) in uses.into_iter().enumerate() {
         if i == 0 {
             chain.pieces.push(next);
             continue;
         }
-        let shift = connect(&mut chain, &next, chart, tolerance, turned);
+        let shift = connection.connect(&mut chain, &next);
         chain.pieces.push(next.shifted(shift));
     }
     let Some(first) = chain.pieces.first().cloned() else { return chain };
     // Back to the start: what the shift says is the winding.
-    let shift = connect(&mut chain, &first, chart, tolerance, turned);
+    let shift = connection.connect(&mut chain, &first);
     for d in 0..2 {
         chain.winding[d] = chart.period[d].map_or(0, |p| (shift[d] / p).round() as i32);
     }
     chain
 }
 
-/// Steps from the end of the chain to the start of `next`, adding pole sides; the shift that `next` needs.
-fn connect(chain: &mut Chain, next: &Piece, chart: &Chart, tolerance: f64, turned: bool) -> Uv {
-    let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
-    let (from, start) = (last.end(), next.start());
-    let near = chart.nearest_representative(start, from);
-    let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
-    let pole = chart.poles.iter().find(|pole| {
-        (pole.point - p).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
-            && (pole.point - q).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
-    });
-    let Some(pole) = pole else {
-        let distance = (p - q).length();
-        // A little apart is one point written twice; more than that is bridged, and told.
-        if distance > 10.0 * tolerance {
-            chain.bridged = chain.bridged.max(distance);
-            chain.pieces.push(Piece::straight(from, near));
+/// Size of the box around pieces, each in the period in which it was found.
+fn extent(pieces: &[Piece]) -> Uv {
+    let points = pieces.iter().flat_map(|p| p.curve.points.iter().map(|q| q.position()));
+    let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    hi - lo
+}
+
+/// How pieces of a loop are joined.
+struct Connection<'c> {
+    chart: &'c Chart,
+    /// Distance within which ends are one, mm.
+    tolerance: f64,
+    /// Whether sides at a pole run the other way.
+    turned: bool,
+    /// Size of the loop in parameters.
+    extent: Uv,
+}
+
+impl Connection<'_> {
+    /// Steps from the end of the chain to the start of `next`, adding pole sides; the shift that `next` needs.
+    fn connect(&self, chain: &mut Chain, next: &Piece) -> Uv {
+        let Self { chart, tolerance, turned, .. } = *self;
+        let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
+        let (from, start) = (last.end(), next.start());
+        let near = chart.nearest_representative(start, from);
+        let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
+        let pole = chart.poles.iter().find(|pole| {
+            (pole.point - p).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
+                && (pole.point - q).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
+        });
+        let Some(pole) = pole else {
+            let distance = (p - q).length();
+            // A little apart is one point written twice; more than that is bridged, and told.
+            if distance > 10.0 * tolerance || distance > tolerance && self.is_wide(near - from) {
+                chain.bridged = chain.bridged.max(distance);
+                chain.pieces.push(Piece::straight(from, near));
+            }
+            return near - start;
+        };
+        let free = 1 - pole.fixed;
+        let same_edge = last.source == next.source;
+        let low = (last.middle()[pole.fixed] > pole.at) != turned;
+        let amount = run_along_pole(pole, chart, low, start[free] - from[free], same_edge);
+        let target = from[free] + amount;
+        // Down to the pole, along it, and back: the first and last step are usually empty.
+        let mut corner = from;
+        for (d, value) in [(pole.fixed, pole.at), (free, target), (pole.fixed, start[pole.fixed])] {
+            let mut to = corner;
+            to[d] = value;
+            if (to[d] - corner[d]).abs() > EMPTY_STEP * (1.0 + value.abs()) {
+                chain.pieces.push(Piece::straight(corner, to));
+                corner = to;
+            }
         }
-        return near - start;
-    };
-    let free = 1 - pole.fixed;
-    let same_edge = last.source == next.source;
-    let low = (last.middle()[pole.fixed] > pole.at) != turned;
-    let amount = run_along_pole(pole, chart, low, start[free] - from[free], same_edge);
-    let target = from[free] + amount;
-    // Down to the pole, along it, and back: the first and last step are usually empty.
-    let mut corner = from;
-    for (d, value) in [(pole.fixed, pole.at), (free, target), (pole.fixed, start[pole.fixed])] {
-        let mut to = corner;
-        to[d] = value;
-        if (to[d] - corner[d]).abs() > EMPTY_STEP * (1.0 + value.abs()) {
-            chain.pieces.push(Piece::straight(corner, to));
-            corner = to;
-        }
+        let mut shift = Uv::ZERO;
+        shift[free] = target - start[free];
+        shift
     }
-    let mut shift = Uv::ZERO;
-    shift[free] = target - start[free];
-    shift
+
+    /// Whether a step is so large a part of the loop that ends which meet half way would leave nothing of it: of a ring between two half circles
+    /// on the same two vertices that was all its width.
+    fn is_wide(&self, step: Uv) -> bool {
+        step.abs().cmpgt(WIDE_STEP * self.extent).any()
+    }
 }
 
 /// How far the loop runs along a pole, with the material on its left.

@@ -30,6 +30,9 @@ pub(super) const STRAIGHT_SEAM_SHARE: f64 = 1e-9;
 /// Of seams that slant alike the shorter is better, by this much a millimetre.
 pub(super) const SEAM_LENGTH_WEIGHT: f64 = 1e-3;
 
+/// A step between ends of edges that is a larger share of the loop's size in either parameter is a side of the loop: only shorter ones are
+/// closed by moving both ends.
+pub(super) const WIDE_STEP: f64 = 0.2;
 /// A step along a pole below this, relative to its coordinates, is none.
 pub(super) const EMPTY_STEP: f64 = 1e-9;
 /// Least distance that can tell a point from a pole, mm.
