@@ -7,7 +7,8 @@ use super::candidate_facet::CandidateFacet;
 use super::cell::{Cell, ProvedCell, Subdivision, parameter_resolution};
 use super::preferred_cuts::preferred_cuts;
 use crate::math::Uv;
-use crate::tessellate::border::polygons::{BorderPolygons, BorderSide, crosses_ray_from};
+use crate::tessellate::border::bands::BorderBands;
+use crate::tessellate::border::polygons::{BorderPolygons, BorderSide};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::pole;
 use crate::tessellate::proof::prover::Prover;
@@ -38,6 +39,8 @@ struct Tree<'s, 'a> {
     segments: Vec<[Uv; 2]>,
     /// How many are the border's.
     border: usize,
+    /// Those, by their place along v.
+    bands: BorderBands,
     /// Segments that are one point in space.
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
@@ -117,9 +120,10 @@ pub(in crate::tessellate) fn split(
     let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
     let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
     let border = segments.len();
+    let bands = BorderBands::new(&segments);
     segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
-    let tree = Tree { surface, acceptance, segments, border, poles, resolution, preferred, max_angle };
+    let tree = Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -288,10 +292,9 @@ impl Tree<'_, '_> {
         Some(xi)
     }
 
-    /// Whether a point lies inside the border: parity of crossings along u.
+    /// Whether a point lies inside the border.
     fn contains(&self, p: Uv) -> bool {
-        // Half-open crossings, as in `crosses_ray_from`: a corner on the line counts once.
-        self.segments[..self.border].iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
+        self.bands.encloses(p)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::math::Uv;
 use crate::model::EdgeId;
-use crate::tessellate::border::polygons::crosses_ray_from;
+use crate::tessellate::border::bands::BorderBands;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
 use crate::tessellate::proof::border_chord::BorderChords;
@@ -155,7 +155,8 @@ pub(in crate::tessellate) fn triangulate(
         mesh.keep_crease(a, b);
     }
     // Where constraints are missing, the flood fill would leak through the gap.
-    let by_centre = if conflicts.is_empty() { None } else { Some(segments.as_slice()) };
+    let uv = |s: &[u32; 2]| s.map(|n| mesh.nodes[n].uv);
+    let by_centre = (!conflicts.is_empty()).then(|| BorderBands::new(&segments.iter().map(uv).collect::<Vec<_>>()));
     // By corners in order, however a triangle is turned.
     let mut known: FxHashMap<[u32; 3], ProvedFacet<3>> = FxHashMap::default();
     let limits = Limits::new(mesh.cdt.num_vertices(), budget);
@@ -163,7 +164,7 @@ pub(in crate::tessellate) fn triangulate(
     let mut round = 0;
     loop {
         // Prove what is new; what was there before stands as it did.
-        let triangles = mesh.inner_triangles(by_centre);
+        let triangles = mesh.inner_triangles(by_centre.as_ref());
         let new: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
         let prove =
             |prover: &mut Prover<'_, '_>, &t: &[u32; 3]| prove_triangle(prover, &mesh.nodes, t, chords, 1.0);
@@ -319,15 +320,12 @@ impl Refinement<'_, '_> {
     }
 
     /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
-    fn inner_triangles(&self, by_centre: Option<&[[u32; 2]]>) -> Vec<[u32; 3]> {
+    fn inner_triangles(&self, by_centre: Option<&BorderBands>) -> Vec<[u32; 3]> {
         type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
         let nodes = |f: Face<'_>| f.vertices().map(|v| v.data().node);
-        if let Some(segments) = by_centre {
+        if let Some(border) = by_centre {
             let uv = |n: u32| self.nodes[n].uv;
-            let is_inside = |t: &[u32; 3]| {
-                let p = (uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0;
-                segments.iter().filter(|s| crosses_ray_from(p, s.map(uv))).count() % 2 == 1
-            };
+            let is_inside = |t: &[u32; 3]| border.encloses((uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0);
             return self.cdt.inner_faces().map(nodes).filter(is_inside).collect();
         }
         let inside = self.sides_of_border();
