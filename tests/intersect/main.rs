@@ -6,3 +6,4 @@ mod horizon;
 mod light;
 mod normals;
 mod support;
+mod surface;
