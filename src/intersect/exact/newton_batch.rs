@@ -14,6 +14,7 @@ use super::patch::{Patch, TRUSTED, project};
 use super::structure::Exact;
 use super::tolerances::TANGENT;
 use super::trim::Region;
+use crate::intersect::prefetch;
 use crate::math::simd::f64x8::{Array, F64x8, LANES};
 #[cfg(target_arch = "x86_64")]
 use crate::math::simd::f64x8::{Avx2Pair, Avx512};
@@ -26,6 +27,11 @@ const LARGEST_DEGREE: usize = 5;
 const LARGEST_NET: usize = (LARGEST_DEGREE + 1) * (LARGEST_DEGREE + 1);
 /// Share of a patch by which a root may lie beyond its border, and is taken back to it: a hundredth of [`TANGENT`] on a patch of 10 mm.
 const BEYOND: f64 = 1e-12;
+/// Seeds ahead of which a patch is asked for, and the cell of a trim: a group is worked off in between.
+const PATCHES_AHEAD: usize = 24;
+const CELLS_AHEAD: usize = 12;
+/// Patches that stay in the cache of the first level without being asked for.
+const FEW_PATCHES: usize = 32;
 /// Groups that are open at a time, one for each pair of degrees; with more the first is worked off early.
 const GROUPS: usize = 8;
 
@@ -90,7 +96,11 @@ impl Convergence<'_> {
         let mut net = [[V::splat(0.0); 4]; LARGEST_NET];
         let mut groups = [Group { degree: [0; 2], count: 0, seeds: [0; LANES] }; GROUPS];
         let mut next = 0;
+        let fetches = self.geometry.patches.len() > FEW_PATCHES;
         for index in 0..self.seeds.len() {
+            if fetches {
+                self.fetch_ahead(index);
+            }
             self.points[index] = None;
             let degree = self.geometry.patches[self.seeds[index].patch as usize].degree;
             // The array of nets side by side has no room for these; rays on them are asked one by one.
@@ -120,6 +130,20 @@ impl Convergence<'_> {
         // What is left in part-filled groups.
         for k in 0..GROUPS {
             settle::<V>(&mut net, self.geometry, self.rays, self.seeds, &groups[k], self.points);
+        }
+    }
+}
+
+impl Convergence<'_> {
+    /// Asks for what the seeds after the `index`-th need: first their patches, then the cells of trims in which they begin and mostly end.
+    #[inline(always)]
+    fn fetch_ahead(&self, index: usize) {
+        if let Some(seed) = self.seeds.get(index + PATCHES_AHEAD) {
+            prefetch(&self.geometry.patches, seed.patch as usize);
+        }
+        if let Some(seed) = self.seeds.get(index + CELLS_AHEAD) {
+            let face = self.geometry.patches[seed.patch as usize].face;
+            self.geometry.trims[self.geometry.faces[face as usize].trim as usize].fetch_cell(seed.uv);
         }
     }
 }

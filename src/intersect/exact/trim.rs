@@ -5,6 +5,7 @@
 
 use super::edge_use::{EdgeUse, edge_uses};
 use super::trim_piece::{TrimPiece, trim_pieces};
+use crate::intersect::prefetch;
 use crate::math::Uv;
 use crate::model::Face;
 use smallvec::SmallVec;
@@ -259,6 +260,13 @@ impl Trim {
         }
         let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());
         self.cells[j * self.count[0] + i]
+    }
+
+    /// Asks for the memory of the cell that holds `q`.
+    #[inline(always)]
+    pub(super) fn fetch_cell(&self, q: Uv) {
+        let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());
+        prefetch(&self.cells, j * self.count[0] + i);
     }
 
     /// Whether `q`, which lies in a border cell, is inside, and what uses pass within `band` mm; `metric` as for
