@@ -253,7 +253,7 @@ impl Prepared {
     /// The facets.
     #[getter]
     fn mesh(&self) -> Mesh {
-        Mesh::of_scene(self.scene.tessellation.mesh.clone())
+        Mesh::of_scene(self.scene.facets.whole().into_owned())
     }
 
     /// How it is traced and why, what is in the scene, as JSON.
@@ -263,7 +263,7 @@ impl Prepared {
         let settings = scene.run_settings();
         let summary = json!({
             "rays": settings.rays, "seed": settings.seed, "threads": scene.threads,
-            "tolerance_mm": [finest, loosest], "facets": scene.tessellation.mesh.facets.len(),
+            "tolerance_mm": [finest, loosest], "facets": scene.facets.facet_count(),
             "intersector": scene.choice.intersector.name(), "normals": scene.choice.normals.name(),
             "unit": scene.power_unit(), "chosen": scene.chosen, "notes": scene.bound.notes(),
             "accounts": scene.job.loaded.reports,

@@ -76,11 +76,15 @@ pub struct Settings {
     pub cured: bool,
     /// How the normal at a hit is got.
     pub normals: NormalMode,
+    /// Largest coordinate that starts were rounded at, mm, where that is not the mesh's own: of a part in its own coordinates that
+    /// stands far away. 0 otherwise.
+    pub farthest_start: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { kind: Kind::CwBvh, quality: Quality::Medium, cured: true, normals: NormalMode::default() }
+        let (kind, quality, normals) = (Kind::CwBvh, Quality::Medium, NormalMode::default());
+        Self { kind, quality, cured: true, normals, farthest_start: 0.0 }
     }
 }
 
@@ -140,7 +144,7 @@ impl<'m> Bvh<'m> {
     /// Builds the hierarchy; facets with corners that are no finite numbers are left out.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
-        let surroundings = Surroundings::new(mesh);
+        let surroundings = Surroundings::new(mesh).with_starts_as_far_as(settings.farthest_start);
         let bounds = surroundings.bounds;
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
         let size = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };

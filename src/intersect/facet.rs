@@ -59,6 +59,11 @@ impl<'m> Surroundings<'m> {
         Self { mesh, reach: largest * REACH, bounds }
     }
 
+    /// The same for starts whose coordinates are as large as this, mm: they are rounded by a share of it, wherever the mesh is.
+    pub(crate) fn with_starts_as_far_as(self, farthest: f64) -> Self {
+        Self { reach: self.reach.max(farthest * REACH), ..self }
+    }
+
     /// A ray that leaves a facet at a grazing angle, started over that facet and not under it: what rounding put on the wrong side would
     /// pass under the next facet where it starts nearer to their common edge than it rises. Other rays rise out of the rounding
     /// within [`Self::reach`] of an edge, where neighbours are asked from a point inside the facet.

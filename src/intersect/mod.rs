@@ -6,6 +6,7 @@ pub mod bvh;
 pub mod exact;
 mod facet;
 mod facet_hit;
+pub mod instanced;
 mod normals;
 pub mod octree;
 pub mod polish;
@@ -39,6 +40,29 @@ pub trait Intersector: Sync {
 
     /// What the structure holds and what it took to build.
     fn footprint(&self) -> Footprint;
+}
+
+/// Whoever borrows an intersector asks as it does.
+impl<T: Intersector + ?Sized> Intersector for &T {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        (**self).intersect(ray, cost)
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        (**self).intersect_batch(rays, hits, cost);
+    }
+
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
+        (**self).prepare_for(expected);
+    }
+
+    fn escapes(&self, ray: &Ray) -> bool {
+        (**self).escapes(ray)
+    }
+
+    fn footprint(&self) -> Footprint {
+        (**self).footprint()
+    }
 }
 
 /// Rays that are going to be asked.

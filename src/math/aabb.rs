@@ -19,6 +19,9 @@ pub struct Aabb {
     pub max: Point,
 }
 
+/// By how much [`Aabb::with_room`] grows a box, in its own size and in the largest coordinate: a crossing is rounded by 1e-15 of these.
+const ROOM: [f64; 2] = [1e-6, 1e-9];
+
 impl Aabb {
     /// The box that contains nothing and is neutral to [`Aabb::union`].
     pub const EMPTY: Self = Self { min: Point::INFINITY, max: Point::NEG_INFINITY };
@@ -75,6 +78,12 @@ impl Aabb {
     /// The box grown by `margin` mm on every side.
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
+    }
+
+    /// The box with room on every side for what is far above the rounding of a crossing.
+    pub fn with_room(self) -> Self {
+        let largest = self.min.abs().max(self.max.abs()).max_element();
+        self.grown(ROOM[0] * self.diagonal() + ROOM[1] * largest)
     }
 
     /// The eight corners.

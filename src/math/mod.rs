@@ -4,6 +4,7 @@
 //! nothing to them but names that say what a triple means.
 
 mod aabb;
+mod box_tree;
 mod frame;
 mod interval;
 mod ray;
@@ -12,6 +13,7 @@ pub(crate) mod simd;
 pub mod units;
 
 pub use aabb::Aabb;
+pub use box_tree::{BoxTree, BoxWalk};
 pub use frame::Frame;
 pub use interval::Interval;
 pub use ray::{Departure, Ray, Triangle};

@@ -12,11 +12,14 @@
 mod account;
 mod bounds;
 mod face;
+mod instancing;
 mod outline;
 mod part;
 mod placed;
+mod tight_box;
 
 pub use account::{FaceAccount, PartAccount, SolidAccount};
 pub use face::{Analytic, Colour, EdgeUse, Face, SurfaceKind, TessellatedFace, TrimLoop};
+pub use instancing::{Instancing, Placement};
 pub use part::{Edge, EdgeId, Part, PartId, Shell, VertexId};
 pub use placed::{Instance, Model, PlacedFace};

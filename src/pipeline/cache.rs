@@ -240,6 +240,14 @@ pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option
     Some(Fingerprint::new(&pieces))
 }
 
+/// The names of so many groups of a model: of a model in one piece its own.
+pub(super) fn group_keys(key: &Fingerprint, groups: usize) -> Vec<Fingerprint> {
+    if groups == 1 {
+        return vec![key.clone()];
+    }
+    (0..groups).map(|k| Fingerprint::new(&[key.0.as_bytes(), &k.to_le_bytes()])).collect()
+}
+
 /// Whether a name is a hash with this ending.
 fn is_entry(name: &str, kind: &str) -> bool {
     name.strip_suffix(kind).is_some_and(|hash| hash.len() == 32 && hash.bytes().all(|b| b.is_ascii_hexdigit()))

@@ -1,19 +1,19 @@
 //! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
 //! change of its light.
 
+use super::intersectors::{farthest_start, in_one_scene};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::ray_sampler::RaySampler;
 use super::scene_results::SceneResults;
 use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::exact::Exact;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::simulate::{PartialRun, Results, RunSettings, replay, verify_pruning};
 use crate::study::Progress;
-use crate::study::cross_check::{self, CrossCheck, Intersectors, cross_check};
+use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
 
 /// Segments of a run that are asked again of BVH and spline.
@@ -76,8 +76,10 @@ fn recheck(
     if rays.is_empty() {
         return (None, pilot);
     }
-    let exact = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.spline_for_few_rays());
-    let check = check_rays(prepared, intersector, &exact, &rays, monitor);
+    let splines = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.splines_for_few_rays());
+    let groups = splines.iter().map(|s| Box::new(&**s) as Box<dyn Intersector>).collect();
+    let exact = in_one_scene(prepared.facets.instancing.as_deref(), groups);
+    let check = check_rays(prepared, intersector, &*exact, &rays, monitor);
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }
 
@@ -98,31 +100,41 @@ fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
 fn check_rays(
     prepared: &PreparedScene,
     intersector: &dyn Intersector,
-    exact: &Exact,
+    exact: &dyn Intersector,
     rays: &[Ray],
     monitor: &dyn Monitor,
 ) -> CrossCheck {
-    let (model, mesh) = (&prepared.job.loaded.model, &prepared.tessellation.mesh);
+    let instancing = prepared.facets.instancing.as_deref();
     monitor.begin(Stage::BuildingCheck("BVH"));
     // With the normals of the run: those of facets with others differ without a fault.
     let normals = prepared.choice.normals.on_facets();
-    let bvh = Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() });
+    let bvh = |(group, mesh)| -> Box<dyn Intersector + '_> {
+        let farthest_start = farthest_start(instancing, group);
+        Box::new(Bvh::build(mesh, &bvh::Settings { normals, farthest_start, ..Default::default() }))
+    };
+    let bvh = in_one_scene(instancing, prepared.facets.meshes().enumerate().map(bvh).collect());
     // The check is about facets: a run on the spline, or polished to it, says nothing about the octree.
     let on_octree =
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
     // A tree of its own where the run had another intersector.
-    let built = (!on_octree).then(|| Octree::build(mesh, &octree::Settings { normals, ..Default::default() }));
-    let octree = built.as_ref().map_or(intersector, |octree| octree as &dyn Intersector);
+    let octree = |(group, mesh)| -> Box<dyn Intersector + '_> {
+        let farthest_start = farthest_start(instancing, group);
+        Box::new(Octree::build(mesh, &octree::Settings { normals, farthest_start, ..Default::default() }))
+    };
+    let octrees = || in_one_scene(instancing, prepared.facets.meshes().enumerate().map(octree).collect());
+    let built = (!on_octree).then(octrees);
+    let octree = built.as_deref().unwrap_or(intersector);
     monitor.end();
     monitor.begin(Stage::Checking(rays.len() as u64));
-    let intersectors = Intersectors { model, mesh, octree, bvh: &bvh, exact };
+    let groups = prepared.models().iter().zip(prepared.facets.meshes()).collect();
+    let intersectors = GroupedIntersectors { groups, instancing, octree, bvh: &*bvh, exact };
     let settings =
         cross_check::Settings { fallback_band_mm: prepared.mesh_settings.loosest(), ..Default::default() };
     let total = rays.len() as f64;
     let progress = |p: Progress| {
         monitor.advance((p.done * total) as u64, rays.len() as u64);
     };
-    let found = cross_check(&intersectors, rays, &settings, &progress);
+    let found = cross_check_groups(&intersectors, rays, &settings, &progress);
     monitor.end();
     found
 }
@@ -133,7 +145,7 @@ fn facet_effects(
     results: &Results,
     facets_and_spline: [&dyn Intersector; 2],
 ) -> Option<GeometricError> {
-    if prepared.choice.intersector == IntersectorKind::Exact || prepared.tessellation.mesh.facets.is_empty() {
+    if prepared.choice.intersector == IntersectorKind::Exact || prepared.facets.is_empty() {
         // On the spline, and without facets, there is nothing to compare.
         return None;
     }

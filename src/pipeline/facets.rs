@@ -4,9 +4,10 @@ use super::error::Error;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::MeshingSettings;
 use super::suggest;
-use crate::model::Model;
+use crate::model::{Instancing, Model};
 use crate::simulate::{BoundScene, Scene};
-use crate::tessellate::{self, FaceSelector, Tessellation, ToleranceOverride, tessellate};
+use crate::tessellate::{self, FaceSelector, GroupedFacets, Tessellation, ToleranceOverride, tessellate};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The mesher's settings from what is asked and the scene.
@@ -103,4 +104,23 @@ pub fn tessellate_model(
     let start = Instant::now();
     let tessellation = in_stage(monitor, Stage::Tessellating, || tessellate(model, settings));
     (tessellation, start.elapsed().as_secs_f64())
+}
+
+/// Facets of every group of a model, or of the model in one piece, with the seconds they took.
+pub(super) fn tessellate_groups(
+    model: &Model,
+    instancing: Option<&Arc<Instancing>>,
+    settings: &tessellate::Settings,
+) -> (GroupedFacets, f64) {
+    let start = Instant::now();
+    let facets = match instancing {
+        None => tessellate(model, settings).into(),
+        Some(instancing) => GroupedFacets {
+            groups: (instancing.groups.iter().enumerate())
+                .map(|(k, group)| tessellate(group, &settings.of_group(instancing, k)))
+                .collect(),
+            instancing: Some(instancing.clone()),
+        },
+    };
+    (facets, start.elapsed().as_secs_f64())
 }

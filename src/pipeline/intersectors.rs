@@ -5,11 +5,12 @@ use super::monitor::{Monitor, Stage};
 use super::settings::{IntersectorKind, TracingSettings, normal_mode};
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
+use crate::intersect::instanced::Instanced;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
 use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
-use crate::model::Model;
+use crate::model::{Instancing, Model};
 use crate::simulate::Scene;
 use std::sync::Arc;
 
@@ -53,50 +54,75 @@ pub fn with_intersector<T>(
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
     let builders = Builders {
-        octree: &|settings| Octree::build(mesh, settings),
-        spline: &|| Arc::new(Exact::build(model, &exact::Settings::default())),
+        octree: &|_, settings| Octree::build(mesh, settings),
+        splines: &|| vec![Arc::new(Exact::build(model, &exact::Settings::default()))],
     };
-    with_built_intersector(choice, builders, mesh, monitor, work)
+    with_built_intersector(choice, builders, (&[mesh], None), monitor, work)
 }
 
-/// How the caller makes octree and spline: anew, or from what was built before.
+/// How the caller makes the octree of each group, and the splines of all: anew, or from what was built before.
 pub(super) struct Builders<'a, 'm> {
-    pub(super) octree: &'a dyn Fn(&octree::Settings) -> Octree<'m>,
-    pub(super) spline: &'a dyn Fn() -> Arc<Exact>,
+    pub(super) octree: &'a dyn Fn(usize, &octree::Settings) -> Octree<'m>,
+    pub(super) splines: &'a dyn Fn() -> Vec<Arc<Exact>>,
 }
 
-/// The same with octree and spline of the caller's making.
+/// The same with octrees and splines of the caller's making, for the meshes of all groups.
 pub(super) fn with_built_intersector<'m, T>(
     choice: IntersectorChoice,
-    Builders { octree, spline }: Builders<'_, 'm>,
-    mesh: &'m FacetMesh,
+    Builders { octree, splines }: Builders<'_, 'm>,
+    (meshes, instancing): (&[&'m FacetMesh], Option<&Instancing>),
     monitor: &dyn Monitor,
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
     monitor.begin(Stage::Building(choice.intersector));
     // On the spline facets are not needed at all.
     if choice.intersector == IntersectorKind::Exact {
-        let exact = spline();
+        let splines = splines();
+        let groups = splines.iter().map(|s| Box::new(&**s) as Box<dyn Intersector>).collect();
+        let exact = in_one_scene(instancing, groups);
         monitor.end();
         return work(&*exact, exact.footprint());
     }
     let normals = choice.normals.on_facets();
-    let facets: Box<dyn Intersector + '_> = match choice.intersector {
-        IntersectorKind::Bvh2 => {
-            Box::new(Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, normals, ..Default::default() }))
-        }
-        IntersectorKind::Cwbvh => Box::new(Bvh::build(mesh, &bvh::Settings { normals, ..Default::default() })),
-        IntersectorKind::Octree | IntersectorKind::Exact => {
-            Box::new(octree(&octree::Settings { normals, ..Default::default() }))
+    let on_facets = |(group, mesh): (usize, &&'m FacetMesh)| -> Box<dyn Intersector + '_> {
+        let farthest_start = farthest_start(instancing, group);
+        let bvh = bvh::Settings { normals, farthest_start, ..Default::default() };
+        match choice.intersector {
+            IntersectorKind::Bvh2 => Box::new(Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..bvh })),
+            IntersectorKind::Cwbvh => Box::new(Bvh::build(mesh, &bvh)),
+            IntersectorKind::Octree | IntersectorKind::Exact => {
+                Box::new(octree(group, &octree::Settings { normals, farthest_start, ..Default::default() }))
+            }
         }
     };
+    let facets: Vec<_> = meshes.iter().enumerate().map(on_facets).collect();
     // Only exact normals need the spline beside the facets.
     if choice.normals != NormalMode::Exact {
+        let facets = in_one_scene(instancing, facets);
         monitor.end();
         return work(&*facets, facets.footprint());
     }
-    let exact = spline();
-    let polished = Polished::new(&*facets, mesh, &exact);
+    let splines = splines();
+    let polished = (facets.iter().zip(meshes).zip(&splines))
+        .map(|((facets, mesh), exact)| Box::new(Polished::new(&**facets, mesh, exact)) as Box<dyn Intersector>);
+    let polished = in_one_scene(instancing, polished.collect());
     monitor.end();
-    work(&polished, polished.footprint())
+    work(&*polished, polished.footprint())
+}
+
+/// The structures of all groups as one.
+pub(super) fn in_one_scene<'a>(
+    instancing: Option<&'a Instancing>,
+    mut groups: Vec<Box<dyn Intersector + 'a>>,
+) -> Box<dyn Intersector + 'a> {
+    match instancing {
+        Some(instancing) => Box::new(Instanced::new(instancing, groups)),
+        // A model in one piece has one group.
+        None => groups.swap_remove(0),
+    }
+}
+
+/// Where the farthest place of a group is, mm; 0 for what has the scene's coordinates.
+pub(super) fn farthest_start(instancing: Option<&Instancing>, group: usize) -> f64 {
+    instancing.map_or(0.0, |i| i.reach(group))
 }

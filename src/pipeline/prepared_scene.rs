@@ -1,16 +1,18 @@
 //! A scene that is bound and faceted, and the tracing of it.
 
-use super::cache::{Cache, CachedFacets, facets_key};
+use super::cache::{Cache, CachedFacets, facets_key, group_keys};
 use super::default_accuracy;
 use super::error::Error;
-use super::facets::{mesh_settings, tessellate_model};
+use super::facets::{mesh_settings, tessellate_groups};
 use super::intersectors::{self, IntersectorChoice};
 use super::loading::LoadedModel;
-use super::monitor::{Monitor, Stage};
+use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
-use crate::intersect::Intersector;
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
+use crate::intersect::{Intersector, NormalMode};
+use crate::mesh::FacetMesh;
+use crate::model::{Instancing, Model};
 use crate::simulate::scene::PowerUnit;
 use crate::simulate::{
     BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range,
@@ -18,8 +20,9 @@ use crate::simulate::{
 };
 use crate::study::accuracy_target::AccuracyPlan;
 use crate::study::default_accuracy::Chosen;
-use crate::tessellate::{self, Tessellation};
+use crate::tessellate::{self, GroupedFacets, Tessellation};
 use std::ops::Range;
+use std::slice;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -60,17 +63,27 @@ impl SceneJob {
         }
     }
 
-    /// The facets of the model with these settings, and the seconds that they took; those that are kept have no report.
-    fn facets(&self, settings: &tessellate::Settings, monitor: &dyn Monitor) -> (Tessellation, f64) {
+    /// The facets of the model or of its groups with these settings, and the seconds that they took; those that are kept have no report.
+    fn facets(
+        &self,
+        instancing: Option<&Arc<Instancing>>,
+        settings: &tessellate::Settings,
+        monitor: &dyn Monitor,
+    ) -> (GroupedFacets, f64) {
         let (start, model) = (Instant::now(), &self.loaded.model);
+        let make = || in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing, settings));
         // Without a cache, or where a file of the scene has gone since, facets are made anew.
-        let Some((cache, key)) = self.cached(settings) else { return tessellate_model(model, settings, monitor) };
-        let kept = CachedFacets { cache, key: &key, monitor };
-        if let Some(mesh) = kept.mesh(model.placed_faces().count()) {
-            return (Tessellation { mesh, ..Tessellation::default() }, start.elapsed().as_secs_f64());
+        let Some((cache, key)) = self.cached(settings) else { return make() };
+        let groups = instancing.map_or(slice::from_ref(model), |i| &i.groups);
+        let keys = group_keys(&key, groups.len());
+        let kept = |key| CachedFacets { cache, key, monitor };
+        let meshes = groups.iter().zip(&keys).map(|(group, key)| kept(key).mesh(group.placed_face_count()));
+        if let Some(meshes) = meshes.collect::<Option<Vec<_>>>() {
+            let groups = meshes.into_iter().map(|mesh| Tessellation { mesh, ..Tessellation::default() }).collect();
+            return (GroupedFacets { groups, instancing: instancing.cloned() }, start.elapsed().as_secs_f64());
         }
-        let (made, seconds) = tessellate_model(model, settings, monitor);
-        kept.keep_mesh(&made.mesh);
+        let (made, seconds) = make();
+        made.meshes().zip(&keys).for_each(|(mesh, key)| kept(key).keep_mesh(mesh));
         (made, seconds)
     }
 
@@ -88,8 +101,8 @@ pub struct PreparedScene {
     pub job: SceneJob,
     /// The scene on its model.
     pub bound: BoundScene,
-    /// The facets.
-    pub tessellation: Tessellation,
+    /// The facets; parts that are placed often have them once.
+    pub facets: GroupedFacets,
     /// What they were made with.
     pub mesh_settings: tessellate::Settings,
     /// Seconds that the facets took.
@@ -103,7 +116,7 @@ pub struct PreparedScene {
     /// Why it is traced as it is, where nobody asked for it.
     pub chosen: Option<Chosen>,
     /// Built once for pilot, run and check.
-    spline: OnceLock<Arc<Exact>>,
+    splines: OnceLock<Vec<Arc<Exact>>>,
 }
 
 /// How to trace beside the settings.
@@ -139,18 +152,19 @@ impl PreparedScene {
         let choice = IntersectorChoice::new(&job.tracing, Some(&job.scene))?;
         let bound = job.scene.bind(&job.loaded.model)?;
         let mesh_settings = mesh_settings(&job.meshing, Some(&job.scene), &job.loaded.model)?;
-        let (tessellation, tessellation_seconds) = job.facets(&mesh_settings, monitor);
+        let instancing = Instancing::new(&job.loaded.model, mesh_settings.glue_mm).map(Arc::new);
+        let (facets, tessellation_seconds) = job.facets(instancing.as_ref(), &mesh_settings, monitor);
         let mut prepared = Self {
             job,
             bound,
-            tessellation,
+            facets,
             mesh_settings,
             tessellation_seconds,
             choice,
             threads,
             rays: None,
             chosen: None,
-            spline: OnceLock::new(),
+            splines: OnceLock::new(),
         };
         // Whoever asks for anything of how it is traced gets just that.
         if !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene) {
@@ -167,11 +181,15 @@ impl PreparedScene {
             return;
         }
         let run = RunSettings { sequences: false, ..self.run_settings() };
-        let facets = (&self.tessellation.mesh, &self.mesh_settings);
-        let model = (&self.job.loaded.model, self.spline());
+        if self.facets.instancing.is_some() {
+            self.choose_without_pilot();
+            return;
+        }
+        let facets = (&self.facets.groups[0].mesh, &self.mesh_settings);
+        let model = (&self.job.loaded.model, self.splines().swap_remove(0));
         let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
         if let Some(finer) = choice.finer {
-            self.tessellation.mesh = finer.mesh;
+            self.facets = Tessellation { mesh: finer.mesh, ..Tessellation::default() }.into();
             self.tessellation_seconds += finer.seconds;
             // The settings tell what the facets are: those of the finer ones.
             self.mesh_settings.tolerance = choice.chosen.tolerance_mm;
@@ -180,16 +198,45 @@ impl PreparedScene {
         self.chosen = Some(choice.chosen);
     }
 
-    /// The exact spline of the model.
-    fn spline(&self) -> Arc<Exact> {
-        let build = || Arc::new(Exact::build(&self.job.loaded.model, &exact::Settings::default()));
-        self.spline.get_or_init(build).clone()
+    /// Takes the spline, which is right without a pilot: that compares one mesh with one spline. Ready meshes have no spline.
+    fn choose_without_pilot(&mut self) {
+        let is_ready = self.models().iter().flat_map(|m| &m.parts).any(|p| !p.tessellated.is_empty());
+        let (intersector, normals, name) = if is_ready {
+            (IntersectorKind::Octree, NormalMode::Bilinear, "octree")
+        } else {
+            (IntersectorKind::Exact, NormalMode::Exact, "exact")
+        };
+        self.choice = IntersectorChoice { intersector, normals };
+        self.chosen = Some(Chosen {
+            tolerance_mm: self.mesh_settings.tolerance,
+            normals,
+            intersector: name,
+            because: "parts are placed so often that they are traced in their own coordinates, without a pilot"
+                .into(),
+            pilot_rays: 0,
+            pilot_seconds: 0.0,
+            alternatives: Vec::new(),
+            geometric: None,
+        });
     }
 
-    /// The exact spline of the model, for some thousands of rays: the one of pilot or run, else one that is built sooner.
-    pub(super) fn spline_for_few_rays(&self) -> Arc<Exact> {
-        let build = || Arc::new(Exact::build(&self.job.loaded.model, &exact::Settings::for_few_rays()));
-        self.spline.get().cloned().unwrap_or_else(build)
+    /// The models of the groups; of a scene in one piece the whole one.
+    pub(super) fn models(&self) -> &[Model] {
+        self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
+    }
+
+    /// The exact spline of each group.
+    fn splines(&self) -> Vec<Arc<Exact>> {
+        self.splines.get_or_init(|| self.built_splines(&exact::Settings::default())).clone()
+    }
+
+    /// The exact splines for some thousands of rays: those of pilot or run, else ones that are built sooner.
+    pub(super) fn splines_for_few_rays(&self) -> Vec<Arc<Exact>> {
+        self.splines.get().cloned().unwrap_or_else(|| self.built_splines(&exact::Settings::for_few_rays()))
+    }
+
+    fn built_splines(&self, settings: &exact::Settings) -> Vec<Arc<Exact>> {
+        self.models().iter().map(|model| Arc::new(Exact::build(model, settings))).collect()
     }
 
     /// The run's settings: the scene's, with what was asked over them.
@@ -229,13 +276,17 @@ impl PreparedScene {
 
     /// Builds the intersector of the run for `work`, which also gets the seconds that it took.
     pub fn with_intersector<T>(&self, monitor: &dyn Monitor, work: impl FnOnce(&dyn Intersector, f64) -> T) -> T {
-        let mesh = &self.tessellation.mesh;
-        let octree = |settings: &octree::Settings| match self.job.cached(&self.mesh_settings) {
-            Some((cache, key)) => CachedFacets { cache, key: &key, monitor }.octree(mesh, settings),
-            None => Octree::build(mesh, settings),
+        let meshes: Vec<&FacetMesh> = self.facets.meshes().collect();
+        let kept = self.job.cached(&self.mesh_settings).map(|(cache, key)| (cache, group_keys(&key, meshes.len())));
+        let octree = |group: usize, settings: &octree::Settings| match &kept {
+            Some((cache, keys)) => {
+                CachedFacets { cache, key: &keys[group], monitor }.octree(meshes[group], settings)
+            }
+            None => Octree::build(meshes[group], settings),
         };
-        let builders = intersectors::Builders { octree: &octree, spline: &|| self.spline() };
-        intersectors::with_built_intersector(self.choice, builders, mesh, monitor, |intersector, footprint| {
+        let builders = intersectors::Builders { octree: &octree, splines: &|| self.splines() };
+        let facets = (meshes.as_slice(), self.facets.instancing.as_deref());
+        intersectors::with_built_intersector(self.choice, builders, facets, monitor, |intersector, footprint| {
             work(intersector, footprint.build_seconds)
         })
     }

@@ -1,19 +1,15 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::cross_check::{self, verdict};
-use super::errors;
 use super::maps::{cuts, photometric_grid, receiver_grid, spoken};
-use super::receiver_blocks;
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
-use super::{figures, grouped, seconds};
+use super::{errors, figures, grouped, receiver_blocks, seconds};
 use crate::formats::{Facets, Grid, Polylines};
 use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
-use crate::study::cross_check::CrossCheck;
-use crate::study::default_accuracy::Chosen;
-use crate::study::figures::ReceiverFigures;
-use crate::study::geometric_error::GeometricError;
+use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen};
+use crate::study::{figures::ReceiverFigures, geometric_error::GeometricError};
 
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
@@ -29,6 +25,10 @@ pub struct SimulationReport<'a> {
     pub results: &'a Results,
     /// The traced facets in their groups.
     pub facets: &'a Facets<'a>,
+    /// Facets that were traced: more than those drawn where parts are placed often.
+    pub facet_count: usize,
+    /// What the view of the facets shows.
+    pub drawn: String,
     /// Unit of powers: `W` or `lm`.
     pub unit: &'static str,
     /// The same rays asked of octree, BVH and spline.
@@ -198,12 +198,11 @@ impl SimulationReport<'_> {
         let out = ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
         // Far fewer that end inside: they would hide the others.
         let stay = ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
-        let note = "Facets as traced, parts in their colours, with some ray paths of the run.";
         let mut view = Some(
             View::of_facets("facets", "Facets and ray paths", self.facets)
                 .lines("rays that leave", &out, [1.0, 0.72, 0.12])
                 .lines("rays that end inside", &stay, [0.85, 0.30, 0.30])
-                .caption(note),
+                .caption(&self.drawn),
         );
         for (k, grid) in maps {
             let r = &self.results.receivers[k];
@@ -378,7 +377,7 @@ impl SimulationReport<'_> {
         let mut table = Table::new("times", "Times", &[("step", ""), ("time", "s"), ("what", "")]);
         for (name, time, what) in [
             ("read", s.read, "STEP files to trimmed splines".to_owned()),
-            ("tessellate", s.tessellate, format!("{} facets", grouped(self.facets.mesh.facets.len() as u64))),
+            ("tessellate", s.tessellate, format!("{} facets", grouped(self.facet_count as u64))),
             ("build", s.build, "the intersector".to_owned()),
             (
                 "trace",

@@ -5,7 +5,7 @@ use crate::math::Aabb;
 use crate::optics::{self, Absorption, BulkScatter, Index};
 
 /// Body 0: what is around everything.
-pub(crate) const AMBIENT: u16 = 0;
+pub(crate) const AMBIENT: u32 = 0;
 
 /// Something with a medium inside.
 #[derive(Clone, Debug, PartialEq)]

@@ -53,7 +53,7 @@ pub struct LostRay {
     /// The face where it happened, if it was at one.
     pub face: Option<u32>,
     /// The body it was in, as [`BoundScene::body`](crate::simulate::BoundScene::body) names it; 0 for the surroundings.
-    pub body: u16,
+    pub body: u32,
 }
 
 /// A vertex of a recorded path.
@@ -124,7 +124,7 @@ pub struct Counts {
     /// Times that light left a body below the one it had come into later, of another index: two bodies that overlap.
     pub overlaps: u64,
     /// The two bodies of one of them, those of the lowest numbers; zeros where there are none.
-    pub overlapping: [u16; 2],
+    pub overlapping: [u32; 2],
 }
 
 impl Counts {
@@ -139,7 +139,7 @@ impl Counts {
     }
 
     /// Notes that these bodies overlap, met so many times.
-    pub(crate) fn add_overlap(&mut self, pair: [u16; 2], times: u64) {
+    pub(crate) fn add_overlap(&mut self, pair: [u32; 2], times: u64) {
         self.overlaps += times;
         if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {
             self.overlapping = pair;

@@ -171,7 +171,7 @@ impl PartialRun {
         }
         let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
-        let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u16, r.u64()? as u16]);
+        let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u32, r.u64()? as u32]);
         t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;

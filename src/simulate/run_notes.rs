@@ -26,7 +26,7 @@ impl BoundScene {
 
     /// One sentence about lost light: where most of it was, and why.
     pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
-        let mut places: BTreeMap<(u16, Option<&str>, LostCause), usize> = BTreeMap::new();
+        let mut places: BTreeMap<(u32, Option<&str>, LostCause), usize> = BTreeMap::new();
         for l in ledger {
             let at = l.face.and_then(|f| self.instance(f));
             *places.entry((l.body, at, l.cause)).or_default() += 1;

@@ -8,7 +8,7 @@ pub(crate) struct FaceOptics {
     /// Index into the surfaces of the bound scene.
     pub(crate) surface: u16,
     /// The body whose boundary it is; [`AMBIENT`](super::body::AMBIENT) when there is no medium behind it.
-    pub(crate) body: u16,
+    pub(crate) body: u32,
     /// Whether it bounds a closed solid that lets no light in.
     pub(crate) opaque_solid: bool,
     /// Whether it may lie on a face of another body.

@@ -26,6 +26,7 @@ mod face;
 mod face_mesh;
 mod face_surface;
 mod fallback;
+mod grouped;
 mod imprint;
 mod limits;
 mod nodes;
@@ -46,6 +47,7 @@ mod triangulator;
 use crate::model::Model;
 pub use angles::SteepFace;
 pub use evaluation::sampled_sag;
+pub use grouped::GroupedFacets;
 pub use report::{
     FaceCounts, FailedFace, FailureCause, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag,
     ShellCounts, ToleranceRange,

@@ -78,7 +78,7 @@ fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &F
 }
 
 /// A mirrored placement turns facets around, so that they stay counter-clockwise from outside.
-fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
+pub(super) fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
     if !frame.is_mirrored() {
         [a, b, c, d]
     } else if c == d {

@@ -210,7 +210,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "write",
         ],
     ),
-    ("math", &["mod", "simd", "ray", "aabb", "frame", "interval", "roots", "units"]),
+    ("model", &["part face", "placed", "outline", "bounds", "account", "tight_box", "instancing", "mod"]),
+    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "interval", "roots", "units"]),
     (
         "intersect",
         &[
@@ -225,6 +226,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "normals",
             "bvh",
             "octree",
+            "instanced",
         ],
     ),
     (
@@ -406,6 +408,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "limits",
             "assemble",
             "placement",
+            "grouped",
             "contact",
             "mod",
         ],

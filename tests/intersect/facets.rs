@@ -3,10 +3,12 @@
 use crate::departures::leave;
 use crate::support::*;
 use lampyris::intersect::bvh::{self, Bvh, Kind};
+use lampyris::intersect::instanced::Instanced;
 use lampyris::intersect::octree::{self, InstructionSet, Octree};
 use lampyris::intersect::{Cost, Hit, Intersector};
-use lampyris::math::{Point, Ray, Vector};
+use lampyris::math::{Aabb, FaceId, Frame, Point, Ray, Vector};
 use lampyris::mesh::FacetMesh;
+use lampyris::model::{Instancing, Placement};
 
 /// Names and structures under test: all must give the same bits.
 pub(crate) fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + '_>)> {
@@ -24,9 +26,22 @@ pub(crate) fn all(mesh: &FacetMesh) -> Vec<(&'static str, Box<dyn Intersector + 
         ),
         ("octree, portable", Box::new(Octree::build(mesh, &portable))),
         ("octree, textbook", Box::new(Octree::build(mesh, &octree::Settings::textbook()))),
+        ("octree, placed", Box::new(placed(mesh))),
         ("Bvh2", Box::new(Bvh::build(mesh, &bvh::Settings { kind: Kind::Bvh2, ..bvh }))),
         ("CwBvh", Box::new(Bvh::build(mesh, &bvh::Settings { kind: Kind::CwBvh, ..bvh }))),
     ]
+}
+
+/// The octree as that of a part which is placed where it is.
+fn placed(mesh: &FacetMesh) -> Instanced<'_> {
+    let usable = mesh.positions.iter().copied().filter(|p| p.abs().max_element() <= 1e12);
+    let bounds = Aabb::from_points(usable).with_room();
+    let place = Placement { group: 1, frame: Frame::IDENTITY, bounds, first_face: FaceId(0) };
+    // Kept for the rest of the test run.
+    let instancing = Box::leak(Box::new(Instancing::from_placements(Vec::new(), vec![place])));
+    let nothing: &FacetMesh = Box::leak(Box::default());
+    let octree = |mesh| Box::new(Octree::build(mesh, &octree::Settings::default())) as Box<dyn Intersector>;
+    Instanced::new(instancing, vec![octree(nothing), octree(mesh)])
 }
 
 /// Asks all structures one by one and in a batch; all answers must be the same bits.

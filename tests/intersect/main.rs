@@ -3,6 +3,7 @@
 mod departures;
 mod facets;
 mod horizon;
+mod instanced;
 mod light;
 mod normals;
 mod support;

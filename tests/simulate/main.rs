@@ -13,6 +13,7 @@ mod glass_catalogues;
 mod growing;
 mod hard;
 mod imaging;
+mod instanced;
 mod laid;
 mod laws;
 mod pipeline;

@@ -46,9 +46,9 @@ pub(crate) fn run(
     let monitor = TerminalMonitor::new(console);
     let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
     let prepared = PreparedScene::new(job, &monitor)?;
-    let mesh = &prepared.tessellation.mesh;
     let [low, high] = prepared.mesh_settings.tolerance;
-    let what = format!("{} facets within {low}..{high} mm of the splines", grouped(mesh.facets.len() as u64));
+    let what =
+        format!("{} facets within {low}..{high} mm of the splines", grouped(prepared.facets.facet_count() as u64));
     say_step("tessellate", what, prepared.tessellation_seconds);
     let start = std::time::Instant::now();
     // Claimed before the trace, which would be lost on a folder that cannot be written.

@@ -358,13 +358,13 @@ fn say_shard(
 /// Says what would be done.
 fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
     let settings = prepared.run_settings();
-    let mesh = &prepared.tessellation.mesh;
+    let facets = &prepared.facets;
     let loaded = &prepared.job.loaded;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let effects = crate::simulate::Required::new(&prepared.bound);
     if console.json {
         let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
-            "faces": faces, "facets": mesh.facets.len(), "mesh_bytes": mesh.bytes(),
+            "faces": faces, "facets": facets.facet_count(), "mesh_bytes": facets.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
             "rules": rule_document(&prepared.bound, &loaded.model),
             "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
@@ -378,8 +378,8 @@ fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result
         grouped(settings.rays),
         settings.seed,
         prepared.threads,
-        grouped(mesh.facets.len() as u64),
-        bytes(mesh.bytes() as u64),
+        grouped(facets.facet_count() as u64),
+        bytes(facets.bytes() as u64),
         prepared.choice.intersector,
         prepared.choice.normals,
         folder.display(),

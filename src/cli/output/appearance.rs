@@ -26,7 +26,7 @@ const CLEAR_OPACITY: f64 = 0.2;
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Look {
     Coloured(usize, Option<String>),
-    Clear(usize, u16),
+    Clear(usize, u32),
 }
 
 /// The mesh with a group for every instance and look; faces that let light into a medium, whatever selected them, are clear.

@@ -14,11 +14,11 @@ const MOST_LABELLED: usize = 20_000;
 
 /// The selector of every placed face; of none where there are too many for a page.
 pub(crate) fn face_labels(model: &Model) -> Vec<String> {
-    let faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
     // None rather than some: a page whose faces answer here and there would puzzle.
-    if faces.len() > MOST_LABELLED {
+    if model.placed_face_count() > MOST_LABELLED {
         return Vec::new();
     }
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
     face_selectors(model, &faces).iter().map(FaceSelector::as_key).collect()
 }
 

@@ -9,9 +9,10 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
+use crate::mesh::FacetMesh;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
 use crate::regulation::Assessment;
-use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, path_lines};
+use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, grouped, path_lines};
 use crate::simulate::arrivals;
 use crate::study::figures::ReceiverFigures;
 use serde_json::Value;
@@ -21,6 +22,8 @@ use std::path::{Path, PathBuf};
 const PAGE_BYTES: u64 = 5_000_000;
 /// What a cell of a receiver takes at least in all its files, bytes: its number as text, twice in binary.
 const CELL_BYTES: u64 = 40;
+/// Facets that are drawn where parts are placed often; the rest of their places are boxes, or nothing: three seconds of a viewer.
+const MOST_DRAWN: usize = 24_000;
 /// What a facet takes at least in the model of the folder, bytes: corners and normals in single precision.
 const FACET_BYTES: u64 = 50;
 
@@ -31,7 +34,7 @@ const FACET_BYTES: u64 = 50;
 pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: bool) -> Result<(), Failure> {
     let scene = &prepared.job.scene;
     let cells: u64 = scene.receivers.iter().map(|r| r.cells.iter().map(|&n| n as u64).product::<u64>()).sum();
-    let facets = prepared.tessellation.mesh.facets.len() as u64;
+    let facets = prepared.facets.drawn(MOST_DRAWN).facets.len() as u64;
     let page = if with_page { PAGE_BYTES } else { 0 };
     require_space(folder, page + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
     for receiver in &scene.receivers {
@@ -87,8 +90,8 @@ pub(crate) fn write(
     let all_figures = run.figures(prepared);
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
-    let mesh = &prepared.tessellation.mesh;
-    let bounds = mesh.bounds();
+    let mesh = &*prepared.facets.drawn(MOST_DRAWN);
+    let bounds = prepared.facets.bounds();
     // Rays that leave go to infinity and would make the model a speck.
     let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
     let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.bound));
@@ -143,6 +146,8 @@ fn page<'a>(
         title,
         results: &run.results,
         facets,
+        facet_count: prepared.facets.facet_count(),
+        drawn: drawn_note(facets.mesh.facets.len(), prepared.facets.facet_count()),
         unit: prepared.power_unit(),
         check: run.check.as_ref(),
         figures: all_figures,
@@ -207,22 +212,37 @@ fn model_table(prepared: &PreparedScene) -> Table {
 
 /// What the facets are.
 fn facet_table(prepared: &PreparedScene) -> Table {
-    let mesh = &prepared.tessellation.mesh;
+    let facets = &prepared.facets;
+    let sum =
+        |of: &dyn Fn(&FacetMesh) -> usize| facets.counted().map(|(mesh, count)| count * of(mesh)).sum::<usize>();
     let mut table = Table::new("facets", "Facets", &[("", ""), ("value", ""), ("unit", "")]);
     let [finest, loosest] = prepared.mesh_settings.tolerance;
-    let proved: Vec<f64> = mesh.sag.iter().copied().filter(|s| s.is_finite()).collect();
-    let megabytes = mesh.bytes() as f64 / 1_000_000.0;
+    let proved = facets.meshes().flat_map(|m| &m.sag).copied().filter(|s| s.is_finite());
+    let megabytes = facets.bytes() as f64 / 1_000_000.0;
     let rows: [(&str, Cell, &str); 7] = [
-        ("facets", mesh.facets.len().into(), ""),
-        ("of these quads", mesh.quad_count().into(), ""),
+        ("facets", facets.facet_count().into(), ""),
+        ("of these quads", sum(&FacetMesh::quad_count).into(), ""),
         ("tolerance where sharply curved", finest.into(), "mm"),
         ("tolerance where nearly flat", loosest.into(), "mm"),
-        ("largest proved distance to the spline", proved.iter().copied().fold(0.0, f64::max).into(), "mm"),
-        ("facets without a proof", (mesh.sag.len() - proved.len()).into(), ""),
+        ("largest proved distance to the spline", proved.fold(0.0, f64::max).into(), "mm"),
+        ("facets without a proof", sum(&|m| m.sag.iter().filter(|s| !s.is_finite()).count()).into(), ""),
         ("memory of the mesh", Cell::Number(megabytes, 3), "MB"),
     ];
     for (name, value, unit) in rows {
         table.row([name.into(), value, unit.into()]);
     }
     table
+}
+
+/// What the view of the facets shows.
+fn drawn_note(drawn: usize, traced: usize) -> String {
+    if drawn == traced {
+        return "Facets as traced, parts in their colours, with some ray paths of the run.".into();
+    }
+    format!(
+        "Of {} facets that were traced {} are shown: a part that is placed often is drawn once, its other places are boxes, of very many \
+         some; with some ray paths of the run.",
+        grouped(traced as u64),
+        grouped(drawn as u64)
+    )
 }

@@ -123,7 +123,8 @@ impl<'m> Octree<'m> {
     }
 
     /// A tree that has been made since `started`.
-    fn with_tree(tree: Tree<'m>, settings: &Settings, statistics: Statistics, started: Instant) -> Self {
+    fn with_tree(mut tree: Tree<'m>, settings: &Settings, statistics: Statistics, started: Instant) -> Self {
+        tree.surroundings = tree.surroundings.with_starts_as_far_as(settings.farthest_start);
         Self {
             tree,
             settings: *settings,

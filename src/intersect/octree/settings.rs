@@ -19,6 +19,9 @@ pub struct Settings {
     pub instruction_set: InstructionSet,
     /// How the normal at a hit is got.
     pub normals: NormalMode,
+    /// Largest coordinate that starts were rounded at, mm, where that is not the mesh's own: of a part in its own coordinates that
+    /// stands far away. 0 otherwise.
+    pub farthest_start: f64,
 }
 
 impl Default for Settings {
@@ -30,6 +33,7 @@ impl Default for Settings {
             max_duplication: 16.0,
             instruction_set: InstructionSet::Fastest,
             normals: NormalMode::default(),
+            farthest_start: 0.0,
         }
     }
 }

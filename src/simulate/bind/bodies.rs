@@ -21,7 +21,7 @@ pub(super) fn find_bodies(
     model: &Model,
     chosen: &ChosenRules,
     light: &SceneLight,
-) -> Result<(Vec<Body>, Vec<u16>, bool), Error> {
+) -> Result<(Vec<Body>, Vec<u32>, bool), Error> {
     let ambient = match &scene.ambient {
         Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
         None => optics::Medium::vacuum(),
@@ -52,12 +52,7 @@ pub(super) fn find_bodies(
         };
         bodies[body].open |= is_open(&f, model);
         bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
-        of_face[f.id.index()] = body as u16;
-    }
-    // The highest number stands for nothing else, but leaves the type no room.
-    if bodies.len() > usize::from(u16::MAX) {
-        let message = format!("{} bodies with media; at most 65534 are possible", bodies.len());
-        return Err(scene.error(ErrorKind::Model, &[Key::Name("material")], message));
+        of_face[f.id.index()] = body as u32;
     }
     // Sweep along x: behind the first box that begins beyond this one, none meets it.
     let mut order: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
@@ -71,12 +66,12 @@ pub(super) fn find_bodies(
 
 /// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
 /// body to light, and as long as the box around them all.
-pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u16; 2]]) {
+pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u32; 2]]) {
     // Union–find with halved paths (Tarjan & van Leeuwen 1984), since touching goes on from body to body; the lowest number
     // stands for its group.
-    let mut united: Vec<u16> = (0..bodies.len() as u16).collect();
+    let mut united: Vec<u32> = (0..bodies.len() as u32).collect();
     /// The number that stands for the group of a body; ways to it are halved as they are walked.
-    fn first(united: &mut [u16], mut body: u16) -> u16 {
+    fn first(united: &mut [u32], mut body: u32) -> u32 {
         while united[body as usize] != body {
             united[body as usize] = united[united[body as usize] as usize];
             body = united[body as usize];
@@ -92,7 +87,7 @@ pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[
     }
     // A path cannot tell where one body of its index ends and the next begins: what counts is the way through all of them.
     let mut whole = vec![(Aabb::EMPTY, false); bodies.len()];
-    let of_body: Vec<usize> = (0..bodies.len() as u16).map(|k| first(&mut united, k) as usize).collect();
+    let of_body: Vec<usize> = (0..bodies.len() as u32).map(|k| first(&mut united, k) as usize).collect();
     for (body, &k) in bodies.iter().zip(&of_body).skip(1) {
         whole[k] = (whole[k].0.union(body.bounds), whole[k].1 | body.absorbs());
     }

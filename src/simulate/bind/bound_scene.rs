@@ -51,21 +51,21 @@ pub struct BoundScene {
 
 impl BoundScene {
     /// The instance and the medium of a body, as lost rays name it.
-    pub fn body(&self, body: u16) -> Option<[&str; 2]> {
-        self.bodies.get(usize::from(body)).map(|b| [b.name.as_str(), b.medium.as_str()])
+    pub fn body(&self, body: u32) -> Option<[&str; 2]> {
+        self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 
     /// The body that light enters through a face; `None` where the face lets none in or no medium lies behind it.
-    pub fn entered_body(&self, face: FaceId) -> Option<u16> {
+    pub fn entered_body(&self, face: FaceId) -> Option<u32> {
         let optics = self.faces.get(face.index())?;
         let lets_in = optics.body != AMBIENT && !self.surfaces[usize::from(optics.surface)].is_opaque();
         lets_in.then_some(optics.body)
     }
 
     /// The index of a body over that of the surroundings, at the wavelength of the scene; 1 for a number without a body.
-    pub fn relative_index(&self, body: u16) -> f64 {
-        let ambient = self.bodies[usize::from(AMBIENT)].index(None);
-        self.bodies.get(usize::from(body)).map_or(1.0, |b| b.index(None) / ambient)
+    pub fn relative_index(&self, body: u32) -> f64 {
+        let ambient = self.bodies[AMBIENT as usize].index(None);
+        self.bodies.get(body as usize).map_or(1.0, |b| b.index(None) / ambient)
     }
 
     /// What someone who reads the results must know: bodies that are open, light beyond the wavelengths of a table.

@@ -8,7 +8,7 @@ use crate::simulate::scene::Scene;
 use crate::simulate::trim_loops::{is_inside, trim_polygons};
 
 /// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
-pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u16]) -> (Vec<bool>, Vec<[u16; 2]>) {
+pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> (Vec<bool>, Vec<[u32; 2]>) {
     // Each box is grown by half of the glue, so that two within its whole meet.
     let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));
     let mut faces: Vec<(usize, Aabb)> =
@@ -30,7 +30,7 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u16]) -> 
 }
 
 /// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.
-pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u16]) -> Vec<bool> {
+pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -> Vec<bool> {
     let mut siblings = vec![false; of_face.len()];
     let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
         // Parts of one shell have no siblings.
@@ -60,7 +60,7 @@ const MOST_DISTANCES: usize = 50_000;
 const SAMPLES: usize = 5;
 
 /// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
-pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u16], opaque: &[bool]) -> Vec<bool> {
+pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
     // Nothing to find: no bodies, or nothing opaque.
     if of_face.iter().all(|b| *b == AMBIENT) || !opaque.contains(&true) {

@@ -43,7 +43,7 @@ pub(super) fn check_interfaces(
     scene: &Scene,
     model: &Model,
     chosen: &ChosenRules,
-    bodies: &[u16],
+    bodies: &[u32],
 ) -> Result<(), Error> {
     for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(bodies) {
         let Some(i) = rule.filter(|&r| scene.materials[r].surface == Some(SurfaceKind::Interface)) else {

@@ -100,7 +100,7 @@ struct Faces {
     faces: Vec<FaceOptics>,
     surfaces: Vec<Surface>,
     /// Pairs of bodies that may touch.
-    touching_pairs: Vec<[u16; 2]>,
+    touching_pairs: Vec<[u32; 2]>,
 }
 
 /// What each face does to light, and the distinct surfaces that faces name by their index.
@@ -108,7 +108,7 @@ fn bind_faces(
     scene: &Scene,
     model: &Model,
     chosen: &ChosenRules,
-    body_of_face: &[u16],
+    body_of_face: &[u32],
     nested: bool,
 ) -> Result<Faces, Error> {
     let (touching, touching_pairs) = if nested {

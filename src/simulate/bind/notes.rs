@@ -123,7 +123,7 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
     let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(open).collect();
     let first = faces.first()?;
     let [instance, medium] = bound.body(bound.faces[first.id.index()].body)?;
-    let bodies: BTreeSet<u16> = faces.iter().map(|f| bound.faces[f.id.index()].body).collect();
+    let bodies: BTreeSet<u32> = faces.iter().map(|f| bound.faces[f.id.index()].body).collect();
     let others = if bodies.len() > 1 { format!(" (and {} more)", bodies.len() - 1) } else { String::new() };
     let sheet = match (first.name(), first.entity()) {
         ("", Some(entity)) => format!(" (face #{entity})"),
@@ -140,8 +140,8 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
 /// One sentence about the thinnest body that touches others and is hardly thicker than the glue, along an axis.
 pub(super) fn films(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
-    let thickness = |k: u16| bound.bodies[usize::from(k)].bounds.size().min_element();
-    let touching: BTreeSet<u16> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
+    let thickness = |k: u32| bound.bodies[k as usize].bounds.size().min_element();
+    let touching: BTreeSet<u32> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();
     // Twice the glue: a body as thin as that has both of its faces within the glue of one place.
     let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;

@@ -44,7 +44,7 @@ pub(crate) struct Emitter {
     /// A number of its own, where the scene gives one.
     pub(crate) rays: Option<u64>,
     /// Bodies around it, outermost first.
-    pub(crate) inside: SmallVec<[u16; 4]>,
+    pub(crate) inside: SmallVec<[u32; 4]>,
     /// Whether the scene says so; geometry tells otherwise.
     pub(crate) media_stated: bool,
     /// Its spectrum, when the scene has several wavelengths.
@@ -260,7 +260,7 @@ impl Emitter {
 }
 
 /// The bodies that a source is said to lie in, outermost first.
-fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVec<[u16; 4]>, Error> {
+fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVec<[u32; 4]>, Error> {
     let mut media = SmallVec::new();
     for instance in scene.sources[source].inside.iter().flat_map(|n| n.as_slice()) {
         let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
@@ -275,7 +275,7 @@ fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVe
             return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
         };
         // Body 0 are the surroundings.
-        media.push(body as u16 + 1);
+        media.push(body as u32 + 1);
     }
     Ok(media)
 }

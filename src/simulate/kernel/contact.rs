@@ -26,7 +26,7 @@ impl FaceHit {
 ///
 /// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
 /// whether rounding puts it before or behind.
-pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u16> {
+pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
     touching_face(context, ray, at).map(|other| other.face.body)
 }
 
@@ -42,7 +42,7 @@ pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) ->
 /// Another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
 /// entered or left at once, wherever rounding puts the second face.
 #[inline(never)]
-pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u16> {
+pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
     // The direction of the ray against the outward normal tells whether it goes in or out, whichever of the two
     // faces is met first.
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;

@@ -12,7 +12,7 @@ use crate::simulate::settings::RunSettings;
 use smallvec::SmallVec;
 
 /// Bodies, outermost first.
-pub(super) type Bodies = SmallVec<[u16; 4]>;
+pub(super) type Bodies = SmallVec<[u32; 4]>;
 
 /// What the rays of a source start in.
 #[derive(Clone, Debug)]
@@ -108,7 +108,7 @@ impl<'a> Context<'a> {
 
     /// Refractive index of a body for the light of a ray.
     #[inline(always)]
-    pub(super) fn index<C: RayPayload>(&self, body: u16, payload: &C) -> f64 {
+    pub(super) fn index<C: RayPayload>(&self, body: u32, payload: &C) -> f64 {
         self.bound.bodies[body as usize].index(payload.wavelength())
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct SurfaceInteraction<'a> {
     /// Times that the facet's normal had to be taken for the interpolated one.
     pub(super) corrected_normals: u32,
     /// Two bodies that are found to overlap here.
-    pub(super) overlap: Option<[u16; 2]>,
+    pub(super) overlap: Option<[u32; 2]>,
 }
 
 /// What a face does to light.

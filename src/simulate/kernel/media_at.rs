@@ -128,7 +128,7 @@ struct Crossings {
 
 impl Crossings {
     /// Notes that the way crosses the border of a body.
-    fn cross(&mut self, body: u16, entering: bool) {
+    fn cross(&mut self, body: u32, entering: bool) {
         if body == AMBIENT {
             return;
         }
@@ -155,16 +155,16 @@ mod tests {
 
     #[test]
     fn what_is_left_and_was_not_entered_is_around() {
-        let around = |crossings: &[(u16, bool)]| {
+        let around = |crossings: &[(u32, bool)]| {
             let mut c = Crossings::default();
             crossings.iter().for_each(|&(body, entering)| c.cross(body, entering));
             c.bodies_around().to_vec()
         };
-        assert_eq!(around(&[(1, true), (1, false)]), Vec::<u16>::new());
+        assert_eq!(around(&[(1, true), (1, false)]), Vec::<u32>::new());
         assert_eq!(around(&[(2, false), (3, true), (3, false), (1, false)]), [1, 2]);
-        assert_eq!(around(&[(1, true), (2, true), (1, false), (2, false)]), Vec::<u16>::new());
+        assert_eq!(around(&[(1, true), (2, true), (1, false), (2, false)]), Vec::<u32>::new());
         // Inside out.
-        assert_eq!(around(&[(1, false), (1, true)]), Vec::<u16>::new());
-        assert_eq!(around(&[(AMBIENT, false)]), Vec::<u16>::new());
+        assert_eq!(around(&[(1, false), (1, true)]), Vec::<u32>::new());
+        assert_eq!(around(&[(AMBIENT, false)]), Vec::<u32>::new());
     }
 }

@@ -73,7 +73,7 @@ impl<C: RayPayload> Path<C> {
 
     /// Whether it has gone in a body by total reflection alone for so long that it will go round there for ever.
     #[inline(always)]
-    pub(super) fn is_trapped_in(&self, context: &Context<'_>, body: u16) -> bool {
+    pub(super) fn is_trapped_in(&self, context: &Context<'_>, body: u32) -> bool {
         self.length - f64::from(self.released_at) > context.bound.bodies[body as usize].trapped_length
     }
 

@@ -21,13 +21,13 @@ pub(crate) trait RayPayload: Copy + Send {
     /// The payload of a ray that is in no body.
     fn in_surroundings() -> Self;
     /// A ray that starts inside these bodies, outermost first; `None` when it cannot carry so many.
-    fn inside(bodies: &[u16]) -> Option<Self>;
+    fn inside(bodies: &[u32]) -> Option<Self>;
     /// The innermost body.
-    fn body(&self) -> u16;
+    fn body(&self) -> u32;
     /// The same ray on the other side of the boundary of a body; `None` for a crossing that cannot be.
-    fn cross(&self, body: u16, entering: bool) -> Option<Self>;
+    fn cross(&self, body: u32, entering: bool) -> Option<Self>;
     /// The same light inside these bodies.
-    fn moved_inside(&self, bodies: &[u16]) -> Option<Self> {
+    fn moved_inside(&self, bodies: &[u32]) -> Option<Self> {
         Self::inside(bodies)
     }
     /// Whether it can carry no more bodies.
@@ -66,13 +66,13 @@ impl<const COATED: bool> RayPayload for NoMedia<COATED> {
     fn in_surroundings() -> Self {
         Self
     }
-    fn inside(_: &[u16]) -> Option<Self> {
+    fn inside(_: &[u32]) -> Option<Self> {
         Some(Self)
     }
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         AMBIENT
     }
-    fn cross(&self, _: u16, _: bool) -> Option<Self> {
+    fn cross(&self, _: u32, _: bool) -> Option<Self> {
         // There is no body to enter, so that every crossing of one is impossible.
         None
     }
@@ -90,18 +90,18 @@ impl<C: RayPayload> RayPayload for EndsOnly<C> {
     fn in_surroundings() -> Self {
         Self(C::in_surroundings())
     }
-    fn inside(bodies: &[u16]) -> Option<Self> {
+    fn inside(bodies: &[u32]) -> Option<Self> {
         C::inside(bodies).map(Self)
     }
     #[inline]
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         self.0.body()
     }
     #[inline]
-    fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+    fn cross(&self, body: u32, entering: bool) -> Option<Self> {
         self.0.cross(body, entering).map(Self)
     }
-    fn moved_inside(&self, bodies: &[u16]) -> Option<Self> {
+    fn moved_inside(&self, bodies: &[u32]) -> Option<Self> {
         self.0.moved_inside(bodies).map(Self)
     }
     fn is_full(&self) -> bool {
@@ -124,14 +124,14 @@ impl<C: RayPayload> RayPayload for EndsOnly<C> {
 
 /// The one body that a ray is in, for scenes whose bodies neither touch nor nest.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Clear(u16);
+pub(crate) struct Clear(u32);
 
 impl RayPayload for Clear {
     const MEDIA: bool = true;
     fn in_surroundings() -> Self {
         Self(AMBIENT)
     }
-    fn inside(bodies: &[u16]) -> Option<Self> {
+    fn inside(bodies: &[u32]) -> Option<Self> {
         match bodies {
             [] => Some(Self(AMBIENT)),
             [body] => Some(Self(*body)),
@@ -140,11 +140,11 @@ impl RayPayload for Clear {
         }
     }
     #[inline]
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         self.0
     }
     #[inline]
-    fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+    fn cross(&self, body: u32, entering: bool) -> Option<Self> {
         // Into a body from the surroundings alone, and out of the one that it is in: all else is a crossing that
         // cannot be.
         if entering { (self.0 == AMBIENT).then_some(Self(body)) } else { (self.0 == body).then_some(Self(AMBIENT)) }
@@ -158,8 +158,8 @@ pub(crate) const DEPTH: usize = 7;
 /// hand light over in either order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nested {
-    bodies: [u16; DEPTH],
-    depth: u16,
+    bodies: [u32; DEPTH],
+    depth: u32,
 }
 
 impl RayPayload for Nested {
@@ -170,20 +170,20 @@ impl RayPayload for Nested {
     fn is_full(&self) -> bool {
         self.depth as usize == DEPTH
     }
-    fn inside(bodies: &[u16]) -> Option<Self> {
-        let mut stack = Self { bodies: [AMBIENT; DEPTH], depth: bodies.len() as u16 };
+    fn inside(bodies: &[u32]) -> Option<Self> {
+        let mut stack = Self { bodies: [AMBIENT; DEPTH], depth: bodies.len() as u32 };
         stack.bodies.get_mut(..bodies.len())?.copy_from_slice(bodies);
         Some(stack)
     }
     #[inline]
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         match self.depth {
             0 => AMBIENT,
             n => self.bodies[n as usize - 1],
         }
     }
     #[inline]
-    fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+    fn cross(&self, body: u32, entering: bool) -> Option<Self> {
         let mut next = *self;
         let n = self.depth as usize;
         if entering {
@@ -216,16 +216,16 @@ impl RayPayload for Coloured {
     fn is_full(&self) -> bool {
         self.stack.is_full()
     }
-    fn inside(bodies: &[u16]) -> Option<Self> {
+    fn inside(bodies: &[u32]) -> Option<Self> {
         Some(Self { stack: Nested::inside(bodies)?, wavelength: None })
     }
-    fn moved_inside(&self, bodies: &[u16]) -> Option<Self> {
+    fn moved_inside(&self, bodies: &[u32]) -> Option<Self> {
         Some(Self { stack: Nested::inside(bodies)?, ..*self })
     }
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         self.stack.body()
     }
-    fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+    fn cross(&self, body: u32, entering: bool) -> Option<Self> {
         Some(Self { stack: self.stack.cross(body, entering)?, ..*self })
     }
     fn wavelength(&self) -> Option<f64> {
@@ -255,16 +255,16 @@ impl RayPayload for Full {
     fn with_media_of(&self, other: Self) -> Self {
         Self { stokes: self.stokes, ..other }
     }
-    fn inside(bodies: &[u16]) -> Option<Self> {
+    fn inside(bodies: &[u32]) -> Option<Self> {
         Some(Self { coloured: Coloured::inside(bodies)?, stokes: Stokes::unpolarised(1.0, Vector::Z) })
     }
-    fn moved_inside(&self, bodies: &[u16]) -> Option<Self> {
+    fn moved_inside(&self, bodies: &[u32]) -> Option<Self> {
         Some(Self { coloured: self.coloured.moved_inside(bodies)?, ..*self })
     }
-    fn body(&self) -> u16 {
+    fn body(&self) -> u32 {
         self.coloured.body()
     }
-    fn cross(&self, body: u16, entering: bool) -> Option<Self> {
+    fn cross(&self, body: u32, entering: bool) -> Option<Self> {
         Some(Self { coloured: self.coloured.cross(body, entering)?, ..*self })
     }
     fn wavelength(&self) -> Option<f64> {

@@ -108,7 +108,7 @@ fn overlapping_bodies<C: RayPayload>(
     context: &Context<'_>,
     payload: &C,
     at: &SurfaceInteraction<'_>,
-) -> Option<[u16; 2]> {
+) -> Option<[u32; 2]> {
     let here = payload.body();
     let left = at.face.body;
     // Lights crossing at a contact come below each other by design; only a crossing by itself tells of an overlap.

@@ -12,6 +12,7 @@
 
 mod border;
 mod classify;
+mod grouped;
 mod measure;
 mod placed_surface;
 mod verdict;
@@ -28,10 +29,25 @@ use super::{Progress, Quantiles};
 use crate::intersect::{Certainty, Cost, Hit, Intersector};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
-use crate::model::Model;
-use classify::Classifier;
+use crate::model::{Instancing, Model};
+use grouped::Classifiers;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Who is asked about a model of whose parts some are placed often and have coordinates of their own.
+#[derive(Clone)]
+pub struct GroupedIntersectors<'a> {
+    /// The model of each group, with the facets that were made of it.
+    pub groups: Vec<(&'a Model, &'a FacetMesh)>,
+    /// Where the groups stand; `None` for a model in one piece.
+    pub instancing: Option<&'a Instancing>,
+    /// All facets in octrees.
+    pub octree: &'a dyn Intersector,
+    /// The same facets in BVHs.
+    pub bvh: &'a dyn Intersector,
+    /// The splines.
+    pub exact: &'a dyn Intersector,
+}
 
 /// Who is asked.
 #[derive(Clone, Copy)]
@@ -73,7 +89,19 @@ pub fn cross_check(
     settings: &Settings,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> CrossCheck {
-    let classifier = Classifier::new(intersectors.model, intersectors.mesh, settings.fallback_band_mm);
+    let Intersectors { model, mesh, octree, bvh, exact } = *intersectors;
+    let whole = GroupedIntersectors { groups: vec![(model, mesh)], instancing: None, octree, bvh, exact };
+    cross_check_groups(&whole, rays, settings, progress)
+}
+
+/// The same for a model in groups.
+pub fn cross_check_groups(
+    intersectors: &GroupedIntersectors<'_>,
+    rays: &(impl RaySource + ?Sized),
+    settings: &Settings,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> CrossCheck {
+    let classifier = Classifiers::new(&intersectors.groups, intersectors.instancing, settings.fallback_band_mm);
     let clock = Clock::new(progress);
     let (count, done) = (rays.len(), AtomicU64::new(0));
     let chunks = count.div_ceil(CHUNK);
@@ -96,8 +124,8 @@ pub fn cross_check(
     }
     let mut check = all.check;
     check.rays = count;
-    check.scene =
-        SceneSize { facets: intersectors.mesh.facets.len(), patches: intersectors.exact.footprint().primitives };
+    let facets = intersectors.groups.iter().map(|(_, mesh)| mesh.facets.len()).sum();
+    check.scene = SceneSize { facets, patches: intersectors.exact.footprint().primitives };
     check.facets_vs_exact.t_error_mm = all.t_errors.summary();
     check.facets_vs_exact.normal_error_deg = all.normal_errors.summary();
     check.disagreements = all.kept;
@@ -121,7 +149,12 @@ struct Tally {
 
 impl Tally {
     /// The tally of some rays, of which `first` is the number of the first.
-    fn of_rays(intersectors: &Intersectors<'_>, classifier: &Classifier<'_>, first: u64, rays: &[Ray]) -> Self {
+    fn of_rays(
+        intersectors: &GroupedIntersectors<'_>,
+        classifier: &Classifiers<'_>,
+        first: u64,
+        rays: &[Ray],
+    ) -> Self {
         let ask = |who: &dyn Intersector| {
             let mut hits = vec![None; rays.len()];
             who.intersect_batch(rays, &mut hits, &mut Cost::default());
@@ -136,7 +169,7 @@ impl Tally {
     }
 
     /// Counts a ray with the answers of all three, and keeps it where they differ by more than the sag.
-    fn add(&mut self, classifier: &Classifier<'_>, index: u64, ray: &Ray, [octree, bvh, exact]: [Option<Hit>; 3]) {
+    fn add(&mut self, classifier: &Classifiers<'_>, index: u64, ray: &Ray, [octree, bvh, exact]: [Option<Hit>; 3]) {
         self.check.hits += u64::from(octree.is_some());
         let facets_differ = match classifier.same_facets(ray, octree.as_ref(), bvh.as_ref()) {
             Ok(tie) => {

@@ -1,0 +1,88 @@
+//! Differences between facets and spline in a model whose parts that are placed often have coordinates of their own: each is explained where
+//! the first hit is, in that part's.
+
+use super::classify::Classifier;
+use super::verdict::Cause;
+use crate::intersect::Hit;
+use crate::math::Ray;
+use crate::mesh::FacetMesh;
+use crate::model::{Instancing, Model};
+
+/// One classifier for each group.
+pub(super) struct Classifiers<'a> {
+    groups: Vec<Classifier<'a>>,
+    instancing: Option<&'a Instancing>,
+}
+
+/// A question in the coordinates of one group.
+struct Local<'c, 'a> {
+    classifier: &'c Classifier<'a>,
+    ray: Ray,
+    hits: [Option<Hit>; 2],
+}
+
+impl<'a> Classifiers<'a> {
+    /// For the models of all groups with their meshes; one of a model in one piece.
+    pub(super) fn new(
+        groups: &[(&'a Model, &'a FacetMesh)],
+        instancing: Option<&'a Instancing>,
+        fallback: f64,
+    ) -> Self {
+        let classifier = |&(model, mesh): &(&'a Model, &'a FacetMesh)| Classifier::new(model, mesh, fallback);
+        Self { groups: groups.iter().map(classifier).collect(), instancing }
+    }
+
+    /// As [`Classifier::compare`].
+    pub(super) fn compare(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Option<Cause> {
+        let (mut facet, mut exact) = (facet, exact);
+        if let (Some(f), Some(e)) = (facet, exact)
+            && self.place(f) != self.place(e)
+        {
+            // Why the other did not see the earlier one does not depend on what it saw elsewhere.
+            if f.t < e.t { exact = None } else { facet = None }
+        }
+        let Local { classifier, ray, hits: [facet, exact] } = self.local(ray, [facet, exact]);
+        classifier.compare(&ray, facet.as_ref(), exact.as_ref())
+    }
+
+    /// As [`Classifier::same_facets`].
+    pub(super) fn same_facets(&self, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) -> Result<bool, ()> {
+        if let (Some(a), Some(b)) = (a, b)
+            && self.place(a) != self.place(b)
+        {
+            return Err(());
+        }
+        let Local { classifier, ray, hits: [a, b] } = self.local(ray, [a, b]);
+        classifier.same_facets(&ray, a.as_ref(), b.as_ref())
+    }
+
+    /// The placement that was hit, if it is one.
+    fn place(&self, hit: &Hit) -> Option<usize> {
+        self.instancing.and_then(|i| i.locate(hit.face).0)
+    }
+
+    /// Hits of one place, and their ray, as their group sees them.
+    fn local(&self, ray: &Ray, hits: [Option<&Hit>; 2]) -> Local<'_, 'a> {
+        let place = hits.into_iter().flatten().next().and_then(|hit| self.place(hit));
+        let numbered = |hit: &Hit| Hit { face: self.instancing.map_or(hit.face, |i| i.locate(hit.face).1), ..*hit };
+        let hits = hits.map(|hit| hit.map(numbered));
+        let Some(place) = place.and_then(|k| Some(&self.instancing?.placements[k])) else {
+            return Local { classifier: &self.groups[0], ray: *ray, hits };
+        };
+        let frame = &place.frame;
+        let turned = |hit: Hit| Hit {
+            normal: frame.local_direction(hit.normal),
+            geometric_normal: frame.local_direction(hit.geometric_normal),
+            ..hit
+        };
+        Local {
+            classifier: &self.groups[place.group as usize],
+            ray: Ray {
+                origin: frame.local_point(ray.origin),
+                direction: frame.local_direction(ray.direction),
+                ..*ray
+            },
+            hits: hits.map(|hit| hit.map(turned)),
+        }
+    }
+}

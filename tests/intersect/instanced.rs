@@ -1,0 +1,203 @@
+//! Parts that are placed often answer as the same facets in one mesh.
+
+use crate::support::*;
+use lampyris::intersect::exact::{self, Exact};
+use lampyris::intersect::instanced::Instanced;
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::intersect::{Cost, Hit, Intersector};
+use lampyris::math::{Frame, Point, Ray, Vector};
+use lampyris::model::{Face, Instance, Instancing, Model, Part, PartId, Shell};
+use lampyris::nurbs::sweep;
+use lampyris::tessellate::{GroupedFacets, Settings, tessellate};
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::sync::Arc;
+
+/// Half a torus of two faces with its ends open, so that rays pass into it, and a ball.
+fn parts() -> Vec<Part> {
+    let frame = Frame::IDENTITY;
+    let part = |name: &str, surfaces: Vec<_>| {
+        let shell = Shell { faces: surfaces.into_iter().map(Face::whole).collect(), ..Shell::default() };
+        Part { name: name.into(), shells: vec![shell], ..Part::default() }
+    };
+    let arch = |u: [f64; 2]| sweep::torus(&frame, 2.0, 0.7, u, [0.0, TAU]);
+    vec![
+        part("arch", vec![arch([0.0, 1.5]), arch([1.5, 3.0])]),
+        part("ball", vec![sweep::sphere(&frame, 1.5, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2])]),
+    ]
+}
+
+/// Parts on a grid, turned anyhow, some mirrored, some of double size, and a few that stand once.
+fn array(middle: Point, count: usize) -> Model {
+    let mut r = Random(5);
+    let mut model = Model { parts: parts(), ..Model::default() };
+    for k in 0..count {
+        let at = middle + 25.0 * Vector::new((k % 6) as f64, (k / 6 % 6) as f64, (k / 36) as f64);
+        let (axis, hint) = (r.direction(), r.direction());
+        let mut placement = Frame::from_axis(at, axis, Some(hint));
+        if k % 5 == 0 {
+            placement.x = -placement.x;
+        }
+        // Each size often enough, but for a few.
+        placement.scale = if k % 50 == 7 { 1.3 } else { [1.0, 2.0][k / 2 % 2] };
+        let part = PartId((k % 2) as u32);
+        model.instances.push(Instance { name: String::new(), part, placement, colour: None });
+    }
+    model
+}
+
+struct Scene {
+    model: Model,
+    instancing: Arc<Instancing>,
+    settings: Settings,
+}
+
+impl Scene {
+    fn new(middle: Point) -> Self {
+        let model = array(middle, 400);
+        let instancing = Arc::new(Instancing::new(&model, 1e-3).unwrap());
+        assert_eq!((instancing.groups.len(), instancing.groups[0].instances.len()), (5, 8));
+        Self { model, instancing, settings: Settings::uniform(0.05) }
+    }
+
+    fn facets(&self) -> GroupedFacets {
+        let groups = self.instancing.groups.iter().enumerate();
+        let mesh = |(k, group)| tessellate(group, &self.settings.of_group(&self.instancing, k));
+        GroupedFacets { groups: groups.map(mesh).collect(), instancing: Some(self.instancing.clone()) }
+    }
+
+    fn octrees<'m>(&'m self, facets: &'m GroupedFacets) -> Vec<Octree<'m>> {
+        let octree = |(k, mesh)| {
+            let settings = octree::Settings { farthest_start: self.instancing.reach(k), ..Default::default() };
+            Octree::build(mesh, &settings)
+        };
+        facets.meshes().enumerate().map(octree).collect()
+    }
+
+    fn splines(&self) -> Vec<Exact> {
+        self.instancing.groups.iter().map(|g| Exact::build(g, &exact::Settings::default())).collect()
+    }
+
+    fn instanced<'a, T: Intersector + 'a>(&'a self, groups: impl IntoIterator<Item = T>) -> Instanced<'a> {
+        let boxed = |g| Box::new(g) as Box<dyn Intersector>;
+        Instanced::new(&self.instancing, groups.into_iter().map(boxed).collect())
+    }
+
+    fn rays(&self, count: usize) -> Vec<Ray> {
+        let mut r = Random(17);
+        let places: Vec<Point> = self.model.instances.iter().map(|i| i.placement.origin).collect();
+        (0..count)
+            .map(|k| {
+                // On no surface: the radii are 1.5, 1.95 and 3.
+                let spot = |r: &mut Random| places[r.below(places.len())] + r.direction() * 2.7;
+                let origin = spot(&mut r) + r.direction() * [0.0, 30.0, 300.0][k % 3];
+                let ray = Ray::from_points(origin, spot(&mut r)).unwrap();
+                if k % 7 == 0 { ray.with_range(2.0, 20.0) } else { ray }
+            })
+            .collect()
+    }
+}
+
+/// One by one and in a batch: the same bits.
+fn ask(who: &dyn Intersector, rays: &[Ray]) -> Vec<Option<Hit>> {
+    let mut hits = vec![None; rays.len()];
+    let mut cost = Cost::default();
+    who.intersect_batch(rays, &mut hits, &mut cost);
+    assert_eq!(cost.rays, rays.len() as u64);
+    for (ray, hit) in rays.iter().zip(&hits) {
+        assert_eq!(who.intersect(ray, &mut Cost::default()), *hit, "{ray:?}");
+    }
+    hits
+}
+
+/// Rays on which two answers differ by more than rounding; those that pass an edge within it may.
+fn differences(rays: &[Ray], one: &[Option<Hit>], other: &[Option<Hit>], size: f64) -> usize {
+    let differ = |((ray, a), b): ((&Ray, &Option<Hit>), &Option<Hit>)| match (a, b) {
+        (None, None) => false,
+        (Some(a), Some(b)) => {
+            let sine = a.geometric_normal.dot(ray.direction).abs().max(1e-3);
+            let is_near = (a.t - b.t).abs() <= 1e-12 * size / sine;
+            !is_near || a.face != b.face || a.normal.distance(b.normal) > 1e-10 * size / sine
+        }
+        _ => true,
+    };
+    rays.iter().zip(one).zip(other).filter(|x| differ(*x)).count()
+}
+
+#[test]
+fn instances_answer_as_one_mesh() {
+    for middle in [Point::ZERO, Point::new(3e4, -2e4, 1e4)] {
+        let size = 300.0 + middle.length();
+        let scene = Scene::new(middle);
+        let facets = scene.facets();
+        let flat = facets.whole();
+        assert_eq!(facets.facet_count(), flat.facets.len());
+        assert!(facets.bytes() < flat.bytes() / 10);
+        let instanced = scene.instanced(scene.octrees(&facets));
+        let rays = scene.rays(3000);
+        let [ours, one] = [ask(&instanced, &rays), ask(&Octree::build(&flat, &Default::default()), &rays)];
+        assert!(ours.iter().flatten().count() > 1500);
+        assert_eq!(differences(&rays, &ours, &one, size), 0);
+        // And on from there, along the mirrored ray.
+        let on: Vec<[Ray; 2]> = (rays.iter().zip(ours.iter().zip(&one)))
+            .filter_map(|(ray, (a, b))| Some([(*a)?, (*b)?].map(|hit| reflected(ray, &hit))))
+            .collect();
+        let [from_ours, from_one] = [0, 1].map(|k| on.iter().map(|rays| rays[k]).collect::<Vec<_>>());
+        let [ours, one] = [ask(&instanced, &from_ours), ask(&Octree::build(&flat, &Default::default()), &from_one)];
+        assert_eq!(differences(&from_ours, &ours, &one, 10.0 * size), 0);
+    }
+}
+
+fn reflected(ray: &Ray, hit: &Hit) -> Ray {
+    let (d, n) = (ray.direction, hit.geometric_normal);
+    Ray::new(ray.point_at(hit.t), (d - n * (2.0 * d.dot(n))).normalize()).with_departure(hit.departure())
+}
+
+#[test]
+fn splines_and_polished_hits_are_those_of_the_whole_model() {
+    let scene = Scene::new(Point::new(300.0, 20.0, -100.0));
+    let (facets, splines) = (scene.facets(), scene.splines());
+    let rays = scene.rays(700);
+    let whole = Exact::build(&scene.model, &exact::Settings::default());
+    let truth = ask(&whole, &rays);
+    let exact = ask(&scene.instanced(&splines), &rays);
+    assert_eq!(differences(&rays, &exact, &truth, 1e4), 0);
+    let octrees = scene.octrees(&facets);
+    let polished = (octrees.iter().zip(facets.meshes()).zip(&splines)).map(|((o, m), s)| Polished::new(o, m, s));
+    let found = ask(&scene.instanced(polished), &rays);
+    let apart = differences(&rays, &found, &truth, 1e4);
+    // Facets at a silhouette may be missed that the spline has.
+    assert!(apart <= 7, "{apart}");
+}
+
+/// Rays bounce about inside balls however far these stand, and none gets out or meets the facet that it leaves.
+#[test]
+fn nothing_slips_out_of_instances() {
+    for middle in [Point::ZERO, Point::new(1e6, -3e5, 2e5)] {
+        let scene = Scene::new(middle);
+        let facets = scene.facets();
+        let instanced = scene.instanced(scene.octrees(&facets));
+        let mut r = Random(3);
+        let balls: Vec<usize> = (0..scene.model.instances.len()).filter(|k| k % 2 == 1).collect();
+        let mut rays: Vec<Ray> = (0..1500)
+            .map(|_| {
+                let at = scene.model.instances[balls[r.below(balls.len())]].placement.origin;
+                Ray::new(at + r.direction() * 0.5, r.direction())
+            })
+            .collect();
+        for bounce in 0..6 {
+            let hits = ask(&instanced, &rays);
+            for (ray, hit) in rays.iter_mut().zip(&hits) {
+                let hit = hit.unwrap_or_else(|| panic!("bounce {bounce} of {middle}: {ray:?} slipped out"));
+                assert!(hit.geometric_normal.dot(ray.direction) > 0.0, "bounce {bounce}: {ray:?} is outside");
+                *ray = reflected(ray, &hit);
+                if bounce % 2 == 1 {
+                    // Flat along the facet, at any sine down to 1e-9.
+                    let inward = -hit.geometric_normal;
+                    let along = inward.cross(r.direction()).normalize();
+                    ray.direction = (along + inward * 10f64.powf(-9.0 * r.unit())).normalize();
+                }
+            }
+        }
+    }
+}
