@@ -150,9 +150,9 @@ fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Ve
 const FOLLOWED: usize = 8;
 const LEVELS: usize = 40;
 
-/// Parameters of a point near `x` on a piece of the surface, the whole one of a facet, given in triangles: those of its parts go on whose
-/// flat triangles lie nearest, so that none is lost where weights crowd most of the parameters into one place and a step of any length
-/// leaps over the surface.
+/// Parameters of a point near `x` on a piece of the surface, which is given in triangles: at first the whole of a facet's. Of the parts
+/// that pieces are cut into those go on whose flat triangles lie nearest. So none is lost where weights crowd most of the parameters into
+/// one place and a step of any length leaps over the surface.
 fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     let at = |u: Uv| (u, surface.evaluate(u));
     let off = |p: &[(Uv, Point); 3]| distance_to_triangle(x, p.map(|q| q.1));

@@ -1,8 +1,8 @@
 //! Polishing of many hits: facets are asked about all rays at once, and Newton's method takes its steps eight at a time.
 //!
-//! What is plain is decided here: a ray that leaves its facet clearly, a root near its facet hit, inside the trims and crossed the
-//! same way, and an answer that the closed shells do not contradict; where that root is the point that the ray leaves, or lies before
-//! its range, the facets are asked about what is behind it. Every other ray, some in a hundred, is asked alone.
+//! What is plain is decided here: a ray that leaves its facet clearly, a root near its facet hit, inside the trims and crossed the same
+//! way, and an answer that the closed shells do not contradict. Where that root is the point that the ray leaves, or lies before its
+//! range, the facets are asked about what is behind it. Every other ray, some in a hundred, is asked alone.
 
 use super::clear_start::ClearStart;
 use super::facet_record::FacetRecord;

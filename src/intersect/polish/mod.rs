@@ -1,13 +1,12 @@
 //! Facet hits moved to the spline: exact position, normal and parameters for a small surcharge.
 //!
 //! A facet hit carries the parameters of its place on the surface; Newton's method takes three or four steps from there, for eight hits
-//! at a time, and across patches where a hit is asked alone. What the facets mislead about is put right: a root outside the trims, or
-//! none, is sought in a short window
-//! of the ray on the exact model; the root that the ray leaves is recognised by face, parameters and place, and the search
-//! goes on behind it; a ray that leaves its own surface so flat that its next root hides inside the sag is asked exactly.
-//! A ray that goes into a closed solid must come out of it, and the other way round: an answer that says otherwise, as beside an
-//! edge where the spline stands out over the facets of both faces, is asked exactly. Without that, and with roots just behind the
-//! exact window of a flat ray passed over, a rod of 1 × 50 mm lost 8 % of its light and a ring 11 %.
+//! at a time, and across patches where a hit is asked alone. What the facets mislead about is put right. A root outside the trims, or
+//! none, is sought in a short window of the ray on the exact model. The root that the ray leaves is recognised by face, parameters and
+//! place, and the search goes on behind it. A ray that leaves its own surface so flat that its next root hides inside the sag is asked
+//! exactly. A ray that goes into a closed solid must come out of it, and the other way round: an answer that says otherwise, as beside an
+//! edge where the spline stands out over the facets of both faces, is asked exactly. Without that, and with roots just behind the exact
+//! window of a flat ray passed over, a rod of 1 × 50 mm lost 8 % of its light and a ring 11 %.
 //!
 //! Guarantee: a hit marked [`Certainty::Polished`] lies on the spline within 1e-9 mm. Known weakness: it starts from the
 //! facets, so a silhouette that they miss stays missed: polishing is never a check. Hits that find no root fall back to the facet

@@ -1,10 +1,9 @@
 //! The same question by pure clipping, in code that shares nothing with the fast path: what the fast path is tested against.
 //!
-//! Every Bézier patch of every face, halved a few times where that makes its boxes smaller, is clipped as in Nishita, Sederberg
-//! and Kakimoto, SIGGRAPH 1990: the signed distances of the control points to a line in the projection along the ray bound each
-//! parameter by the convex hull of (parameter, distance); what clipping shrinks by less than a fifth is halved, until the box holds
-//! a single root or is as small as rounding. Trims are decided by crossings of a half-line towards +v with the uv curves, halved
-//! until their hulls decide.
+//! Every Bézier patch of every face, halved a few times where that makes its boxes smaller, is clipped as in Nishita, Sederberg and
+//! Kakimoto, SIGGRAPH 1990: the signed distances of the control points to a line in the projection along the ray bound each parameter by
+//! the convex hull of (parameter, distance). What clipping shrinks by less than a fifth is halved, until the box holds a single root or
+//! is as small as rounding. Trims are decided by crossings of a half-line towards +v with the uv curves, halved until their hulls decide.
 //!
 //! Guarantee: none is claimed near tangency, at singular points and within about 1e-9 mm of trims; there it reports what it
 //! finds. Where a patch took all of its steps it says from which distance on crossings may be missing. Known weakness: slow,

@@ -2,7 +2,7 @@
 //!
 //! The horizon of a triangle is bounded, in eight sectors around it, from lines in its plane that have the triangle on one side.
 //! A ray of slope `s` that runs at an angle `a` to the normal of such a line is at a height of at most `g·s/cos a` when it is
-//! `g` beyond the line; and of points of a convex set at heights `h` and distances `g`, `h/g` is greatest at a corner of the set.
+//! `g` beyond the line. Of points of a convex set at heights `h` and distances `g`, `h/g` is greatest at a corner of the set.
 //! So is it bounded for boxes, and only boxes that may stand higher than what was found already are opened.
 //!
 //! Weakness: eight sectors of one angle each, so that out of a narrow shaft no ray is seen to be free.
