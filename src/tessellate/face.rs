@@ -77,7 +77,6 @@ pub(super) fn mesh_with_imprint(
     imprint: &Imprint,
 ) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
     let FaceInput { part, face, surface, divisions, shared, settings, taken } = *input;
-    // The border as polygons of the parameter plane, and the tree of cells over it.
     let loops = polygons::loops(face);
     let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
     let polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
@@ -91,7 +90,6 @@ pub(super) fn mesh_with_imprint(
     let angle = settings.angle_deg.map(f64::to_radians);
     // The tree is asked for imprinted lines too, which no cell may lie across.
     let cells = tree::split(surface, settings.acceptance, &polygons, &lines, settings.budget, angle);
-    // Whole cells become facets.
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);
@@ -108,10 +106,9 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::TooManySteps);
     }
     border.divide_poles(&cells);
-    // What is left between them and the border is triangulated. Where cells reach the border, both are done.
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let all = border.segments.iter().chain(&grid.outline);
-    // A segment of the border that cells already meet is used twice, and nothing of it is left to the transition.
+    // The transition fills what is left to the border. A segment that cells already meet is used twice, and nothing of it is left.
     all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
     let segments: Vec<[u32; 2]> = all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect();
     let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
@@ -144,7 +141,6 @@ pub(super) fn mesh_with_imprint(
     let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
     let mut coarse: Vec<EdgeId> = coarse.filter_map(|s| followed.get(&edge_key(s[0], s[1])).copied()).collect();
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
-    // Pairs of triangles become quads.
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
     let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
     let mut emission = Emission::new(surface, &transition.nodes);

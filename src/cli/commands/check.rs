@@ -64,7 +64,6 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let contenders = Contenders::build(mesh, model, normals.on_facets(), count, console);
     let Contenders { octree, exact, .. } = &contenders;
     let polish = Polished::new(octree, mesh, exact);
-
     // The same rays through all three, and a cause for every difference.
     let lift = LIFT_IN_TOLERANCES * settings.loosest();
     let rays = match given {
@@ -86,7 +85,6 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     }
     time_all(&mut found, &contenders.named(&polish), &rays, console);
     write_rays(command, &found, octree, &rays, console)?;
-
     // What the facets change of the light, which only a scene has.
     let facets: &dyn Intersector = if normals == NormalMode::Exact { &polish } else { octree };
     let bound = scene.map(|s| s.bind(model)).transpose()?;

@@ -101,12 +101,10 @@ fn trace_whole(
 ) -> Result<Completion, Failure> {
     let TraceCommand { folder, extra, .. } = *command;
     let file = folder.join(CHECKPOINT);
-
     // All that can go wrong with the place of the results is tried before anything is traced.
     let _owned = OutputPlace::folder(folder)?;
     let with_page = extra.page.is_wanted();
     let paths = try_outputs(prepared, command, &file)?;
-
     // With an error to reach, the number of rays is found by tracing.
     let found = target.map(|target| target.trace(prepared, &TerminalMonitor::of_saveable(console, None)));
     let settled = if extra.until_settled { Some(verdicts::trace_until_settled(prepared, console)?) } else { None };
@@ -123,7 +121,6 @@ fn trace_whole(
         None => (settled, None),
     };
     let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
-
     // Called by any thread: it saves when it is time to.
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
@@ -150,7 +147,6 @@ fn trace_whole(
         _ => None,
     };
     say_verification(&run, console)?;
-
     let sentences = say_target(result.as_ref(), console);
     let written = results_folder::write(prepared, folder, &mut run, sentences.clone(), with_page, console);
     let (mut document, answer) = match written {

@@ -43,8 +43,7 @@ impl Exact {
     pub fn converge(&self, ray: &Ray, face: FaceId, uv: Uv, steps: u32) -> Option<SurfacePoint> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let grid = &self.geometry.grids[record.grid as usize];
-        // Two equations in two unknowns: the distances of the surface point from the ray along two directions
-        // across it.
+        // Two equations in two unknowns: the distances of the surface point from the ray along two directions across it.
         let (n1, n2) = orthonormal_pair(ray.direction);
         let bounds = [0, 1].map(|d| [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]]);
         let mut uv = Uv::new(uv.x.clamp(bounds[0][0], bounds[0][1]), uv.y.clamp(bounds[1][0], bounds[1][1]));
@@ -88,8 +87,7 @@ impl Exact {
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
                 let inside = match trim.cell_at(uv) {
-                    // With a band of nothing the parity decides alone: no certificate hangs on it, so no edge is
-                    // asked.
+                    // With a band of nothing the parity decides alone: no certificate hangs on it, so no edge is asked.
                     Region::Border => {
                         let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
                         let (su, sv) = (du / widths[0], dv / widths[1]);
