@@ -180,7 +180,7 @@ impl BvhBenchmark {
                 (Comparison::new(mesh, rays, &truth, &hits), cost)
             })
             .collect();
-        // The octree errs where any other is right against it.
+        // The octree errs where any other is right against it; it is one of those that are judged, so that there is a largest.
         judged[0].0.wrong = judged.iter().map(|(j, _)| j.octree_wrong).max().unwrap_or(0);
         for (call, batch, threads) in [("batch", true, 1), ("single", false, 1), ("batch", true, threads)] {
             // With one thread in all the second batch would be the first once more.

@@ -12,6 +12,7 @@ const RAY_SETS: [&str; 7] = ["csv", "txt", "npz", "tm25ray", "dat", "sdf", "ray"
 
 /// The rays of a file, in the order they stand there.
 pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
+    // A name without an extension is one of the others.
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let rays: Vec<Ray> = if RAY_SETS.contains(&extension.as_str()) {
         // Which flux a set has says nothing about where its rays run.
