@@ -105,6 +105,7 @@ pub struct Alternative {
     pub figure: String,
 }
 
+/// Writes normals by their name.
 fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
     s.serialize_str(n.name())
 }

@@ -22,6 +22,7 @@ pub(crate) struct PathFile {
 }
 
 impl PathFile {
+    /// Begins the file, which must be an `.npz`.
     pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());

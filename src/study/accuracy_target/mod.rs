@@ -94,6 +94,7 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+/// Writes normals by their name.
 fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
     s.serialize_str(n.name())
 }

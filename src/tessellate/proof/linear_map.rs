@@ -98,7 +98,7 @@ impl LinearMap {
         [(a - self.lo) / size, (b - a) / size]
     }
 
-    /// L at the corners (0,0), (1,0), (0,1), (1,1) of a part.
+    /// L at the corners (0,0), (1,0), (0,1), (1,1) of a part, which begins at `from` and is `share` of the rectangle.
     pub(in crate::tessellate) fn corner_values(&self, from: Uv, share: Uv) -> [Point; 4] {
         let [l00, ls, lt] = self.values;
         let l = l00 + ls * from.x + lt * from.y;
