@@ -150,6 +150,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     container(path, &document, &buffer.bytes)
 }
 
+/// Takes the empty list of children away, which glTF forbids.
 fn nodes_without_children(document: &mut Value) {
     if let Some(node) = document["nodes"][0].as_object_mut() {
         node.remove("children");

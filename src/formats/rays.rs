@@ -60,6 +60,7 @@ impl LightRay {
         Ok(Self { origin: triple(0), direction, power, wavelength_nm })
     }
 
+    /// Origin, direction and power, as files list them.
     pub(super) fn numbers(&self) -> [f64; 7] {
         let ([x, y, z], [dx, dy, dz]) = (self.origin.to_array(), self.direction.to_array());
         [x, y, z, dx, dy, dz, self.power]

@@ -87,6 +87,7 @@ fn parameters(hit: &FacetHit) -> Uv {
     Uv::new(select_unpredictable(hit.second, b1, sum), select_unpredictable(hit.second, sum, b2))
 }
 
+/// Weights of the corners at a place of the unit square.
 #[inline(always)]
 fn bilinear_weights(p: Uv) -> [f64; 4] {
     let q = 1.0 - p;

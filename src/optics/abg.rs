@@ -69,6 +69,7 @@ impl Abg {
         (up2 > 0.0).then(|| (beta + n * up2.sqrt()).normalize())
     }
 
+    /// The BSDF times the cosine of the outgoing direction, 1/sr.
     pub(super) fn density(&self, specular: Vector, n: Vector, out: Vector) -> f64 {
         let step = out - specular;
         let r = (step - n * step.dot(n)).length();

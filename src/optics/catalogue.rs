@@ -69,6 +69,7 @@ const ENTRIES: &[Entry] = &[
     },
 ];
 
+/// By any of its names, in any case.
 fn entry(name: &str) -> Option<&'static Entry> {
     let wanted = name.trim().to_lowercase();
     ENTRIES.iter().find(|e| e.name.to_lowercase() == wanted || e.aliases.contains(&wanted.as_str()))

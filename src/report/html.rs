@@ -191,6 +191,7 @@ fn emphasised(text: &str) -> Markup {
     html! { @for (k, piece) in text.split("**").enumerate() { @if k % 2 == 1 { strong { (piece) } } @else { (piece) } } }
 }
 
+/// A title as a name for links.
 fn anchor(title: &str) -> String {
     let lower = title.to_lowercase();
     lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect::<Vec<_>>().join("-")

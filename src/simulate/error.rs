@@ -43,6 +43,7 @@ impl Error {
         self
     }
 
+    /// The error with its place in the scene's file.
     pub(crate) fn located(mut self, file: &str, text: &Arc<str>, span: Option<Range<usize>>) -> Self {
         self.file = file.into();
         self.text = Some(text.clone());

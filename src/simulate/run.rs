@@ -166,6 +166,7 @@ pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, setting
     announce(&Context::new(bound, intersector, settings), thread_count(settings));
 }
 
+/// Threads that are asked for, or as many as the machine has.
 fn thread_count(settings: &RunSettings) -> usize {
     match settings.threads {
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),

@@ -71,6 +71,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     Ok(Import { model, report })
 }
 
+/// The schemas that the file names.
 fn schema(file: &File<'_>) -> Vec<String> {
     let Some(args) = file.header("FILE_SCHEMA") else { return Vec::new() };
     let list = args.list(0);

@@ -198,6 +198,7 @@ fn move_end(u: &mut EdgeUse, start: bool, to: Uv) {
     *p = ControlPoint::weighted(to, p.weight());
 }
 
+/// Area in parameters, positive where the loop runs counterclockwise.
 fn signed_area(l: &TrimLoop) -> f64 {
     let points: Vec<Uv> = l.uses.iter().flat_map(along).collect();
     (0..points.len()).map(|i| points[i].perp_dot(points[(i + 1) % points.len()])).sum::<f64>() * 0.5

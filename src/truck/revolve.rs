@@ -159,6 +159,7 @@ impl Revolved {
         q.x.hypot(q.y) < ON_AXIS * (1.0 + self.size)
     }
 
+    /// Angle of a point about the axis, from the meridian on.
     fn angle(&self, p: Point) -> f64 {
         let q = self.axis.local_point(self.local(p));
         q.y.atan2(q.x) - self.azimuth

@@ -280,6 +280,7 @@ fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray>
         .collect()
 }
 
+/// What a structure answers to the rays, and what that cost.
 fn answers(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
     let mut hits = vec![None; rays.len()];
     let mut cost = Cost::default();

@@ -63,6 +63,7 @@ impl StudyResult {
         Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new() })
     }
 
+    /// Adds a further table under a name of its own.
     fn with_rows(mut self, name: &'static str, rows: &impl Serialize) -> Result<Self, Failure> {
         self.extra_rows.push((name, json_value(rows)?));
         Ok(self)

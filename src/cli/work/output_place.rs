@@ -140,6 +140,7 @@ pub(crate) fn require_space(folder: &Path, needed_bytes: u64) -> Result<(), Fail
     }
 }
 
+/// Bytes that are left on the folder's file system, where it tells.
 #[cfg(unix)]
 fn free_bytes(folder: &Path) -> Option<u64> {
     let system = rustix::fs::statvfs(folder).ok()?;

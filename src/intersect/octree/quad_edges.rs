@@ -51,6 +51,7 @@ impl QuadRay {
         2.0 * 2.0 * LONGEST_NUDGE * self.reach * (2.0 * 4.0 * farthest)
     }
 
+    /// The ray as the careful test wants it.
     fn line(&self) -> Line {
         let [x, y, z, _] = self.ordered_origin;
         Line { origin: [x, y, z], shear: self.shear, t_min: self.t_min }

@@ -167,6 +167,7 @@ fn start_near(scene: &Scene, emitters: &mut [Emitter], ambient: &Body, scene_box
     Ok(())
 }
 
+/// The receivers, with the faces that absorbing ones name.
 fn bind_receivers(scene: &Scene, model: &Model) -> Result<Vec<Receiver>, Error> {
     let mut receivers = Vec::new();
     for (i, r) in scene.receivers.iter().enumerate() {

@@ -73,6 +73,7 @@ pub(super) fn source_files(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<Stri
     sentences
 }
 
+/// The least and the greatest.
 fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
     let first = nm.next()?;
     Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))

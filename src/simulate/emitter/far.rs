@@ -24,6 +24,7 @@ struct TwoFold {
 }
 
 impl TwoFold {
+    /// The exact sum.
     fn sum(a: f64, b: f64) -> Self {
         // Knuth's sum without a condition on which is larger; what is rounded off is exact.
         let high = a + b;
@@ -31,6 +32,7 @@ impl TwoFold {
         Self { high, low: (a - (high - b_share)) + (b - b_share) }
     }
 
+    /// The exact product.
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
         Self { high, low: a.mul_add(b, -high) }

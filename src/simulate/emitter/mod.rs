@@ -198,6 +198,7 @@ impl Emitter {
         }
     }
 
+    /// The ray's wavelength, nm, where rays have one.
     #[inline(always)]
     fn wavelength(&self, stream: &Stream, index: RayIndex) -> Option<f64> {
         let wavelengths = self.wavelengths.as_ref()?;

@@ -123,6 +123,7 @@ fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     ))
 }
 
+/// The absorption of a glass from its transmittances; none where fewer than two are known.
 fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
     let points = glass.absorption();
     if points.len() < 2 {

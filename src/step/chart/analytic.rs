@@ -4,6 +4,7 @@ use crate::math::{Frame, Point, Uv, Vector};
 use crate::nurbs::Derivatives;
 use std::f64::consts::FRAC_PI_2;
 
+/// The foot of a point on a plane.
 pub(super) fn locate_plane(frame: &Frame, p: Point) -> Uv {
     let q = frame.local_point(p);
     Uv::new(q.x, q.y)

@@ -34,6 +34,7 @@ pub(crate) struct DirectedCurve {
 }
 
 impl CurveShape {
+    /// A spline that knows whether its ends meet.
     pub(crate) fn spline(curve: Curve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();

@@ -118,6 +118,7 @@ impl<'a> File<'a> {
         Some(self.instance(position as usize))
     }
 
+    /// The instance at a place in the file's order.
     fn instance(&self, position: usize) -> Entity<'_, 'a> {
         let i = self.instances[position];
         Entity { file: self, id: i.id, records: &self.records[i.first as usize..(i.first + i.count) as usize] }

@@ -114,6 +114,7 @@ fn polygons(face: &Face) -> Vec<Vec<Uv>> {
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
+/// Whether a point lies inside of the polygons, by even and odd crossings.
 fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
     let sides = loops.iter().flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])));
     let crossed =

@@ -353,6 +353,7 @@ fn distance(axis: &Frame, p: Point) -> f64 {
     q.x.hypot(q.y)
 }
 
+/// The curve with its control points moved.
 fn moved(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
     Curve { points, ..curve.clone() }

@@ -26,6 +26,7 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// The end of the curve, whichever way the loop runs it.
     fn end_point(&self, end: bool) -> Uv {
         let n = self.curve.points.len() - 1;
         self.curve.points[if end { n } else { 0 }].position()

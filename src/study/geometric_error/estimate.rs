@@ -52,6 +52,7 @@ impl Means {
     }
 }
 
+/// Both values with the error of their difference, from replicates of the same rays.
 fn paired(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
     let difference = facets.by_replicate.iter().zip(&spline.by_replicate).map(|(a, b)| a - b);
     Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * standard_error(difference) }

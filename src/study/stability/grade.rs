@@ -96,6 +96,7 @@ impl Scene<'_> {
         self.case.questions.iter().map(|q| self.ray(&first(q))).collect()
     }
 
+    /// The ray in the place of the variant.
     fn ray(&self, local: &Ray) -> Ray {
         let range = |t: f64| t * self.frame.scale;
         Ray::new(self.frame.point(local.origin), self.frame.direction(local.direction).normalize())
@@ -211,6 +212,7 @@ impl Grader<'_> {
         (self.scene.case.distance)(ray.point_at(self.local_t(hit))).abs() <= 64.0 * resolution + ON_SURFACE
     }
 
+    /// Whether a hit lies within the facets' sag of the surface.
     fn in_band(&self, ray: &Ray, t: f64) -> bool {
         let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, t);
         (self.scene.case.distance)(ray.point_at(t)).abs() <= self.band + slack

@@ -118,6 +118,7 @@ impl<'m> TrimmedFace<'m> {
             })
     }
 
+    /// Whether a point lies on one of these edges.
     fn is_at_border(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
         // A face without edges is whole: its border is a seam or a pole.
         edges.is_empty() || edges.iter().any(|&e| self.nearest_on_edge(e, p).1 <= glue)
