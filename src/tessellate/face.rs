@@ -106,11 +106,7 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::TooManySteps);
     }
     border.divide_poles(&cells);
-    let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-    let all = border.segments.iter().chain(&grid.outline);
-    // The transition fills what is left to the border. A segment that cells already meet is used twice, and nothing of it is left.
-    all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
-    let segments: Vec<[u32; 2]> = all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect();
+    let segments = unmet_segments(&border.segments, &grid.outline);
     let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
     // Without a transition its scale is of no interest, and it costs curvatures.
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
@@ -129,13 +125,7 @@ pub(super) fn mesh_with_imprint(
         transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
         grid.quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
     }
-    let repaired = if !transition.conflicts.is_empty() {
-        Some(Repair::CrossingBorder)
-    } else if !is_covered {
-        Some(Repair::AreaOff)
-    } else {
-        cells.exhausted.then_some(Repair::CoarserCells)
-    };
+    let repaired = first_repair(&transition, is_covered, cells.exhausted);
     // Where the budget has ended, shorter chords only cost more.
     let unproved = if cells.exhausted { Vec::new() } else { transition.unproved_chords(&chords, &followed) };
     let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
@@ -158,6 +148,26 @@ pub(super) fn mesh_with_imprint(
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
     Ok((FaceMesh { own, coarse, coincident, repaired, ..made }, carrier))
+}
+
+/// What was given up, the gravest first.
+fn first_repair(transition: &Transition, is_covered: bool, exhausted: bool) -> Option<Repair> {
+    if !transition.conflicts.is_empty() {
+        Some(Repair::CrossingBorder)
+    } else if !is_covered {
+        Some(Repair::AreaOff)
+    } else {
+        exhausted.then_some(Repair::CoarserCells)
+    }
+}
+
+/// What is left for the transition to fill, between the border and the outline of whole cells.
+fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
+    let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+    let all = border.iter().chain(outline);
+    // A segment of the border that cells already meet is used twice, and nothing of it is left.
+    all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
+    all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect()
 }
 
 /// Whether facets cover as much of the parameter plane as the border bounds: more where they lie over each other or beyond a border that

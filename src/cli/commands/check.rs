@@ -94,7 +94,6 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     };
     let text = json_text(&document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
     if let Some(folder) = &command.output {
-        let seed = tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1);
         let report = CheckReport {
             title: file_name(&command.file),
             check: &found,
@@ -102,7 +101,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
             normals: &normals.to_string(),
             tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers)] },
             also: reached.iter().map(|a| a.answer.clone()).collect(),
-            provenance: console.provenance(Some(seed), threads),
+            provenance: console.provenance(Some(tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1)), threads),
         };
         let _owned = OutputPlace::folder(folder)?;
         if command.page.is_wanted() {
