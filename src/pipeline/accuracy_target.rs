@@ -5,7 +5,7 @@ use super::intersectors::IntersectorChoice;
 use super::monitor::{Monitor, Stage};
 use super::ray_sampler::RaySampler;
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
-use crate::intersect::{Intersector, NormalMode};
+use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
 use crate::model::Model;
 use crate::simulate::{RunSettings, Scene, simulate};
@@ -14,6 +14,10 @@ use crate::study::{ModelMeshSource, Progress};
 
 /// How far above a surface a ray starts that left it, mm: facets lie at most 0.8 mm off the surface here.
 const RAY_LIFT_MM: f64 = 1.0;
+
+/// Largest share of the way to the next surface, along the normal, that a ray is lifted by: in a lens of 0.5 mm a whole millimetre put
+/// every start outside, and 0.32° were claimed where it was 1.8°.
+const LIFTED_SHARE: f64 = 0.1;
 
 /// Settings that keep an accuracy, and how that was reached; unchanged where none was asked for.
 #[derive(Clone, Debug)]
@@ -117,5 +121,9 @@ fn scene_rays(
     // As many as are traced: about every ray meets one surface.
     let sampler = RaySampler::new(exact, settings.rays, settings.rays);
     simulate(bound, &sampler, settings, &|_| true);
-    sampler.rays(settings.rays as usize, model, RAY_LIFT_MM)
+    let lift = |ray: &Ray, cosine: f64| {
+        let way = exact.intersect(ray, &mut Cost::default()).map_or(f64::INFINITY, |hit| hit.t * cosine);
+        RAY_LIFT_MM.min(LIFTED_SHARE * way)
+    };
+    sampler.rays(settings.rays as usize, model, lift)
 }

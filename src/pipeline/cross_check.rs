@@ -93,7 +93,7 @@ fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
     let sampler = RaySampler::new(intersector, RECHECKED as u64, 4 * count);
     replay(&prepared.bound, &sampler, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
-    sampler.rays(RECHECKED, &prepared.job.loaded.model, lift)
+    sampler.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)
 }
 
 /// Octree against BVH against spline on these rays.

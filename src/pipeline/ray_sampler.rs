@@ -31,25 +31,26 @@ impl<'a> RaySampler<'a> {
         }
     }
 
-    /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts `lift` mm
-    /// above it, in free space, so that all intersectors are asked the same question whatever they take for the surface; one that
-    /// left a ready mesh, which has no surface, is left out.
-    pub fn rays(self, wanted: usize, model: &Model, lift: f64) -> Vec<Ray> {
+    /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it, in free
+    /// space, so that all intersectors are asked the same question whatever they take for the surface: so many mm as `lift` says of the
+    /// ray and its cosine to the normal. One that left a ready mesh, which has no surface, is left out.
+    pub fn rays(self, wanted: usize, model: &Model, lift: impl Fn(&Ray, f64) -> f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
         // By the hash: an order that no thread and no batch decides, and that mixes sources and bounces.
         noted.sort_by_key(|(hash, _)| *hash);
-        noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, lift)).take(wanted).collect()
+        noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, &lift)).take(wanted).collect()
     }
 }
 
 /// The ray a little above the surface that it left; `None` where there is no surface.
-fn lift_off(ray: Ray, faces: &[PlacedFace], lift: f64) -> Option<Ray> {
+fn lift_off(ray: Ray, faces: &[PlacedFace], lift: &impl Fn(&Ray, f64) -> f64) -> Option<Ray> {
     let Some(departure) = ray.departure else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;
     let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
+    let along = normal.dot(ray.direction);
     // To the side on which it goes on.
-    let side = if normal.dot(ray.direction) < 0.0 { -lift } else { lift };
+    let side = lift(&ray, along.abs()).copysign(along);
     Some(Ray::new(ray.origin + side * normal, ray.direction))
 }
 
@@ -115,7 +116,7 @@ mod tests {
         let sample = |rays: &[Ray]| {
             let sampler = RaySampler::new(&Nothing, 500, rays.len() as u64);
             sampler.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
-            sampler.rays(500, &Model::default(), 0.1)
+            sampler.rays(500, &Model::default(), |_, _| 0.1)
         };
         let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
         assert_eq!(forward.len(), 500);

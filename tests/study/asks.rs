@@ -1,9 +1,12 @@
 //! Accuracy asked for as an angle, on every fixture: whether it is reached, and what it costs beside a full sweep.
 
 use crate::files::{fixture, step_files};
+use crate::known_scenes;
 use lampyris::intersect::{Cost, Intersector, NormalMode};
 use lampyris::math::Vector;
 use lampyris::model::Model;
+use lampyris::pipeline::{MeshingSettings, Silent, TracingSettings, settings_for_accuracy};
+use lampyris::simulate::Scene;
 use lampyris::step;
 use lampyris::study::accuracy::{Row, Settings, accuracy};
 use lampyris::study::accuracy_target::{AccuracyPlan, AccuracyTarget, meet_target};
@@ -110,6 +113,18 @@ fn judged_again(product: &ModelMeshSource<'_>, found: &AccuracyPlan) -> f64 {
         .collect();
     errors.sort_by(f64::total_cmp);
     errors[errors.len() * 99 / 100]
+}
+
+/// In a ball of 0.5 mm the rays inside it count too: two segments of three meet a surface, the last leaves.
+#[test]
+fn rays_inside_a_small_part_are_judged() {
+    let ball = known_scenes::ball(0.25, 1.5);
+    let scene = Scene::parse(&ball.text, "ball.toml", Path::new(".")).unwrap();
+    let tracing = TracingSettings { normals: Some(NormalMode::Bilinear), ..Default::default() };
+    let asked = (MeshingSettings::default(), tracing);
+    let found = settings_for_accuracy(Some(2.0), asked, Some(&scene), &ball.model, &Silent).unwrap().plan.unwrap();
+    let met = found.checked as f64 / AccuracyTarget::degrees(2.0).check_rays as f64;
+    assert!(found.kept && (met - 2.0 / 3.0).abs() < 0.02, "{met} {}", found.answer);
 }
 
 #[test]

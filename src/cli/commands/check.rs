@@ -225,7 +225,7 @@ fn own_rays(
     };
     let sampler = RaySampler::new(octree, count, count);
     simulate(&bound, &sampler, &settings, &|_| true);
-    Ok(sampler.rays(count as usize, model, lift))
+    Ok(sampler.rays(count as usize, model, |_, _| lift))
 }
 
 /// How far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
