@@ -376,7 +376,7 @@ fn load(
         if let Some(known) = read.iter().find(same) {
             return Ok(Import { model: known.import.model.clone(), report: known.import.report.clone() });
         }
-        let settings = step::Settings { length_unit_mm: entry.unit_mm, ..step::Settings::default() };
+        let settings = pipeline::step_settings(entry);
         monitor.begin(pipeline::Stage::Reading(&path));
         let import = step::read(Path::new(&path), &settings);
         monitor.end();

@@ -53,11 +53,25 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
 pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedModel, Error> {
     read_models(scene, |entry| {
         let path = scene.resolve(&entry.file);
-        let length_unit_mm = entry.unit_mm;
-        // The box of the model is not asked for here, and costs a look at every surface.
-        let settings = step::Settings { length_unit_mm, measure_box: false, ..step::Settings::default() };
-        Ok(in_stage(monitor, Stage::Reading(&path), || step::read(&path, &settings))?)
+        let import = in_stage(monitor, Stage::Reading(&path), || step::read(&path, &step_settings(entry)));
+        import.map_err(|e| {
+            let is_limit = matches!(e.kind(), step::ErrorKind::TooManyPlaced { .. });
+            let error = Error::from(e);
+            if is_limit { error.help("`max_placed` under this [[model]] raises the limit") } else { error }
+        })
     })
+}
+
+/// How the file of a scene's model is read.
+pub fn step_settings(entry: &ModelUse) -> step::Settings {
+    let usual = step::Settings::default();
+    step::Settings {
+        length_unit_mm: entry.unit_mm,
+        max_placed: entry.max_placed.unwrap_or(usual.max_placed),
+        // The box of the model is not asked for in a scene, and costs a look at every surface.
+        measure_box: false,
+        ..usual
+    }
 }
 
 /// Reads a scene file and the models it names.

@@ -47,7 +47,7 @@ pub use error_target::{ErrorTarget, TargetResult};
 pub use facets::{mesh_settings, tessellate_model};
 pub use fingerprint::fingerprint;
 pub use intersectors::{IntersectorChoice, with_intersector};
-pub use loading::{LoadedModel, read_models, read_scene, read_scene_models};
+pub use loading::{LoadedModel, read_models, read_scene, read_scene_models, step_settings};
 pub use monitor::{Monitor, Silent, Stage};
 pub use prepared_scene::{PreparedScene, SceneJob, TraceRequest};
 pub use ray_sampler::RaySampler;

@@ -111,6 +111,24 @@ fn what_assemblies_place_has_a_limit_that_an_option_raises() {
 }
 
 #[test]
+fn a_scene_says_how_much_the_assemblies_of_its_models_may_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |limit: u32| {
+        let scene = format!(
+            "[[model]]\nfile = {:?}\nmax_placed = {limit}\n[[source]]\nkind = \"lambertian\"\nat = [-95, 0, 17.69]\n\
+             [[receiver]]\nname = \"far\"\nkind = \"far_field\"\n",
+            step("lamp_multicavity.stp")
+        );
+        let path = written(folder.path(), "scene.toml", scene.as_bytes());
+        lampyris(&["trace", &path.display().to_string(), "--dry-run"])
+    };
+    let (code, _, err) = run(2);
+    assert!(code == 3 && err.contains("beyond 2") && err.contains("max_placed"), "{code} {err}");
+    let (code, _, err) = run(1000);
+    assert_eq!(code, 0, "{err}");
+}
+
+#[test]
 fn the_schema_of_a_scene_is_a_json_schema() {
     let (code, out, _) = lampyris(&["schema"]);
     let schema: Value = serde_json::from_str(&out).unwrap();

@@ -15,6 +15,8 @@ pub struct ModelUse {
     pub name: String,
     /// Millimetres per length unit of the file, for files whose unit is wrong; the file's own unit otherwise.
     pub unit_mm: Option<f64>,
+    /// Most products and shapes that the file's assemblies may place; beyond it the file is refused. A million unless given.
+    pub max_placed: Option<u64>,
     /// Where it stands.
     pub placement: Placement,
 }
