@@ -20,11 +20,13 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> 
         for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
             if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
                 (touching[*a], touching[*b]) = (true, true);
-                pairs.push([of_face[*a], of_face[*b]]);
+                let pair = [of_face[*a], of_face[*b]];
+                // Neighbouring faces of the same two bodies come one after another; others twice do no harm.
+                if pairs.last() != Some(&pair) {
+                    pairs.push(pair);
+                }
             }
         }
-        // Neighbouring faces of the same two bodies come one after another; others twice do no harm.
-        pairs.dedup();
     }
     (touching, pairs)
 }
