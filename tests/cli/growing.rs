@@ -69,13 +69,18 @@ fn ranges_of_rays_merge_to_the_bits_of_one_run() {
     assert!(code == 3 && err.contains("rays 200000..420000"), "{err}");
 }
 
-/// A merge takes what its parts chose and has no pilot of its own, whose seconds would differ from theirs.
+/// A merge takes the spline where its parts chose it, and has no pilot of its own, whose seconds would differ from theirs.
 #[test]
 fn merge_takes_the_choice_of_its_parts() {
-    let folder = lens("40_000");
+    let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    for shard in ["1/2", "2/2"] {
-        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", shard, "-o", "parts"]);
+    // Facets miss light at the rim of this reflector, wherever their hits are moved: a run that may grow is not content with them.
+    std::fs::copy(fixture("step/reflector_freeform_trimmed.stp"), path.join("model.stp")).unwrap();
+    let scene = std::fs::read_to_string(fixture("scenes/s3_reflector.toml")).unwrap();
+    std::fs::write(path.join("scene.toml"), scene.replace("../step/reflector_freeform_trimmed.stp", "model.stp"))
+        .unwrap();
+    for range in ["0..20000", "20000..40000"] {
+        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", range, "-o", "parts"]);
         assert_eq!(code, 0, "{err}");
     }
     let [once, again] = ["once", "again"].map(|to| {
@@ -83,8 +88,7 @@ fn merge_takes_the_choice_of_its_parts() {
         let text = std::fs::read_to_string(path.join(to).join("results.json")).unwrap();
         serde_json::from_str::<Value>(&text).unwrap()["chosen"].clone()
     });
-    assert_eq!((&once["intersector"], &once["normals"]), (&"octree".into(), &"exact".into()));
-    assert_eq!(once, again);
+    assert_eq!((&once["intersector"], &once), (&"exact".into(), &again));
     assert!(once["pilot_seconds"].as_f64().unwrap() > 0.0);
 }
 
