@@ -252,6 +252,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "acceptance",
             "settlement",
             "clip_hull",
+            "tangency",
             "clip",
             "leaf_test",
             "traversal",

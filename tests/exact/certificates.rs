@@ -1,9 +1,10 @@
 //! A certified hit lies in the face, and a ray that passes beside one meets what stands behind.
 
+use crate::referee;
 use crate::support::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost};
-use lampyris::math::{FaceId, Frame, Point, Ray, Vector};
+use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::nurbs::{Surface, sweep};
 
 /// A sheet of 100 mm in degree `p` that rises by `slope` about the line x = `pivot`.
@@ -77,4 +78,82 @@ fn what_a_budget_leaves_open_is_flagged() {
     }
     // Each of the three would be an answer wrong in silence.
     assert!(later > 20 && none > 20 && passed > 20, "{later} later, {none} none, {passed} passages");
+}
+
+/// A ray that leaves the middle of a plane of a metre, but starts at `height` over it.
+fn from_the_middle(exact: &Exact, height: f64, direction: Vector) -> Ray {
+    let down = Ray::new(Point::new(0.3, 0.2, 10.0), -Vector::Z);
+    let left = exact.first(&down, &mut Cost::default()).hit.expect("the plane lies below");
+    Ray::new(Point::new(0.3, 0.2, height), direction.normalize()).with_departure(left.departure())
+}
+
+#[test]
+fn only_the_point_that_a_ray_leaves_is_left_out() {
+    let exact = Exact::build(&model([sweep::plane(&Frame::IDENTITY, [[-500.0, 500.0]; 2])]), &Settings::default());
+    // A start a micrometre over its point, or a hundredth: at a slope of 1 : 20 the plane is met twenty times as far ahead.
+    for height in [1e-3, 1e-2, 5.0] {
+        let ray = from_the_middle(&exact, height, Vector::new(1.0, 0.0, -0.05));
+        let hit = exact.first(&ray, &mut Cost::default()).hit.expect("the plane lies ahead");
+        assert!((hit.t - height * 401f64.sqrt()).abs() < 1e-9, "{hit:?}");
+    }
+    // A start within rounding of its point is that point, however far ahead so small a height puts the plane.
+    for (height, slope) in [(5e-10, 1e-7), (9e-10, 1e-8), (1e-12, 1e-11)] {
+        let ray = from_the_middle(&exact, height, Vector::new(1.0, 0.0, -slope));
+        let answer = exact.first(&ray, &mut Cost::default());
+        assert_eq!((answer.hit, answer.certainty), (None, Certainty::Certified), "{height} at {slope}");
+    }
+}
+
+#[test]
+fn a_face_is_met_inside_its_border_from_a_thousand_kilometres() {
+    let turned = Frame::from_axis(Point::new(3.1, -2.7, 1.3), Vector::new(0.3, 0.5, 0.8), None);
+    let surface = sweep::plane(&turned, [[0.0, 100.0]; 2]);
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let mut s = Stream(83);
+    let mut near = 0;
+    for k in 0..3000 {
+        // Across the border by up to 10 µm, at sines where rounding blurs the place along the ray by as much.
+        let beside = 10f64.powf(s.within(-6.0, -2.0));
+        let x = if k % 2 == 0 { beside } else { 100.0 - beside };
+        let target = turned.point(Point::new(x, s.within(10.0, 90.0), 0.0));
+        let along = turned.x * if k % 4 < 2 { 1.0 } else { -1.0 } + turned.y * s.within(-0.5, 0.5);
+        let d = (along.normalize() - turned.z * 10f64.powf(s.within(-5.0, -3.0))).normalize();
+        let ray = Ray::new(target - d * 1e9, d);
+        let [u, v] = surface.domain();
+        let start = Uv::new(u[0] + (u[1] - u[0]) * x / 100.0, 0.5 * (v[0] + v[1]));
+        let Some(truth) = referee::root(&surface, &ray, start) else { continue };
+        if truth.inside > 1e-6 {
+            near += usize::from(truth.inside < 0.02);
+            let answer = exact.first(&ray, &mut Cost::default());
+            let met = answer.hit.is_some_and(|hit| (hit.t - truth.t).abs() < 1e-5);
+            assert!(met || answer.certainty != Certainty::Certified, "{truth:?} by {ray:?}: {answer:?}");
+        }
+    }
+    assert!(near > 1000, "{near} near the border");
+}
+
+#[test]
+fn tangencies_are_told_to_the_last_bit() {
+    // z = x²/64 in powers of two: a ray at height h meets it at x = ±8 √h, or not.
+    let knots = [vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+    let points = [(-64.0, 64.0), (0.0, -64.0), (64.0, 64.0)];
+    let points = points.iter().flat_map(|&(x, z)| [-32.0, 32.0].map(|y| Point::new(x, y, z).extend(1.0))).collect();
+    let exact = Exact::build(&model([Surface { degree: [2, 1], knots, points }]), &Settings::default());
+    let mut s = Stream(85);
+    for k in 0..400 {
+        let height = 10f64.powf(s.within(-16.0, -7.0)) * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let d = if k % 3 == 0 { Vector::X } else { Vector::new(1.0, s.within(-0.3, 0.3), 0.0).normalize() };
+        // Powers of two keep the origin exact.
+        let ray = Ray::new(Point::new(-96.0, s.within(-1.0, 1.0) - 96.0 * d.y / d.x, height), d);
+        let answer = exact.first(&ray, &mut Cost::default());
+        assert_eq!(answer.certainty, Certainty::Certified, "height {height:e}: {answer:?}");
+        let half = 8.0 * height.max(0.0).sqrt();
+        let truths = if height > 0.0 { vec![(96.0 - half) / d.x, (96.0 + half) / d.x] } else { Vec::new() };
+        let found: Vec<f64> = exact.crossings(&ray, &mut Cost::default()).iter().map(|hit| hit.t).collect();
+        assert_eq!(found.len(), truths.len(), "height {height:e}: {found:?} for {truths:?}");
+        for (t, truth) in found.iter().zip(&truths) {
+            assert!((t - truth).abs() < 1e-8, "height {height:e}: {found:?} for {truths:?}");
+        }
+        assert_eq!(answer.hit.map(|hit| hit.t), found.first().copied());
+    }
 }

@@ -168,6 +168,50 @@ fn nothing_slips_through_a_mesh_smaller_than_a_wavelength() {
 }
 
 #[test]
+fn nothing_slips_through_a_small_mesh_seen_from_a_thousand_kilometres() {
+    // The place where such a ray enters is rounded by 1e-7 mm.
+    let mesh = globe(24, 13, |v| v * 5e-3);
+    let mut r = Random(90);
+    let rays: Vec<Ray> = (0..6000)
+        .map(|k| {
+            let corners = mesh.corners(r.below(mesh.facets.len()));
+            let target =
+                [corners[0], corners[0].lerp(corners[1], r.unit()), corners[0].lerp(corners[2], r.unit())][k % 3];
+            let inside = r.direction() * (2e-3 * r.unit());
+            let origin = target + (target - inside).normalize() * 1e9;
+            Ray::new(origin, (target - origin).normalize())
+        })
+        .collect();
+    for instruction_set in [octree::Settings::default().instruction_set, InstructionSet::Portable] {
+        let tree = Octree::build(&mesh, &octree::Settings { instruction_set, ..octree::Settings::default() });
+        let lost = rays.iter().filter(|ray| tree.intersect(ray, &mut Cost::default()).is_none()).count();
+        assert_eq!(lost, 0);
+    }
+}
+
+#[test]
+fn an_edge_is_passed_on_the_side_where_it_is_passed() {
+    // Cassini: of Fibonacci's numbers F(n − 1)·F(n + 1) − F(n)² is ±1, and their products in floats are the same. An edge from
+    // (F(n − 1), F(n)) to −(F(n), F(n + 1)) passes the origin by 1e-15 of its length.
+    let fibonacci = |n: usize| (0..n).fold([0i64, 1], |[a, b], _| [b, a + b])[0];
+    for n in [70, 71] {
+        let [a, b, c] = [n - 1, n, n + 1].map(|k| fibonacci(k) as f64 * 2f64.powi(-47));
+        let left_of_edge =
+            i128::from(fibonacci(n)).pow(2) - i128::from(fibonacci(n - 1)) * i128::from(fibonacci(n + 1));
+        assert_eq!(b * b, a * c);
+        for (corner, is_left) in [([2.0, -1.0], true), ([-2.0, 1.0], false)] {
+            let corners = [Point::new(a, b, 0.0), Point::new(-b, -c, 0.0), Point::new(corner[0], corner[1], 0.0)];
+            let mut mesh = FacetMesh { positions: corners.to_vec(), ..FacetMesh::default() };
+            add_facet(&mut mesh, [0, 1, 2, 2], 0);
+            let hits = ask(&mesh, &[Ray::new(Point::Z, -Vector::Z), Ray::new(-Point::Z, Vector::Z)]);
+            for hit in hits {
+                assert_eq!(hit.is_some(), is_left == (left_of_edge > 0), "F({n}), {corners:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_gap_of_a_micrometre_is_seen() {
     let mut mesh = FacetMesh::default();
     add_grid(&mut mesh, 20, 20, 0, |a, b| Point::new(100.0 * a, 100.0 * b, 0.0));

@@ -21,8 +21,10 @@ FAULTS = [
     ("Krawczyk radius forgotten", EXACT + "leaf_test.rs", "* (1.0 + «row_u» + INVERSE_ROUNDING) + margin", "0.0", SPLINE),
     ("Krawczyk reach a third", EXACT + "leaf_test.rs", "let reach_v = «f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin»;",
      "(f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin) / 3.0", SPLINE),
-    ("singular Jacobians inverted", EXACT + "leaf_test.rs", "det.abs() > «SINGULAR» *", "0.0", SPLINE),
-    ("singular nets preconditioned", EXACT + "clip_hull.rs", "det.abs() > «SINGULAR» *", "0.0", SPLINE),
+    ("large margins not clipped", EXACT + "leaf_test.rs", "margin < «LARGEST_MARGIN»", "f64::INFINITY", SPLINE),
+    ("singular nets preconditioned", EXACT + "clip_hull.rs", "let blur = if «regular» {", "true", SPLINE),
+    ("one root of a tangency forgotten", EXACT + "tangency.rs", "for side in «[-1.0, 1.0]» {", "[1.0, 1.0]", SPLINE),
+    ("a tangency is none", EXACT + "tangency.rs", "if «height + slope * way + 0.5 * least * way * way > rounding» {", "true", SPLINE),
     ("roots counted far beside the leaf", EXACT + "leaf_test.rs", "let e = «margin + 2.0 * NEWTON_STEP»;", "margin + 0.05", SPLINE),
     ("range not asked of a root", EXACT + "acceptance.rs", "if «!query.is_in_range(t)» {", "false", SPLINE),
     ("oriented box shrunk", EXACT + "leaf_test.rs", "let (a, b) = «((leaf.olo[k] - noise - o) * inv, (leaf.ohi[k] + noise - o) * inv)»;",
@@ -49,7 +51,7 @@ FAULTS = [
     # Settling in 32 digits.
     ("open roots not settled", EXACT + "leaf_test.rs", "let open = leaf.ill_scaled || «settlement::is_open([u, v], margins)»;", "false", SPLINE),
     ("settled roots count beyond the face", EXACT + "settlement.rs", "if «!sides.iter().any(|&(k, end)| is_over(k, end))» {", "true", SPLINE),
-    ("settled roots of another root kept", EXACT + "settlement.rs", "root.filter(|(_, local)| «near(*local)»)", "true", SPLINE),
+    ("settled roots of another root kept", EXACT + "settlement.rs", "settled.filter(|root| «near(leaf.leaf_parameters(root.local))»)", "true", SPLINE),
     ("unsettled roots told as certified", EXACT + "settlement.rs", "Candidate { certainty: «Certainty::Uncertified», ..found }", "Certainty::Certified", SPLINE),
     # Polishing.
     ("polish accepts a point off the ray", EXACT + "newton.rs", "if «residual > near + rounding» {", "residual > 1e-2", SPLINE),

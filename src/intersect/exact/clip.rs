@@ -2,18 +2,22 @@
 //!
 //! The leaf's net is seen along the ray: two coordinates across, one along, and the weight. A box of parameters is dropped
 //! when the hull misses the ray or when the preconditioned hull shows that no root can lie in it, shrunk when the hull
-//! says so, solved by Newton when at most one root is left, and halved otherwise. Boxes that come down to rounding are
-//! reported as tangent or uncertified, never dropped.
+//! says so, solved by Newton when at most one root is left, and halved otherwise. What comes down to rounding is looked at once more
+//! in 32 digits, and what these leave is reported as tangent or uncertified, never dropped.
 
 use super::acceptance::Candidate;
-use super::clip_hull::{Preconditioner, hull, linear_hull, newton, precondition, range_along, seen_along};
+use super::clip_hull::{
+    Preconditioner, SeenLeaf, halving_rounding, hull, linear_hull, newton, precondition, range_along, seen_along,
+    tangent_frame,
+};
 use super::leaf::Leaf;
 use super::net::{self, Net, Slopes, V4};
 use super::patch::project;
 use super::query::Query;
 use super::settlement;
 use super::structure::Exact;
-use super::tolerances::{CONTACT_LENGTH, ROUND, SAME_PARAMETER, TANGENT};
+use super::tangency;
+use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
 
@@ -22,14 +26,11 @@ const FINEST: f64 = 1e-13;
 /// A leaf whose roots count no farther beyond its unit square than this is clipped over that alone: what lies beyond is within
 /// the margin of a root.
 const BEYOND_UNIT: f64 = 1e-9;
-/// Half ulps by which a coordinate across the ray is off, beside those of each de Casteljau step.
-const SHIFT_ROUNDING: f64 = 4.0;
 /// Row sums below this leave at most one root, and Newton's method a tenth of each error at worst; what lies above is halved.
 const UNIQUE: f64 = 0.9;
 /// How far beyond its box a root counts beside twice the margin: Newton's method ends within 1e-14.
 const ROOT_ROUNDING: f64 = 1e-12;
-/// Boxes of this size are a point to Newton's method; one that touches the ray over more than [`CONTACT_LENGTH`] contacts is
-/// a contact all the same.
+/// Boxes of this size are a point to Newton's method.
 const POINT_BOX: f64 = 1e-7;
 /// A box of which the hull leaves less than this share is cut down, others are halved: Nishita, Sederberg and Kakimoto halve above
 /// 0.8, but a halving costs half of a cut.
@@ -40,6 +41,20 @@ const LEAST_CUT: f64 = 1e-15;
 const REGULAR: f64 = 1e-6;
 /// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
 const TANGENT_SINE: f64 = 1e-3;
+/// A box of this size that still holds more than one root is asked for a tangency: most rays that graze a surface have found theirs.
+const TANGENCY_BOX: f64 = 1.0 / 64.0;
+/// Clipping steps that looking for a bend counts as: two microseconds.
+const BEND_WORK: u32 = 4;
+/// Clipping steps that a tangency counts as: its search takes 150 to 300 microseconds.
+const TANGENCY_WORK: u32 = 400;
+/// How far beyond its leaf a net from 32 digits is looked at, as a share of the leaf.
+const CRACK: f64 = 1e-8;
+/// Clipping steps that a net from 32 digits counts as: fifty microseconds.
+const PRECISE_WORK: u32 = 100;
+/// Relative error of such a net's coordinates: that of a thousand roundings of 2⁻¹⁰⁴, twenty times over.
+const PRECISE_ROUNDING: f64 = 1e-27;
+/// A side along which the ray's distance changes by a smaller share of what it does along the other is not halved.
+const ALIKE: f64 = 1e-6;
 /// Points times degrees of a bicubic net, on which a step takes half a microsecond.
 const BICUBIC_WORK: usize = 96;
 
@@ -56,10 +71,12 @@ struct Node {
 struct Clipping<'a> {
     index: u32,
     leaf: &'a Leaf,
-    /// Bound of the rounding of the two coordinates across the ray, in homogeneous units.
-    margin: [f64; 2],
+    seen: SeenLeaf,
     /// The point that the ray leaves, in the leaf's parameters.
     departure: Option<[f64; 2]>,
+    /// Whether the ray passes a pole: its control points differ by their own rounding, and what 32 digits say of the cracks between them
+    /// is not meant.
+    at_pole: bool,
 }
 
 /// A leaf to be clipped, for [`simd::dispatch`].
@@ -90,25 +107,60 @@ impl Exact {
     fn clip_leaf(&self, query: &mut Query, index: u32) {
         query.clips += 1;
         let leaf = &self.leaves[index as usize];
-        let degree = leaf.degree;
         let oc = query.o - leaf.center;
-        let (mut net, size) = seen_along(query, leaf.net(&self.pool), oc);
+        let (net, size) = seen_along(query, leaf.net(&self.pool), oc);
+        let noise = self.noise(leaf, oc);
+        let margin = size.map(|s| noise + halving_rounding(leaf) * s);
+        let departure = query.departure.and_then(|own| own.local_to(leaf, &self.geometry));
+        let seen = SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
+        let patch = &self.geometry.patches[leaf.patch as usize];
+        let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * TANGENT);
+        let clipping = Clipping { index, leaf, seen, departure, at_pole };
+        let before = [query.all.len(), query.all_rejected.len()];
+        if !self.clip_seen(query, &clipping) {
+            // In a search for all, what it found is found again.
+            query.all.truncate(before[0]);
+            query.all_rejected.truncate(before[1]);
+            self.clip_precisely(query, clipping);
+        }
+    }
+
+    /// Looks for every root on a leaf whose net comes from 32 digits: the ray runs along it, or touches it, within the rounding of `f64`.
+    #[cold]
+    fn clip_precisely(&self, query: &mut Query, clipping: Clipping<'_>) {
+        query.budget = query.budget.saturating_sub(PRECISE_WORK);
+        let Clipping { index, leaf, seen, departure, at_pole } = clipping;
+        let frame = tangent_frame(&seen, leaf.degree, query.d);
+        let reference = self.geometry.reference(&self.geometry.patches[leaf.patch as usize]);
+        let net = reference.net_along([query.o, query.d], frame, leaf.rect);
+        let largest = |k: usize| net.iter().map(|p| p[k].abs()).fold(0.0, f64::max);
+        let reach = query.o.abs().max_element() + leaf.center.abs().max_element() + leaf.radius;
+        let rounding = PRECISE_ROUNDING * reach * largest(3);
+        let margin = [0, 1].map(|k| halving_rounding(leaf) * largest(k) + rounding);
+        let seen = SeenLeaf { net, frame, margin, precise: true };
+        self.clip_seen(query, &Clipping { index, leaf, seen, departure, at_pole });
+    }
+
+    /// Looks for every root in what is seen of a leaf; whether its precision was enough.
+    #[inline(always)]
+    fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> bool {
+        let leaf = clipping.leaf;
+        let degree = leaf.degree;
+        let mut net = clipping.seen.net.clone();
         let mut rect = [[0.0, 1.0]; 2];
         // Only where a trim may run along the border of the surface do roots count beyond the unit square.
         for d in 0..2 {
-            let [lo, hi] = leaf.reach[d];
+            let [mut lo, mut hi] = leaf.reach[d];
+            if clipping.seen.precise {
+                // The two ends of a closed surface leave a crack of their rounding: roots in it are found, and placed later.
+                (lo, hi) = (lo - CRACK, hi + CRACK);
+            }
             let (below, above) = (lo < -BEYOND_UNIT, hi > 1.0 + BEYOND_UNIT);
             if below || above {
                 rect[d] = [if below { lo } else { 0.0 }, if above { hi } else { 1.0 }];
                 net::restrict(&mut net, degree, d, rect[d]);
             }
         }
-        // Halving errs by one rounding a degree and level relative to a net that shrinks with the level: twice the first.
-        let steps = SHIFT_ROUNDING + 2.0 * (degree[0] as f64 + degree[1] as f64);
-        let noise = self.noise(leaf, oc);
-        let margin = size.map(|s| noise + steps * ROUND * s);
-        let departure = query.departure.and_then(|own| own.local_to(leaf, &self.geometry));
-        let clipping = Clipping { index, leaf, margin, departure };
         // A step on a net of many points costs as many of a bicubic one.
         let work = (net.len() * (usize::from(degree[0]) + usize::from(degree[1]))).div_ceil(BICUBIC_WORK) as u32;
         let near = range_along(&net).0;
@@ -124,39 +176,50 @@ impl Exact {
                 continue;
             }
             query.budget = query.budget.saturating_sub(work);
-            self.clip_node(query, &clipping, node, &mut stack);
+            if !self.clip_node(query, clipping, node, &mut stack) {
+                return false;
+            }
         }
+        true
     }
 
-    /// One step: drops a box, takes its root, or puts what is left of it on the stack.
+    /// One step: drops a box, takes its root, or puts what is left of it on the stack; false where `f64` cannot tell.
     #[inline(always)]
-    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: Node, stack: &mut Vec<Node>) {
-        let degree = clipping.leaf.degree;
-        let Some(hull) = hull(&node.net, clipping.margin) else { return };
+    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: Node, stack: &mut Vec<Node>) -> bool {
+        let (degree, seen) = (clipping.leaf.degree, &clipping.seen);
+        let Some(hull) = hull(&node.net, seen.margin) else { return true };
         if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
-            return;
+            return true;
         }
         // What the preconditioned hull leaves of the box, and its root where there is one at most.
         let mut keep = [[0.0, 1.0]; 2];
         let slopes = net::slopes(&node.net, degree);
-        if let Some(y) = precondition(&slopes, clipping.margin) {
+        if let Some(y) = precondition(&slopes, degree, seen.margin) {
             // Wider by what rounding may move a root, so that no cut parts a root from its box.
             keep = linear_hull(&node.net, degree, &y.inverse);
             for k in 0..2 {
                 keep[k] = [keep[k][0] - y.slack[k], keep[k][1] + y.slack[k]];
                 if keep[k][0] > 1.0 || keep[k][1] < 0.0 {
-                    return;
+                    return true;
                 }
                 keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
             }
             if y.deviation < UNIQUE && self.take_single_root(query, clipping, &node, &y, keep) {
-                return;
+                return true;
             }
         }
         let small = size(&node.rect).into_iter().fold(0.0, f64::max);
-        // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is.
-        let touches =
-            hull.across < TANGENT && (hull.far - hull.near < CONTACT_LENGTH * TANGENT || small < POINT_BOX);
+        if small <= TANGENCY_BOX && self.take_tangency(query, clipping, &node) {
+            return true;
+        }
+        // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is. What `f64`
+        // takes for one is looked at once more in 32 digits, until it is a point or nothing is left of it.
+        let is_short = if clipping.at_pole {
+            hull.far - hull.near < CONTACT_LENGTH * TANGENT || small < POINT_BOX
+        } else {
+            !seen.precise || hull.far - hull.near < TANGENT || small < POINT_BOX
+        };
+        let touches = hull.across < TANGENT && is_short;
         if touches || small < FINEST {
             return self.take_contact(query, clipping, &node);
         }
@@ -167,6 +230,7 @@ impl Exact {
         } else {
             halve(&node, degree, &slopes, stack);
         }
+        true
     }
 
     /// Takes the root of a box with one at most, when Newton's method finds it there; whether it did.
@@ -210,7 +274,9 @@ impl Exact {
             let found = Candidate { local, t, certainty: Certainty::Certified, settled: None };
             let margin = [0, 1].map(|k: usize| (ROOT_ROUNDING + 2.0 * y.slack[k]) * [size_u, size_v][k]);
             let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
-            if ill_scaled || settlement::is_open(local, margin) {
+            if clipping.seen.precise {
+                self.settle(query, clipping.index, found, [settlement::LOOSE; 2]);
+            } else if ill_scaled || settlement::is_open(local, margin) {
                 // Where its margin reaches over the leaf's border, or the patch has few digits, `f64` cannot say
                 // whose root it is.
                 self.settle(query, clipping.index, found, margin);
@@ -221,22 +287,47 @@ impl Exact {
         true
     }
 
-    /// Reports a box that touches the ray within rounding, unless it is the point that the ray leaves.
+    /// Takes the roots of a box where the ray touches a surface that bends, none or both; whether it could tell.
+    #[cold]
+    fn take_tangency(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
+        // The square around the box, and somewhat more, is what is looked at.
+        let side = size(&node.rect).into_iter().fold(0.0, f64::max);
+        let is_around =
+            |p: [f64; 2]| (0..2).all(|k| (p[k] - 0.5 * (node.rect[k][0] + node.rect[k][1])).abs() <= side);
+        // Which of two roots a ray leaves that starts off them by rounding, 32 digits do not tell either.
+        if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < TANGENCY_WORK {
+            return false;
+        }
+        query.budget -= BEND_WORK;
+        let Some(roots) = tangency::roots(self, query, clipping.leaf, &clipping.seen, node.rect) else {
+            return false;
+        };
+        query.budget = query.budget.saturating_sub(TANGENCY_WORK);
+        for root in roots {
+            self.offer_settled(query, clipping.index, &root, [settlement::LOOSE; 2]);
+        }
+        true
+    }
+
+    /// Reports a box that touches the ray within rounding, unless it is the point that the ray leaves; false where 32 digits may tell more.
     #[inline(always)]
-    fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) {
+    fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
         let s = net::evaluate_inlined(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
         let [size_u, size_v] = size(&node.rect);
         let local = [node.rect[0][0] + 0.5 * size_u, node.rect[1][0] + 0.5 * size_v];
         let t = s[2] / s[3];
-        // A contact is known only to the size of its box: a departure within that is the contact, or a tangent ray
-        // would hit where it starts.
         let reach = POINT_BOX + size_u.max(size_v);
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
             && query.departure.is_some_and(|own| own.is_unique_root(t.abs() - CONTACT_LENGTH * TANGENT));
-        if !leaving {
-            let certainty = self.contact(clipping.leaf, local, query);
-            self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
+        if leaving {
+            return true;
         }
+        if !clipping.seen.precise && !clipping.at_pole {
+            return false;
+        }
+        let certainty = self.contact(clipping.leaf, local, query);
+        self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
+        true
     }
 
     /// Tangent where the surface is regular and the ray grazes it; uncertified at singular points.
@@ -277,8 +368,12 @@ fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
 #[inline(always)]
 fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     // The first derivative is as long as its middle and its radius allow: a side is at most that.
-    let longest = |m: &V4, r: &V4| (0..3).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
-    let u_first = longest(&slopes.u, &slopes.ru) >= longest(&slopes.v, &slopes.rv);
+    let longest = |m: &V4, r: &V4, count: usize| (0..count).map(|c| m[c].abs() + r[c]).fold(0.0, f64::max);
+    let lengths = [longest(&slopes.u, &slopes.ru, 3), longest(&slopes.v, &slopes.rv, 3)];
+    let across = [longest(&slopes.u, &slopes.ru, 2), longest(&slopes.v, &slopes.rv, 2)];
+    // Where the ray runs along a straight line of the surface, halves of that line are alike.
+    let v_alike = across[1] < ALIKE * across[0];
+    let u_first = v_alike || (across[0] >= ALIKE * across[1] && lengths[0] >= lengths[1]);
     let [size_u, size_v] = size(&node.rect);
     // A side of the finest size stays: its two halves could no longer be told apart.
     let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };

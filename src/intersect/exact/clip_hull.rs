@@ -1,18 +1,34 @@
 //! A net as the ray sees it: what its hull and its derivatives say of roots, for clipping.
 
+use super::leaf::Leaf;
 use super::net::{self, Net, Slopes, V4, by_degree};
 use super::query::Query;
-use super::tolerances::{INVERSE_ROUNDING, SINGULAR};
+use super::tolerances::{INVERSE_ROUNDING, ROUND, SINGULAR};
+use crate::math::Vector;
 
-/// Rounding of the preconditioned hull, as a share of the box: about a thousand half ulps, for sums of four products of which
-/// the inverse magnifies each by no more than what [`SINGULAR`] lets pass and the margin takes into account.
+/// Rounding of the preconditioned hull, as a share of the box: about a thousand half ulps, for sums of four products. Any matrix may stand
+/// for the inverse there, so that only its products round, by less than it magnifies the margin.
 const HULL_ROUNDING: f64 = 1e-13;
+/// Half ulps by which a coordinate across the ray is off, beside those of each de Casteljau step.
+const SHIFT_ROUNDING: f64 = 4.0;
 /// Newton steps in a box with one root at most.
 const STEPS: usize = 12;
 /// Newton's method ends at steps of this size, as a share of the box.
 const LAST_STEP: f64 = 1e-14;
 /// Steps below this that do not get shorter are rounding.
 const STALLED_STEP: f64 = 1e-8;
+
+/// A leaf's net as a ray sees it.
+pub(super) struct SeenLeaf {
+    /// Across, across, along, weight.
+    pub(super) net: Net,
+    /// The directions of the two coordinates across.
+    pub(super) frame: [Vector; 2],
+    /// Bound of the rounding of these two, in homogeneous units.
+    pub(super) margin: [f64; 2],
+    /// Whether it comes from the surface as given in 32 digits.
+    pub(super) precise: bool,
+}
 
 /// What a net's hull says of the ray.
 pub(super) struct Hull {
@@ -86,19 +102,37 @@ pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net
     (net, size)
 }
 
+/// Bound of what halving rounds, as a share of a leaf's largest coordinate: one rounding a degree and level relative to a net that shrinks
+/// with the level, twice the first.
+#[inline(always)]
+pub(super) fn halving_rounding(leaf: &Leaf) -> f64 {
+    (SHIFT_ROUNDING + 2.0 * (f64::from(leaf.degree[0]) + f64::from(leaf.degree[1]))) * ROUND
+}
+
+/// Two directions across a ray: one along the longer tangent as it is seen, the other across it. That coordinate is small all over a leaf
+/// that the ray runs along, and what is small is rounded by little.
+pub(super) fn tangent_frame(seen: &SeenLeaf, degree: [u8; 2], direction: Vector) -> [Vector; 2] {
+    let slopes = net::slopes(&seen.net, degree);
+    let [[a, b], [c, d]] = [[slopes.u[0], slopes.u[1]], [slopes.v[0], slopes.v[1]]];
+    let [x, y] = if a.hypot(b) >= c.hypot(d) { [a, b] } else { [c, d] };
+    let along = (seen.frame[0] * x + seen.frame[1] * y).normalize_or(seen.frame[0]);
+    [along, direction.cross(along)]
+}
+
 /// The inverse of the middle Jacobian; `None` where its rounding is not bounded.
 #[inline(always)]
-pub(super) fn precondition(s: &Slopes, margin: [f64; 2]) -> Option<Preconditioner> {
+pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Option<Preconditioner> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
-    // The determinant is rounded relative to these products: when it is much smaller, its digits are noise.
-    let size = (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
-    if !(det.abs() > SINGULAR * size) {
+    if !(det.abs() > f64::MIN_POSITIVE) {
         return None;
     }
     let y = [[s.v[1] / det, -s.v[0] / det], [-s.u[1] / det, s.u[0] / det]];
     let row = |r: usize| y[r][0].abs() * (s.ru[0] + s.rv[0]) + y[r][1].abs() * (s.ru[1] + s.rv[1]);
     let slack = [0, 1].map(|r: usize| y[r][0].abs() * margin[0] + y[r][1].abs() * margin[1] + HULL_ROUNDING);
-    Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING, slack })
+    let regular = det.abs() > SINGULAR * (s.u[0].abs() + s.v[0].abs()) * (s.u[1].abs() + s.v[1].abs());
+    // A derivative is off by twice the degree of what control points are off, and the inverse of a nearly singular Jacobian by no more.
+    let blur = if regular { 0.0 } else { 4.0 * f64::from(degree[0].max(degree[1])) * slack[0].max(slack[1]) };
+    Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING + blur, slack })
 }
 
 /// Ranges of u and v that can hold a root: where `u = u − g(u, v)` for the preconditioned net g.

@@ -5,7 +5,7 @@ use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
 use super::reference::{self, ReferencePatch};
 use super::tolerances::VERTEX_RADIUS;
 use super::trim::Trim;
-use crate::math::{FaceId, Frame, Point, Uv};
+use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
 use crate::nurbs::{Curve, Surface};
 use rustc_hash::FxHashMap;
@@ -154,6 +154,19 @@ impl Geometry {
                 let mut local = [0.5; 2];
                 local[d] = end as f64;
                 sides[d][end] && project(&patch.jet(local)).0.distance(point - patch.center) <= distance
+            })
+        })
+    }
+
+    /// Whether a ray (origin, direction) passes a pole of the patch's surface within `distance` mm.
+    pub(super) fn passes_pole(&self, patch: &Patch, [o, d]: [Vector; 2], distance: f64) -> bool {
+        let near = |pole: Point| (pole - (o - patch.center)).cross(d).length() <= distance;
+        let sides = self.pole_sides(patch);
+        (0..2).any(|k| {
+            (0..2).any(|end| {
+                let mut local = [0.5; 2];
+                local[k] = end as f64;
+                sides[k][end] && near(project(&patch.jet(local)).0)
             })
         })
     }

@@ -17,8 +17,14 @@ use super::tolerances::{COORDINATE_ROUNDING, EXTENSION, INVERSE_ROUNDING, NEWTON
 use crate::intersect::Certainty;
 use crate::math::Vector;
 
-/// Row sums above this go to clipping: 5 % is kept for the rounding of `Y`, which stays below [`INVERSE_ROUNDING`].
+/// Row sums above this go to clipping: 5 % is kept for the rounding of `Y` and of what it is the inverse of.
 const UNIQUE: f64 = 0.95;
+/// Leaves that are nearly singular go to clipping where rounding moves a root by more, as a share of the leaf.
+///
+/// A derivative is off by twice the degree, 25 at most, of what control points are off, and the inverse magnifies both alike: row sums are
+/// off by a hundred times the margin, the 5 % that [`UNIQUE`] leaves. What the inverse is off by itself, eight half ulps of the product of row
+/// sums over the determinant, is less: the margin has 32 of the leaf's radius, a seventh of a row sum, over the same.
+const LARGEST_MARGIN: f64 = 5e-4;
 /// Rounding of parameters of a unit square: fifty ulps of its middle.
 const PARAMETER_ROUNDING: f64 = 1e-14;
 /// Newton steps on a leaf; its map is nearly linear, and three do on most.
@@ -50,9 +56,6 @@ impl Exact {
         let [a, b, f1] = leaf.projected(query.n1, k1);
         let [c, d, f2] = leaf.projected(query.n2, k2);
         let det = a * d - b * c;
-        if !(det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs())) {
-            return self.clip_touched(query, index);
-        }
         let (r1, r2) = (leaf.radius(query.n1, k1), leaf.radius(query.n2, k2));
         let inv = 1.0 / det;
         let (y00, y01, y10, y11) = (d * inv, -b * inv, -c * inv, a * inv);
@@ -60,7 +63,10 @@ impl Exact {
         // Where its boxes deviate from it by less than itself there is one root at most.
         let row_u = y00.abs() * r1 + y01.abs() * r2;
         let row_v = y10.abs() * r1 + y11.abs() * r2;
-        if !(row_u < UNIQUE && row_v < UNIQUE) {
+        let margin = PARAMETER_ROUNDING + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
+        // Where it is singular the margin is infinite, or no number.
+        let regular = det.abs() > SINGULAR * (a.abs() + b.abs()) * (c.abs() + d.abs());
+        if !(row_u < UNIQUE && row_v < UNIQUE && (regular || margin < LARGEST_MARGIN)) {
             return self.clip_touched(query, index);
         }
 
@@ -69,7 +75,6 @@ impl Exact {
         let dv = -(y10 * f1 + y11 * f2);
         // What rounding may move the operator's image by, then the leaf's half width with what the Jacobian's
         // spread adds to it.
-        let margin = PARAMETER_ROUNDING + noise * (y00.abs() + y01.abs() + y10.abs() + y11.abs());
         let reach_u = f64::from(leaf.half[0]) * (1.0 + row_u + INVERSE_ROUNDING) + margin;
         let reach_v = f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin;
         if du.abs() > reach_u || dv.abs() > reach_v {

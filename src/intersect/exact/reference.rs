@@ -7,6 +7,7 @@
 //! An evaluation takes some microseconds: only roots whose place `f64` leaves open are settled here.
 
 use super::double_double::DoubleDouble;
+use super::net::{Net, V4};
 use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Frame, Homogeneous, Uv, Vector};
 use crate::nurbs::{BezierPatch, Surface, find_span};
@@ -33,6 +34,15 @@ pub(super) struct SettledRoot {
     pub(super) uv: Uv,
 }
 
+/// The surface as it is seen along a ray: two components across it that no rounding of a frame blurs.
+pub(super) struct SeenAlong {
+    /// The coordinates that the components belong to: all but the direction's largest.
+    pub(super) axes: [usize; 2],
+    pub(super) value: [DoubleDouble; 2],
+    /// By the two parameters, as shares of the patch.
+    pub(super) derivatives: [[DoubleDouble; 2]; 2],
+}
+
 /// A patch of a placed surface.
 #[derive(Clone, Copy)]
 pub(super) struct ReferencePatch<'a> {
@@ -55,6 +65,36 @@ impl Kernel for Settling<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self) -> Self::Output {
         self.patch.newton(self.ray, self.start)
+    }
+}
+
+/// A net to be seen along a ray, for [`simd::dispatch`].
+struct NetAlong<'a> {
+    patch: ReferencePatch<'a>,
+    ray: [Vector; 2],
+    frame: [Vector; 2],
+    rect: [[f64; 2]; 2],
+}
+
+impl Kernel for NetAlong<'_> {
+    type Output = Net;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> Net {
+        let Self { patch, ray: [o, d], frame, rect } = self;
+        let ends = [0, 1].map(|k: usize| rect[k].map(|x| patch.width(k) * x.into() + patch.domain[k][0].into()));
+        let main = d.abs().max_position();
+        let axes = [(main + 1) % 3, (main + 2) % 3];
+        let origin: Point3 = patch.placement.origin.to_array().map(Number::from);
+        let seen = |point: Point4| -> V4 {
+            let placed = patch.place(&[point[0], point[1], point[2]]);
+            let r: Point3 = std::array::from_fn(|k| placed[k] + (origin[k] - o[k].into()) * point[3]);
+            let across = axes.map(|k| r[k] - r[main] * d[k].into() / d[main].into());
+            let component = |n: Vector| (across[0] * n[axes[0]].into() + across[1] * n[axes[1]].into()).to_f64();
+            let along = r[0] * d.x.into() + r[1] * d.y.into() + r[2] * d.z.into();
+            [component(frame[0]), component(frame[1]), along.to_f64(), point[3].to_f64()]
+        };
+        bezier_points(patch.surface, patch.domain, ends).into_iter().map(seen).collect()
     }
 }
 
@@ -84,6 +124,28 @@ impl ReferencePatch<'_> {
     /// Derivatives in the world by u and v, as shares of the patch: how far the surface would run over it at this speed, mm.
     pub(super) fn tangents(self, uv: Uv) -> [Vector; 2] {
         simd::dispatch(TangentsAt { patch: self, uv })
+    }
+
+    /// The surface seen along a ray (origin, direction), at local parameters.
+    ///
+    /// For a direction n across the ray, `n·(S − o)` is the sum of n's components at the axes times these.
+    #[inline(always)]
+    pub(super) fn seen_along(&self, [o, d]: [Vector; 2], local: [DoubleDouble; 2]) -> SeenAlong {
+        let main = d.abs().max_position();
+        let axes = [(main + 1) % 3, (main + 2) % 3];
+        let widths = [0, 1].map(|k| self.width(k));
+        let (p, du, dv) = self.derivatives([0, 1].map(|k| widths[k] * local[k] + self.domain[k][0].into()));
+        let r: Point3 = std::array::from_fn(|k| p[k] - o[k].into());
+        let across =
+            |x: &Point3, scale: Number| axes.map(|k| (x[k] - x[main] * d[k].into() / d[main].into()) * scale);
+        let derivatives = [across(&du, widths[0]), across(&dv, widths[1])];
+        SeenAlong { axes, value: across(&r, 1.0.into()), derivatives }
+    }
+
+    /// The control net of a rectangle of the patch as `frame` sees it along a ray (origin, direction): two coordinates across, one along,
+    /// and the weight. Each is rounded once, when all that cancels has cancelled.
+    pub(super) fn net_along(self, ray: [Vector; 2], frame: [Vector; 2], rect: [[f64; 2]; 2]) -> Net {
+        simd::dispatch(NetAlong { patch: self, ray, frame, rect })
     }
 
     #[inline(always)]
@@ -197,30 +259,49 @@ fn rounded(x: Point3) -> Vector {
 /// The control points of a Bézier patch, each coordinate rounded once: knot spans of 1e-9 beside weights of 1e6 leave no digit of
 /// what `f64` extracts.
 pub(super) fn extract(surface: &Surface, patch: &mut BezierPatch) {
+    let ends = patch.domain.map(|ends| ends.map(Number::from));
+    let points = bezier_points(surface, patch.domain, ends);
+    for (rounded, point) in patch.points.iter_mut().zip(points) {
+        *rounded = Homogeneous::from_array(point.map(Number::to_f64));
+    }
+}
+
+/// Control points over a rectangle of the surface's domain, in the knot rectangle `domain`.
+#[inline(always)]
+fn bezier_points(surface: &Surface, domain: [[f64; 2]; 2], ends: [[Number; 2]; 2]) -> Vec<Point4> {
     let [p, q] = surface.degree;
     let columns = surface.counts()[1];
-    let spans = [0, 1]
-        .map(|d| find_span(&surface.knots[d], surface.degree[d], 0.5 * (patch.domain[d][0] + patch.domain[d][1])));
+    let spans =
+        [0, 1].map(|d| find_span(&surface.knots[d], surface.degree[d], 0.5 * (domain[d][0] + domain[d][1])));
     let rows: Vec<Vec<Point4>> = (spans[0] - p..=spans[0])
         .map(|i| {
             let row = &surface.points[i * columns + spans[1] - q..=i * columns + spans[1]];
             let row: SmallVec<[Point4; 8]> = row.iter().map(|x| x.to_array().map(Number::from)).collect();
-            (0..=q).map(|k| blossom(&surface.knots[1], q, spans[1], row.clone(), k)).collect()
+            (0..=q).map(|k| blossom(&surface.knots[1], spans[1], row.clone(), ends[1], k)).collect()
         })
         .collect();
+    let mut points = vec![[Number::ZERO; 4]; (p + 1) * (q + 1)];
     for j in 0..=q {
         let column: SmallVec<[Point4; 8]> = rows.iter().map(|row| row[j]).collect();
         for i in 0..=p {
-            let point = blossom(&surface.knots[0], p, spans[0], column.clone(), i);
-            patch.points[i * (q + 1) + j] = Homogeneous::from_array(point.map(Number::to_f64));
+            points[i * (q + 1) + j] = blossom(&surface.knots[0], spans[0], column.clone(), ends[0], i);
         }
     }
+    points
 }
 
-/// The blossom of a span at its start, and `ends` times at its end: a Bézier point.
-fn blossom(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Point4; 8]>, ends: usize) -> Point4 {
+/// The blossom of a span at the first of two parameters, and `seconds` times at the other: a Bézier point over the range between them.
+#[inline(always)]
+fn blossom(
+    knots: &[f64],
+    span: usize,
+    mut points: SmallVec<[Point4; 8]>,
+    [first, second]: [Number; 2],
+    seconds: usize,
+) -> Point4 {
+    let degree = points.len() - 1;
     for r in 1..=degree {
-        let t = Number::from(if r <= ends { knots[span + 1] } else { knots[span] });
+        let t = if r <= seconds { second } else { first };
         for j in (r..=degree).rev() {
             let low = Number::from(knots[span - degree + j]);
             let high = Number::from(knots[span + 1 + j - r]);

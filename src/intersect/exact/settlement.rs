@@ -8,13 +8,14 @@ use super::acceptance::Candidate;
 use super::leaf::{Leaf, border_sides};
 use super::patch::Patch;
 use super::query::Query;
+use super::reference::SettledRoot;
 use super::structure::Exact;
 use super::tolerances::TANGENT;
 use crate::intersect::Certainty;
 use crate::math::Uv;
 
 /// Roots with a larger margin are settled wherever they lie, as a share of the leaf: of a leaf of 10 mm, 10 nm along the surface.
-const LOOSE: f64 = 1e-6;
+pub(super) const LOOSE: f64 = 1e-6;
 /// Roots with a larger margin are settled where that reaches over the leaf's border: ten times where Newton's method ends, so that
 /// no face is certified farther beside its border than a shared one is blurred.
 const AMBIGUOUS: f64 = 1e-11;
@@ -53,16 +54,22 @@ impl Exact {
         let near = |local: [f64; 2]| {
             (0..2).all(|k| (local[k] - found.local[k]).abs() <= (STRAYED * margin[k]).max(AMBIGUOUS))
         };
-        let root = settled.map(|root| (root, leaf.leaf_parameters(root.local)));
-        let Some((root, local)) = root.filter(|(_, local)| near(*local)) else {
+        let root = settled.filter(|root| near(leaf.leaf_parameters(root.local)));
+        let Some(root) = root else {
             // Singular, or Newton's method ran to another root.
             return self.leave_open(query, index, found);
         };
-        let place = self.place_on_leaf(leaf, patch, margin, (root.uv, local));
-        match place {
-            Place::OnLeaf => {
-                self.offer(query, index, Candidate { local, t: root.t, settled: Some(root.uv), ..found })
-            }
+        self.offer_settled(query, index, &root, margin);
+    }
+
+    /// Offers a root in 32 digits that a leaf's search has found, if it lies on the leaf.
+    pub(super) fn offer_settled(&self, query: &mut Query, index: u32, root: &SettledRoot, margin: [f64; 2]) {
+        let leaf = &self.leaves[index as usize];
+        let patch = &self.geometry.patches[leaf.patch as usize];
+        let local = leaf.leaf_parameters(root.local);
+        let found = Candidate { local, t: root.t, certainty: Certainty::Certified, settled: Some(root.uv) };
+        match self.place_on_leaf(leaf, patch, margin, (root.uv, local)) {
+            Place::OnLeaf => self.offer(query, index, found),
             Place::InCrack => self.leave_open(query, index, found),
             // The parameters of a pole are any: beside it they say nothing of where the face ends.
             Place::Beside if self.geometry.is_pole(patch, query.o + query.d * root.t, TANGENT) => {
@@ -121,5 +128,32 @@ impl Exact {
         // Two radii before the root: no point of the leaf lies nearer.
         query.undecided_from = query.undecided_from.min(found.t - 2.0 * leaf.radius);
         self.offer(query, index, Candidate { certainty: Certainty::Uncertified, ..found });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::exact::Settings;
+    use crate::math::{Frame, Point, Ray, Vector};
+    use crate::model::{Face, Model, Part, Shell};
+    use crate::nurbs::sweep;
+
+    #[test]
+    fn another_root_is_not_taken_for_the_one_that_was_found() {
+        let plane = Face::whole(sweep::plane(&Frame::IDENTITY, [[0.0, 100.0]; 2]));
+        let shells = vec![Shell { faces: vec![plane], ..Shell::default() }];
+        let model = Model::from_part(Part { shells, ..Part::default() });
+        let exact = Exact::build(&model, &Settings::default());
+        let leaf = exact.leaves[0].rect;
+        assert_eq!((exact.leaves.len(), leaf), (1, [[0.0, 1.0]; 2]));
+        let ray = Ray::new(Point::new(80.0, 50.0, 7.0), -Vector::Z);
+        for (x, right) in [(0.8, true), (0.2, false)] {
+            let mut query = Query::IDLE;
+            query.restart(&ray, &exact.geometry, &exact.tree, exact.settings.budget);
+            let found = Candidate { local: [x, 0.5], t: 7.0, certainty: Certainty::Certified, settled: None };
+            exact.settle(&mut query, 0, found, [1e-9; 2]);
+            assert_eq!(query.undecided_from == f64::INFINITY, right, "found at {x}");
+        }
     }
 }

@@ -169,3 +169,37 @@ fn subdivide(geometry: &Geometry, settings: &Settings) -> Vec<PatchLeaves> {
     }
     patches
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Homogeneous, Point};
+    use crate::model::{Face, Part, Shell};
+    use crate::nurbs::Surface;
+
+    #[test]
+    fn boxes_of_leaves_hold_the_corners_of_their_face() {
+        // Corners are control points: no rounding comes before the leaf's own. Their coordinates have finer digits than its centre.
+        for k in 0..100 {
+            let odd = |n: usize| ((k * 16 + n) as f64 * 12.9898).sin();
+            let corner = |i: usize| i == 0 || i == 3;
+            let points: Vec<Homogeneous> = (0..16)
+                .map(|n| {
+                    let (i, j) = (n / 4, n % 4);
+                    let bend = if corner(i) && corner(j) { 0.0 } else { 3.0 * odd(n) };
+                    (Point::new(33.0 * i as f64, 33.0 * j as f64, bend) + Point::splat(0.1 * odd(n))).extend(1.0)
+                })
+                .collect();
+            let corners = [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[u, v]| ([u, v], points[12 * u + 3 * v].project()));
+            let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+            let face = Face::whole(Surface { degree: [3, 3], knots: [knots.clone(), knots], points });
+            let shells = vec![Shell { faces: vec![face], ..Shell::default() }];
+            let exact = Exact::build(&Model::from_part(Part { shells, ..Part::default() }), &Settings::default());
+            for (ends, corner) in corners {
+                let mut leaves = exact.leaves.iter();
+                let leaf = leaves.find(|leaf| (0..2).all(|d| leaf.rect[d][ends[d]] == ends[d] as f64)).unwrap();
+                assert!(corner.cmpge(leaf.lo).all() && corner.cmple(leaf.hi).all(), "{corner} in {leaf:?}");
+            }
+        }
+    }
+}

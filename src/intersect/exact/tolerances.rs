@@ -23,8 +23,8 @@ pub(super) const REACH: [[f64; 2]; 2] = [[-NEWTON_STEP, 1.0 + NEWTON_STEP]; 2];
 /// Newton's method stops where its next step is foreseen below this: 1e-12 of a leaf of 10 mm are 1e-11 mm.
 pub(super) const NEWTON_STEP: f64 = 1e-12;
 
-/// A Jacobian whose determinant is a smaller part of the product of its row sums is not inverted: the rounding of the inverse, two
-/// half ulps over this, would reach [`INVERSE_ROUNDING`].
+/// A Jacobian whose determinant is a smaller part of the product of its row sums is inverted only where the margin says that no digit that
+/// counts is lost: the rounding of the inverse, two half ulps over this, would reach [`INVERSE_ROUNDING`].
 pub(super) const SINGULAR: f64 = 1e-8;
 /// Bound of the relative rounding of an inverse Jacobian, and of its products with the radii of the derivative boxes: forty times
 /// what [`SINGULAR`] leaves.
