@@ -12,6 +12,7 @@
 use super::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Aabb, BoxTree, BoxWalk, Departure, FaceId, Ray};
 use crate::model::{Instancing, Placement};
+use smallvec::SmallVec;
 use std::time::Instant;
 
 /// Rays that are under way at a time: as many as their walks take half of the first cache.
@@ -44,6 +45,8 @@ pub struct Instanced<'a> {
     instancing: &'a Instancing,
     groups: Vec<Box<dyn Intersector + 'a>>,
     tree: BoxTree,
+    /// Whether the first group holds anything.
+    has_single: bool,
     build_seconds: f64,
 }
 
@@ -64,21 +67,28 @@ impl<'a> Instanced<'a> {
         let started = Instant::now();
         let boxes: Vec<Aabb> = instancing.placements.iter().map(|p| p.bounds).collect();
         let tree = BoxTree::new(&boxes);
-        Self { instancing, groups, tree, build_seconds: started.elapsed().as_secs_f64() }
+        let has_single = instancing.groups.first().is_some_and(|group| !group.instances.is_empty());
+        Self { instancing, groups, tree, has_single, build_seconds: started.elapsed().as_secs_f64() }
     }
 
     /// At most [`BATCH`] rays.
     fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
-        let single: Vec<Ray> = rays.iter().map(|ray| self.left_by(ray, None)).collect();
         let rays_before = cost.rays;
-        self.groups[0].intersect_batch(&single, hits, cost);
-        let mut walks: Vec<Walk> = (rays.iter().zip(hits.iter_mut()))
+        if self.has_single {
+            let single: SmallVec<[Ray; BATCH]> = rays.iter().map(|ray| self.left_by(ray, None)).collect();
+            self.groups[0].intersect_batch(&single, hits, cost);
+        } else {
+            hits.fill(None);
+        }
+        let mut walks: SmallVec<[Walk; BATCH]> = (rays.iter().zip(hits.iter_mut()))
             .map(|(ray, hit)| {
                 let ray = Ray { t_max: hit.map_or(ray.t_max, |h| h.t), ..*ray };
                 Walk { ray, boxes: self.tree.walk(&ray), best: hit.take().map(|h| (None, h)), next: None }
             })
             .collect();
-        let (mut asked, mut local, mut found) = (Vec::new(), Vec::new(), Vec::new());
+        let mut asked: SmallVec<[usize; BATCH]> = SmallVec::new();
+        let mut local: SmallVec<[Ray; BATCH]> = SmallVec::new();
+        let mut found: SmallVec<[Option<Hit>; BATCH]> = SmallVec::new();
         loop {
             for walk in &mut walks {
                 walk.next = walk.boxes.next(walk.ray.t_max);

@@ -1,4 +1,4 @@
-//! A binary tree of boxes: which of very many a ray crosses, nearest first, and which of them another box meets.
+//! A tree of boxes: which of very many a ray crosses, nearest first, and which of them another box meets.
 //!
 //! Guarantee: no box is left out that a box meets, or that a ray crosses by more than rounding: whoever looks for what touches a side
 //! grows the boxes first, see [`Aabb::with_room`]. The tree depends on the boxes and their order alone.
@@ -6,27 +6,41 @@
 use super::{Aabb, Ray, Vector};
 use smallvec::SmallVec;
 
-/// Levels that a stack on its place has room for: of a million boxes.
-const LEVELS: usize = 24;
+/// Children of a node: as many as keep a tree of a hundred thousand boxes at nine levels, and a node within four lines of the cache.
+const WIDTH: usize = 4;
 
-/// Boxes, by their index.
-#[derive(Clone, Debug, Default)]
+/// Entries that a stack on its place has room for: three that wait on each level of a tree of a million boxes.
+const STACK: usize = 32;
+
+/// Marks a link as a box in place of a node.
+const BOX: u32 = 1 << 31;
+
+/// Boxes, by their index: fewer than 2³¹.
+#[derive(Clone, Debug)]
 pub struct BoxTree {
-    /// The root first.
+    bounds: Aabb,
+    /// The root first; none where there are no boxes.
     nodes: Vec<Node>,
 }
 
-/// A box around others.
+/// Up to four boxes around others, by axis and child: their sides lie next to each other, so that four are tried at once.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    bounds: Aabb,
-    /// Of a leaf its box, otherwise the first of two children next to each other.
-    first: u32,
-    is_leaf: bool,
+    low: [[f64; WIDTH]; 3],
+    high: [[f64; WIDTH]; 3],
+    /// Of each child its node, or its box with [`BOX`].
+    links: [u32; WIDTH],
+    children: u32,
+}
+
+impl Default for BoxTree {
+    fn default() -> Self {
+        Self::new(&[])
+    }
 }
 
 impl BoxTree {
-    /// A tree of these boxes, halved at the middle one along the longest side of their centres.
+    /// A tree of these boxes, halved and halved again at the middle one along the longest side of their centres.
     ///
     /// ```
     /// use lampyris::math::{Aabb, BoxTree, Point, Ray, Vector};
@@ -39,39 +53,38 @@ impl BoxTree {
     /// assert_eq!(walk.next(4.0), None);
     /// ```
     pub fn new(boxes: &[Aabb]) -> Self {
-        let mut tree = Self { nodes: Vec::with_capacity(2 * boxes.len()) };
+        assert!(boxes.len() < BOX as usize, "a tree of boxes holds fewer than 2^31");
+        let mut tree = Self { bounds: union(0..boxes.len() as u32, boxes), nodes: Vec::new() };
         let mut leaves: Vec<u32> = (0..boxes.len() as u32).collect();
         if !leaves.is_empty() {
-            tree.nodes.push(Node { bounds: Aabb::EMPTY, first: 0, is_leaf: true });
-            tree.divide(0, &mut leaves, boxes);
+            tree.add_node(&mut leaves, boxes);
         }
         tree
     }
 
-    fn divide(&mut self, node: usize, leaves: &mut [u32], boxes: &[Aabb]) {
-        let bounds = leaves.iter().fold(Aabb::EMPTY, |sum, &k| sum.union(boxes[k as usize]));
-        if let [only] = leaves {
-            self.nodes[node] = Node { bounds, first: *only, is_leaf: true };
-            return;
+    /// Adds the node of these boxes and all below it; its index.
+    fn add_node(&mut self, leaves: &mut [u32], boxes: &[Aabb]) -> u32 {
+        let index = self.nodes.len();
+        let (zeros, none) = ([[0.0; WIDTH]; 3], [0; WIDTH]);
+        self.nodes.push(Node { low: zeros, high: zeros, links: none, children: 0 });
+        let (left, right) = halves(leaves, boxes);
+        for half in [left, right] {
+            let (first, second) = halves(half, boxes);
+            for group in [first, second] {
+                let link = match group {
+                    [] => continue,
+                    [only] => *only | BOX,
+                    _ => self.add_node(group, boxes),
+                };
+                self.nodes[index].add_child(union(group.iter().copied(), boxes), link);
+            }
         }
-        let center = |k: u32| boxes[k as usize].center();
-        let size = Aabb::from_points(leaves.iter().map(|&k| center(k))).size();
-        let axis = if size.x >= size.y.max(size.z) { 0 } else { 1 + usize::from(size.z > size.y) };
-        let middle = leaves.len() / 2;
-        // By index among equals: the tree is the same wherever it is built.
-        leaves.select_nth_unstable_by(middle, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]).then(a.cmp(&b)));
-        let first = self.nodes.len();
-        let child = Node { bounds: Aabb::EMPTY, first: 0, is_leaf: true };
-        self.nodes.extend([child, child]);
-        self.nodes[node] = Node { bounds, first: first as u32, is_leaf: false };
-        let (left, right) = leaves.split_at_mut(middle);
-        self.divide(first, left, boxes);
-        self.divide(first + 1, right, boxes);
+        index as u32
     }
 
     /// Around all boxes.
     pub fn bounds(&self) -> Aabb {
-        self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
+        self.bounds
     }
 
     /// Bytes held.
@@ -81,16 +94,19 @@ impl BoxTree {
 
     /// Whether one of the boxes that meet this one is wanted.
     pub fn any_meeting(&self, bounds: &Aabb, mut is_wanted: impl FnMut(u32) -> bool) -> bool {
-        let mut open: SmallVec<[u32; LEVELS]> = self.nodes.first().map(|_| 0).into_iter().collect();
+        let mut open: SmallVec<[u32; STACK]> = self.nodes.first().map(|_| 0).into_iter().collect();
         while let Some(node) = open.pop() {
             let node = &self.nodes[node as usize];
-            if node.bounds.intersection(*bounds).is_empty() {
-                continue;
-            }
-            if !node.is_leaf {
-                open.extend([node.first, node.first + 1]);
-            } else if is_wanted(node.first) {
-                return true;
+            for child in 0..node.children as usize {
+                if node.bounds(child).intersection(*bounds).is_empty() {
+                    continue;
+                }
+                let link = node.links[child];
+                if link & BOX == 0 {
+                    open.push(link);
+                } else if is_wanted(link & !BOX) {
+                    return true;
+                }
             }
         }
         false
@@ -99,17 +115,47 @@ impl BoxTree {
     /// Goes through the boxes that a ray crosses.
     #[inline]
     pub fn walk(&self, ray: &Ray) -> BoxWalk<'_> {
-        let mut walk = BoxWalk {
-            tree: self,
-            origin: ray.origin,
-            inverse: ray.direction.recip(),
-            least: ray.t_min,
-            open: SmallVec::new(),
-        };
-        if let Some(near) = self.nodes.first().and_then(|root| walk.entry(root, ray.t_max)) {
-            walk.open.push((near, 0));
+        let mut open = SmallVec::new();
+        if !self.nodes.is_empty() {
+            open.push((ray.t_min, 0));
         }
-        walk
+        BoxWalk { tree: self, origin: ray.origin, inverse: ray.direction.recip(), least: ray.t_min, open }
+    }
+}
+
+fn union(leaves: impl Iterator<Item = u32>, boxes: &[Aabb]) -> Aabb {
+    leaves.fold(Aabb::EMPTY, |sum, k| sum.union(boxes[k as usize]))
+}
+
+/// Parts boxes at the middle one along the longest side of their centres; the first half of a single box is empty.
+fn halves<'l>(leaves: &'l mut [u32], boxes: &[Aabb]) -> (&'l mut [u32], &'l mut [u32]) {
+    let middle = leaves.len() / 2;
+    if middle > 0 {
+        let center = |k: u32| boxes[k as usize].center();
+        let size = Aabb::from_points(leaves.iter().map(|&k| center(k))).size();
+        let axis = if size.x >= size.y.max(size.z) { 0 } else { 1 + usize::from(size.z > size.y) };
+        // By index among equals: the tree is the same wherever it is built.
+        leaves.select_nth_unstable_by(middle, |&a, &b| center(a)[axis].total_cmp(&center(b)[axis]).then(a.cmp(&b)));
+    }
+    leaves.split_at_mut(middle)
+}
+
+impl Node {
+    fn add_child(&mut self, bounds: Aabb, link: u32) {
+        let child = self.children as usize;
+        for axis in 0..3 {
+            self.low[axis][child] = bounds.min[axis];
+            self.high[axis][child] = bounds.max[axis];
+        }
+        self.links[child] = link;
+        self.children += 1;
+    }
+
+    fn bounds(&self, child: usize) -> Aabb {
+        Aabb {
+            min: Vector::from_array(self.low.map(|side| side[child])),
+            max: Vector::from_array(self.high.map(|side| side[child])),
+        }
     }
 }
 
@@ -120,37 +166,56 @@ pub struct BoxWalk<'t> {
     origin: Vector,
     inverse: Vector,
     least: f64,
-    /// Nodes with where the ray enters them, the nearest last.
-    open: SmallVec<[(f64, u32); LEVELS]>,
+    /// Links with where the ray enters them, the nearest last.
+    open: SmallVec<[(f64, u32); STACK]>,
 }
 
 impl BoxWalk<'_> {
     /// The next box that is entered at `end` or before.
     #[inline]
     pub fn next(&mut self, end: f64) -> Option<u32> {
-        while let Some((near, node)) = self.open.pop() {
+        while let Some((near, link)) = self.open.pop() {
             if near > end {
                 continue;
             }
-            let node = &self.tree.nodes[node as usize];
-            if node.is_leaf {
-                return Some(node.first);
+            if link & BOX != 0 {
+                return Some(link & !BOX);
             }
-            let [a, b] = [node.first, node.first + 1].map(|k| (self.entry(&self.tree.nodes[k as usize], end), k));
-            let (near, far) = if b.0 < a.0 { (b, a) } else { (a, b) };
-            self.open.extend([far, near].into_iter().filter_map(|(entry, k)| Some((entry?, k))));
+            self.open_node(link, end);
         }
         None
     }
 
-    /// Where the ray enters a box, if it does so before `end`.
+    /// Puts the children of a node that the ray enters before `end` where they are asked, the nearest first.
     #[inline(always)]
-    fn entry(&self, node: &Node, end: f64) -> Option<f64> {
-        // NaN of 0 · ∞, where a ray runs in a side of the box, fails both comparisons: the box is taken.
-        let (a, b) =
-            ((node.bounds.min - self.origin) * self.inverse, (node.bounds.max - self.origin) * self.inverse);
-        let (near, far) = (a.min(b).max_element().max(self.least), a.max(b).min_element());
-        (!(near > far || near > end)).then_some(near)
+    fn open_node(&mut self, link: u32, end: f64) {
+        let node = &self.tree.nodes[link as usize];
+        let (mut near, mut far) = ([self.least; WIDTH], [f64::INFINITY; WIDTH]);
+        for axis in 0..3 {
+            let (origin, inverse) = (self.origin[axis], self.inverse[axis]);
+            for child in 0..WIDTH {
+                let a = (node.low[axis][child] - origin) * inverse;
+                let b = (node.high[axis][child] - origin) * inverse;
+                let (first, last) = if a < b { (a, b) } else { (b, a) };
+                // NaN is 0 · ∞: a ray that runs in a side of the box is within it there.
+                let is_in_side = a.is_nan() || b.is_nan();
+                near[child] = if first > near[child] && !is_in_side { first } else { near[child] };
+                far[child] = if last < far[child] && !is_in_side { last } else { far[child] };
+            }
+        }
+        let base = self.open.len();
+        for child in 0..node.children as usize {
+            if near[child] > far[child] || near[child] > end {
+                continue;
+            }
+            // At most three come before it: sorted in as it is found.
+            let mut place = self.open.len();
+            self.open.push((near[child], node.links[child]));
+            while place > base && self.open[place - 1].0 < near[child] {
+                self.open.swap(place - 1, place);
+                place -= 1;
+            }
+        }
     }
 }
 
@@ -202,5 +267,16 @@ mod tests {
             assert_eq!(tree.any_meeting(&around, |_| true), boxes.iter().any(meets));
         }
         assert!(!BoxTree::new(&[]).any_meeting(&Aabb::from_points([Point::ZERO]), |_| true));
+    }
+
+    #[test]
+    fn a_ray_in_a_side_of_a_box_is_within_it() {
+        let tree = BoxTree::new(&[Aabb::from_points([Point::ZERO, Point::ONE])]);
+        for side in [0.0, 1.0] {
+            for direction in [Vector::X, -Vector::X] {
+                let ray = Ray::new(Point::new(0.5, side, 0.5) - 2.0 * direction, direction);
+                assert_eq!(tree.walk(&ray).next(f64::INFINITY), Some(0), "{ray:?}");
+            }
+        }
     }
 }
