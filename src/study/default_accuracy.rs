@@ -4,7 +4,7 @@
 //! A pilot traces a few per cent of the run's rays on facets and on the spline ([`super::geometric_error`]) and foretells the
 //! standard errors of the whole run. Facets are taken where their error stays below these on every figure, else finer ones where
 //! they are cheaper than the spline by counted work and pass a pilot of their own, else the spline; hits moved to the spline are a way
-//! between them that is not taken yet ([`TRIES_POLISHED`]).
+//! between them that is not taken yet (`TRIES_POLISHED`).
 //!
 //! Guarantee: the choice follows from model, scene, seed, number of rays and counted work, never from a clock, so that every
 //! machine, number of threads and shard makes the same one, and so does every range of a run that grows.
