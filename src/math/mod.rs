@@ -1,4 +1,4 @@
-//! Points, rays, boxes, frames, intervals and roots: what every other module stands on.
+//! Points, rays, boxes, frames and roots: what every other module stands on.
 //!
 //! Lengths are millimetres, angles radians, all numbers `f64`. The vector types are glam's; the module adds
 //! nothing to them but names that say what a triple means.
@@ -6,7 +6,6 @@
 mod aabb;
 mod box_tree;
 mod frame;
-mod interval;
 mod ray;
 mod roots;
 pub(crate) mod simd;
@@ -15,7 +14,6 @@ pub mod units;
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
 pub use frame::Frame;
-pub use interval::Interval;
 pub use ray::{Departure, Ray, Triangle};
 pub use roots::{quadratic_roots, safe_newton};
 

@@ -211,7 +211,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     ("model", &["part face", "placed", "outline", "bounds", "account", "tight_box", "instancing", "mod"]),
-    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "interval", "roots", "units"]),
+    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "units"]),
     (
         "intersect",
         &[

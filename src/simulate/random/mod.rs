@@ -26,12 +26,8 @@ pub enum Purpose {
     Scatter = 2,
     /// Distance to the next bulk scatter.
     Bulk = 3,
-    /// Wavelength at the source.
-    Wavelength = 4,
     /// Specular or scattered at a surface.
     Lobe = 5,
-    /// Absorbed or kept at low power.
-    Survival = 6,
     /// Scrambles of the Sobol net.
     Scramble = 7,
     /// Direction after bulk scatter.

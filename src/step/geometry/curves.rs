@@ -172,9 +172,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         let ahead = |shape| Ok(DirectedCurve { shape, reversed: false });
         if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
-            let own =
-                e.attributes("SURFACE_CURVE", 1).or_else(|| Some(e.args()).filter(|a| a.id(1).is_some()).and(None));
-            let curve = own.and_then(|a| a.id(0)).or_else(|| e.args().id(1));
+            let own = e.attributes("SURFACE_CURVE", 1).and_then(|a| a.id(0));
+            let curve = own.or_else(|| e.args().id(1));
             let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
             return self.curve(basis.id, depth + 1);
         }
