@@ -3,8 +3,7 @@
 //!
 //! A pilot traces a few per cent of the run's rays on facets and on the spline ([`super::geometric_error`]) and foretells the
 //! standard errors of the whole run. Facets are taken where their error stays below these on every figure, else finer ones where
-//! they are cheaper than the spline by counted work and pass a pilot of their own, else the spline; hits moved to the spline are a way
-//! between them that is not taken yet (`TRIES_POLISHED`).
+//! they are cheaper than the spline by counted work and pass a pilot of their own, else the spline.
 //!
 //! Guarantee: the choice follows from model, scene, seed, number of rays and counted work, never from a clock, so that every
 //! machine, number of threads and shard makes the same one, and so does every range of a run that grows.
@@ -44,20 +43,13 @@ const MARGIN: f64 = 1.5;
 /// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
 /// three scenes of the fixtures, as are the others.
 const FACET_HIT: f64 = 350.0;
-/// The same with the hit moved to the spline: 1.6 to 2.2 times that on facets alone, of which the spline takes 2.6 to 2.8 (the same three
-/// scenes, one thread, AMD EPYC of 2024).
-const POLISHED_HIT: f64 = 630.0;
-/// Whether a run may be given moved hits. Not yet: of 60,000 rays of the demo they lose one that the spline keeps, which no pilot is long
-/// enough to see, and a run that goes on until an error is reached chooses apart from one of as many rays.
-const TRIES_POLISHED: bool = false;
 /// The same on the spline.
 const SPLINE_HIT: f64 = 850.0;
 /// Work of making one facet and sorting it into the octree.
 const FACET: f64 = 15_000.0;
 
-/// Intersector and normals of a run on facets, of one whose facet hits are moved to the spline, and of one on the spline.
+/// Intersector and normals of a run on facets, and of one on the spline.
 const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
-const POLISHED: (&str, NormalMode) = ("octree", NormalMode::Exact);
 const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
 
 /// `octree` or `exact`. An alias, as serde takes a reference in a struct for one into the text that it reads.
@@ -143,15 +135,6 @@ pub struct Undecided<'a> {
     pub tolerance: [f64; 2],
 }
 
-/// A way to trace between facets of the default tolerance and the spline.
-#[derive(Clone, Copy, Debug)]
-enum Way {
-    /// Facets so many times finer.
-    Finer(f64),
-    /// Hits on the facets moved to the spline.
-    Polished,
-}
-
 /// Chooses; with the finer facets, where these are taken.
 pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
     let start = Instant::now();
@@ -190,52 +173,21 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
         let because = "the spline loses more light than facets do".to_owned();
         return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
-    // The cheapest first; each must pass a pilot of its own.
-    for way in undecided.ways_before_spline(&worst, &error) {
-        let tried = undecided.try_way(way, &settings, &spline);
-        let tried_worst = worst_figure(&tried.error, &settings, scale);
-        let seconds = tried.error.seconds[0] * scale + tried.meshed.as_ref().map_or(0.0, |meshed| meshed.seconds);
+    if let Some(factor) = undecided.finer_factor(&worst, &error) {
+        let finer = tolerance.map(|t| t / factor);
+        let meshed = undecided.source.mesh(finer);
+        let error = compare(bound, [&undecided.trace_facets(&meshed.mesh, &settings), &spline]);
+        let finer_worst = worst_figure(&error, &settings, scale);
+        let seconds = error.seconds[0] * scale + meshed.seconds;
         // Between the two that are always there.
-        alternatives.insert(
-            alternatives.len() - 1,
-            alternative(tried.tolerance_mm, way.traced_with(), &tried_worst, seconds),
-        );
-        if tried_worst.ratio <= 1.0 {
-            let because = format!("{} ({})", way.reason(), worst.in_words());
-            let error = Some(tried.error);
-            return (chosen(way.traced_with(), tried.tolerance_mm, because, alternatives, error), tried.meshed);
+        alternatives.insert(1, alternative(finer, ON_FACETS, &finer_worst, seconds));
+        if finer_worst.ratio <= 1.0 {
+            let because = format!("at the default tolerance facets are too coarse ({})", worst.in_words());
+            return (chosen(ON_FACETS, finer, because, alternatives, Some(error)), Some(meshed));
         }
     }
     let because = format!("facets change the answer by more than its statistical error ({})", worst.in_words());
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
-}
-
-impl Way {
-    /// Intersector and normals.
-    fn traced_with(self) -> (&'static str, NormalMode) {
-        match self {
-            Self::Finer(_) => ON_FACETS,
-            Self::Polished => POLISHED,
-        }
-    }
-
-    /// Why it is taken; what facets of the default tolerance get wrong comes after it.
-    fn reason(self) -> &'static str {
-        match self {
-            Self::Finer(_) => "at the default tolerance facets are too coarse",
-            Self::Polished => {
-                "facets change the answer by more than its statistical error until their hits are moved to the spline"
-            }
-        }
-    }
-}
-
-/// What came of the pilot of a [`Way`].
-struct TriedWay {
-    tolerance_mm: [f64; 2],
-    error: GeometricError,
-    /// Facets finer than the default ones.
-    meshed: Option<MeasuredMesh>,
 }
 
 /// What was tried, with the worst that it changes of any figure.
@@ -326,40 +278,14 @@ impl Undecided<'_> {
         trace_replicates(self.bound, &*octree, settings)
     }
 
-    /// The ways that counted work foretells to be cheaper than the spline, the cheapest first.
-    fn ways_before_spline(&self, worst: &Worst, error: &GeometricError) -> Vec<Way> {
+    /// How much finer facets would have to be, where counted work foretells that they are cheaper than the spline.
+    fn finer_factor(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
         let factor = MARGIN * worst.ratio;
         // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
-        let finer =
+        let work =
             factor * self.facets.facets.len() as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
-        let mut ways = Vec::new();
-        if TRIES_POLISHED {
-            ways.push((Way::Polished, hits * POLISHED_HIT));
-        }
-        if factor <= MOST_FINER {
-            ways.push((Way::Finer(factor), finer));
-        }
-        ways.retain(|(_, work)| *work < hits * SPLINE_HIT);
-        ways.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-        ways.into_iter().map(|(way, _)| way).collect()
-    }
-
-    /// Traces the pilot so.
-    fn try_way(&self, way: Way, settings: &RunSettings, spline: &ReplicatedRun) -> TriedWay {
-        let (tolerance_mm, run, meshed) = match way {
-            Way::Finer(factor) => {
-                let finer = self.tolerance.map(|t| t / factor);
-                let meshed = self.source.mesh(finer);
-                (finer, self.trace_facets(&meshed.mesh, settings), Some(meshed))
-            }
-            Way::Polished => {
-                let octree = self.source.build(self.facets, FacetTree::Octree, NormalMode::Exact.on_facets());
-                let polished = self.source.polish(&*octree, self.facets);
-                (self.tolerance, trace_replicates(self.bound, &*polished, settings), None)
-            }
-        };
-        TriedWay { tolerance_mm, error: compare(self.bound, [&run, spline]), meshed }
+        (factor <= MOST_FINER && work < hits * SPLINE_HIT).then_some(factor)
     }
 }
 
