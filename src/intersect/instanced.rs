@@ -123,10 +123,7 @@ impl<'a> Instanced<'a> {
     /// A ray in the coordinates of where it is asked next.
     fn moved(&self, walk: &Walk) -> Ray {
         let Some(next) = walk.next else { return walk.ray };
-        let frame = &self.placement(next).frame;
-        let ray = self.left_by(&walk.ray, Some(next as usize));
-        // Not normalised anew: a point at t is the same point then.
-        Ray { origin: frame.local_point(ray.origin), direction: frame.local_direction(ray.direction), ..ray }
+        self.placement(next).local_ray(&self.left_by(&walk.ray, Some(next as usize)))
     }
 
     /// The ray as it leaves what stands once or one placement: where its face is of another, it leaves none.

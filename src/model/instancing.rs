@@ -5,7 +5,7 @@
 //! the same facets.
 
 use super::{Instance, Model, Part, PartId};
-use crate::math::{Aabb, BoxTree, FaceId, Frame};
+use crate::math::{Aabb, BoxTree, FaceId, Frame, Ray};
 use rustc_hash::FxHashMap;
 
 /// A part that is placed so often is traced in its own coordinates. Of fewer, one structure over all of them answers up to twice as
@@ -36,6 +36,19 @@ pub struct Placement {
     pub bounds: Aabb,
     /// Its first face in the model; the group's others follow.
     pub first_face: FaceId,
+}
+
+impl Placement {
+    /// A ray of the scene in the group's coordinates. It is not normalised anew, so that a point at t is the same point; what it leaves
+    /// stays as it is.
+    #[inline]
+    pub fn local_ray(&self, ray: &Ray) -> Ray {
+        Ray {
+            origin: self.frame.local_point(ray.origin),
+            direction: self.frame.local_direction(ray.direction),
+            ..*ray
+        }
+    }
 }
 
 /// Faces of the model that follow each other in a group too.

@@ -68,6 +68,13 @@ impl Kernel for Settling<'_> {
     }
 }
 
+/// The largest coordinate of a direction, and the two others.
+#[inline(always)]
+fn main_axis(direction: Vector) -> (usize, [usize; 2]) {
+    let main = direction.abs().max_position();
+    (main, [(main + 1) % 3, (main + 2) % 3])
+}
+
 /// A net to be seen along a ray, for [`simd::dispatch`].
 struct NetAlong<'a> {
     patch: ReferencePatch<'a>,
@@ -83,8 +90,7 @@ impl Kernel for NetAlong<'_> {
     fn run<I: Instructions>(self) -> Net {
         let Self { patch, ray: [o, d], frame, rect } = self;
         let ends = [0, 1].map(|k: usize| rect[k].map(|x| patch.width(k) * x.into() + patch.domain[k][0].into()));
-        let main = d.abs().max_position();
-        let axes = [(main + 1) % 3, (main + 2) % 3];
+        let (main, axes) = main_axis(d);
         let origin: Point3 = patch.placement.origin.to_array().map(Number::from);
         let seen = |point: Point4| -> V4 {
             let placed = patch.place(&[point[0], point[1], point[2]]);
@@ -131,8 +137,7 @@ impl ReferencePatch<'_> {
     /// For a direction n across the ray, `n·(S − o)` is the sum of n's components at the axes times these.
     #[inline(always)]
     pub(super) fn seen_along(&self, [o, d]: [Vector; 2], local: [DoubleDouble; 2]) -> SeenAlong {
-        let main = d.abs().max_position();
-        let axes = [(main + 1) % 3, (main + 2) % 3];
+        let (main, axes) = main_axis(d);
         let widths = [0, 1].map(|k| self.width(k));
         let (p, du, dv) = self.derivatives([0, 1].map(|k| widths[k] * local[k] + self.domain[k][0].into()));
         let r: Point3 = std::array::from_fn(|k| p[k] - o[k].into());
@@ -157,8 +162,7 @@ impl ReferencePatch<'_> {
     fn newton(&self, [o, d]: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
         // Two planes that hold the ray, each from the largest component of the direction and one of the others: with a small
         // one in its place their normals would be nearly parallel.
-        let main = d.abs().max_position();
-        let others = [(main + 1) % 3, (main + 2) % 3];
+        let (main, others) = main_axis(d);
         let widths = [0, 1].map(|k| self.width(k));
         let mut uv = [0, 1].map(|k| widths[k] * start[k].into() + self.domain[k][0].into());
         for _ in 0..STEPS {

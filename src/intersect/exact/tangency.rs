@@ -134,20 +134,10 @@ impl Bend {
         let slope = ends.as_flattened().iter().fold([f64::INFINITY, f64::NEG_INFINITY], |a, &x| grown(a, x));
         let lambda = (spread(across, radii[q]) + first_noise * noise_across) / h_q;
 
-        let g2 = second_derivatives(
-            net,
-            degree,
-            [p, q],
-            |x| across[0] * x[0] + across[1] * x[1],
-            second_noise * noise_across,
-        );
-        let h2 = second_derivatives(
-            net,
-            degree,
-            [p, q],
-            |x| along[0] * x[0] + along[1] * x[1],
-            second_noise * noise_along,
-        );
+        let second = |e: [f64; 2], noise: f64| {
+            second_derivatives(net, degree, [p, q], |x| e[0] * x[0] + e[1] * x[1], second_noise * noise)
+        };
+        let (g2, h2) = (second(across, noise_across), second(along, noise_along));
         let steepest = slope[0].abs().max(slope[1].abs());
         let size = |x: Range| x[0].abs().max(x[1].abs());
         let h_bend = size(h2[0]) + 2.0 * size(h2[1]) * steepest + size(h2[2]) * steepest * steepest;

@@ -77,11 +77,7 @@ impl<'a> Classifiers<'a> {
         };
         Local {
             classifier: &self.groups[place.group as usize],
-            ray: Ray {
-                origin: frame.local_point(ray.origin),
-                direction: frame.local_direction(ray.direction),
-                ..*ray
-            },
+            ray: place.local_ray(ray),
             hits: hits.map(|hit| hit.map(turned)),
         }
     }
