@@ -3,6 +3,8 @@
 //! A ray is moved into the coordinates of every part whose box it crosses, and the hit back. Frames turn and shift, so that a distance
 //! along the ray is the same in all of them. Rays of a batch that come to places of one part are asked there together, wherever these are.
 //!
+//! A ray that leaves a placement is asked there first: where that one's box meets no other's, a hit in it is the nearest.
+//!
 //! Guarantee: the nearest hit of all groups, of equal ones that of the first group, then of the first placement; the same bits for a
 //! single ray and a batch. A hit depends on ray, part and place alone, not on what else the scene holds. Inside a part nothing changes:
 //! a ray is moved once, so that facets which meet there meet here, and what it leaves is known by part and place.
@@ -12,6 +14,7 @@
 use super::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Aabb, BoxTree, BoxWalk, Departure, FaceId, Ray};
 use crate::model::{Instancing, Placement};
+use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::time::Instant;
 
@@ -45,6 +48,8 @@ pub struct Instanced<'a> {
     instancing: &'a Instancing,
     groups: Vec<Box<dyn Intersector + 'a>>,
     tree: BoxTree,
+    /// Of each placement, whether its box meets no other's.
+    stands_alone: Vec<bool>,
     /// Whether the first group holds anything.
     has_single: bool,
     build_seconds: f64,
@@ -54,11 +59,31 @@ pub struct Instanced<'a> {
 struct Walk<'t> {
     /// The ray, up to the nearest hit so far.
     ray: Ray,
-    boxes: BoxWalk<'t>,
+    /// What the ray leaves, as its owner knows it.
+    departure: Option<OwnDeparture>,
+    /// The boxes still to be entered; none where the hit so far is known to be the nearest.
+    boxes: Option<BoxWalk<'t>>,
     /// Of the first group, or of a placement.
     best: Option<(Option<u32>, Hit)>,
     /// Where the ray is asked next.
     next: Option<u32>,
+}
+
+/// A point that a ray leaves, in its group.
+#[derive(Clone, Copy)]
+struct OwnDeparture {
+    /// `None` for the first group.
+    place: Option<u32>,
+    /// With the face's number in the group.
+    departure: Departure,
+}
+
+/// A ray that is asked of a placement.
+struct Question {
+    group: usize,
+    place: u32,
+    /// Index of the ray's walk.
+    walk: usize,
 }
 
 impl<'a> Instanced<'a> {
@@ -67,72 +92,99 @@ impl<'a> Instanced<'a> {
         let started = Instant::now();
         let boxes: Vec<Aabb> = instancing.placements.iter().map(|p| p.bounds).collect();
         let tree = BoxTree::new(&boxes);
+        let is_alone = |(k, bounds): (usize, &Aabb)| !tree.any_meeting(bounds, |other| other as usize != k);
+        let stands_alone = boxes.par_iter().enumerate().map(is_alone).collect();
         let has_single = instancing.groups.first().is_some_and(|group| !group.instances.is_empty());
-        Self { instancing, groups, tree, has_single, build_seconds: started.elapsed().as_secs_f64() }
+        let build_seconds = started.elapsed().as_secs_f64();
+        Self { instancing, groups, tree, stands_alone, has_single, build_seconds }
     }
 
     /// At most [`BATCH`] rays.
     fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let rays_before = cost.rays;
+        let mut walks: SmallVec<[Walk; BATCH]> = rays.iter().map(|ray| self.departing(ray)).collect();
         if self.has_single {
-            let single: SmallVec<[Ray; BATCH]> = rays.iter().map(|ray| self.left_by(ray, None)).collect();
+            let single: SmallVec<[Ray; BATCH]> = walks.iter().map(|walk| walk.local_ray(None)).collect();
             self.groups[0].intersect_batch(&single, hits, cost);
-        } else {
-            hits.fill(None);
+            walks.iter_mut().zip(hits.iter()).for_each(|(walk, hit)| walk.take(None, *hit));
         }
-        let mut walks: SmallVec<[Walk; BATCH]> = (rays.iter().zip(hits.iter_mut()))
-            .map(|(ray, hit)| {
-                let ray = Ray { t_max: hit.map_or(ray.t_max, |h| h.t), ..*ray };
-                Walk { ray, boxes: self.tree.walk(&ray), best: hit.take().map(|h| (None, h)), next: None }
-            })
-            .collect();
-        let mut asked: SmallVec<[usize; BATCH]> = SmallVec::new();
-        let mut local: SmallVec<[Ray; BATCH]> = SmallVec::new();
-        let mut found: SmallVec<[Option<Hit>; BATCH]> = SmallVec::new();
+        // Light that leaves a surface mostly meets its own part next, and where no other stands in that one's box nothing can be nearer.
+        let mut open: SmallVec<[usize; BATCH]> = (0..walks.len()).collect();
+        self.ask(&open, &mut walks, cost);
+        walks.iter_mut().for_each(|walk| walk.boxes = self.boxes_ahead(walk));
         loop {
-            for walk in &mut walks {
-                walk.next = walk.boxes.next(walk.ray.t_max);
-            }
-            if walks.iter().all(|w| w.next.is_none()) {
+            open.retain(|i| walks[*i].advance());
+            if open.is_empty() {
                 break;
             }
-            for group in 1..self.groups.len() {
-                let is_here = |w: &Walk| w.next.is_some_and(|k| self.placement(k).group as usize == group);
-                asked.clear();
-                asked.extend((0..walks.len()).filter(|&i| is_here(&walks[i])));
-                local.clear();
-                local.extend(asked.iter().map(|&i| self.moved(&walks[i])));
-                found.clear();
-                found.resize(local.len(), None);
-                self.groups[group].intersect_batch(&local, &mut found, cost);
-                for (&i, hit) in asked.iter().zip(&found) {
-                    walks[i].take(*hit);
-                }
-            }
+            self.ask(&open, &mut walks, cost);
         }
         cost.rays = rays_before + rays.len() as u64;
-        for (walk, hit) in walks.into_iter().zip(hits) {
+        for (walk, hit) in walks.iter().zip(hits) {
             *hit = walk.best.map(|(place, found)| self.in_scene(place, found));
         }
     }
 
+    /// A ray before it is asked anywhere, with the placement that it leaves as the first to ask, unless it is known to be free of it.
+    fn departing(&self, ray: &Ray) -> Walk<'_> {
+        let departure = ray.departure.map(|from| {
+            let (place, face) = self.instancing.locate(from.face);
+            OwnDeparture { place: place.map(|k| k as u32), departure: Departure { face, ..from } }
+        });
+        let mut walk = Walk { ray: *ray, departure, boxes: None, best: None, next: None };
+        walk.next = departure.and_then(|from| from.place).filter(|&k| !self.is_free_of(&walk, k));
+        walk
+    }
+
+    /// Whether a ray is known to meet nothing of the placement that it leaves.
+    fn is_free_of(&self, walk: &Walk, place: u32) -> bool {
+        self.groups[self.placement(place).group as usize].escapes(&self.moved(walk, place))
+    }
+
+    /// Asks rays where they are next, those of one group together.
+    fn ask(&self, open: &[usize], walks: &mut [Walk], cost: &mut Cost) {
+        let question = |&walk: &usize| {
+            let place = walks[walk].next?;
+            Some(Question { group: self.placement(place).group as usize, place, walk })
+        };
+        let mut asked: SmallVec<[Question; BATCH]> = open.iter().filter_map(question).collect();
+        asked.sort_by_key(|question| question.group);
+        let mut local: SmallVec<[Ray; BATCH]> = SmallVec::new();
+        let mut found: SmallVec<[Option<Hit>; BATCH]> = SmallVec::new();
+        for together in asked.chunk_by(|a, b| a.group == b.group) {
+            local.clear();
+            local.extend(together.iter().map(|q| self.moved(&walks[q.walk], q.place)));
+            found.clear();
+            found.resize(local.len(), None);
+            self.groups[together[0].group].intersect_batch(&local, &mut found, cost);
+            for (question, hit) in together.iter().zip(&found) {
+                walks[question.walk].take(Some(question.place), *hit);
+            }
+        }
+    }
+
+    /// The ray of a walk in the coordinates of a placement.
+    fn moved(&self, walk: &Walk, place: u32) -> Ray {
+        self.placement(place).local_ray(&walk.local_ray(Some(place)))
+    }
+
+    /// The boxes that a ray may enter once it has been asked what it leaves; `None` where nothing in them can be nearer than its hit.
+    fn boxes_ahead(&self, walk: &Walk) -> Option<BoxWalk<'_>> {
+        let own = walk.departure.and_then(|from| from.place).filter(|&k| self.is_alone(k, &walk.ray));
+        let Some(own) = own else { return Some(self.tree.walk(&walk.ray)) };
+        // Boxes have room: nothing of others is found before the ray is out of a box that meets none of theirs, nor at its very end.
+        let end = self.placement(own).bounds.exit(&walk.ray);
+        (walk.ray.t_max > end)
+            .then(|| self.tree.walk(&Ray { t_min: walk.ray.t_min.max(end.next_up()), ..walk.ray }))
+    }
+
+    /// Whether a ray starts in the box of a placement that meets no other's.
+    fn is_alone(&self, place: u32, ray: &Ray) -> bool {
+        self.stands_alone[place as usize] && self.placement(place).bounds.contains(ray.origin)
+    }
+
     fn placement(&self, index: u32) -> &Placement {
         &self.instancing.placements[index as usize]
-    }
-
-    /// A ray in the coordinates of where it is asked next.
-    fn moved(&self, walk: &Walk) -> Ray {
-        let Some(next) = walk.next else { return walk.ray };
-        self.placement(next).local_ray(&self.left_by(&walk.ray, Some(next as usize)))
-    }
-
-    /// The ray as it leaves what stands once or one placement: where its face is of another, it leaves none.
-    fn left_by(&self, ray: &Ray, place: Option<usize>) -> Ray {
-        let departure = ray.departure.and_then(|from| {
-            let (owner, face) = self.instancing.locate(from.face);
-            (owner == place).then_some(Departure { face, ..from })
-        });
-        Ray { departure, ..*ray }
     }
 
     /// A hit in its group's coordinates as one in the scene's.
@@ -149,14 +201,30 @@ impl<'a> Instanced<'a> {
 }
 
 impl Walk<'_> {
+    /// Goes on to the next box that the ray enters before its hit; false where there is none. What the ray leaves has been asked.
+    fn advance(&mut self) -> bool {
+        let own = self.departure.and_then(|from| from.place);
+        let Some(boxes) = &mut self.boxes else { return false };
+        self.next = boxes.next(self.ray.t_max);
+        if own.is_some() && self.next == own {
+            self.next = boxes.next(self.ray.t_max);
+        }
+        self.next.is_some()
+    }
+
+    /// The ray as it leaves the first group or one placement: where its face is of another, it leaves none.
+    fn local_ray(&self, place: Option<u32>) -> Ray {
+        let own = self.departure.filter(|from| from.place == place);
+        Ray { departure: own.map(|from| from.departure), ..self.ray }
+    }
+
     /// Keeps the nearer hit, of equal ones that of the first group or placement.
-    fn take(&mut self, hit: Option<Hit>) {
+    fn take(&mut self, place: Option<u32>, hit: Option<Hit>) {
         let Some(hit) = hit else { return };
-        let is_nearer =
-            self.best.is_none_or(|(place, best)| hit.t < best.t || (hit.t == best.t && self.next < place));
+        let is_nearer = self.best.is_none_or(|(other, best)| hit.t < best.t || (hit.t == best.t && place < other));
         if is_nearer {
             self.ray.t_max = hit.t;
-            self.best = Some((self.next, hit));
+            self.best = Some((place, hit));
         }
     }
 }
@@ -175,13 +243,26 @@ impl Intersector for Instanced<'_> {
     }
 
     fn prepare_for(&self, expected: &ExpectedRays<'_>) {
-        // What is placed is not seen from the source as its part would be.
         self.groups[0].prepare_for(expected);
+        // What is placed is not seen from the source as its part would be, but what leaves its facets is free of it in every place.
+        self.groups[1..].iter().for_each(|group| group.prepare_for(&ExpectedRays { beams: &[], ..*expected }));
+    }
+
+    /// Of rays that leave the box of their placement where they leave the box around all.
+    fn escapes(&self, ray: &Ray) -> bool {
+        if self.has_single {
+            return false;
+        }
+        let walk = self.departing(ray);
+        let own = walk.departure.and_then(|from| from.place).filter(|_| walk.next.is_none());
+        own.is_some_and(|k| {
+            self.is_alone(k, ray) && self.placement(k).bounds.exit(ray) >= self.tree.bounds().exit(ray)
+        })
     }
 
     fn footprint(&self) -> Footprint {
         let own = Footprint {
-            bytes: self.tree.bytes() + size_of_val(&*self.instancing.placements),
+            bytes: self.tree.bytes() + size_of_val(&*self.instancing.placements) + self.stands_alone.len(),
             primitives: 0,
             build_seconds: self.build_seconds,
         };

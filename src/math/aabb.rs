@@ -98,6 +98,15 @@ impl Aabb {
         })
     }
 
+    /// Where a ray that starts inside comes out, rounded by some 1e-16 of the box's coordinates. A side that it runs in is none.
+    #[inline]
+    pub fn exit(&self, ray: &Ray) -> f64 {
+        let inverse = ray.direction.recip();
+        let (low, high) = ((self.min - ray.origin) * inverse, (self.max - ray.origin) * inverse);
+        // `f64::max` and `min` leave out the NaN of 0 · ∞.
+        (0..3).map(|axis| low[axis].max(high[axis])).fold(f64::INFINITY, f64::min)
+    }
+
     /// The range of `t` in which the ray is inside, cut to the ray's own range; `None` for a miss.
     ///
     /// Conservative: the range is widened by a few ulp so that rounding never loses a box that is touched.

@@ -132,12 +132,27 @@ impl Instancing {
     /// Index into the placements, where the face is of one, and the face in its group.
     #[inline]
     pub fn locate(&self, face: FaceId) -> (Option<usize>, FaceId) {
-        let Some(run) = self.runs.partition_point(|r| r.first <= face.0).checked_sub(1).map(|k| self.runs[k])
-        else {
-            return (None, face);
-        };
+        let Some(&run) = self.run(face) else { return (None, face) };
         let placement = (run.placement != SINGLE).then_some(run.placement as usize);
         (placement, FaceId(face.0 - run.first + run.local))
+    }
+
+    #[inline]
+    fn run(&self, face: FaceId) -> Option<&FaceRun> {
+        // Where most of a model is one part, its runs are as long as each other and this is the one: searching among a hundred thousand
+        // took as long as a part's octree.
+        let last = self.runs.last()?;
+        let guess = u64::from(face.0) * (self.runs.len() as u64 - 1) / u64::from(last.first.max(1));
+        let is_run = |k: usize| {
+            self.runs.get(k).is_some_and(|r| r.first <= face.0)
+                && self.runs.get(k + 1).is_none_or(|r| r.first > face.0)
+        };
+        let index = if is_run(guess as usize) {
+            guess as usize
+        } else {
+            self.runs.partition_point(|r| r.first <= face.0).checked_sub(1)?
+        };
+        self.runs.get(index)
     }
 
     /// The face of the model that a face of the first group is.

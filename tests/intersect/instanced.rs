@@ -5,7 +5,7 @@ use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::instanced::Instanced;
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
-use lampyris::intersect::{Cost, Hit, Intersector};
+use lampyris::intersect::{Cost, ExpectedRays, Hit, Intersector};
 use lampyris::math::{Frame, Point, Ray, Vector};
 use lampyris::model::{Face, Instance, Instancing, Model, Part, PartId, Shell};
 use lampyris::nurbs::sweep;
@@ -27,12 +27,17 @@ fn parts() -> Vec<Part> {
     ]
 }
 
+/// Where parts stand so close that their boxes meet, some in each other.
+const CLOSE: f64 = 5.0;
+/// Where no box meets another.
+const APART: f64 = 25.0;
+
 /// Parts on a grid, turned anyhow, some mirrored, some of double size, and a few that stand once.
-fn array(middle: Point, count: usize) -> Model {
+fn array(middle: Point, pitch: f64, count: usize) -> Model {
     let mut r = Random(5);
     let mut model = Model { parts: parts(), ..Model::default() };
     for k in 0..count {
-        let at = middle + 25.0 * Vector::new((k % 6) as f64, (k / 6 % 6) as f64, (k / 36) as f64);
+        let at = middle + pitch * Vector::new((k % 6) as f64, (k / 6 % 6) as f64, (k / 36) as f64);
         let (axis, hint) = (r.direction(), r.direction());
         let mut placement = Frame::from_axis(at, axis, Some(hint));
         if k % 5 == 0 {
@@ -54,9 +59,13 @@ struct Scene {
 
 impl Scene {
     fn new(middle: Point) -> Self {
-        let model = array(middle, 400);
-        let instancing = Arc::new(Instancing::new(&model, 1e-3).unwrap());
-        assert_eq!((instancing.groups.len(), instancing.groups[0].instances.len()), (5, 8));
+        let scene = Self::of_model(array(middle, APART, 400), 1e-3);
+        assert_eq!((scene.instancing.groups.len(), scene.instancing.groups[0].instances.len()), (5, 8));
+        scene
+    }
+
+    fn of_model(model: Model, glue_mm: f64) -> Self {
+        let instancing = Arc::new(Instancing::new(&model, glue_mm).unwrap());
         Self { model, instancing, settings: Settings::uniform(0.05) }
     }
 
@@ -145,6 +154,44 @@ fn instances_answer_as_one_mesh() {
         let [from_ours, from_one] = [0, 1].map(|k| on.iter().map(|rays| rays[k]).collect::<Vec<_>>());
         let [ours, one] = [ask(&instanced, &from_ours), ask(&Octree::build(&flat, &Default::default()), &from_one)];
         assert_eq!(differences(&from_ours, &ours, &one, 10.0 * size), 0);
+    }
+}
+
+/// Rays that leave parts among others, and which of them a structure knows to be free once it expects rays.
+#[test]
+fn what_leaves_a_part_meets_what_it_meets_in_one_mesh() {
+    for (pitch, every_size_is_frequent) in [(CLOSE, false), (CLOSE, true), (APART, true)] {
+        let mut model = array(Point::new(20.0, -7.0, 3.0), pitch, 400);
+        if every_size_is_frequent {
+            model.instances.iter_mut().for_each(|i| i.placement.scale = 1.0);
+        }
+        let scene = Scene::of_model(model, 0.0);
+        let (facets, size) = (scene.facets(), 300.0);
+        let whole = facets.whole();
+        let flat = Octree::build(&whole, &Default::default());
+        let [instanced, expecting] = [0, 1].map(|_| scene.instanced(scene.octrees(&facets)));
+        expecting.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 1, beams: &[] });
+        let mut rays = scene.rays(2000);
+        // A ray leaves a facet, which has another number in one mesh.
+        let mut in_one_mesh = rays.clone();
+        let mut escaped = 0;
+        for bounce in 0..5 {
+            let [ours, one] = [ask(&instanced, &rays), ask(&flat, &in_one_mesh)];
+            assert_eq!(differences(&rays, &ours, &one, 10.0 * size), 0, "bounce {bounce} at {pitch} mm");
+            // Often enough that free cones are laid.
+            for _ in 0..10 {
+                for (ray, hit) in rays.iter().zip(&ours).filter(|(ray, _)| expecting.escapes(ray)) {
+                    assert!(hit.is_none(), "{ray:?} meets {hit:?}");
+                    escaped += 1;
+                }
+            }
+            assert_eq!(ours, ask(&expecting, &rays), "what is known beforehand changes no answer");
+            let on = rays.iter().zip(&in_one_mesh).zip(ours.iter().zip(&one));
+            let on = on.filter_map(|((a, b), (x, y))| Some((reflected(a, &(*x)?), reflected(b, &(*y)?))));
+            (rays, in_one_mesh) = on.unzip();
+        }
+        // Whatever leaves may meet what stands once.
+        assert_eq!(escaped > 0, every_size_is_frequent && pitch == APART, "{escaped} at {pitch} mm");
     }
 }
 
