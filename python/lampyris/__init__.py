@@ -19,7 +19,7 @@ from .materials import Material, Selector, coating, diffuse, glass, absorber, in
 from .mesh import Mesh
 from .model import Account, Model, read_step
 from .receivers import Receiver as ReceiverTable
-from .receivers import absorbed, far_field, plane, sphere
+from .receivers import absorbed, disc, far_field, plane, sphere
 from .results import Figure, Receiver, Run
 from .scene import Interrupted, Part, Scene, media, scene_schema
 from .sources import Source, collimated, cone, cosine, eulumdat, ies, lambertian, led, point, ray_file, rays
@@ -30,7 +30,7 @@ __all__ = [
     "Account", "Assessment", "Bvh", "Defect", "Exact", "Figure", "Hits", "InputError", "Interrupted", "Material",
     "Mesh", "Model", "Octree", "Part", "Receiver", "ReceiverTable", "Run", "Scene", "SceneError", "Selector",
     "Source", "__version__", "absorbed", "absorber", "coating", "collimated", "cone", "cosine", "diffuse",
-    "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media", "metal", "mirror", "plane",
+    "disc", "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media", "metal", "mirror", "plane",
     "point", "ray_file", "rays", "read_step", "regulations", "scene_schema", "select", "sphere", "study",
     "write_demo",
 ]

@@ -48,6 +48,18 @@ def far_field(
     return _receiver("far_field", name, keys, h_deg=h_deg, v_deg=v_deg, cells=cells)
 
 
+def disc(
+    name: str,
+    at: Vector,
+    radius: float,
+    normal: Vector = (0.0, 0.0, 1.0),
+    cells: Sequence[int] = (100, 100),
+    **keys: Any,
+) -> Receiver:
+    """A round detector in space, power per area; ``cells`` are those of the square around it."""
+    return _receiver("disc", name, keys, at=at, normal=normal, radius=radius, cells=cells)
+
+
 def sphere(name: str, at: Vector, radius: float, cells: Sequence[int] = (180, 90), **keys: Any) -> Receiver:
     """A sphere in space by direction from its centre, power per area."""
     return _receiver("sphere", name, keys, at=at, radius=radius, cells=cells)

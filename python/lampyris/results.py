@@ -80,7 +80,7 @@ class Receiver:
 
     @cached_property
     def edges(self) -> tuple[FloatArray, FloatArray]:
-        """Edges of the cells along both axes: mm of planes, degrees of angles."""
+        """Edges of the cells along both axes: mm of planes and discs, degrees of angles."""
         return self._results.edges(self._index)
 
     @property
@@ -92,7 +92,7 @@ class Receiver:
     @property
     def axis_names(self) -> tuple[str, str]:
         """What runs along the axes, as dimensions of ``to_xarray``."""
-        if self.kind == "plane":
+        if self.kind in ("plane", "disc"):
             return "x", "y"
         return ("C", "gamma") if self.document.get("angles") == "C" else ("H", "V")
 
@@ -108,7 +108,7 @@ class Receiver:
 
     @property
     def lux(self) -> FloatArray:
-        """Illuminance, of a plane or sphere in a run that counts lm."""
+        """Illuminance, of a plane, disc or sphere in a run that counts lm."""
         return self._in("lx")
 
     @property
@@ -131,7 +131,7 @@ class Receiver:
         layers = {"value": self.values, "statistical": self.statistical}
         if self.geometric is not None:
             layers["geometric"] = self.geometric
-        unit = "mm" if self.kind == "plane" else "deg"
+        unit = "mm" if self.kind in ("plane", "disc") else "deg"
         data = {name: ((second, first), layer, {"units": self.unit}) for name, layer in layers.items()}
         coordinates = {first: (first, along, {"units": unit}), second: (second, across, {"units": unit})}
         return xarray.Dataset(data, coordinates, {"receiver": self.name, "kind": self.kind})

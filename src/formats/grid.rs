@@ -32,7 +32,7 @@ pub struct Grid {
     pub unit: String,
     /// The two axes; the first runs fastest in `values`.
     pub axes: [Axis; 2],
-    /// `values[j * axes[0].cells + i]`.
+    /// `values[j * axes[0].cells + i]`; NaN where there is no cell, as beyond the rim of a disc.
     pub values: Vec<f64>,
     /// Standard error of each value, where it was estimated.
     pub error: Option<Vec<f64>>,
@@ -122,13 +122,19 @@ impl Grid {
         finite.fold(None, |e, v| Some(e.map_or([v, v], |[lo, hi]: [f64; 2]| [lo.min(v), hi.max(v)])))
     }
 
-    /// Index, position and value of the largest finite value.
-    pub fn peak(&self) -> Option<([f64; 2], f64)> {
+    /// Column and row of the largest finite value; `None` without any.
+    pub fn peak_cell(&self) -> Option<(usize, usize)> {
         let nx = self.axes[0].cells.max(1);
         let best = (0..self.values.len())
             .filter(|&k| self.values[k].is_finite())
             .max_by(|&a, &b| self.values[a].total_cmp(&self.values[b]))?;
-        Some(([self.axes[0].center(best % nx), self.axes[1].center(best / nx)], self.values[best]))
+        Some((best % nx, best / nx))
+    }
+
+    /// Position and value of the largest finite value.
+    pub fn peak(&self) -> Option<([f64; 2], f64)> {
+        let (i, j) = self.peak_cell()?;
+        Some(([self.axes[0].center(i), self.axes[1].center(j)], self.values[j * self.axes[0].cells.max(1) + i]))
     }
 }
 

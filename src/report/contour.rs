@@ -89,6 +89,10 @@ fn crossings(values: &[f64], [columns, rows]: [usize; 2], level: f64) -> FxHashM
         for i in 0..columns - 1 {
             let corner = |di: usize, dj: usize| values[(j + dj) * columns + i + di];
             let corners = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            // No line runs where there is no cell, as beyond the rim of a disc.
+            if corners.iter().any(|v| v.is_nan()) {
+                continue;
+            }
             let above = corners.map(|v| v >= level);
             // Bottom, right, top, left: the edge behind each corner, going round.
             let edges: [Edge; 4] = [(i, j, false), (i + 1, j, true), (i, j + 1, false), (i, j, true)];

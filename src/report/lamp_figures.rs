@@ -88,11 +88,11 @@ fn value_ahead(grid: &Grid) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The share of a plane's power within a radius around the mean position of its light.
+/// The share of the power of a plane or disc within a radius around the mean position of its light.
 pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
-    let total: f64 = grid.values.iter().sum();
-    if receiver.kind != "plane" || total <= 0.0 {
+    let total: f64 = grid.values.iter().filter(|v| v.is_finite()).sum();
+    if !matches!(receiver.kind, "plane" | "disc") || total <= 0.0 {
         return None;
     }
     // The mean position of the light, not the place of the plane's middle.

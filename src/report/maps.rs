@@ -13,7 +13,7 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         return None;
     }
     let (labels, unit) = match r.kind {
-        "plane" => (["x", "y"], "mm"),
+        "plane" | "disc" => (["x", "y"], "mm"),
         _ if r.angles == Some(FarFieldType::C) => (["C", "gamma"], "deg"),
         _ => (["H", "V"], "deg"),
     };
@@ -34,16 +34,23 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         quantity: quantity.into(),
         unit: r.unit.into(),
         axes: [axis(0), axis(1)],
-        values: r.cells.clone(),
+        values: on_receiver(r, &r.cells),
         // Where errors were not kept for cells there are none.
         error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
         geometric: None,
-        layers: r.channels.iter().map(layer).collect(),
+        layers: r.channels.iter().map(|channel| layer(r, channel)).collect(),
     })
 }
 
+/// Values of cells, with none off a disc.
+fn on_receiver(r: &ReceiverResult, cells: &[f64]) -> Vec<f64> {
+    let mut values = cells.to_vec();
+    r.off.iter().for_each(|&k| values[k] = f64::NAN);
+    values
+}
+
 /// A channel over the cells of its receiver.
-fn layer(channel: &ChannelResult) -> Layer {
+fn layer(r: &ReceiverResult, channel: &ChannelResult) -> Layer {
     Layer {
         quantity: match (channel.name.as_str(), channel.unit) {
             ("lm", "lx") => "illuminance".into(),
@@ -51,7 +58,7 @@ fn layer(channel: &ChannelResult) -> Layer {
             (name, _) => name.into(),
         },
         unit: channel.unit.into(),
-        values: channel.cells.clone(),
+        values: on_receiver(r, &channel.cells),
         error: channel.errors.clone(),
         geometric: None,
     }
@@ -59,7 +66,7 @@ fn layer(channel: &ChannelResult) -> Layer {
 
 /// What the eye sees of a receiver in watts that counts lumens or CIE values too: the grid of its candela or lux.
 pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
-    let (grid, Layer { unit, values, error, .. }) = (receiver_grid(r)?, layer(r.photometric()?));
+    let (grid, Layer { unit, values, error, .. }) = (receiver_grid(r)?, layer(r, r.photometric()?));
     let quantity = if unit == "lx" { "illuminance" } else { "luminous intensity" };
     Some(Grid {
         quantity: quantity.into(),
@@ -75,8 +82,7 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
 /// The values along both axes through the peak, with their errors; `None` for a grid without cells.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
-    let peak = (0..grid.values.len()).max_by(|&x, &y| grid.values[x].total_cmp(&grid.values[y]))?;
-    let (column, row) = (peak % a.cells, peak / a.cells);
+    let (column, row) = grid.peak_cell()?;
     let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
         name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
         points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
@@ -118,7 +124,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     });
     // The relative error where the light is: weighted by the light itself.
     let error = grid.error.as_ref().map(|e| {
-        let sum: f64 = grid.values.iter().sum();
+        let sum: f64 = grid.values.iter().filter(|v| v.is_finite()).sum();
         format!(
             "Statistical error of a cell, weighted by its light: {} %. ",
             figures(100.0 * e.iter().sum::<f64>() / sum.max(f64::MIN_POSITIVE), 2)

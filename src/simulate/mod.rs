@@ -11,16 +11,19 @@
 //! is moved by the glue distance only where two faces are one; every ray that is lost is kept with its cause.
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `receiver`, `seconds`,
-//! `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `sequence`, `tallies`,
-//! `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`, `sequence_results`, `results`,
+//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `channels`, `disc_cells`, `receiver`,
+//! `seconds`, `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `sequence`, `tallies`,
+//! `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`, `sequence_results`,
+//! `receiver_results`, `results`,
 //! `arrivals`, `run`, `verify`.
 
 mod arrivals;
 mod assemble;
 mod bind;
 mod body;
+mod channels;
 mod digest;
+mod disc_cells;
 mod dispatch;
 mod effects;
 mod emitter;
@@ -33,6 +36,7 @@ mod partial_run;
 mod plan;
 pub mod random;
 mod receiver;
+mod receiver_results;
 mod recorder;
 mod results;
 mod run;
@@ -58,7 +62,8 @@ pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::{Fingerprint, PartialRun};
 pub use plan::GROWING_REPLICATE;
-pub use results::{Absorbed, ChannelResult, EffectsUsed, Power, ReceiverResult, Results};
+pub use receiver_results::{ChannelResult, ReceiverResult};
+pub use results::{Absorbed, EffectsUsed, Power, Results};
 pub use run::{grows, replay, replicate_range, replicates, simulate, trace};
 pub use scene::Scene;
 pub use seconds::{MergedSeconds, Seconds};

@@ -1,8 +1,9 @@
 //! Receivers in the form the kernel asks: where a ray meets them, and which cell counts it.
 
+use super::channels::Channels;
+use super::disc_cells::DiscCells;
 use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
-use crate::optics::xyz_of_watt;
 use std::f64::consts::TAU;
 
 /// A receiver.
@@ -18,76 +19,6 @@ pub(crate) struct Receiver {
     pub(crate) channels: Channels,
 }
 
-/// What a receiver counts besides power.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Channels {
-    None,
-    /// Lumens, by the CIE's V(λ), for sources in watts.
-    Photometric,
-    /// CIE X, Y, Z.
-    Xyz,
-    /// Power between each two wavelengths, nm.
-    Bins(Vec<f64>),
-}
-
-/// Lumens that a quantum of a weighted channel stands for: above all values of 683·x̄, 683·ȳ, 683·z̄.
-pub(crate) const CHANNEL_LUMENS: f64 = 2048.0;
-
-impl Channels {
-    fn new(r: &scene::Receiver) -> Self {
-        match (&r.channels, &r.bins_nm) {
-            (_, Some(bins)) => Self::Bins(bins.clone()),
-            (Some(scene::Channels::Photometric), None) => Self::Photometric,
-            (Some(scene::Channels::Xyz), None) => Self::Xyz,
-            (None, None) => Self::None,
-        }
-    }
-
-    /// How many sums a cell has beside its power.
-    pub(crate) fn count(&self) -> usize {
-        match self {
-            Self::None => 0,
-            Self::Photometric => 1,
-            Self::Xyz => 3,
-            Self::Bins(edges) => edges.len() - 1,
-        }
-    }
-
-    /// Name of a channel.
-    pub(crate) fn name(&self, channel: usize) -> String {
-        match self {
-            Self::None => String::new(),
-            Self::Photometric => "lm".into(),
-            Self::Xyz => ["X", "Y", "Z"][channel].into(),
-            Self::Bins(edges) => format!("{}-{} nm", edges[channel], edges[channel + 1]),
-        }
-    }
-
-    /// Hands out the weight of each channel that counts a wavelength.
-    #[inline]
-    pub(crate) fn weigh(&self, nm: f64, mut add: impl FnMut(usize, f64)) {
-        match self {
-            Self::None => {}
-            Self::Photometric => add(0, xyz_of_watt(nm)[1] / CHANNEL_LUMENS),
-            Self::Xyz => (0..3).zip(xyz_of_watt(nm)).for_each(|(c, x)| add(c, x / CHANNEL_LUMENS)),
-            Self::Bins(edges) => {
-                let k = edges.partition_point(|e| *e <= nm);
-                if k > 0 && k < edges.len() {
-                    add(k - 1, 1.0);
-                }
-            }
-        }
-    }
-
-    /// What a quantum of a channel is worth, against a quantum of power.
-    pub(crate) fn worth(&self) -> f64 {
-        match self {
-            Self::Photometric | Self::Xyz => CHANNEL_LUMENS,
-            Self::None | Self::Bins(_) => 1.0,
-        }
-    }
-}
-
 /// Where a receiver stands; lengths in mm, `half` are half sides.
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
@@ -95,6 +26,12 @@ pub(crate) enum Shape {
         frame: Frame,
         half: [f64; 2],
         one_sided: bool,
+    },
+    Disc {
+        frame: Frame,
+        radius: f64,
+        one_sided: bool,
+        cells: DiscCells,
     },
     Sphere {
         frame: Frame,
@@ -132,6 +69,12 @@ impl Receiver {
                 let frame = Frame::from_axis(at, n, r.x.map(Vector::from_array));
                 Shape::Plane { frame, half: [0.5 * a, 0.5 * b], one_sided: r.one_sided }
             }
+            ReceiverKind::Disc => Shape::Disc {
+                frame: Frame::from_axis(at, n, r.x.map(Vector::from_array)),
+                radius: r.radius.unwrap_or(1.0),
+                one_sided: r.one_sided,
+                cells: DiscCells::new(r.cells),
+            },
             ReceiverKind::Sphere => {
                 Shape::Sphere { frame: far_axes(at, n, Vector::from_array(r.up)), radius: r.radius.unwrap_or(1.0) }
             }
@@ -164,15 +107,12 @@ impl Receiver {
         self.cell_count() * (1 + self.channels.count())
     }
 
-    /// A box around a plane or sphere; empty for what stands nowhere.
+    /// A box around what stands in space; empty for what stands nowhere.
     pub(crate) fn bounds(&self) -> Aabb {
         match &self.shape {
-            Shape::Plane { frame, half, .. } => {
-                let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-                Aabb::from_points(
-                    corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1])),
-                )
-            }
+            Shape::Plane { frame, half, .. } => rectangle_bounds(frame, *half),
+            // That of the square around it: a box that is too large costs a test, no light.
+            Shape::Disc { frame, radius, .. } => rectangle_bounds(frame, [*radius; 2]),
             Shape::Sphere { frame, radius } => {
                 let reach = Vector::splat(*radius);
                 Aabb::from_points([frame.origin - reach, frame.origin + reach])
@@ -184,7 +124,7 @@ impl Receiver {
     /// Whether it may have a point in common with a box; asked with care, so that `true` costs time alone.
     pub(crate) fn meets(&self, region: &Aabb) -> bool {
         match &self.shape {
-            Shape::Plane { frame, .. } => {
+            Shape::Plane { frame, .. } | Shape::Disc { frame, .. } => {
                 let apart = |box_corners: [Point; 8]| {
                     let sides = box_corners.map(|c| (c - frame.origin).dot(frame.z));
                     // All corners on one side of the plane: the box lies before it or behind.
@@ -207,18 +147,14 @@ impl Receiver {
     pub(crate) fn crossing(&self, ray: &Ray, after: f64, before: f64) -> Option<f64> {
         match &self.shape {
             Shape::Plane { frame, half, one_sided } => {
-                let along = ray.direction.dot(frame.z);
-                // A one-sided plane counts what comes against its normal.
-                if along == 0.0 || *one_sided && along > 0.0 {
-                    return None;
-                }
-                let t = (frame.origin - ray.origin).dot(frame.z) / along;
-                // Refuses NaN too, as of a ray without direction.
-                if !(t > after && t < before) {
-                    return None;
-                }
+                let t = plane_crossing(frame, *one_sided, ray, after, before)?;
                 let p = ray.point_at(t) - frame.origin;
                 (p.dot(frame.x).abs() <= half[0] && p.dot(frame.y).abs() <= half[1]).then_some(t)
+            }
+            Shape::Disc { frame, radius, one_sided, .. } => {
+                let t = plane_crossing(frame, *one_sided, ray, after, before)?;
+                let p = ray.point_at(t) - frame.origin;
+                (p.dot(frame.x).hypot(p.dot(frame.y)) <= *radius).then_some(t)
             }
             Shape::Sphere { frame, radius } => {
                 let o = ray.origin - frame.origin;
@@ -236,7 +172,7 @@ impl Receiver {
         }
     }
 
-    /// The cell and coordinates of a point on a plane or sphere.
+    /// The cell and coordinates of a point on a receiver that stands in space.
     #[inline(always)]
     pub(crate) fn spot(&self, p: Point) -> Option<Spot> {
         match &self.shape {
@@ -247,6 +183,13 @@ impl Receiver {
                 let at = [(x / half[0]).clamp(-1.0, 1.0), (y / half[1]).clamp(-1.0, 1.0)];
                 let largest = half[0].max(half[1]);
                 Some(self.counted(at, (x * x + y * y) / (largest * largest)))
+            }
+            Shape::Disc { frame, radius, cells, .. } => {
+                let local = p - frame.origin;
+                let at = [local.dot(frame.x) / radius, local.dot(frame.y) / radius];
+                let spot = self.counted(at.map(|x| x.clamp(-1.0, 1.0)), at[0] * at[0] + at[1] * at[1]);
+                // A cell whose middle lies beyond the rim leaves its light to the next one inwards.
+                Some(Spot { cell: cells.home(spot.cell), ..spot })
             }
             Shape::Sphere { frame, .. } => {
                 let d = frame.local_direction(p - frame.origin).normalize();
@@ -286,29 +229,43 @@ impl Receiver {
         Spot { cell, at, radius2 }
     }
 
-    /// Area (mm²) or solid angle (sr) of the cells of a row; all cells of a row are alike.
-    pub(crate) fn cell_measure(&self, row: usize) -> f64 {
+    /// Area (mm²) or solid angle (sr) of a cell; 0 for one that lies off a disc, where no light is counted.
+    pub(crate) fn measure(&self, column: usize, row: usize) -> f64 {
         let n = self.cells.map(f64::from);
         match &self.shape {
             Shape::Plane { half, .. } => 4.0 * half[0] * half[1] / (n[0] * n[1]),
+            Shape::Disc { radius, cells, .. } => {
+                radius * radius * cells.measure(row * self.cells[0] as usize + column)
+            }
             Shape::Sphere { radius, .. } => {
                 let [h, v] = [[-0.5 * TAU, 0.5 * TAU], [-0.25 * TAU, 0.25 * TAU]];
                 radius * radius * solid_angle(FarFieldType::A, [h[0], v[0]], [h[1], v[1]], self.cells, [0, row])
             }
-            Shape::FarField { angles, low, high, .. } => solid_angle(*angles, *low, *high, self.cells, [0, row]),
-            Shape::Absorbed { .. } => 1.0,
-        }
-    }
-
-    /// The same for one cell; only type B has columns that differ.
-    pub(crate) fn measure(&self, column: usize, row: usize) -> f64 {
-        match &self.shape {
             Shape::FarField { angles, low, high, .. } => {
                 solid_angle(*angles, *low, *high, self.cells, [column, row])
             }
-            _ => self.cell_measure(row),
+            Shape::Absorbed { .. } => 1.0,
         }
     }
+}
+
+/// A box around a rectangle of these half sides.
+fn rectangle_bounds(frame: &Frame, half: [f64; 2]) -> Aabb {
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+    Aabb::from_points(corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1])))
+}
+
+/// The distance at which a ray crosses the plane of a frame, in `(after, before)`.
+#[inline(always)]
+fn plane_crossing(frame: &Frame, one_sided: bool, ray: &Ray, after: f64, before: f64) -> Option<f64> {
+    let along = ray.direction.dot(frame.z);
+    // A one-sided receiver counts what comes against its normal.
+    if along == 0.0 || one_sided && along > 0.0 {
+        return None;
+    }
+    let t = (frame.origin - ray.origin).dot(frame.z) / along;
+    // Refuses NaN too, as of a ray without direction.
+    (t > after && t < before).then_some(t)
 }
 
 /// Axes of directions: right, up and forward as seen by one who looks along the light.

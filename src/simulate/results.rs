@@ -7,18 +7,14 @@ use super::effects::{Because, Required};
 use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
-use super::receiver::{Receiver, Shape};
-use super::scene::{FarFieldType, PowerUnit};
+use super::receiver_results::ReceiverResult;
 use super::seconds::Seconds;
 use super::sequence_results::ReceiverSequences;
 use super::settings::RunSettings;
 use super::tallies::Tallies;
 use super::tally::Sum;
 use crate::intersect::Cost;
-use serde::{Serialize, Serializer};
-
-/// Square millimetres to a square metre.
-const MM2_PER_M2: f64 = 1e6;
+use serde::Serialize;
 
 /// Rates are told in millions.
 const MILLION: f64 = 1e6;
@@ -129,84 +125,6 @@ pub struct Absorbed {
     pub error: f64,
 }
 
-/// What one receiver counted.
-#[derive(Clone, Debug, Serialize)]
-pub struct ReceiverResult {
-    /// Its name.
-    pub name: String,
-    /// `plane`, `far_field`, `sphere` or `absorbed`.
-    pub kind: &'static str,
-    /// Power that it counted.
-    pub power: f64,
-    /// Standard error of `power`.
-    pub power_error: f64,
-    /// Cells along both sides.
-    pub grid: [usize; 2],
-    /// Largest cell, in `unit`.
-    pub max: f64,
-    /// Smallest cell, in `unit`.
-    pub min: f64,
-    /// Unit of the cells: `W/m2` or `W/sr` for sources in watts, `lx` or `cd` for sources in lumens.
-    pub unit: &'static str,
-    /// Mean position of the light: mm on a plane, degrees in angles.
-    pub centroid: [f64; 2],
-    /// Its standard error.
-    pub centroid_error: [f64; 2],
-    /// Root mean square about the receiver's centre, in the same units.
-    pub rms: [f64; 2],
-    /// Its standard error.
-    pub rms_error: [f64; 2],
-    /// Largest distance from the centre, in the same units.
-    pub farthest: f64,
-    /// Files written for it; whoever writes them fills this in.
-    pub files: Vec<String>,
-    /// Half sides: mm of a plane, degrees of angles.
-    pub half: [f64; 2],
-    /// Middle of the ranges of angles, degrees; 0 for planes.
-    pub middle: [f64; 2],
-    /// Type of the angles of a far field.
-    #[serde(serialize_with = "angle_type")]
-    pub angles: Option<FarFieldType>,
-    /// Power, lumens or CIE values of each further channel.
-    pub channels: Vec<ChannelResult>,
-    /// Cells row by row, the first coordinate running fastest, in `unit`.
-    #[serde(skip)]
-    pub cells: Vec<f64>,
-    /// Standard error of each cell, in `unit`.
-    #[serde(skip)]
-    pub errors: Vec<f64>,
-}
-
-/// A further channel of a receiver.
-#[derive(Clone, Debug, Serialize)]
-pub struct ChannelResult {
-    /// `lm`, `X`, `Y`, `Z`, or the wavelengths of a bin.
-    pub name: String,
-    /// Unit of its cells: `lx` or `cd` of lumens and CIE values, the receiver's own of a bin.
-    pub unit: &'static str,
-    /// Sum over the receiver: lumens, CIE values with Y in lumens, or watts of a bin.
-    pub total: f64,
-    /// Its standard error.
-    pub error: f64,
-    /// Cells as those of the receiver, per m² or sr.
-    #[serde(skip)]
-    pub cells: Vec<f64>,
-    /// Standard error of each cell.
-    #[serde(skip)]
-    pub errors: Vec<f64>,
-}
-
-impl ChannelResult {
-    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for the others.
-    pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
-        if matches!(self.unit, "lx" | "cd") { "lm" } else { power }
-    }
-}
-
-fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S::Error> {
-    a.serialize(s)
-}
-
 impl Results {
     /// The results of a run, or of the part of it that was traced.
     pub fn new(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
@@ -300,93 +218,4 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
     // other.
     let bulk = bound.bodies.iter().zip(&tallies.bulk).map(|(b, s)| result(&b.name, &b.medium, s));
     faces.chain(bulk).filter(|a| a.power > 0.0).collect()
-}
-
-impl ReceiverResult {
-    /// The figures of receiver `i`: sums of quanta turned into densities and their errors.
-    fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64, unit: PowerUnit) -> Self {
-        let grid = r.cells.map(|n| n as usize);
-        let degrees = |low: [f64; 2], high: [f64; 2]| {
-            let half = [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees());
-            (half, [0, 1].map(|a| 0.5 * (high[a] + low[a]).to_degrees()))
-        };
-        let lumen = unit == PowerUnit::Lumen;
-        let (per_area, per_angle) = if lumen { ("lx", "cd") } else { ("W/m2", "W/sr") };
-        let (kind, unit, scale, (half, middle), angles) = match &r.shape {
-            Shape::Plane { half, .. } => ("plane", per_area, MM2_PER_M2, (*half, [0.0; 2]), None),
-            Shape::Sphere { .. } => ("sphere", per_area, MM2_PER_M2, ([180.0, 90.0], [0.0; 2]), None),
-            Shape::FarField { angles, low, high, .. } => {
-                ("far_field", per_angle, 1.0, degrees(*low, *high), Some(*angles))
-            }
-            Shape::Absorbed { .. } => ("absorbed", if lumen { "lm" } else { "W" }, 1.0, ([1.0; 2], [0.0; 2]), None),
-        };
-        // Quanta of a cell to its mean density: per area, or per solid angle for a far field.
-        let per = |k: usize| quantum * scale / r.measure(k % grid[0], k / grid[0]);
-        let n = r.cell_count();
-        let (sums, further) = tallies.cells[i].split_at(n);
-        let channels = further.chunks(n).enumerate();
-        let channels = channels.map(|(c, sums)| {
-            let worth = r.channels.worth();
-            let total = &tallies.channels[i][c];
-            ChannelResult {
-                name: r.channels.name(c),
-                unit: if r.channels.worth() == 1.0 {
-                    unit
-                } else if scale == 1.0 {
-                    "cd"
-                } else {
-                    "lx"
-                },
-                total: total.total as f64 * quantum * worth,
-                error: total.error(tallies.replicates) * quantum * worth,
-                cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
-                errors: sums
-                    .iter()
-                    .enumerate()
-                    .map(|(k, s)| s.error(tallies.replicates) * per(k) * worth)
-                    .collect(),
-            }
-        });
-        let channels = channels.collect();
-        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k)).collect();
-        let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
-        let total = &tallies.receivers[i];
-        let means = tallies.moments[i].means(total.total);
-        let of_means = tallies.spreads[i].errors(total, &tallies.moments[i], tallies.replicates);
-        // Distances are counted in units of the longer half side, in which a circle stays one.
-        let largest = half[0].max(half[1]);
-        Self {
-            name: r.name.clone(),
-            kind,
-            power: total.total as f64 * quantum,
-            power_error: total.error(tallies.replicates) * quantum,
-            grid,
-            max: cells.iter().copied().fold(0.0, f64::max),
-            min: cells.iter().copied().fold(f64::INFINITY, f64::min),
-            unit,
-            centroid: [0, 1].map(|a| middle[a] + half[a] * means[a][0]),
-            centroid_error: [0, 1].map(|a| half[a] * of_means[a]),
-            rms: [0, 1].map(|a| half[a] * means[a][1].sqrt()),
-            // Of a square root, to first order.
-            rms_error: [0, 1].map(|a| 0.5 * half[a] * of_means[2 + a] / means[a][1].sqrt().max(f64::MIN_POSITIVE)),
-            farthest: largest * tallies.moments[i].farthest(),
-            files: Vec::new(),
-            half,
-            middle,
-            angles,
-            channels,
-            cells,
-            errors,
-        }
-    }
-
-    /// The channel of lumens, of a receiver that counts them beside watts.
-    pub fn photometric(&self) -> Option<&ChannelResult> {
-        self.channels.iter().find(|c| matches!(c.name.as_str(), "lm" | "Y"))
-    }
-
-    /// Cell `(i, j)`: the `i`-th along the first side, the `j`-th along the second.
-    pub fn cell(&self, i: usize, j: usize) -> f64 {
-        self.cells[j * self.grid[0] + i]
-    }
 }

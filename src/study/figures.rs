@@ -194,7 +194,7 @@ impl<'a> Errors<'a> {
         });
         // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
-        let length = if r.kind == "plane" { "mm" } else { "deg" };
+        let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
         let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
             let geometric = self.geometric(0.0, |m| paired(m).geometric());
             Some(Figure::new(value, length, statistical, geometric))

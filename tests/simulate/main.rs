@@ -3,6 +3,7 @@
 mod caught;
 mod closed;
 mod contacts;
+mod discs;
 mod effects;
 mod facets;
 mod far_sources;

@@ -1,4 +1,4 @@
-//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, Data_3 and TM-25 for planes, IES LM-63 for whole far fields in candela.
+//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, TM-25 for planes and discs, Data_3 for planes, IES LM-63 for whole far fields in candela.
 
 use crate::cli::failure::Failure;
 use crate::formats::{
@@ -38,10 +38,13 @@ pub(crate) fn write(
         names.push(format!("{stem}.{extension}"));
         write(&folder.join(format!("{stem}.{extension}")), &grid)?;
     }
-    if receiver.kind == "plane" {
-        names.push(format!("{stem}.data3"));
+    if matches!(receiver.kind, "plane" | "disc") {
         names.push(format!("{stem}.tm25ray"));
         write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
+    }
+    // A Data_3 holds a rectangle.
+    if receiver.kind == "plane" {
+        names.push(format!("{stem}.data3"));
         // Data_3 gives rows first.
         let size = [receiver.grid[1], receiver.grid[0]];
         let data = Data3 { size, results: receiver.cells.clone(), rays };
@@ -63,13 +66,13 @@ pub(crate) fn write(
     Ok(names)
 }
 
-/// The sampled rays of a plane as a TM-25 file.
+/// The sampled rays of a plane or disc as a TM-25 file.
 fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
     let mut file = Tm25::from_rays(rays, flux);
     file.header.descriptions[SOFTWARE] = concat!("lampyris ", env!("CARGO_PKG_VERSION")).into();
     file.header.descriptions[ADDITIONAL] =
-        "a sample of the rays of a simulation where they met the plane; each stands for many".into();
+        "a sample of the rays of a simulation where they met the receiver; each stands for many".into();
     file
 }
 

@@ -60,8 +60,10 @@ impl<'a> Context<'a> {
         // A far field counts directions; it cuts no segment.
         let far = |&i: &usize| matches!(all[i].shape, Shape::FarField { .. });
         let region = bound.region;
-        // A far field has no place, and faces that receive are found by the hit itself: only planes and spheres cut segments.
-        let stands = |r: &Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Sphere { .. });
+        // A far field has no place, and faces that receive are found by the hit itself: only planes, discs and spheres cut
+        // segments.
+        let stands =
+            |r: &Receiver| matches!(r.shape, Shape::Plane { .. } | Shape::Disc { .. } | Shape::Sphere { .. });
         Self {
             bound,
             intersector,

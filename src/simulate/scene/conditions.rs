@@ -24,10 +24,10 @@ pub(super) fn add(schema: &mut Value) {
         // Without a kind a receiver is a plane.
         {"if": never(&["kind"]), "then": needs(&["size"])},
         of_kind(&["plane"], needs(&["size"])),
-        of_kind(&["sphere"], needs(&["radius"])),
+        of_kind(&["sphere", "disc"], needs(&["radius"])),
         of_kind(&["absorbed"], json!({"anyOf": [needs(&["part"]), needs(&["instance"]), needs(&["on"])]})),
         of_kind(&["plane", "far_field", "absorbed"], never(&["radius"])),
-        of_kind(&["sphere", "far_field", "absorbed"], never(&["size"])),
+        of_kind(&["sphere", "disc", "far_field", "absorbed"], never(&["size"])),
     ]});
     let source = json!({"allOf": [
         of_kind(&["cone"], needs(&["half_angle_deg"])),

@@ -4,7 +4,7 @@ use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
-/// Where light is counted. Planes and spheres stand in space and are no part of a model.
+/// Where light is counted. Planes, discs and spheres stand in space and are no part of a model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -14,23 +14,23 @@ pub struct Receiver {
     pub name: String,
     /// What it is.
     pub kind: ReceiverKind,
-    /// Centre of a plane or sphere, mm.
+    /// Centre of a plane, disc or sphere, mm.
     pub at: [f64; 3],
-    /// Normal of a plane; the main direction of a far field or of a sphere's cells: H 0, V 0, or γ 0.
+    /// Normal of a plane or disc; the main direction of a far field or of a sphere's cells: H 0, V 0, or γ 0.
     pub normal: [f64; 3],
-    /// Direction of the first side of a plane, as far as `normal` lets it; the second is `normal` × `x`.
+    /// Direction of the first side of a plane, or of the cells of a disc, as far as `normal` lets it; the second is `normal` × `x`.
     pub x: Option<[f64; 3]>,
     /// Upward direction of a far field, as far as `normal` lets it.
     pub up: [f64; 3],
     /// Sides of a plane, mm.
     pub size: Option<[f64; 2]>,
-    /// Radius of a sphere, mm.
+    /// Radius of a disc or sphere, mm.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
-    /// Number of cells along both sides.
+    /// Number of cells along both sides; of a disc along those of the square around it, whose corners stay empty.
     #[cfg_attr(feature = "schema", schemars(inner(range(min = 1))))]
     pub cells: [u32; 2],
-    /// Whether light ends at a plane or sphere; otherwise it is counted and goes on.
+    /// Whether light ends at a plane, disc or sphere; otherwise it is counted and goes on.
     pub absorbs: bool,
     /// Counts light that comes against `normal` only, and lets the other pass unseen.
     pub one_sided: bool,
@@ -90,6 +90,8 @@ impl Default for Receiver {
 pub enum ReceiverKind {
     /// A rectangle in space: power per area.
     Plane,
+    /// A round detector in space: power per area.
+    Disc,
     /// All light that leaves the scene, by direction: power per solid angle.
     FarField,
     /// A sphere in space, by direction from its centre as angles of type A: power per area.
@@ -156,17 +158,22 @@ impl Receiver {
 
     /// A key that is given and means nothing for this kind, and the kinds it belongs to.
     fn misplaced(&self) -> Option<(&'static str, &'static str)> {
-        use ReceiverKind::{Absorbed, FarField, Plane, Sphere};
+        use ReceiverKind::{Absorbed, Disc, FarField, Plane, Sphere};
         let unset = Self::default();
         // One table for all kinds: a new key that is missing here would be ignored in silence.
         let keys: [(&str, bool, &[ReceiverKind], &str); 13] = [
-            ("at", self.at != unset.at, &[Plane, Sphere], "plane or sphere"),
-            ("normal", self.normal != unset.normal, &[Plane, Sphere, FarField], "plane, sphere or far_field"),
-            ("x", self.x.is_some(), &[Plane], "plane"),
+            ("at", self.at != unset.at, &[Plane, Disc, Sphere], "plane, disc or sphere"),
+            (
+                "normal",
+                self.normal != unset.normal,
+                &[Plane, Disc, Sphere, FarField],
+                "plane, disc, sphere or far_field",
+            ),
+            ("x", self.x.is_some(), &[Plane, Disc], "plane or disc"),
             ("up", self.up != unset.up, &[Sphere, FarField], "sphere or far_field"),
             ("size", self.size.is_some(), &[Plane], "plane"),
-            ("radius", self.radius.is_some(), &[Sphere], "sphere"),
-            ("one_sided", self.one_sided, &[Plane], "plane"),
+            ("radius", self.radius.is_some(), &[Disc, Sphere], "disc or sphere"),
+            ("one_sided", self.one_sided, &[Plane, Disc], "plane or disc"),
             ("angles", self.angles != unset.angles, &[FarField], "far_field"),
             ("h_deg", self.h_deg != unset.h_deg, &[FarField], "far_field"),
             ("v_deg", self.v_deg != unset.v_deg, &[FarField], "far_field"),
@@ -217,9 +224,9 @@ impl Receiver {
                 Some(s) if s.iter().all(|x| *x > 0.0 && x.is_finite()) => Ok(()),
                 _ => fail("size", "a plane needs `size`, two positive lengths"),
             },
-            ReceiverKind::Sphere => match self.radius {
+            ReceiverKind::Disc | ReceiverKind::Sphere => match self.radius {
                 Some(r) if r > 0.0 && r.is_finite() => Ok(()),
-                _ => fail("radius", "a sphere needs a positive `radius`"),
+                _ => fail("radius", "a disc or sphere needs a positive `radius`"),
             },
             ReceiverKind::FarField => {
                 let ([h0, h1], [v0, v1]) = self.angles_deg();

@@ -68,8 +68,10 @@ struct Block {
 pub(super) struct CellPairs<'r> {
     grid: [usize; 2],
     cells: Vec<Cell>,
-    /// From quanta to the receiver's unit, cell by cell.
+    /// From quanta to the receiver's unit, cell by cell; 0 for cells off a disc, where no light is counted.
     unit: Vec<f64>,
+    /// The inverse of that, and 0 too off a disc.
+    measure: Vec<f64>,
     /// Of the run on facets, then on the spline.
     replicates: [Vec<&'r ReplicateSums>; 2],
     /// 0 for power, then the further channels.
@@ -97,8 +99,11 @@ impl<'r> CellPairs<'r> {
         let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
         let worth = if layer == 0 { 1.0 } else { receiver.channels.worth() };
         let quantum = runs[1].results.quantum * worth;
-        let unit = (0..cells.len()).map(|c| quantum * scale / receiver.measure(c % grid[0], c / grid[0])).collect();
-        Some(Self { grid, cells, unit, replicates, layer })
+        let per_measure = |m: f64| if m > 0.0 { quantum * scale / m } else { 0.0 };
+        let unit: Vec<f64> =
+            (0..cells.len()).map(|c| per_measure(receiver.measure(c % grid[0], c / grid[0]))).collect();
+        let measure = unit.iter().map(|u| if *u > 0.0 { 1.0 / u } else { 0.0 }).collect();
+        Some(Self { grid, cells, unit, measure, replicates, layer })
     }
 
     /// Cells of a block, as far as the grid goes.
@@ -127,7 +132,7 @@ impl<'r> CellPairs<'r> {
     /// Quanta over measure of a square, in the receiver's unit.
     fn density(&self, block: Block, quanta: impl Fn(&Cell) -> f64) -> f64 {
         let sum = |of: &dyn Fn(usize) -> f64| self.inside(block).map(of).sum::<f64>();
-        let measure = sum(&|c| 1.0 / self.unit[c]);
+        let measure = sum(&|c| self.measure[c]);
         if measure > 0.0 { sum(&|c| quanta(&self.cells[c])) / measure } else { 0.0 }
     }
 
@@ -143,7 +148,7 @@ impl<'r> CellPairs<'r> {
         }
         // Facets may have their brightest place elsewhere: places are compared by how bright they are.
         let (on_facets, facets) = self.brightest(side, |c| c.facets);
-        let inverse = |block: Block| self.inside(block).map(|c| 1.0 / self.unit[c]).sum::<f64>();
+        let inverse = |block: Block| self.inside(block).map(|c| self.measure[c]).sum::<f64>();
         let measures = [inverse(on_facets), inverse(block)];
         let by_replicate = |run: usize, block: Block| {
             let (nx, layer) = (self.grid[0], self.layer);

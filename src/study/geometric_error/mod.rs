@@ -182,7 +182,7 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
     statistical.rms = result.rms_error;
     let mut error = ReceiverError {
         name: result.name.clone(),
-        unit: if result.kind == "plane" { "mm" } else { "deg" },
+        unit: if matches!(result.kind, "plane" | "disc") { "mm" } else { "deg" },
         power,
         centroid: [first[0], second[0]],
         rms: [first[1], second[1]],

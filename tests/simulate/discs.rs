@@ -1,0 +1,79 @@
+//! Round receivers: solid angles and view factors in closed form, and maps that end at the rim.
+
+use crate::support::World;
+use lampyris::simulate::{ReceiverResult, Results};
+use std::f64::consts::PI;
+
+/// Standard errors that a figure may be off.
+const SIGMAS: f64 = 4.0;
+
+fn trace(scene: &str) -> Results {
+    World::default().run(&format!("[run]\nrays = 200_000\n{scene}"), |_| {})
+}
+
+fn assert_near(receiver: &ReceiverResult, expected: f64) {
+    let (found, error) = (receiver.power, receiver.power_error);
+    assert!(error > 0.0 && (found - expected).abs() < SIGMAS * error, "{}: {found} ± {error}", receiver.name);
+}
+
+/// A point at the height h over the middle of a disc of radius a sends it (1 − h/√(h² + a²))/2 of its power, from either side, and to a
+/// one-sided disc from before it only.
+#[test]
+fn a_disc_gets_its_solid_angle() {
+    let disc = |name: &str, more: &str| {
+        format!("[[receiver]]\nname = '{name}'\nkind = 'disc'\nradius = 3\ncells = [20, 20]\n{more}\n")
+    };
+    let receivers = [
+        disc("front", "at = [0, 0, -4]"),
+        disc("aside", "at = [4, 0, 0]\nnormal = [1, 0, 0]"),
+        disc("passed", "at = [0, 4, 0]\nnormal = [0, -1, 0]\nabsorbs = false\none_sided = true"),
+        disc("behind", "at = [0, -4, 0]\nnormal = [0, -1, 0]\none_sided = true"),
+    ];
+    let r = trace(&format!("[[source]]\n{}", receivers.concat()));
+    for receiver in &r.receivers[..3] {
+        assert_near(receiver, 0.5 * (1.0 - 4.0 / 5.0));
+    }
+    assert_eq!(r.receivers[3].power, 0.0);
+}
+
+/// Between parallel coaxial discs of radii a and b at the distance h the view factor is (S − √(S² − 4b²/a²))/2 with
+/// S = 1 + (h² + b²)/a² (Howell, C-41).
+#[test]
+fn a_disc_gets_its_view_factor_of_another() {
+    let (a, b, h) = (2.0f64, 3.0f64, 5.0f64);
+    let s = 1.0 + (h * h + b * b) / (a * a);
+    let expected = 0.5 * (s - (s * s - 4.0 * b * b / (a * a)).sqrt());
+    let r = trace(
+        "[[source]]\nkind = 'lambertian'\nradius = 2\n[[receiver]]\nname = 'disc'\nkind = 'disc'\nat = [0, 0, 5]\nradius = 3\n",
+    );
+    assert_near(&r.receivers[0], expected);
+}
+
+/// Parallel light of 1 W on a disc of 2 mm falls on a detector of 4 mm, and on one of 1 mm, which gets a quarter evenly: 1/4π W/mm²
+/// everywhere, ½ mm from the middle along each axis in the mean square.
+#[test]
+fn a_map_ends_at_the_rim() {
+    let r = trace(
+        "[[source]]\nkind = 'collimated'\nradius = 2\n[[receiver]]\nname = 'whole'\nkind = 'disc'\nat = [0, 0, 1]\nradius = 4\nabsorbs = false
+        [[receiver]]\nname = 'part'\nkind = 'disc'\nat = [0, 0, 2]\nradius = 1\ncells = [11, 10]\n",
+    );
+    let [whole, part] = [&r.receivers[0], &r.receivers[1]];
+    assert!((whole.power - 1.0).abs() < 1e-12 && (whole.farthest - 2.0).abs() < 1e-3, "{}", whole.farthest);
+    assert_near(part, 0.25);
+    assert!((part.farthest - 1.0).abs() < 1e-3 && part.farthest <= 1.0, "{}", part.farthest);
+    for axis in 0..2 {
+        assert!((part.rms[axis] - 0.5).abs() < SIGMAS * part.rms_error[axis], "{:?}", part.rms);
+    }
+    // Every cell on the disc has the same irradiance, none off it has any, and the least is that of the light.
+    let expected = 1e6 / (4.0 * PI);
+    let off = |k: &usize| part.off.contains(k);
+    for k in (0..110).filter(|k| !off(k)) {
+        let (found, error) = (part.cells[k], part.errors[k]);
+        assert!((found - expected).abs() < 5.0 * error, "{k}: {found} ± {error}");
+    }
+    assert!(part.min > 0.5 * expected && part.off.iter().all(|&k| part.cells[k] == 0.0));
+    // Those whose middles are off it.
+    let middle = |k: usize| [((k % 11) as f64 - 5.0) / 5.5, ((k / 11) as f64 - 4.5) / 5.0];
+    let beyond = |k: &usize| middle(*k)[0].hypot(middle(*k)[1]) > 1.0;
+    assert_eq!(part.off, (0..110).filter(beyond).collect::<Vec<_>>());
+}
