@@ -1,6 +1,6 @@
 //! Light through curved faces of two bodies that touch, on facets of the default tolerance: none is lost or misled between them.
 
-use crate::turned::{assembly, ball_in_cup, doublet, lens, ring_in_groove, rod_in_hole, turned};
+use crate::turned::{assembly, ball_in_cup, doublet, lens, ring_in_groove, rod_in_hole, rod_in_plate, turned};
 use lampyris::intersect::Intersector;
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
@@ -74,6 +74,18 @@ fn light_passes_a_rod_in_its_hole() {
         "kind = 'cone'\nhalf_angle_deg = 40\nat = [0.3, 0.2, 4]\ndirection = [0, 0, 1]",
     );
     check("rod", &rod_in_hole(0.4), &text);
+}
+
+/// A rod that stands in its hole with one end, or not to the ends of the hole: only a part of one or of both faces is shared.
+#[test]
+fn light_passes_a_rod_partly_in_its_hole() {
+    let cone = "kind = 'cone'\nhalf_angle_deg = 60\nat = [0.4, 0.3, 1.2]\ndirection = [0, 0, 1]";
+    let text = scene([("rod", 1.5), ("plate", 1.6)], cone).replace("rays = 20000", "rays = 2000");
+    for (name, ends) in [("half", [1.0, 7.0]), ("one end flush", [0.0, 7.0]), ("short", [0.5, 2.5])] {
+        for from in [0.0, 0.6] {
+            check(name, &rod_in_plate(ends, from), &text);
+        }
+    }
 }
 
 #[test]

@@ -112,6 +112,13 @@ pub(crate) fn rod_in_hole(from: f64) -> Model {
     assembly(vec![turned("rod", &rod, 0.0), turned("block", &block, from)])
 }
 
+/// A rod of radius 2 between these heights in a hole of a plate from z = 0 to 3.
+pub(crate) fn rod_in_plate([bottom, top]: [f64; 2], from: f64) -> Model {
+    let rod = lines(&[[0.0, bottom], [2.0, bottom], [2.0, top], [0.0, top]]);
+    let plate = lines(&[[2.0, 0.0], [6.0, 0.0], [6.0, 3.0], [2.0, 3.0], [2.0, 0.0]]);
+    assembly(vec![turned("rod", &rod, 0.0), turned("plate", &plate, from)])
+}
+
 /// A ball of radius 10 in a cup that reaches nearly to its equator.
 pub(crate) fn ball_in_cup(from: f64) -> Model {
     let rim = -0.3f64;

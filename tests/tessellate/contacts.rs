@@ -1,9 +1,10 @@
 //! Curved faces of two solids that lie on each other have one and the same facets there, whatever their parametrisations.
 
-use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole};
+use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole, rod_in_plate};
 use lampyris::math::{FaceId, Point};
 use lampyris::model::Model;
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
+use std::f64::consts::PI;
 
 /// The corners of a facet, each once, in an order that does not depend on where it starts.
 fn corners(made: &Tessellation, facet: usize) -> Vec<Point> {
@@ -69,4 +70,38 @@ fn solids_that_do_not_touch_are_faceted_as_they_were() {
     model.instances[1].placement.origin.z += 0.01;
     let glued = tessellate(&model, &Settings { glue_mm: 1e-3, ..Settings::default() });
     assert_eq!(glued.mesh, tessellate(&model, &Settings::default()).mesh);
+}
+
+/// Of a rod of radius 2 in a hole of 3 mm, faces that touch in part have the same facets there and others elsewhere.
+#[test]
+fn faces_that_touch_in_part_have_one_interface_there() {
+    for (ends, height) in [([1.0, 7.0], 2.0), ([-5.0, 1.5], 1.5), ([0.5, 2.5], 2.0), ([-5.0, 7.0], 3.0)] {
+        for from in [0.0, 0.6] {
+            let model = rod_in_plate(ends, from);
+            let settings = Settings { glue_mm: 1e-3, measure: true, ..Settings::uniform(0.02) };
+            let made = tessellate(&model, &settings);
+            let r = &made.report;
+            assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.open), (0, 0, 0), "{ends:?}");
+            assert_eq!((r.certified, r.over_tolerance), (r.facets, Some(0)), "{ends:?}: {:?}", r.not_certified);
+            let [rod, hole] = [1, 6].map(|face| facets_of(&made, face));
+            let area = |p: &Vec<Point>| 0.5 * (p[2] - p[0]).cross(p[p.len() - 1] - p[1]).length();
+            let area = |facets: &mut dyn Iterator<Item = &Vec<Point>>| facets.map(area).sum::<f64>();
+            let shared = area(&mut rod.iter().filter(|f| hole.iter().any(|g| same(f, g))));
+            // The chords of a circle of radius r with sag s are shorter than their arcs by a share of s/3r.
+            let wall = 4.0 * PI * height;
+            assert!(shared < wall && shared > 0.995 * wall, "{ends:?}: {shared} of {wall} mm²");
+            // No other place is filled twice.
+            let whole = area(&mut rod.iter());
+            let expected = 4.0 * PI * (ends[1] - ends[0]);
+            assert!(whole < expected && whole > 0.995 * expected, "{ends:?}: {whole} of {expected} mm²");
+        }
+    }
+}
+
+/// A border that runs inside the other face has chords short enough for the facets on both sides: with those of the short rod as they are
+/// the hole came to 4,600 facets.
+#[test]
+fn a_short_rod_does_not_refine_its_hole() {
+    let made = tessellate(&rod_in_plate([0.5, 2.5], 0.6), &Settings { glue_mm: 1e-3, ..Settings::default() });
+    assert!(facets_of(&made, 6).len() < 200, "{}", facets_of(&made, 6).len());
 }

@@ -1,4 +1,4 @@
-//! Which curved face of one solid lies wholly on a face of another.
+//! Which curved face of one solid lies on a face of another, wholly or in part.
 
 use super::trimmed::{FaceKey, TrimmedFace};
 use crate::math::Aabb;
@@ -11,6 +11,15 @@ use rustc_hash::{FxHashMap, FxHashSet};
 /// Share of the tolerance that a carrier's facets are held to.
 pub(super) const CARRIER_SHARE: f64 = 0.8;
 
+/// How much of a guest lies on its carrier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Extent {
+    /// All of it.
+    Whole,
+    /// An area, but not all of it.
+    Part,
+}
+
 /// A face that lies on another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Contact {
@@ -18,6 +27,8 @@ pub(super) struct Contact {
     pub(super) carrier: FaceKey,
     /// The face that lies on it.
     pub(super) guest: FaceKey,
+    /// How much of it does.
+    pub(super) extent: Extent,
 }
 
 /// A curved face with its box in the model.
@@ -59,22 +70,14 @@ pub(super) fn contacts<'m>(
         // The face with the lower key is asked first, so that the carrier does not depend on chance.
         let (x, y) = (trimmed.get(&a)?, trimmed.get(&b)?);
         if x.carries(y, glue) {
-            Some(Contact { carrier: a, guest: b })
+            Some(Contact { carrier: a, guest: b, extent: Extent::Whole })
+        } else if y.carries(x, glue) {
+            Some(Contact { carrier: b, guest: a, extent: Extent::Whole })
         } else {
-            y.carries(x, glue).then_some(Contact { carrier: b, guest: a })
+            x.overlaps(y, glue).then_some(Contact { carrier: a, guest: b, extent: Extent::Part })
         }
     };
-    let all: Vec<Contact> = pairs.par_iter().filter_map(carried).collect();
-    // One role a face: a guest that carried another would hand on facets that are not its own.
-    let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
-    let mut guests: FxHashSet<FaceKey> = FxHashSet::default();
-    let mut out = Vec::new();
-    for c in all {
-        if !guests.contains(&c.carrier) && !carriers.contains(&c.guest) && guests.insert(c.guest) {
-            carriers.insert(c.carrier);
-            out.push(c);
-        }
-    }
+    let mut out = with_one_role_each(pairs.par_iter().filter_map(carried).collect());
     out.sort_unstable();
     // Tighter than asked, so that the guest's own proof, over other parameters, has a share left.
     for c in &out {
@@ -85,8 +88,38 @@ pub(super) fn contacts<'m>(
             carrier.surface.field = carrier.asked.tighter(&field, CARRIER_SHARE);
         }
     }
-    trimmed.retain(|key, _| carriers.contains(key) || guests.contains(key));
+    let concerned: FxHashSet<FaceKey> = out.iter().flat_map(|c| [c.carrier, c.guest]).collect();
+    trimmed.retain(|key, _| concerned.contains(key));
     (out, trimmed)
+}
+
+/// One role a face: a guest that carried another would hand on facets that are not its own.
+fn with_one_role_each(all: Vec<Contact>) -> Vec<Contact> {
+    let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
+    let mut guests: FxHashSet<FaceKey> = FxHashSet::default();
+    let mut out = Vec::new();
+    let (whole, part): (Vec<Contact>, Vec<Contact>) = all.into_iter().partition(|c| c.extent == Extent::Whole);
+    let mut contacts_in_part: FxHashMap<FaceKey, usize> = FxHashMap::default();
+    part.iter().flat_map(|c| [c.carrier, c.guest]).for_each(|key| *contacts_in_part.entry(key).or_default() += 1);
+    for c in whole.into_iter().chain(part) {
+        let turned = Contact { carrier: c.guest, guest: c.carrier, ..c };
+        // Of two that share a part either may carry: the one that touches more others, which each can have one carrier only.
+        let prefers_turned = contacts_in_part.get(&c.guest) > contacts_in_part.get(&c.carrier);
+        let ways = match c.extent {
+            Extent::Whole => vec![c],
+            Extent::Part if prefers_turned => vec![turned, c],
+            Extent::Part => vec![c, turned],
+        };
+        let is_free = |c: &Contact| {
+            !guests.contains(&c.carrier) && !carriers.contains(&c.guest) && !guests.contains(&c.guest)
+        };
+        if let Some(c) = ways.into_iter().find(is_free) {
+            guests.insert(c.guest);
+            carriers.insert(c.carrier);
+            out.push(c);
+        }
+    }
+    out
 }
 
 /// Curved faces with facets of their own, in order of their boxes along x.

@@ -1,5 +1,7 @@
 //! A face that lies on a carrier takes over the carrier's facets, each proved anew on its own surface.
 
+use super::closure::SideCounts;
+use super::detection::Extent;
 use super::trimmed::TrimmedFace;
 use crate::math::{Point, Uv};
 use crate::model::{EdgeUse, Part};
@@ -15,7 +17,7 @@ use crate::tessellate::proof::facet::prove_triangle;
 use crate::tessellate::proof::pole;
 use crate::tessellate::proof::prover::Prover;
 use crate::tessellate::settings::Settings;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 /// A guest with its border as it is divided now.
 pub(super) struct Guest<'f, 'm> {
@@ -65,18 +67,24 @@ impl<'f, 'm> Guest<'f, 'm> {
         }
     }
 
-    /// The border as lines on the carrier; corners are counted from `first` on.
-    pub(super) fn imprint(&self, carrier: &TrimmedFace<'_>, first: usize, out: &mut Imprint) {
+    /// The border as lines on the carrier, as far as it lies there; corners are counted from `first` on.
+    pub(super) fn imprint(&self, carrier: &TrimmedFace<'_>, extent: Extent, first: usize, out: &mut Imprint) {
         let uses: Vec<&EdgeUse> = self.face.loops.iter().flat_map(|l| &l.uses).collect();
         let local = |p: Point| carrier.frame.local_point(self.face.frame.point(p));
+        let edges = carrier.edges();
         for (i, j, a, b) in self.sides() {
             let places = [self.places[i], self.places[j]].map(local);
             // What is one point in space has no line to imprint.
             if a.side == BorderSide::Pole || places[0] == places[1] {
                 continue;
             }
+            let middle = self.middle(self.face.part, &uses, a, b);
+            let is_on_carrier = |p: &Point| carrier.holds(&edges, self.face.frame.point(*p), out.near);
+            if extent == Extent::Part && ![middle, self.places[i], self.places[j]].iter().all(is_on_carrier) {
+                continue;
+            }
             // The middle is on no seam: it tells on which side of one the ends are.
-            let (middle, _) = carrier.projector.project(local(self.middle(self.face.part, &uses, a, b)));
+            let (middle, _) = carrier.projector.project(local(middle));
             let end = |vertex: usize, place: Point| {
                 let (uv, _) = carrier.projector.project(place);
                 ImprintEnd { uv: beside(carrier, uv, middle), place, vertex: first + vertex }
@@ -86,7 +94,7 @@ impl<'f, 'm> Guest<'f, 'm> {
     }
 
     /// Whether parameters lie inside the border.
-    fn contains(&self, uv: Uv) -> bool {
+    pub(super) fn contains(&self, uv: Uv) -> bool {
         self.sides().filter(|(_, _, a, b)| crosses_ray_from(uv, [a.uv, b.uv])).count() % 2 == 1
     }
 }
@@ -114,15 +122,15 @@ fn beside(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     uv
 }
 
-/// The facets of a guest; `None` where they do not cover it exactly. `first` is the number of its first corner in the carrier's imprint.
-pub(super) fn facets(
+/// The facets of the carrier that lie in a guest, and the guest's border. `first` is the number of its first corner in the carrier's imprint.
+pub(super) fn taken_facets(
     guest: &Guest<'_, '_>,
     carrier: &TrimmedFace<'_>,
     facets: &CarrierFacets,
     first: usize,
     mesh: &PartMesh,
     settings: &Settings,
-) -> Option<FaceMesh> {
+) -> (FaceMesh, SideCounts) {
     let face = guest.face;
     let surface = &face.surface;
     let border = BorderNodes::new(face.part, &face.loops, surface, &guest.polygons, &mesh.shared);
@@ -145,23 +153,14 @@ pub(super) fn facets(
         made.push((proved, pole));
     }
     let border = builder.border;
-    // Each side of the border is the side of one facet.
-    let key = |a: u32, b: u32| {
-        let (a, b) = (border.nodes[a].position, border.nodes[b].position);
-        [a.min(b), a.max(b)]
-    };
-    let sides = made.iter().flat_map(|(f, _)| (0..4).map(|k| key(f.nodes[k], f.nodes[(k + 1) % 4])));
-    let sides: FxHashSet<[Position; 2]> = sides.collect();
-    // A side without a facet is a gap to the neighbour: the guest keeps facets of its own then.
-    if made.is_empty() || border.segments.iter().any(|s| !sides.contains(&key(s[0], s[1]))) {
-        return None;
-    }
+    let position = |n: u32| border.nodes[n].position;
+    let sides = SideCounts::new(border.segments.iter().map(|s| s.map(position)));
     let mut emission = Emission::new(surface, &border.nodes);
     made.iter().for_each(|(f, pole)| emission.facet(f, *pole));
     let out = emission.finish();
     let coincident = border.coincident;
     let (_, own) = border.nodes.into_parts();
-    Some(FaceMesh { own, coincident, ..out })
+    (FaceMesh { own, coincident, ..out }, sides)
 }
 
 /// Bound and tolerance of a facet; a triangle repeats its third corner.

@@ -1,31 +1,36 @@
 //! Faces of two solids that lie on each other are faceted once: a cemented doublet, a rod in its hole, a ring in its groove, a ball in
 //! its cup. Faceted apart, they overlap and gap by the sag of both, and light is lost between them.
 //!
-//! Where all of one face (the guest) lies on another (the carrier) within [`Settings::glue_mm`], whatever their parametrisations, the
-//! guest's border is imprinted on the carrier: its corners become nodes there, its chords edges that no facet crosses. The guest then
-//! takes over the carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Edges that run
-//! together get the samples of both, so that neighbours of either face still meet it.
+//! Where a face (the guest) lies on another (the carrier) within [`Settings::glue_mm`], whatever their parametrisations, the guest's border
+//! is imprinted on the carrier: its corners become nodes there, its chords edges that no facet crosses. The guest then takes over the
+//! carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Where only a part of the guest lies
+//! there, the carrier's border is imprinted on the guest too, which keeps facets of its own outside of it. Edges that run together get the
+//! samples of both, so that neighbours of either face still meet it, and those that run inside the other face chords short enough for it.
 //!
-//! Guarantee: a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier by the glue
-//! distance; shells stay closed, as a guest that the carrier's facets do not cover up to its border keeps its own. Known weakness: faces
-//! that overlap only in part are faceted apart.
+//! Guarantee: where they touch, a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier by
+//! the glue distance; shells stay closed, as a guest whose facets do not fill its border side on side keeps its own. Known weakness: a face
+//! has one carrier, so of three that touch in turn two are faceted apart.
 
+mod closure;
 mod detection;
 mod guest;
 mod projector;
 mod samples;
+mod shared_part;
 mod trimmed;
 
 use super::assemble::{PartMesh, Renumbering, mesh_face, with_coincident_vertices_joined};
 use super::border::edges;
 use super::border::polygons::{self, ImprintedPoints};
 use super::face::{FaceInput, mesh_with_imprint};
+use super::face_mesh::FaceMesh;
 use super::imprint::{CarrierFacets, Imprint};
 use super::settings::Settings;
 use super::taken_chords::NO_CHORDS;
 use crate::math::Point;
 use crate::model::{Face, Model};
-use detection::{CARRIER_SHARE, Contact};
+use closure::SideCounts;
+use detection::{CARRIER_SHARE, Contact, Extent};
 use guest::Guest;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -57,6 +62,14 @@ struct Joiner<'j, 'm> {
     faces: &'j FxHashMap<FaceKey, TrimmedFace<'m>>,
 }
 
+/// A guest among those of one carrier.
+struct Member<'f, 'm> {
+    guest: Guest<'f, 'm>,
+    extent: Extent,
+    /// Number of its first corner in the carrier's imprint.
+    first: usize,
+}
+
 impl<'j, 'm> Joiner<'j, 'm> {
     fn mesh_of(&self, instance: usize) -> Option<&'j PartMesh> {
         self.parts[self.model.instances[instance].part.0 as usize].as_ref()
@@ -74,8 +87,15 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let (Some(carrier), Some(guest)) = (self.edge_samples(c.carrier), self.edge_samples(c.guest)) else {
                 continue;
             };
-            // Both ways: after this both edges have the samples of either.
+            guest.shorten_chords(carrier.face, glue, &mut further);
             guest.cross_seams(carrier.face, glue, &mut further);
+            if c.extent == Extent::Part {
+                carrier.shorten_chords(guest.face, glue, &mut further);
+                carrier.cross_seams(guest.face, glue, &mut further);
+                guest.cross_edges(&carrier, glue, &mut further);
+                carrier.cross_edges(&guest, glue, &mut further);
+            }
+            // Both ways: after this both edges have the samples of either.
             carrier.take_over(&guest, glue, &mut further);
             guest.take_over(&carrier, glue, &mut further);
         }
@@ -96,7 +116,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let (divisions, shared) = edges::divide_more(part, &before.divisions, further.get(&i).unwrap_or(&none));
             let renumbering = Renumbering::new(part, (&before.divisions, before.shared.len()), &divisions);
             let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-            let renew = |(k, old): (usize, &Option<super::face_mesh::FaceMesh>)| {
+            let renew = |(k, old): (usize, &Option<FaceMesh>)| {
                 let key = FaceKey { instance: i, face: k };
                 let changed = faces[k].loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge));
                 // Carriers and guests are meshed later.
@@ -140,7 +160,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
     fn mesh_carriers_and_guests(&self, meshes: &mut FxHashMap<usize, PartMesh>) {
         let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
         let now = &*meshes;
-        let made: Vec<Vec<(FaceKey, Option<super::face_mesh::FaceMesh>)>> =
+        let made: Vec<Vec<(FaceKey, Option<FaceMesh>)>> =
             groups.par_iter().map(|group| self.mesh_group(group, now)).collect();
         for (key, mesh) in made.into_iter().flatten() {
             if let Some(part) = meshes.get_mut(&key.instance) {
@@ -154,18 +174,18 @@ impl<'j, 'm> Joiner<'j, 'm> {
         &self,
         group: &[Contact],
         meshes: &FxHashMap<usize, PartMesh>,
-    ) -> Vec<(FaceKey, Option<super::face_mesh::FaceMesh>)> {
+    ) -> Vec<(FaceKey, Option<FaceMesh>)> {
         let carrier = &self.faces[&group[0].carrier];
         let carrier_mesh = &meshes[&carrier.key.instance];
         let mut imprint = Imprint { segments: Vec::new(), near: self.settings.glue_mm };
-        let mut guests: Vec<(Guest<'_, '_>, usize)> = Vec::new();
+        let mut members: Vec<Member<'_, '_>> = Vec::new();
         let mut first = 0;
         for c in group {
             let face = &self.faces[&c.guest];
             let guest = self.guest(face, carrier, &meshes[&face.key.instance]);
-            guest.imprint(carrier, first, &mut imprint);
+            guest.imprint(carrier, c.extent, first, &mut imprint);
             let next = first + guest.len();
-            guests.push((guest, first));
+            members.push(Member { guest, extent: c.extent, first });
             first = next;
         }
         let made = mesh_with_imprint(&self.input(carrier, carrier_mesh), &imprint);
@@ -180,12 +200,37 @@ impl<'j, 'm> Joiner<'j, 'm> {
             _ => (mesh_face(&self.input(carrier, carrier_mesh)), CarrierFacets::default()),
         };
         let mut out = vec![(carrier.key, mesh)];
-        for (guest, first) in &guests {
-            let mesh = &meshes[&guest.face.key.instance];
-            let taken = guest::facets(guest, carrier, &facets, *first, mesh, self.settings);
-            out.push((guest.face.key, taken.or_else(|| mesh_face(&self.input(guest.face, mesh)))));
+        for member in &members {
+            let face = member.guest.face;
+            let taken = self.guest_mesh(member, carrier, &facets, meshes);
+            let made = taken.or_else(|| mesh_face(&self.input(face, &meshes[&face.key.instance])));
+            out.push((face.key, made));
         }
         out
+    }
+
+    /// The facets of a guest with those of its carrier; `None` where they do not fill its border.
+    fn guest_mesh(
+        &self,
+        member: &Member<'_, 'm>,
+        carrier: &TrimmedFace<'m>,
+        facets: &CarrierFacets,
+        meshes: &FxHashMap<usize, PartMesh>,
+    ) -> Option<FaceMesh> {
+        let Member { guest, extent, first } = member;
+        let mesh = &meshes[&guest.face.key.instance];
+        let (taken, border) = guest::taken_facets(guest, carrier, facets, *first, mesh, self.settings);
+        if *extent == Extent::Whole {
+            return SideCounts::of_facets(&taken).fill(&border).then_some(taken);
+        }
+        let near = self.settings.glue_mm;
+        let carrier = self.guest(carrier, guest.face, &meshes[&carrier.key.instance]);
+        let mut imprint = Imprint { segments: Vec::new(), near };
+        carrier.imprint(guest.face, Extent::Part, 0, &mut imprint);
+        let (own, lines) = mesh_with_imprint(&self.input(guest.face, mesh), &imprint).ok()?;
+        // What was repaired has no facets that others could meet.
+        let is_sound = lines.holds_imprint && own.repaired.is_none() && !taken.facets.is_empty();
+        if is_sound { shared_part::joined(guest, &carrier, &own, &taken, mesh, near) } else { None }
     }
 
     /// A guest with corners where its seams cross the carrier's.

@@ -19,6 +19,8 @@ pub(super) struct Projector<'s> {
     seeds: Vec<(Uv, Point)>,
     /// Places at poles.
     poles: Vec<(Uv, Point)>,
+    /// Largest distance between neighbouring places: none of the surface is farther from all of them.
+    spacing: f64,
 }
 
 impl<'s> Projector<'s> {
@@ -41,8 +43,19 @@ impl<'s> Projector<'s> {
             let d = spline.derivatives(uv);
             d.du.cross(d.dv).length() > SINGULAR * size * size
         };
-        let (seeds, poles) = (0..(nu + 1) * (nv + 1)).map(place).partition(is_regular);
-        Self { spline, seeds, poles }
+        let places: Vec<(Uv, Point)> = (0..(nu + 1) * (nv + 1)).map(place).collect();
+        let apart = |a: usize, b: usize| (places[a].1 - places[b].1).length();
+        let cells = (0..nu * nv).map(|cell| cell / nv * (nv + 1) + cell % nv);
+        // Both diagonals of every cell.
+        let spacing = cells.map(|k| apart(k, k + nv + 2).max(apart(k + 1, k + nv + 1))).fold(0.0, f64::max);
+        let (seeds, poles) = places.into_iter().partition(is_regular);
+        Self { spline, seeds, poles, spacing }
+    }
+
+    /// Whether no place of the surface is within `distance` of `p`, as far as the seeds tell.
+    pub(super) fn is_beyond(&self, p: Point, distance: f64) -> bool {
+        let reach = distance + self.spacing;
+        self.seeds.iter().chain(&self.poles).all(|(_, q)| (*q - p).length_squared() > reach * reach)
     }
 
     /// Parameters of the point nearest to `p`, and how far that is.

@@ -32,8 +32,10 @@ pub(super) struct TrimmedFace<'m> {
     pub(super) loops: Vec<TrimLoop>,
     pub(super) polygons: BorderPolygons,
     pub(super) projector: Projector<'m>,
-    /// Places on its border and inside, in the model's coordinates.
+    /// Places on its border, then those inside, in the model's coordinates.
     pub(super) samples: Vec<Point>,
+    /// How many lie on its border.
+    border_samples: usize,
 }
 
 impl<'m> TrimmedFace<'m> {
@@ -55,15 +57,18 @@ impl<'m> TrimmedFace<'m> {
             loops,
             polygons,
             samples: Vec::new(),
+            border_samples: 0,
         };
-        let border = out.vertices().map(|v| out.place_of(v, mesh));
+        let border: Vec<Point> = out.vertices().map(|v| out.place_of(v, mesh)).collect();
+        let border_samples = border.len();
         let (lo, hi) = out.polygons.bounds();
         // Middles of a grid's cells: none lies on the border, whose vertices are samples already.
         let step = |k: usize| (k as f64 + 0.5) / GRID as f64;
         let grid = (0..GRID * GRID).map(|k| lo + Uv::new(step(k / GRID), step(k % GRID)) * (hi - lo));
         let inside = grid.filter(|&uv| out.contains(uv)).map(|uv| out.surface.point(uv));
-        let samples = border.chain(inside).map(|p| out.frame.point(p)).collect();
+        let samples = border.into_iter().chain(inside).map(|p| out.frame.point(p)).collect();
         out.samples = samples;
+        out.border_samples = border_samples;
         Some(out)
     }
 
@@ -95,6 +100,14 @@ impl<'m> TrimmedFace<'m> {
         edges
     }
 
+    /// The edges beyond which other faces lie: seams are not among them.
+    pub(super) fn rims(&self) -> Vec<EdgeId> {
+        let uses = || self.face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge);
+        let mut edges = self.edges();
+        edges.retain(|edge| uses().filter(|used| used == edge).count() == 1);
+        edges
+    }
+
     /// Parameter of the point of an edge that is nearest to a place of the model, and how far it is, mm.
     pub(super) fn nearest_on_edge(&self, edge: EdgeId, p: Point) -> (f64, f64) {
         let (t, away) = project::nearest(&self.part.edges[edge.0 as usize].curve, self.frame.local_point(p));
@@ -110,16 +123,40 @@ impl<'m> TrimmedFace<'m> {
     /// Whether all of another face lies on this one, within `glue` mm.
     pub(super) fn carries(&self, other: &Self, glue: f64) -> bool {
         let edges = self.edges();
-        !other.samples.is_empty()
-            // Near the border, parameters may fall outside by rounding; distance in space decides there.
-            && other.samples.iter().all(|&p| {
-                let (uv, away) = self.project(p);
-                away <= glue && (self.contains(uv) || self.is_at_border(&edges, p, glue))
-            })
+        !other.samples.is_empty() && other.samples.iter().all(|&p| self.holds(&edges, p, glue))
+    }
+
+    /// Whether a place lies on this face, within `glue` mm; `edges` are the face's own.
+    pub(super) fn holds(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
+        let (uv, away) = self.project(p);
+        // Near the border, parameters may fall outside by rounding; distance in space decides there.
+        away <= glue && (self.contains(uv) || self.is_at_border(edges, p, glue))
+    }
+
+    /// Whether a place lies inside this face, off its border.
+    pub(super) fn holds_inside(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
+        let (uv, away) = self.project(p);
+        away <= glue && self.contains(uv) && !self.is_at_border(edges, p, glue)
+    }
+
+    /// Whether places inside one of two faces lie inside the other: they have an area in common, and not just a line.
+    pub(super) fn overlaps(&self, other: &Self, glue: f64) -> bool {
+        let holds = |on: &Self, of: &Self| {
+            let edges = on.edges();
+            let mut inside = of.samples[of.border_samples..].iter();
+            // Most faces whose boxes meet do not touch: the seeds tell, before any nearest point is looked for.
+            inside.any(|&p| !on.is_beyond(p, glue) && on.holds_inside(&edges, p, glue))
+        };
+        holds(self, other) || holds(other, self)
+    }
+
+    /// Whether a place is certainly farther from the surface than this, mm.
+    fn is_beyond(&self, p: Point, mm: f64) -> bool {
+        self.projector.is_beyond(self.frame.local_point(p), mm / self.frame.scale.abs())
     }
 
     /// Whether a point lies on one of these edges.
-    fn is_at_border(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
+    pub(super) fn is_at_border(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
         // A face without edges is whole: its border is a seam or a pole.
         edges.is_empty() || edges.iter().any(|&e| self.nearest_on_edge(e, p).1 <= glue)
     }
