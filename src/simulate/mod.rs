@@ -11,11 +11,10 @@
 //! is moved by the glue distance only where two faces are one; every ray that is lost is kept with its cause.
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `channels`, `disc_cells`, `receiver`,
-//! `seconds`, `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`, `sequence`, `tallies`,
-//! `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`, `sequence_results`,
-//! `receiver_results`, `results`,
-//! `arrivals`, `run`, `verify`.
+//! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `channels`, `disc_cells`,
+//! `receiver`, `seconds`, `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`,
+//! `sequence`, `tallies`, `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`,
+//! `sequence_results`, `face_results`, `receiver_results`, `results`, `arrivals`, `run`, `verify`.
 
 mod arrivals;
 mod assemble;
@@ -28,6 +27,7 @@ mod dispatch;
 mod effects;
 mod emitter;
 mod error;
+mod face_results;
 mod gather;
 mod hooks;
 mod kernel;
@@ -58,6 +58,7 @@ pub use bind::{BoundScene, RuleFaces, face_selectors};
 pub use dispatch::kernel_name;
 pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};
+pub use face_results::{FaceResult, FaceResults};
 pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::{Fingerprint, PartialRun};

@@ -30,7 +30,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 6\n";
+const MAGIC: &[u8] = b"lampyris tally 7\n";
 
 impl PartialRun {
     pub(crate) fn empty(bound: &BoundScene, replicates: u32) -> Self {
@@ -99,6 +99,7 @@ impl PartialRun {
         }
         t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| out.extend(x.to_le_bytes()));
         t.channels.iter().for_each(|c| sums(&mut out, c));
+        [&t.entered, &t.left].into_iter().for_each(|s| sums(&mut out, s));
         let c = &t.counts;
         let [one, other] = c.overlapping.map(u64::from);
         [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught, c.overlaps, one, other]
@@ -169,6 +170,8 @@ impl PartialRun {
         for channels in &mut t.channels {
             r.sums(channels)?;
         }
+        r.sums(&mut t.entered)?;
+        r.sums(&mut t.left)?;
         let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
         let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u32, r.u64()? as u32]);
@@ -217,6 +220,7 @@ fn same_shape(a: &Tallies, b: &Tallies) -> bool {
     cells
         && a.receivers.len() == b.receivers.len()
         && a.faces.len() == b.faces.len()
+        && a.left.len() == b.left.len()
         && a.bulk.len() == b.bulk.len()
 }
 

@@ -4,6 +4,7 @@ use super::bind::BoundScene;
 use super::digest::digest;
 use super::dispatch::kernel_kind;
 use super::effects::{Because, Required};
+use super::face_results::FaceResults;
 use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
@@ -57,6 +58,9 @@ pub struct Results {
     /// For each receiver the ways that light took to it, where that was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sequences: Vec<ReceiverSequences>,
+    /// What faces absorbed and let through, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub faces: Option<FaceResults>,
     /// Lost rays of the lowest index, at most 1000.
     #[serde(skip)]
     pub ledger: Vec<LostRay>,
@@ -178,6 +182,7 @@ impl Results {
                 .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum, bound.scene.run.unit))
                 .collect(),
             sequences: sequences(bound, &tallies, quantum),
+            faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, quantum)),
             ledger: std::mem::take(&mut tallies.ledger),
             paths: std::mem::take(&mut tallies.paths),
             cost,

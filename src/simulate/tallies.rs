@@ -21,6 +21,8 @@ pub struct ReplicateTally {
     pub(crate) moments: Vec<Moments>,
     /// By face, and by body.
     pub(crate) absorbed: Grid,
+    /// What passes each face, where that is asked for.
+    pub(crate) crossings: Option<FaceCrossings>,
     pub(crate) bulk: Grid,
     pub(crate) ends: Ends,
     pub(crate) counts: Counts,
@@ -32,6 +34,15 @@ pub struct ReplicateTally {
     pub(crate) deposits: Option<Vec<Deposit>>,
     /// Power by sequence, where that is asked for.
     pub(crate) sequences: SequenceTally,
+}
+
+/// Light that passes each face, by the way that it goes.
+#[derive(Debug)]
+pub(crate) struct FaceCrossings {
+    /// Into the body that the face bounds.
+    pub(crate) entered: Grid,
+    /// Out of it.
+    pub(crate) left: Grid,
 }
 
 /// Power by how it ended, quanta of one replicate.
@@ -52,6 +63,10 @@ impl ReplicateTally {
             receiver_totals: vec![0; bound.receivers.len()],
             moments: vec![Moments::default(); bound.receivers.len()],
             absorbed: Grid::new(bound.faces.len()),
+            crossings: bound.counts_faces().then(|| FaceCrossings {
+                entered: Grid::new(bound.faces.len()),
+                left: Grid::new(bound.faces.len()),
+            }),
             bulk: Grid::new(bound.bodies.len()),
             ends: Ends::default(),
             counts: Counts::default(),
@@ -67,6 +82,7 @@ impl ReplicateTally {
     pub(crate) fn discard(&mut self) {
         // Grids know their touched cells: clearing costs what was counted, not what there is.
         self.receivers.iter_mut().chain([&mut self.absorbed, &mut self.bulk]).for_each(Grid::clear);
+        self.crossings.iter_mut().flat_map(|c| [&mut c.entered, &mut c.left]).for_each(Grid::clear);
         self.receiver_totals.fill(0);
         self.moments.fill(Moments::default());
         self.ends = Ends::default();
@@ -119,6 +135,15 @@ impl ReplicateTally {
         self.absorbed.add(face.index(), quanta);
     }
 
+    /// Notes power that passes a face, where that is asked for.
+    #[inline]
+    pub(crate) fn cross(&mut self, face: FaceId, entering: bool, quanta: f64) {
+        if let Some(crossings) = &mut self.crossings {
+            let grid = if entering { &mut crossings.entered } else { &mut crossings.left };
+            grid.add(face.index(), quanta);
+        }
+    }
+
     /// Books a lost ray.
     #[cold]
     pub(crate) fn lose(&mut self, lost: LostRay) {
@@ -155,6 +180,10 @@ pub struct Tallies {
     pub channels: Vec<Vec<Sum>>,
     /// Power absorbed on each placed face.
     pub faces: Vec<Sum>,
+    /// Power that entered a body through each placed face; empty where that was not asked for.
+    pub entered: Vec<Sum>,
+    /// Power that left a body through each placed face; empty where that was not asked for.
+    pub left: Vec<Sum>,
     /// Power absorbed on each instance: its faces share the replicates' ups and downs, so their errors do not simply add up.
     pub instances: Vec<Sum>,
     /// Power absorbed inside each body, the surroundings first.
@@ -174,6 +203,7 @@ pub struct Tallies {
 
 impl Tallies {
     pub(crate) fn new(bound: &BoundScene) -> Self {
+        let crossed = if bound.counts_faces() { bound.faces.len() } else { 0 };
         Self {
             cells: bound.receivers.iter().map(|r| vec![Sum::default(); r.sum_count()]).collect(),
             receivers: vec![Sum::default(); bound.receivers.len()],
@@ -181,6 +211,8 @@ impl Tallies {
             spreads: vec![MomentSpread::default(); bound.receivers.len()],
             channels: bound.receivers.iter().map(|r| vec![Sum::default(); r.channels.count()]).collect(),
             faces: vec![Sum::default(); bound.faces.len()],
+            entered: vec![Sum::default(); crossed],
+            left: vec![Sum::default(); crossed],
             instances: vec![Sum::default(); bound.instances.len()],
             bulk: vec![Sum::default(); bound.bodies.len()],
             ..Self::default()
@@ -215,6 +247,10 @@ impl Tallies {
         // Only what got something: a replicate that adds nothing changes neither sum nor square.
         filled.for_each(|(sum, quanta)| sum.add_replicate(quanta));
         replicate.absorbed.flush(&mut self.faces);
+        if let Some(crossings) = &mut replicate.crossings {
+            crossings.entered.flush(&mut self.entered);
+            crossings.left.flush(&mut self.left);
+        }
         replicate.bulk.flush(&mut self.bulk);
         let e = std::mem::take(&mut replicate.ends);
         let ends = [e.emitted, e.received, e.absorbed, e.escaped, e.cut_off, e.lost];
@@ -238,6 +274,8 @@ impl Tallies {
         self.spreads.iter_mut().zip(&o.spreads).for_each(|(a, b)| a.merge(b));
         self.channels.iter_mut().zip(&o.channels).for_each(|(a, b)| merge_sums(a, b));
         merge_sums(&mut self.faces, &o.faces);
+        merge_sums(&mut self.entered, &o.entered);
+        merge_sums(&mut self.left, &o.left);
         merge_sums(&mut self.instances, &o.instances);
         merge_sums(&mut self.bulk, &o.bulk);
         self.ends.iter_mut().zip(&o.ends).for_each(|(a, b)| a.merge(b));

@@ -5,6 +5,7 @@ mod closed;
 mod contacts;
 mod discs;
 mod effects;
+mod face_power;
 mod facets;
 mod far_sources;
 #[path = "../support/files.rs"]

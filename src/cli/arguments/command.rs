@@ -277,6 +277,9 @@ pub(crate) struct TraceOptions {
     /// error; each ray is then traced twice, and no other figure changes
     #[arg(long, value_name = "N", conflicts_with = "verify_pruning")]
     pub(crate) sequences: Option<u32>,
+    /// List the N faces that absorb and let out most, with the power that enters and leaves their bodies through them and its error
+    #[arg(long, value_name = "N")]
+    pub(crate) faces: Option<u32>,
     /// Trace one ray again and show its path; a lost_rays.csv for all the rays in it; may be given several times
     #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "verify_pruning", "paths"])]
     pub(crate) replay: Vec<String>,

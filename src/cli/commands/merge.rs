@@ -6,7 +6,7 @@ use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::json::json_value;
-use crate::cli::output::{closing, sequence_tables};
+use crate::cli::output::{closing, face_tables, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::output_place::OutputPlace;
@@ -52,6 +52,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         None => Failure::from(error).with_help("where the scene has moved since, --scene FILE says where it is"),
     })?;
     scene.run.sequences = header.sequences;
+    scene.run.faces = header.faces;
     set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let cache = cache_folder::cache(command.cache)?;
@@ -101,6 +102,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
+    face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console);

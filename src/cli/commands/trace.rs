@@ -8,7 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::rule_table::{rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
-use crate::cli::output::{closing, sequence_tables};
+use crate::cli::output::{closing, face_tables, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
@@ -50,6 +50,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let monitor = TerminalMonitor::new(console);
     let (mut scene, loaded) = read_scene(command.scene, &monitor)?;
     scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
+    scene.run.faces = extra.faces.unwrap_or(scene.run.faces);
     let accuracy = extra.precision.accuracy;
     if accuracy.is_some() && (shard.is_some() || extra.resume) {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
@@ -166,6 +167,7 @@ fn trace_whole(
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say(&run, prepared, console)?;
+    face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Only after everything was written: until then it is all that would be left.

@@ -2,6 +2,7 @@
 
 pub(super) mod appearance;
 pub(super) mod closing;
+pub(super) mod face_tables;
 pub(super) mod json;
 pub(super) mod octree_shape;
 pub(super) mod receiver_files;

@@ -27,7 +27,7 @@ const MOST_DRAWN: usize = 60;
 const SHARE_DIGITS: usize = 4;
 
 /// Names of faces as ways have them: what selects each, without the braces around it, behind its instance where there are several.
-fn face_names(model: &Model) -> Vec<String> {
+pub(super) fn face_names(model: &Model) -> Vec<String> {
     let name = |(face, label): (PlacedFace<'_>, String)| {
         let bare = label.strip_prefix("on = { ").and_then(|l| l.strip_suffix(" }")).unwrap_or(&label);
         if model.instances.len() < 2 || bare.starts_with("instance") {

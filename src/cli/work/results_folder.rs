@@ -5,6 +5,7 @@ use super::output_place::{make_folder, require_space, rescue_folders};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
+use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
 use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
@@ -103,6 +104,7 @@ pub(crate) fn write(
     let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
+    face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);
     document["provenance"] = json_value(&provenance)?;
     let verdicts = run.verdicts(prepared).map_err(Failure::running)?;
     if !verdicts.is_empty() {
@@ -161,6 +163,7 @@ fn page<'a>(
             prepared.power_unit(),
         )
         .into_iter()
+        .chain(face_tables::face_section(&run.results, &prepared.job.loaded.model, prepared.power_unit()))
         .collect(),
         views: Vec::new(),
         tables: [

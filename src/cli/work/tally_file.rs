@@ -50,6 +50,9 @@ pub(crate) struct TallyHeader {
     /// Sequences that are listed for each receiver; 0 where light is not grouped.
     #[serde(default)]
     pub(crate) sequences: u32,
+    /// Faces that are listed with what they absorb and let through; 0 where that is not counted.
+    #[serde(default)]
+    pub(crate) faces: u32,
     pub(crate) command: String,
     /// What it took.
     #[serde(default)]
@@ -90,6 +93,7 @@ impl TallyHeader {
             normals: t.normals.map(|n| n.to_string()),
             shard,
             sequences: prepared.job.scene.run.sequences,
+            faces: prepared.job.scene.run.faces,
             command: console.command.clone(),
             usage: Usage::default(),
         })

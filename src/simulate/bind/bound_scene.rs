@@ -55,6 +55,11 @@ impl BoundScene {
         self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 
+    /// Whether the scene asks what passes each face.
+    pub(crate) fn counts_faces(&self) -> bool {
+        self.scene.run.faces > 0
+    }
+
     /// The body that light enters through a face; `None` where the face lets none in or no medium lies behind it.
     pub fn entered_body(&self, face: FaceId) -> Option<u32> {
         let optics = self.faces.get(face.index())?;

@@ -93,7 +93,10 @@ impl<'a> Context<'a> {
     /// Whether nothing is asked about a ray on its way but where it ends.
     pub(crate) fn asks_ends_only(&self) -> bool {
         let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;
-        self.passing.is_empty() && !self.plan.records_any() && !self.bound.receivers.iter().any(extra)
+        self.passing.is_empty()
+            && !self.plan.records_any()
+            && !self.bound.counts_faces()
+            && !self.bound.receivers.iter().any(extra)
     }
 
     /// Whether the polarisation of rays is followed.

@@ -192,6 +192,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             division.reflect(context, path, ray.direction, at)
         } else {
             self.record(path, at.point, Event::Transmitted, Some(at.hit.face));
+            if !C::ENDS_ONLY {
+                self.tally.cross(at.hit.face, at.entering, path.quanta);
+            }
             division.transmit(context, path, ray.direction, at)
         }
     }

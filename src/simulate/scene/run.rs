@@ -71,6 +71,9 @@ pub struct Run {
     /// Group light by the faces it met and what happened there, and list so many of these sequences for each receiver; 0 for none. Each
     /// ray is then traced twice.
     pub sequences: u32,
+    /// Count the light that enters and leaves its body through each face, and list so many faces by the power that they absorb and let
+    /// out; 0 for none.
+    pub faces: u32,
 }
 
 impl Default for Run {
@@ -91,6 +94,7 @@ impl Default for Run {
             glue_mm: GLUE_MM,
             replicates: 128,
             sequences: 0,
+            faces: 0,
         }
     }
 }
