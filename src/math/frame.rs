@@ -97,6 +97,12 @@ impl Frame {
         }
     }
 
+    /// Another frame moved along, its scale kept: where a thing of fixed size goes that stands in this one.
+    pub fn carry(&self, inner: &Self) -> Self {
+        // The frame of the scene changes no bit.
+        if self.is_identity() { *inner } else { Self { scale: inner.scale, ..self.compose(inner) } }
+    }
+
     /// The placement that undoes this one.
     pub fn inverse(&self) -> Self {
         // Axes of unit length at right angles: the inverse of the turn is its transpose.

@@ -97,6 +97,18 @@ impl Receiver {
         }
     }
 
+    /// The same where a placement puts it; of a placement that scales its place alone, as sizes are given in mm.
+    pub(crate) fn placed(mut self, placement: &Frame) -> Self {
+        match &mut self.shape {
+            Shape::Plane { frame, .. }
+            | Shape::Disc { frame, .. }
+            | Shape::Sphere { frame, .. }
+            | Shape::FarField { frame, .. } => *frame = placement.carry(frame),
+            Shape::Absorbed { .. } => {}
+        }
+        self
+    }
+
     /// Cells of one channel.
     pub(crate) fn cell_count(&self) -> usize {
         self.cells[0] as usize * self.cells[1] as usize

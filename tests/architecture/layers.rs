@@ -487,6 +487,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "role",
             "select",
             "face_selectors",
+            "frames",
             "chosen",
             "rule_table",
             "materials",

@@ -1,13 +1,14 @@
 //! A scene bound to a model: what every placed face does to light, as tables indexed by [`FaceId`](crate::math::FaceId).
 //!
 //! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `face_selectors`,
-//! `chosen`, `rule_table`, `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
+//! `frames`, `chosen`, `rule_table`, `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
 
 mod bodies;
 mod bound_scene;
 mod chosen;
 mod contacts;
 mod face_selectors;
+mod frames;
 mod materials;
 mod nearest;
 mod notes;
@@ -22,7 +23,7 @@ use super::receiver::Receiver;
 use super::scene::{Key, Material, ReceiverKind, Scene};
 use super::surfaces::{FaceOptics, Surface};
 use super::{Error, ErrorKind};
-use crate::math::{Aabb, Vector};
+use crate::math::{Aabb, Frame, Vector};
 use crate::model::Model;
 pub use bound_scene::{BoundScene, RuleFaces};
 use chosen::ChosenRules;
@@ -59,16 +60,18 @@ impl Scene {
             |f: &FaceOptics| f.touches_body && surfaces[f.surface as usize] != Surface::Interface;
         let coated_contacts = faces.iter().any(is_coated_contact);
         // Sources and receivers.
+        let source_frames: Vec<Frame> =
+            (0..self.sources.len()).map(|i| source_frame(self, model, i)).collect::<Result<_, _>>()?;
         let mut emitters = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
             let area = select::luminous_area(self, i, model)?;
             // Emitters need bodies: a source says by name what it lies in.
-            emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?);
+            emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?.placed(&source_frames[i]));
         }
         let receivers = bind_receivers(self, model)?;
         let faces_box = model.placed_faces().map(|f| nearest::face_bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
         let scene_box = receivers.iter().map(Receiver::bounds).fold(faces_box, Aabb::union);
-        start_near(self, &mut emitters, &bodies[AMBIENT as usize], &scene_box)?;
+        start_near(self, &mut emitters, &source_frames, &bodies[AMBIENT as usize], &scene_box)?;
         let region = emitters.iter().map(Emitter::extent).fold(faces_box, Aabb::union);
         let region = if region.is_empty() { region } else { region.grown(REGION_MARGIN * region.diagonal()) };
         let mut bound = BoundScene {
@@ -152,12 +155,19 @@ fn bind_faces(
 
 /// Lets the rays of sources that are far away start beside the scene, which lies in a box. Surroundings that absorb or scatter take a
 /// part in what comes of them on their way; there they start where they are.
-fn start_near(scene: &Scene, emitters: &mut [Emitter], ambient: &Body, scene_box: &Aabb) -> Result<(), Error> {
+fn start_near(
+    scene: &Scene,
+    emitters: &mut [Emitter],
+    frames: &[Frame],
+    ambient: &Body,
+    scene_box: &Aabb,
+) -> Result<(), Error> {
     if ambient.absorbs() || ambient.scatter.is_some() {
         return Ok(());
     }
     for (i, emitter) in emitters.iter_mut().enumerate() {
-        let direction = Vector::from_array(scene.sources[i].direction);
+        // As the scene gives it: a unit vector would have lost a digit over such a distance.
+        let direction = frames[i].direction(Vector::from_array(scene.sources[i].direction));
         emitter.start_near(scene_box, direction).map_err(|message| {
             let at = [Key::Name("source"), Key::Index(i), Key::Name("at")];
             let error = scene.error(ErrorKind::Value, &at, format!("this source cannot be traced: {message}"));
@@ -165,6 +175,12 @@ fn start_near(scene: &Scene, emitters: &mut [Emitter], ambient: &Body, scene_box
         })?;
     }
     Ok(())
+}
+
+/// The frame that a source is given in.
+fn source_frame(scene: &Scene, model: &Model, index: usize) -> Result<Frame, Error> {
+    let of = [Key::Name("source"), Key::Index(index)];
+    frames::frame(scene, model, of, scene.sources[index].frame.as_deref())
 }
 
 /// The receivers, with the faces that absorbing ones name.
@@ -175,7 +191,9 @@ fn bind_receivers(scene: &Scene, model: &Model) -> Result<Vec<Receiver>, Error> 
             ReceiverKind::Absorbed => select::absorbing_faces(scene, i, model)?,
             _ => Vec::new(),
         };
-        receivers.push(Receiver::new(r, faces));
+        let of = [Key::Name("receiver"), Key::Index(i)];
+        let placement = frames::frame(scene, model, of, r.frame.as_deref())?;
+        receivers.push(Receiver::new(r, faces).placed(&placement));
     }
     Ok(receivers)
 }

@@ -202,7 +202,7 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
 }
 
 /// The nearest name, or what names there are.
-fn advice(word: &str, mut names: Vec<&str>) -> String {
+pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
     if let Some(near) = suggest::nearest(word, names.iter().copied().filter(|n| !n.is_empty())) {
         return format!("did you mean '{near}'?");
     }

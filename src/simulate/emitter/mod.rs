@@ -150,6 +150,15 @@ impl Emitter {
         })
     }
 
+    /// The same where a placement puts it.
+    pub(crate) fn placed(mut self, placement: &Frame) -> Self {
+        self.frame = placement.carry(&self.frame);
+        if !placement.is_identity() {
+            self.polarised = self.polarised.map(|field| placement.direction(field));
+        }
+        self
+    }
+
     /// Which pairs of numbers it draws from the net: for the place, the direction, the wavelength.
     fn needed_pairs(&self) -> [bool; 3] {
         let list = matches!(self.shape, Shape::List(_));

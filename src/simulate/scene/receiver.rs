@@ -14,6 +14,9 @@ pub struct Receiver {
     pub name: String,
     /// What it is.
     pub kind: ReceiverKind,
+    /// Instance, or part that is placed once, in whose own coordinates `at`, `normal`, `x` and `up` are given: the receiver goes where it
+    /// goes.
+    pub frame: Option<String>,
     /// Centre of a plane, disc or sphere, mm.
     pub at: [f64; 3],
     /// Normal of a plane or disc; the main direction of a far field or of a sphere's cells: H 0, V 0, or γ 0.
@@ -60,6 +63,7 @@ impl Default for Receiver {
         Self {
             name: String::new(),
             kind: ReceiverKind::Plane,
+            frame: None,
             at: [0.0; 3],
             normal: [0.0, 0.0, 1.0],
             x: None,
@@ -161,7 +165,8 @@ impl Receiver {
         use ReceiverKind::{Absorbed, Disc, FarField, Plane, Sphere};
         let unset = Self::default();
         // One table for all kinds: a new key that is missing here would be ignored in silence.
-        let keys: [(&str, bool, &[ReceiverKind], &str); 13] = [
+        let keys: [(&str, bool, &[ReceiverKind], &str); 14] = [
+            ("frame", self.frame.is_some(), &[Plane, Disc, Sphere, FarField], "plane, disc, sphere or far_field"),
             ("at", self.at != unset.at, &[Plane, Disc, Sphere], "plane, disc or sphere"),
             (
                 "normal",

@@ -26,6 +26,9 @@ pub struct Source {
     pub file: Option<String>,
     /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`.
     pub on: Option<FaceSelector>,
+    /// Instance, or part that is placed once, in whose own coordinates `at`, `direction`, `x` and `polarised` are given, and the rays of a
+    /// list: the source goes where it goes.
+    pub frame: Option<String>,
     /// Position or centre, mm.
     pub at: [f64; 3],
     /// Main direction; need not be of unit length.
@@ -64,6 +67,7 @@ impl Default for Source {
             power: None,
             file: None,
             on: None,
+            frame: None,
             at: [0.0; 3],
             direction: [0.0, 0.0, 1.0],
             x: None,
@@ -152,6 +156,12 @@ impl Source {
         }
         if self.on.is_some() && measured {
             return Some(("on", "a measured source does not shine from faces".into()));
+        }
+        if self.on.is_some() && self.frame.is_some() {
+            return Some((
+                "frame",
+                "faces that shine are where they are: `frame` belongs to a source with `at`".into(),
+            ));
         }
         if self.on.is_some() && sized {
             return Some(("on", "faces that shine have neither `radius` nor `size`".into()));

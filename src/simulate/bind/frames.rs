@@ -1,0 +1,30 @@
+//! The frames of parts, in which sources and receivers may be given.
+
+use super::select::advice;
+use crate::math::Frame;
+use crate::model::Model;
+use crate::simulate::scene::{Key, Scene};
+use crate::simulate::{Error, ErrorKind};
+
+/// The placement of the instance that `frame` names, or of the only instance of a part of this name; that of the scene without a name.
+pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option<&str>) -> Result<Frame, Error> {
+    let Some(name) = name else { return Ok(Frame::IDENTITY) };
+    let at = [of[0], of[1], Key::Name("frame")];
+    // An instance says which of several is meant, so that its name comes first.
+    let mut named: Vec<_> = model.instances.iter().filter(|i| i.name == name).collect();
+    if named.is_empty() {
+        named = model.instances.iter().filter(|i| model.part(i.part).name == name).collect();
+    }
+    match named[..] {
+        [instance] => Ok(instance.placement),
+        [] => {
+            let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
+            let error = scene.error(ErrorKind::NoMatch, &at, format!("no instance or part is called '{name}'"));
+            Err(error.help(advice(name, names.collect())))
+        }
+        _ => {
+            let message = format!("'{name}' is placed {} times, each with a frame of its own", named.len());
+            Err(scene.error(ErrorKind::NoMatch, &at, message).help("name an instance that there is once"))
+        }
+    }
+}
