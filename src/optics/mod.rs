@@ -15,6 +15,7 @@ mod abg;
 pub mod catalogue;
 mod cie;
 mod coating;
+mod colour;
 mod effects;
 mod error;
 pub mod fresnel;
@@ -32,6 +33,7 @@ mod testing;
 
 pub use abg::Abg;
 pub use coating::{Coating, CoatingTable, Split};
+pub use colour::{linear_srgb, srgb_byte};
 pub use effects::{Effect, Effects};
 pub use error::{Error, ErrorKind};
 pub use intensity::IntensitySampler;

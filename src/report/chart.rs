@@ -2,7 +2,7 @@
 
 use super::contour::{Isoline, isolines, round_levels};
 use super::figures;
-use crate::formats::{ColourMap, Grid};
+use crate::formats::{Axis, ColourMap, Grid, Picture};
 
 /// A picture in two dimensions: interactive in the page, static beside it.
 #[derive(Clone, Debug)]
@@ -57,6 +57,13 @@ pub enum Content {
         map: ColourMap,
         /// Lines and points over it.
         marks: Box<Marks>,
+    },
+    /// A picture over two axes, a pixel a cell.
+    Picture {
+        /// The axes; the second points up.
+        axes: [Axis; 2],
+        /// The pixels.
+        picture: Picture,
     },
 }
 
@@ -178,6 +185,13 @@ impl Chart {
                 marks: Box::new(Marks { lines, ..Marks::default() }),
             },
         }
+    }
+
+    /// A picture over two axes.
+    pub fn picture(name: &str, title: &str, caption: &str, axes: [Axis; 2], picture: Picture) -> Self {
+        let [x, y] = [0, 1].map(|k| AxisStyle::linear(&axes[k].label, &axes[k].unit));
+        let content = Content::Picture { axes, picture };
+        Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, equal_scales: false, content }
     }
 
     /// The map with named places and borders of zones.

@@ -10,6 +10,7 @@
 
 mod chart;
 mod chart_png;
+mod colour_picture;
 mod contour;
 mod cross_check;
 mod document;
@@ -18,6 +19,7 @@ mod errors;
 mod framing;
 mod html;
 mod lamp_figures;
+mod level_labels;
 mod maps;
 mod number;
 mod plotly;
@@ -35,6 +37,7 @@ mod write;
 
 pub use crate::formats::file_stem;
 pub use chart::{AxisStyle, Chart, Content, MapPoint, Marks, Series, SeriesStyle};
+pub use colour_picture::colour_picture;
 pub use contour::Isoline;
 pub use cross_check::{CheckReport, verdict};
 pub use document::{Block, Report, Section};

@@ -1,12 +1,10 @@
 //! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
 
 use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
-use super::contour::Isoline;
-use super::figures;
+use super::level_labels::level_labels;
 use super::raster::{EYE, common_range};
-use super::static_chart::longest_of_levels;
 use super::view::{Shape, View};
-use crate::formats::{ColourMap, base64};
+use crate::formats::{Axis, ColourMap, Picture, base64};
 use serde_json::{Value, json};
 use std::io::Read;
 
@@ -102,10 +100,11 @@ pub(super) fn chart(chart: &Chart) -> Value {
             data.extend(mark_traces(marks));
             (
                 data,
-                json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_labels(marks),
+                json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_annotations(marks, &grid.axes, same),
                 "showlegend": false, "meta": {"unit": grid.unit, "scales": "both"}}),
             )
         }
+        Content::Picture { axes, picture } => picture_trace(axes, picture),
     };
     let along = |k: usize| -> Vec<f64> {
         match &chart.content {
@@ -162,14 +161,43 @@ fn mark_traces(marks: &Marks) -> Vec<Value> {
     traces
 }
 
-/// The level at the middle of the longest line of each.
-fn level_labels(marks: &Marks) -> Vec<Value> {
-    let label = |line: &Isoline| {
-        let [x, y] = line.points[line.points.len() / 2];
-        json!({"x": x, "y": y, "text": figures(line.level, 3), "showarrow": false, "font": {"color": "#ffffff", "size": 11},
-            "bgcolor": "rgba(0,0,0,0.35)"})
+/// Pixels of the longer side of a map in the page, about: pages have two columns, which windows make wider or narrower.
+const MAP_PIXELS: f64 = 260.0;
+
+/// Width of a digit and height of a line of the labels in the page, pixels.
+const LETTER: [f64; 2] = [6.5, 15.0];
+
+/// The levels of lines, where there is room for them; `same` where a unit has one length along both axes.
+fn level_annotations(marks: &Marks, axes: &[Axis; 2], same: bool) -> Vec<Value> {
+    let spans = [0, 1].map(|k| axes[k].range[1] - axes[k].range[0]);
+    let pixel = |at: [f64; 2]| {
+        let span = |k: usize| if same { spans[0].max(spans[1]) } else { spans[k] };
+        [0, 1].map(|k| MAP_PIXELS * at[k] / span(k))
     };
-    longest_of_levels(&marks.lines).into_iter().map(label).collect()
+    let labels = level_labels(marks, pixel, LETTER).into_iter().map(|label| {
+        json!({"x": label.at[0], "y": label.at[1], "text": label.text, "showarrow": false,
+            "font": {"color": "#ffffff", "size": 11}, "bgcolor": "rgba(0,0,0,0.35)"})
+    });
+    labels.collect()
+}
+
+/// A picture with its bottom row first.
+fn upside_down(picture: &Picture) -> Picture {
+    let rows = picture.rgb.chunks(3 * picture.width.max(1) as usize).rev();
+    Picture { rgb: rows.flatten().copied().collect(), ..*picture }
+}
+
+/// A picture over its axes; one that has no pixels leaves them empty.
+fn picture_trace([a, b]: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
+    // Row after row along the axis, which points up: the other way, with steps downward, plotly draws it upside down.
+    let source = upside_down(picture).to_png().map(|bytes| format!("data:image/png;base64,{}", base64(&bytes)));
+    let image = json!({"type": "image", "source": source.ok(), "x0": a.center(0), "dx": a.step(),
+        "y0": b.center(0), "dy": b.step(),
+        "hovertemplate": format!("{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<extra></extra>", a.label, a.unit, b.label, b.unit)});
+    let anchor = if a.unit == b.unit { json!("x") } else { json!(false) };
+    let layout = json!({"yaxis": {"autorange": true, "scaleanchor": anchor, "constrain": "domain"},
+        "xaxis": {"constrain": "domain"}, "showlegend": false});
+    (vec![image], layout)
 }
 
 /// A series as plotly's trace.
@@ -274,9 +302,21 @@ fn merge(into: &mut Value, from: Value) {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
+    /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
+    #[test]
+    fn pictures_begin_at_the_bottom() {
+        let picture = Picture { width: 1, height: 2, rgb: vec![1, 2, 3, 4, 5, 6] };
+        assert_eq!(upside_down(&picture).rgb, [4, 5, 6, 1, 2, 3]);
+        let axis = |range, cells| Axis { label: "x".into(), unit: "mm".into(), range, cells };
+        let (data, _) = picture_trace(&[axis([0.0, 1.0], 1), axis([-2.0, 2.0], 2)], &picture);
+        assert_eq!([data[0]["y0"].as_f64(), data[0]["dy"].as_f64()], [Some(-1.0), Some(2.0)]);
+    }
+
     #[test]
     fn the_script_is_whole_and_can_stand_in_a_page() {
-        let script = super::script();
+        let script = script();
         assert_eq!(script.len(), 4_653_932);
         assert!(script.contains("plotly.js v3.0.1") && !script.contains("</script"));
     }

@@ -1,5 +1,6 @@
 //! What the page shows of one receiver: its map, and what people of the trade read beside it.
 
+use super::colour_picture::colour_chart;
 use super::framing::lit_part;
 use super::lamp_figures::{encircled_power, polar, table};
 use super::maps::{reading, spoken};
@@ -24,9 +25,10 @@ pub(super) fn map(r: &ReceiverResult, grid: &Grid) -> Chart {
     }
 }
 
-/// The polar diagram of a luminaire, the encircled power of a spot, the figures of a lamp: those that apply.
+/// The colours of a receiver that counts them, the polar diagram of a luminaire, the encircled power of a spot, the figures of a lamp: those that apply.
 pub(super) fn more(r: &ReceiverResult, grid: &Grid, results: &Results, judged: Option<&Assessment>) -> Vec<Block> {
     let in_candela = r.kind == "far_field" && grid.unit == "cd";
-    let charts = [polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
+    let charts =
+        [colour_chart(grid), polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
     charts.chain(in_candela.then(|| Block::Table(table(r, grid, results, judged)))).collect()
 }

@@ -1,10 +1,10 @@
 //! The static picture of a chart: its scales, axes, lines, bars, legend or map as elements.
 
 use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
-use super::contour::Isoline;
-use super::drawing::{Anchor, Drawing, Element, Ink, Place};
+use super::drawing::{Anchor, Drawing, Element, Ink, Place, TYPE_SIZE};
+use super::level_labels::level_labels;
 use super::number::figures;
-use crate::formats::{ColourMap, Grid, Picture};
+use crate::formats::{Axis, ColourMap, Grid, Picture};
 
 /// Size of a chart in the drawing's units.
 const WIDTH: f64 = 760.0;
@@ -95,6 +95,9 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
         Content::Map { grid, map, marks } => {
             let scales = map_chart(elements, chart, grid, *map);
             draw_marks(elements, marks, &grid.unit, scales);
+        }
+        Content::Picture { axes, picture } => {
+            pixels(elements, chart, axes, picture.clone());
         }
     }
     drawing
@@ -280,17 +283,29 @@ fn bar_chart(
     legend(elements, &names);
 }
 
-/// Draws a map in colours beside their bar; returns the scales on which it stands.
-fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) -> [Scale; 2] {
+/// Room for the colour bar beside a map.
+const BAR_ROOM: f64 = 74.0;
+
+/// A linear scale of exactly this range.
+fn linear_scale([low, high]: [f64; 2], [from, to]: [f64; 2]) -> Scale {
+    Scale { low, high, log: false, from, to }
+}
+
+/// Draws the cells of a map or a picture over its axes; returns the scales on which they stand.
+fn pixels(elements: &mut Vec<Element>, chart: &Chart, [a, b]: &[Axis; 2], picture: Picture) -> [Scale; 2] {
     let [left, top, right, bottom] = AREA;
-    // Room for the colour bar.
-    let right = right - 74.0;
-    let plain =
-        |range: [f64; 2], to: [f64; 2]| Scale { low: range[0], high: range[1], log: false, from: to[0], to: to[1] };
-    let (x, y) = (plain(grid.axes[0].range, [left, right]), plain(grid.axes[1].range, [bottom, top]));
-    let picture = Picture::of_grid(grid, map, 1, 1.0);
+    let right = right - BAR_ROOM;
+    let (x, y) = (linear_scale(a.range, [left, right]), linear_scale(b.range, [bottom, top]));
     elements.push(Element::Pixels { corner: [left, top], size: [right - left, bottom - top], picture });
     axes(elements, chart, Some(&x), &y, right);
+    [x, y]
+}
+
+/// Draws a map in colours beside their bar; returns the scales on which it stands.
+fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: ColourMap) -> [Scale; 2] {
+    let [_, top, right, bottom] = AREA;
+    let scales = pixels(elements, chart, &grid.axes, Picture::of_grid(grid, map, 1, 1.0));
+    let right = right - BAR_ROOM;
     let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
     let steps = 64;
     for k in 0..steps {
@@ -300,17 +315,20 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
         // A little taller than its step: no seam shows between two.
         elements.push(Element::Rectangle { corner, size: [14.0, h + 0.3], radius: 0.0, ink });
     }
-    let bar = plain([low, high], [bottom, top]);
+    let bar = linear_scale([low, high], [bottom, top]);
     for t in bar.ticks() {
         elements.push(tick_label(figures(t, 3), [right + 30.0, bar.position(t) + 4.0], Anchor::Start));
     }
     elements.push(label(grid.unit.clone(), [right + 30.0, bottom + 19.0], Anchor::Middle));
-    [x, y]
+    scales
 }
 
 /// The colour of lines and words on a map, and of the borders of zones: both stand against every colour of it.
 const MARK: Ink = Ink::Colour([255, 255, 255]);
 const ZONE: Ink = Ink::Colour([0x5e, 0xea, 0xd4]);
+
+/// Width of a digit, which most fonts have at about half of the height of the type, with room to either side.
+const LETTER_WIDTH: f64 = 0.6 * TYPE_SIZE;
 
 /// How strongly the lines of equal value stand against the map.
 const LINE_OPACITY: f64 = 0.75;
@@ -334,9 +352,8 @@ fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str, [x, y]: [S
         let points: Vec<Place> = outline.iter().map(place).collect();
         elements.push(Element::Line { points, ink: ZONE, width: 1.2, opacity: 1.0, dashed: true });
     }
-    for line in longest_of_levels(&marks.lines) {
-        let middle = place(&line.points[line.points.len() / 2]);
-        elements.push(word(figures(line.level, 3), middle, MARK, Anchor::Middle));
+    for label in level_labels(marks, |at| place(&at), [LETTER_WIDTH, TYPE_SIZE]) {
+        elements.push(word(label.text, place(&label.at), MARK, Anchor::Middle));
     }
     for point in &marks.points {
         let at = place(&point.at);
@@ -349,17 +366,4 @@ fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str, [x, y]: [S
         let text = format!("lines: {unit}, from {}", figures(line.level, 3));
         elements.push(word(text, corner, MARK, Anchor::Start));
     }
-}
-
-/// The longest line of each level, which bears its name.
-pub(super) fn longest_of_levels(lines: &[Isoline]) -> Vec<&Isoline> {
-    let mut longest: Vec<&Isoline> = Vec::new();
-    for line in lines {
-        match longest.iter_mut().find(|l| l.level == line.level) {
-            Some(known) if known.points.len() < line.points.len() => *known = line,
-            Some(_) => {}
-            None => longest.push(line),
-        }
-    }
-    longest
 }

@@ -162,6 +162,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "optics",
         &[
             "cie",
+            "colour",
             "effects",
             "error",
             "testing",
@@ -188,6 +189,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "number",
             "contour",
             "chart",
+            "level_labels",
             "maps",
             "provenance",
             "drawing",
@@ -200,6 +202,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "view",
             "document",
             "lamp_figures",
+            "colour_picture",
             "receiver_blocks",
             "verdicts",
             "cross_check",

@@ -3,9 +3,9 @@
 use crate::cli::failure::Failure;
 use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
-    write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_tm25, write_vti,
+    write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
-use crate::report::{file_stem, photometric_grid, receiver_grid};
+use crate::report::{colour_picture, file_stem, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::FarFieldType;
 use std::path::Path;
@@ -37,6 +37,10 @@ pub(crate) fn write(
     for (extension, write) in writers {
         names.push(format!("{stem}.{extension}"));
         write(&folder.join(format!("{stem}.{extension}")), &grid)?;
+    }
+    if let Some(picture) = colour_picture(&grid) {
+        names.push(format!("{stem}-colours.png"));
+        write_png(&folder.join(format!("{stem}-colours.png")), &picture)?;
     }
     if matches!(receiver.kind, "plane" | "disc") {
         names.push(format!("{stem}.tm25ray"));

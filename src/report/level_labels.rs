@@ -1,0 +1,112 @@
+//! Where the levels of lines of equal value are written: each on its line, and none over another.
+
+use super::chart::Marks;
+use super::contour::Isoline;
+use super::number::figures;
+
+/// Digits of a level.
+const DIGITS: usize = 3;
+
+/// Places that are tried along a line, as shares of it: its middle first.
+const PLACES: [f64; 7] = [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875];
+
+/// A level and where it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LevelLabel {
+    pub(super) text: String,
+    /// The middle of the text, in the coordinates of the map.
+    pub(super) at: [f64; 2],
+}
+
+/// Half of the room that a text takes: characters are so wide, lines so high.
+fn half_size(text: &str, [width, height]: [f64; 2]) -> [f64; 2] {
+    [0.5 * width * text.chars().count() as f64, 0.5 * height]
+}
+
+/// The level of the longest line of each that has room for it, from the highest down: the brightest levels are the ones that count.
+/// `place` gives where a point of the map is in the picture, `letter` the width of a character and the height of a line there.
+pub(super) fn level_labels(
+    marks: &Marks,
+    place: impl Fn([f64; 2]) -> [f64; 2],
+    letter: [f64; 2],
+) -> Vec<LevelLabel> {
+    // Middle and half size of what is written already: the names of points stand to the right of them.
+    let mut taken: Vec<[[f64; 2]; 2]> = Vec::new();
+    for point in &marks.points {
+        let half = half_size(&point.name, letter);
+        let [x, y] = place(point.at);
+        taken.push([[x + half[0] + letter[0], y - half[1]], half]);
+    }
+    let mut longest = longest_of_levels(&marks.lines);
+    longest.sort_by(|a, b| b.level.total_cmp(&a.level));
+    let mut labels = Vec::new();
+    for line in longest {
+        let text = figures(line.level, DIGITS);
+        let half = half_size(&text, letter);
+        let is_free = |[x, y]: [f64; 2]| {
+            taken.iter().all(|[m, h]| (x - m[0]).abs() > half[0] + h[0] || (y - m[1]).abs() > half[1] + h[1])
+        };
+        let candidates = PLACES.map(|share| line.points[(share * (line.points.len() - 1) as f64) as usize]);
+        // A level without room is left out: two texts over each other say less than one.
+        if let Some(at) = candidates.into_iter().find(|at| is_free(place(*at))) {
+            taken.push([place(at), half]);
+            labels.push(LevelLabel { text, at });
+        }
+    }
+    labels
+}
+
+/// The longest line of each level, which bears its name.
+fn longest_of_levels(lines: &[Isoline]) -> Vec<&Isoline> {
+    let mut longest: Vec<&Isoline> = Vec::new();
+    for line in lines {
+        match longest.iter_mut().find(|l| l.level == line.level) {
+            Some(known) if known.points.len() < line.points.len() => *known = line,
+            Some(_) => {}
+            None => longest.push(line),
+        }
+    }
+    longest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chart::MapPoint;
+    use super::*;
+
+    fn labels(marks: &Marks) -> Vec<String> {
+        level_labels(marks, |p| p, [7.0, 13.0]).into_iter().map(|l| l.text).collect()
+    }
+
+    /// Upright lines at a steep flank, 5 units apart, each 200 long: labels of three characters are 21 wide and 13 high, so that
+    /// neighbours must stand at other heights; of ten lines seven places are enough, for every fifth is far enough aside.
+    #[test]
+    fn labels_at_a_steep_flank_stand_apart() {
+        let upright = |k: usize| Isoline {
+            level: 100.0 * (k + 1) as f64,
+            points: (0..=200).map(|y| [5.0 * k as f64, f64::from(y)]).collect(),
+        };
+        let marks = Marks { lines: (0..9).map(upright).collect(), ..Marks::default() };
+        let found = level_labels(&marks, |p| p, [7.0, 13.0]);
+        assert_eq!(found.len(), 9);
+        for (k, a) in found.iter().enumerate() {
+            for b in &found[..k] {
+                assert!((a.at[0] - b.at[0]).abs() > 21.0 || (a.at[1] - b.at[1]).abs() > 13.0, "{a:?} {b:?}");
+            }
+        }
+        // On short lines there is no other height: the highest level stays, and those that are far enough from it.
+        let short = |k: usize| Isoline { points: vec![[5.0 * k as f64, 0.0]; 6], ..upright(k) };
+        let marks = Marks { lines: (0..9).map(short).collect(), ..Marks::default() };
+        assert_eq!(labels(&marks), ["900", "400"]);
+    }
+
+    #[test]
+    fn names_of_points_are_not_written_over() {
+        let line = Isoline { level: 5.0, points: vec![[20.0, -6.0]; 6] };
+        let point = MapPoint { name: "HV".into(), note: String::new(), at: [10.0, 0.0] };
+        let mut marks = Marks { lines: vec![line], points: vec![point], ..Marks::default() };
+        assert!(labels(&marks).is_empty());
+        marks.points[0].at = [10.0, 40.0];
+        assert_eq!(labels(&marks), ["5"]);
+    }
+}
