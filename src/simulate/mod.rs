@@ -13,7 +13,7 @@
 //!
 //! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `channels`, `disc_cells`,
 //! `receiver`, `seconds`, `settings`, `surfaces`, `body`, `tally`, `trim_loops`, `emitter`, `bind`, `effects`, `plan`, `run_notes`,
-//! `sequence`, `tallies`, `digest`, `kernel`, `dispatch`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`,
+//! `sequence`, `tallies`, `digest`, `kernel`, `dispatch`, `listed_rays`, `partial_run`, `hooks`, `gather`, `recorder`, `sequence_recorder`,
 //! `sequence_results`, `face_results`, `receiver_results`, `results`, `arrivals`, `run`, `verify`.
 
 mod arrivals;
@@ -31,6 +31,7 @@ mod face_results;
 mod gather;
 mod hooks;
 mod kernel;
+mod listed_rays;
 mod outcome;
 mod partial_run;
 mod plan;
@@ -60,6 +61,7 @@ pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};
 pub use face_results::{FaceResult, FaceResults};
 pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
+pub use listed_rays::{ListedEnd, listed_ends, ray_lists};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::{Fingerprint, PartialRun};
 pub use plan::GROWING_REPLICATE;

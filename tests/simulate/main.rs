@@ -19,6 +19,7 @@ mod imaging;
 mod instanced;
 mod laid;
 mod laws;
+mod listed_rays;
 mod pipeline;
 mod polished;
 mod refusals;

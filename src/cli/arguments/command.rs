@@ -273,6 +273,11 @@ pub(crate) struct TraceOptions {
     /// received, escaped, cut off, lost
     #[arg(long, value_name = "FILE.npz", conflicts_with_all = ["resume", "verify_pruning"])]
     pub(crate) paths: Option<PathBuf>,
+    /// Trace every ray of the scene's ray lists once more, whatever share of the power it has, and write where each ended: source, ray
+    /// (its place in the list), branch, event (numbered as for --paths), face (-1 for none), bounces, point (mm; of light that left
+    /// one on its way), direction and power (what came there, in the unit of the run)
+    #[arg(long, value_name = "FILE.npz|csv", conflicts_with_all = ["shard", "replay"])]
+    pub(crate) ends: Option<PathBuf>,
     /// Group the light of each receiver by the faces it met and what happened there, and list the N ways of most power, each with its
     /// error; each ray is then traced twice, and no other figure changes
     #[arg(long, value_name = "N", conflicts_with = "verify_pruning")]

@@ -15,7 +15,7 @@ use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, requir
 use crate::cli::work::path_file::PathFile;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
-use crate::cli::work::{input_files, lost_rays, results_folder, shards};
+use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards};
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TargetResult,
     TraceRequest, TracingSettings, read_scene, settings_for_accuracy,
@@ -72,6 +72,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let mut prepared = PreparedScene::new(job, &monitor)?;
     let target =
         extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &prepared.job.scene)).transpose()?;
+    end_file::check(&prepared, extra.ends.as_deref())?;
     lost_rays::warn(&prepared, console);
     if extra.dry_run {
         return dry_run(&prepared, folder, console);
@@ -166,6 +167,7 @@ fn trace_whole(
     let missed = result.as_ref().is_some_and(|result| !result.reached) || unsettled;
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
+    end_file::write(prepared, extra.ends.as_deref(), console)?;
     verdicts::say(&run, prepared, console)?;
     face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;

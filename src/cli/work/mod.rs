@@ -1,12 +1,13 @@
 //! What commands share: from options and files to runs, and what is made of these.
 //!
-//! Inner modules, each of which sees only those before it: `threads`, `path_file`, `terminal_monitor` and `input_files` (the ingredients),
-//! `output_place`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and `contenders` (what is made
+//! Inner modules, each of which sees only those before it: `threads`, `path_file`, `end_file`, `terminal_monitor` and `input_files` (the
+//! ingredients), `output_place`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and `contenders` (what is made
 //! of a run).
 
 pub(super) mod cache_folder;
 pub(super) mod checkpoint;
 pub(super) mod contenders;
+pub(super) mod end_file;
 pub(super) mod input_files;
 pub(super) mod lost_rays;
 pub(super) mod output_place;

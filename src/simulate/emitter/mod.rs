@@ -18,7 +18,7 @@ use super::receiver::far_axes;
 use super::scene::{self, Scene, SourceKind};
 use super::surfaces::SceneLight;
 use super::{Error, ErrorKind};
-use crate::formats::PhotometricType;
+use crate::formats::{LightRay, PhotometricType};
 use crate::intersect::Beam;
 use crate::math::{Aabb, FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
@@ -214,6 +214,30 @@ impl Emitter {
         Some(wavelengths.sample(stream.pair(index, 2)[0]))
     }
 
+    /// The measured rays of this source, where it has a list.
+    pub(crate) fn list(&self) -> Option<&RayList> {
+        match &self.shape {
+            Shape::List(list) => Some(list),
+            _ => None,
+        }
+    }
+
+    /// A ray of the list of this source, by its place there; one that there is not is left as it was.
+    fn emit_listed(&self, stream: &Stream, index: RayIndex, listed: u64, ray: &mut Ray) -> Emission {
+        let wavelength = self.wavelength(stream, index);
+        match self.list().and_then(|list| list.rays.get(listed as usize)) {
+            Some(measured) => self.emit_measured(measured, wavelength, ray),
+            None => Emission { from: None, wavelength },
+        }
+    }
+
+    /// A measured ray, which has its own wavelength where the source draws none.
+    #[inline(always)]
+    fn emit_measured(&self, measured: &LightRay, drawn: Option<f64>, ray: &mut Ray) -> Emission {
+        *ray = Ray::new(self.frame.point(measured.origin), self.frame.direction(measured.direction));
+        Emission { from: None, wavelength: drawn.or(measured.wavelength_nm) }
+    }
+
     /// A ray of this source.
     #[inline(never)]
     fn emit(&self, stream: &Stream, index: RayIndex, ray: &mut Ray) -> Emission {
@@ -243,10 +267,7 @@ impl Emitter {
             // A measured ray has a place and a direction of its own, and perhaps a wavelength. Systematic sampling: shares evenly
             // spaced over the list take from every part what it has.
             Shape::List(list) => {
-                let r = list.ray_at_share(stream.systematic(index));
-                *ray = Ray::new(f.point(r.origin), f.direction(r.direction));
-                emission.wavelength = emission.wavelength.or(r.wavelength_nm);
-                return emission;
+                return self.emit_measured(list.ray_at_share(stream.systematic(index)), emission.wavelength, ray);
             }
         }
         ray.direction = match &self.lobe {

@@ -61,6 +61,15 @@ impl RaySampler {
         (index, emission)
     }
 
+    /// Puts a ray of the emitter's list, by its place there, into `ray`.
+    pub(crate) fn listed_ray(&mut self, emitter: &Emitter, listed: u64, ray: &mut Ray) -> (RayIndex, Emission) {
+        self.stream.prepare_single(0);
+        let index = RayIndex { in_run: listed, in_stream: 0 };
+        let emission = emitter.emit_listed(&self.stream, index, listed, ray);
+        emitter.bring_near(ray);
+        (index, emission)
+    }
+
     #[inline(always)]
     fn index(&self, in_stream: u32) -> RayIndex {
         RayIndex { in_run: self.first + u64::from(in_stream), in_stream }

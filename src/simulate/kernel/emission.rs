@@ -13,6 +13,7 @@ use crate::math::Ray;
 use crate::optics::polarised::Stokes;
 use crate::simulate::emitter::{Emission, RaySampler, Stream};
 use crate::simulate::outcome::{Event, LostCause};
+use crate::simulate::scene::Sampling;
 use crate::simulate::tally::quanta_as_integer;
 
 /// Goes through the rays of one replicate, source by source.
@@ -27,14 +28,17 @@ pub(super) struct SourceQueue {
     last: usize,
     /// Whether one ray alone is asked for, by its number.
     single: bool,
+    /// The ray of a list that is asked for.
+    listed: Option<u64>,
 }
 
 impl SourceQueue {
     /// The queue of a replicate, or of a single ray that is traced again.
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
-        let single = matches!(rays, RaySelection::Ray(_));
-        let mut queue = Self { replicate: 0, source: 0, next: 0, range: [0, 0], sampler: None, last, single };
+        let single = !matches!(rays, RaySelection::Replicate(_));
+        let (range, sampler, listed) = ([0, 0], None, None);
+        let mut queue = Self { replicate: 0, source: 0, next: 0, range, sampler, last, single, listed };
         match rays {
             RaySelection::Replicate(replicate) => {
                 queue.replicate = replicate;
@@ -47,6 +51,15 @@ impl SourceQueue {
                     queue.replicate = replicate;
                     queue.enter(context, source);
                     (queue.next, queue.range[1]) = (ray, ray + 1);
+                }
+            }
+            RaySelection::Listed { source, ray } => {
+                (queue.last, queue.source, queue.listed) = (0, source as usize, Some(ray));
+                // Independent numbers: by its place in the list a ray has no place in a net.
+                let stream = Stream::new(context.settings.seed, Sampling::Random, 0, source, 1);
+                if let Some(emitter) = context.bound.emitters.get(source as usize) {
+                    queue.sampler = Some(RaySampler::new(emitter, stream, ray));
+                    queue.range = [0, 1];
                 }
             }
         }
@@ -94,7 +107,9 @@ impl SourceQueue {
             let started = (self.next - self.range[0]) as u32;
             self.next += 1;
             // A single ray draws its numbers alone; in order they are drawn in packets. Both give the same bits.
-            let (index, emission) = if self.single {
+            let (index, emission) = if let Some(listed) = self.listed {
+                sampler.listed_ray(emitter, listed, ray)
+            } else if self.single {
                 sampler.single_ray(emitter, started, ray)
             } else {
                 sampler.next_ray(emitter, started, ray)

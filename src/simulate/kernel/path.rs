@@ -11,6 +11,8 @@ pub(crate) enum RaySelection {
     Replicate(u32),
     /// One ray of the run.
     Ray(u64),
+    /// One ray of the list of a source, whatever share of the power it has.
+    Listed { source: u32, ray: u64 },
 }
 
 /// A path under way; its ray is kept apart, in the slice that the intersector reads.

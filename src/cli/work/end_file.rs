@@ -1,0 +1,123 @@
+//! `--ends FILE`: where every ray of a list ended, as NPZ or CSV.
+
+use super::terminal_monitor::TerminalMonitor;
+use crate::cli::console::Console;
+use crate::cli::failure::Failure;
+use crate::formats::{Column, NpzStream, file_name, write_atomic};
+use crate::pipeline::PreparedScene;
+use crate::report::grouped;
+use crate::simulate::{ListedEnd, RunSettings, listed_ends, ray_lists};
+use std::path::Path;
+
+/// Most rays of all lists together: their ends take half a gigabyte.
+const MOST_RAYS: u64 = 5_000_000;
+
+/// The arrays of an NPZ file, one row an end.
+const COLUMNS: [Column; 9] = [
+    Column { name: "source", numbers: "<u4", bytes: 4, width: 1 },
+    Column { name: "ray", numbers: "<u8", bytes: 8, width: 1 },
+    Column { name: "branch", numbers: "<u4", bytes: 4, width: 1 },
+    Column { name: "event", numbers: "|u1", bytes: 1, width: 1 },
+    Column { name: "face", numbers: "<i8", bytes: 8, width: 1 },
+    Column { name: "bounces", numbers: "<u4", bytes: 4, width: 1 },
+    Column { name: "point", numbers: "<f8", bytes: 8, width: 3 },
+    Column { name: "direction", numbers: "<f8", bytes: 8, width: 3 },
+    Column { name: "power", numbers: "<f8", bytes: 8, width: 1 },
+];
+
+/// The face of an end that is at none.
+const NO_FACE: i64 = -1;
+
+/// Refuses, before anything is traced, what could not be written.
+pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(), Failure> {
+    let Some(file) = file else { return Ok(()) };
+    let refuse = |message: &str| Failure::arguments(format!("--ends {}: {message}", file.display()));
+    if !is_csv(file) && file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
+        return Err(refuse("ends of rays are written as .npz or .csv").with_help("write --ends ends.npz"));
+    }
+    let lists = ray_lists(&prepared.bound);
+    if lists.is_empty() {
+        let help = "--paths FILE.npz has the paths of any source";
+        return Err(refuse("no source of this scene is a list of rays").with_help(help));
+    }
+    let rays: u64 = lists.iter().map(|(_, rays)| rays).sum();
+    if rays > MOST_RAYS {
+        let largest = lists.iter().max_by_key(|(_, rays)| rays).map_or(0, |(source, _)| *source as usize);
+        let named = prepared.job.scene.sources[largest].file.clone();
+        let message = format!(
+            "{} has most of the {} rays of this scene, of which at most {} can be followed one by one",
+            named.map_or_else(|| format!("source {}", largest + 1), |name| file_name(Path::new(&name))),
+            grouped(rays),
+            grouped(MOST_RAYS)
+        );
+        return Err(refuse(&message).with_help("give a shorter list, or take --paths"));
+    }
+    Ok(())
+}
+
+fn is_csv(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+}
+
+/// Traces every ray of the lists once and writes where each ended.
+pub(crate) fn write(prepared: &PreparedScene, file: Option<&Path>, console: &Console) -> Result<(), Failure> {
+    let Some(file) = file else { return Ok(()) };
+    let settings = RunSettings { threads: prepared.threads, ..prepared.run_settings() };
+    let monitor = TerminalMonitor::new(console);
+    let ends =
+        prepared.with_intersector(&monitor, |intersector, _| listed_ends(&prepared.bound, intersector, &settings));
+    if is_csv(file) {
+        write_csv(file, &ends)?
+    } else {
+        write_npz(file, &ends)?
+    }
+    console.say(format_args!(
+        "wrote where {} rays and their parts ended into {}",
+        grouped(ends.len() as u64),
+        file.display()
+    ));
+    Ok(())
+}
+
+fn face(end: &ListedEnd) -> i64 {
+    end.face.map_or(NO_FACE, i64::from)
+}
+
+fn write_csv(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
+    write_atomic(file, |out| {
+        writeln!(out, "source,ray,branch,event,face,bounces,x_mm,y_mm,z_mm,dx,dy,dz,power")?;
+        for end in ends {
+            let event = serde_json::to_value(end.event).map_err(std::io::Error::other)?;
+            let event = event.as_str().unwrap_or("unknown");
+            let ([x, y, z], [dx, dy, dz]) = (end.point.to_array(), end.direction.to_array());
+            let ListedEnd { source, ray, branch, bounces, power, .. } = end;
+            let face = face(end);
+            writeln!(out, "{source},{ray},{branch},{event},{face},{bounces},{x},{y},{z},{dx},{dy},{dz},{power}")?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn write_npz(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
+    let mut stream = NpzStream::create(file, &COLUMNS)?;
+    // In blocks, so that the bytes of all columns need not stand in memory beside the ends.
+    for block in ends.chunks(1 << 16) {
+        let mut columns: [Vec<u8>; 9] = Default::default();
+        for end in block {
+            columns[0].extend(end.source.to_le_bytes());
+            columns[1].extend(end.ray.to_le_bytes());
+            columns[2].extend(end.branch.to_le_bytes());
+            columns[3].push(end.event as u8);
+            columns[4].extend(face(end).to_le_bytes());
+            columns[5].extend(end.bounces.to_le_bytes());
+            end.point.to_array().iter().for_each(|x| columns[6].extend(x.to_le_bytes()));
+            end.direction.to_array().iter().for_each(|x| columns[7].extend(x.to_le_bytes()));
+            columns[8].extend(end.power.to_le_bytes());
+        }
+        let slices: Vec<&[u8]> = columns.iter().map(Vec::as_slice).collect();
+        stream.write(block.len() as u64, &slices)?;
+    }
+    stream.finish()?;
+    Ok(())
+}

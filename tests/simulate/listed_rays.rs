@@ -1,0 +1,107 @@
+//! What became of each ray of a list: ends, faces and powers that can be told by hand.
+
+use crate::support::World;
+use lampyris::formats::{LightRay, write_rays};
+use lampyris::math::{Point, Vector};
+use lampyris::simulate::{Event, ListedEnd, RunSettings, Scene, listed_ends, simulate};
+
+/// The face of the first cuboid that looks down.
+const BLACK: u32 = 4;
+
+fn ray(x: f64, direction: Vector, power: f64) -> LightRay {
+    LightRay { origin: Point::new(x, 0.0, 0.0), direction: direction.normalize(), power, wavelength_nm: None }
+}
+
+#[test]
+fn every_ray_of_a_list_tells_where_it_ended() {
+    let mut world = World::default();
+    world.cuboid("black", Point::new(9.0, -1.0, 5.0), Point::new(11.0, 1.0, 6.0)).cuboid(
+        "mirror",
+        Point::new(19.0, -1.0, 5.0),
+        Point::new(21.0, 1.0, 6.0),
+    );
+    let slanted = Vector::new(0.6, 0.0, 0.8);
+    let rays = [
+        ray(0.0, Vector::Z, 1.0),
+        ray(10.0, Vector::Z, 2.0),
+        ray(20.0 - 3.75, slanted, 4.0),
+        ray(0.0, -Vector::Y, 3.0),
+        // Too weak to be drawn in the run below.
+        ray(10.0, Vector::Z, 0.0),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    write_rays(&folder.path().join("list.csv"), &rays).unwrap();
+    let text = "[run]\nrays = 64
+        [[source]]\nkind = 'rays'\nfile = 'list.csv'\npower = 20
+        [[material]]\npart = 'mirror'\nsurface = 'mirror'\nreflectance = 0.75
+        [[receiver]]\nname = 'wall'\nat = [0, 0, 30]\nsize = [2, 2]\n";
+    let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let settings = |threads| RunSettings { threads, ..RunSettings::from(&scene.run) };
+    let found = listed_ends(&bound, &world, &settings(1));
+    assert_eq!(found, listed_ends(&bound, &world, &settings(3)));
+    // Twice the powers of the list, as the source has 20 of its 10.
+    let end = |ray: u64, event: Event, face: Option<u32>, power: f64| ListedEnd {
+        source: 0,
+        ray,
+        branch: 0,
+        event,
+        face,
+        bounces: 0,
+        point: Point::new(10.0, 0.0, 5.0),
+        direction: Vector::Z,
+        power,
+    };
+    // Light that leaves is told of 100 mm on its way.
+    let expected = [
+        ListedEnd { point: Point::new(0.0, 0.0, 30.0), ..end(0, Event::Received, None, 2.0) },
+        end(1, Event::Absorbed, Some(BLACK), 4.0),
+        ListedEnd {
+            bounces: 1,
+            point: Point::new(80.0, 0.0, -75.0),
+            direction: Vector::new(0.6, 0.0, -0.8),
+            ..end(2, Event::Escaped, None, 0.75 * 8.0)
+        },
+        ListedEnd {
+            point: Point::new(0.0, -100.0, 0.0),
+            direction: -Vector::Y,
+            ..end(3, Event::Escaped, None, 6.0)
+        },
+        end(4, Event::Absorbed, Some(BLACK), 0.0),
+    ];
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a.point - b.point).length() < 1e-9 && (a.direction - b.direction).length() < 1e-9, "{a:?}");
+        assert!((a.power - b.power).abs() < 1e-9, "{a:?}");
+        let rounded = ListedEnd { point: b.point, direction: b.direction, power: b.power, ..*a };
+        assert_eq!(rounded, *b);
+    }
+    // The mirror took the rest, as the run says too.
+    let run = simulate(&bound, &world, &settings(1), &|_| true);
+    let mirror = run.absorbed.iter().find(|a| a.name == "mirror").unwrap();
+    assert!((mirror.power - 2.0).abs() < 0.6, "{}", mirror.power);
+}
+
+/// A ray that is split has a row for each of its parts, and their powers add up.
+#[test]
+fn parts_of_a_ray_have_rows_of_their_own() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-5.0, -5.0, 5.0), Point::new(5.0, 5.0, 8.0));
+    let folder = tempfile::tempdir().unwrap();
+    write_rays(&folder.path().join("list.npz"), &[ray(0.0, Vector::Z, 1.0), ray(50.0, Vector::Z, 1.0)]).unwrap();
+    let text = "[run]\nrays = 64\ninterfaces = 'split'\nsplit_floor = 0.001
+        [[source]]\nkind = 'rays'\nfile = 'list.npz'
+        [[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'\n";
+    let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let found = listed_ends(&bound, &world, &RunSettings { threads: 2, ..RunSettings::from(&scene.run) });
+    let [split, alone]: [Vec<&ListedEnd>; 2] = [0, 1].map(|k| found.iter().filter(|e| e.ray == k).collect());
+    assert_eq!((alone.len(), alone[0].power), (1, 1.0));
+    assert!(split.len() >= 3, "{split:?}");
+    let sum: f64 = split.iter().map(|e| e.power).sum();
+    assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    // What the first side throws back, and what goes straight through both.
+    for power in [0.04, 0.96 * 0.96] {
+        assert!(split.iter().any(|e| (e.power - power).abs() < 1e-9), "{power}: {split:?}");
+    }
+}
