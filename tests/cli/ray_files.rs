@@ -145,3 +145,33 @@ fn a_damaged_file_is_refused_by_its_byte() {
     assert_eq!(code, 3, "{err}");
     assert!(err.contains("source.dat") && err.contains("byte"), "{err}");
 }
+
+/// Both rays of the list, with the power of each, whatever was drawn; what cannot be listed is refused before anything is traced.
+#[test]
+fn every_ray_of_a_list_has_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    write_tm25(&folder.path().join("source.dat"), &Tm25::from_rays(&rays([None; 2]), Flux::Luminous)).unwrap();
+    let scene = "[run]\nrays = 400\nunit = 'lm'\n[[source]]\nkind = 'rays'\nfile = 'source.dat'\n";
+    std::fs::write(folder.path().join("scene.toml"), format!("{scene}{SCREEN}")).unwrap();
+    let ends = |scene: &str, file: &str| {
+        lampyris_in(folder.path(), &["trace", scene, "-o", "out", "-q", "--no-report", "--ends", file])
+    };
+    let (code, _, err) = ends("scene.toml", "ends.csv");
+    assert_eq!(code, 0, "{err}");
+    let text = std::fs::read_to_string(folder.path().join("ends.csv")).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!(lines[0], "source,ray,branch,event,face,bounces,x_mm,y_mm,z_mm,dx,dy,dz,power");
+    assert_eq!(lines[1..], ["0,0,0,received,-1,0,-1,0,20,0,0,1,1", "0,1,0,received,-1,0,2,0,20,0,0,1,3"]);
+    let (code, _, err) = ends("scene.toml", "ends.npz");
+    assert_eq!(code, 0, "{err}");
+    let mut zip = zip::ZipArchive::new(std::fs::File::open(folder.path().join("ends.npz")).unwrap()).unwrap();
+    let mut power = Vec::new();
+    std::io::Read::read_to_end(&mut zip.by_name("power.npy").unwrap(), &mut power).unwrap();
+    assert_eq!(power[power.len() - 16..], [1f64.to_le_bytes(), 3f64.to_le_bytes()].concat());
+
+    let (code, _, err) = ends("scene.toml", "ends.txt");
+    assert!(code == 2 && err.contains(".npz or .csv"), "{err}");
+    std::fs::write(folder.path().join("point.toml"), format!("[run]\nrays = 400\n[[source]]\n{SCREEN}")).unwrap();
+    let (code, _, err) = ends("point.toml", "ends.csv");
+    assert!(code == 2 && err.contains("no source of this scene is a list of rays"), "{err}");
+}

@@ -292,3 +292,47 @@ fn a_scene_without_a_model_is_drawn() {
     let accessors = document["accessors"].as_array().unwrap();
     assert!(accessors.len() == 2 && accessors.iter().all(|a| a["count"].as_u64() > Some(100)), "{accessors:?}");
 }
+
+/// D65 on a round wall that counts X, Y, Z: white in the middle of the picture, and a chart of it in the page.
+#[test]
+fn a_receiver_of_colours_has_a_picture_in_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "[run]\nrays = 60_000\n[[source]]\nkind = 'collimated'\nradius = 4\nspectrum = { kind = 'd65' }
+        [[receiver]]\nname = 'wall'\nkind = 'disc'\nat = [0, 0, 9]\nradius = 5\ncells = [8, 8]\nchannels = 'xyz'\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "-q"]);
+    assert_eq!(code, 0, "{err}");
+    let file = std::fs::File::open(folder.path().join("out/wall-colours.png")).unwrap();
+    let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!((info.width, info.height), (800, 800));
+    let pixel = |x: usize, y: usize| [0, 1, 2].map(|c| bytes[3 * (y * 800 + x) + c]);
+    // The brightest of all cells is full; by their noise, some per cent, the others are a little darker.
+    assert!(pixel(350, 450).iter().all(|byte| *byte > 215), "{:?}", pixel(350, 450));
+    assert_eq!(pixel(1, 1), [128; 3], "off the disc there is no cell");
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("wall: colours") && page.contains("white is D65"));
+    assert!(folder.path().join("out/figures/wall-colours.png").exists());
+}
+
+/// The faces of a lens with what goes through them: as much enters one side as leaves the other, but for Fresnel's share.
+#[test]
+fn faces_are_listed_with_their_power() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = fixture("scenes/s1_lens.toml").display().to_string();
+    let arguments =
+        ["trace", &scene, "-o", "out", "--rays", "20000", "--tolerance", "0.05", "--faces", "2", "--json"];
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
+    assert_eq!(code, 0, "{err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    let faces = &document["faces"];
+    let first = faces["first"].as_array().unwrap();
+    assert!(first.len() <= 2 && faces["count"].as_u64() >= Some(first.len() as u64), "{faces}");
+    let of = |key: &str| first.iter().map(|f| f[key].as_f64().unwrap()).fold(0.0, f64::max);
+    let (entered, left) = (of("entered"), of("left"));
+    assert!(left > 0.8 * entered && left < entered, "{faces}");
+    assert!(first.iter().all(|f| !f["selector"].as_str().unwrap().is_empty()), "{faces}");
+    let table = std::fs::read_to_string(folder.path().join("out/tables/faces.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + first.len());
+}
