@@ -1,5 +1,6 @@
-//! What the machine is, as far as the system tells: processor, cores, memory.
+//! What the machine is, as far as the system tells: processor, cores, memory, name.
 
+use crate::formats::file_stem;
 use std::fs;
 
 /// As the system counts memory.
@@ -30,4 +31,21 @@ fn field(text: &str, key: &str) -> Option<String> {
 
 fn kilobytes(text: &str, key: &str) -> Option<u64> {
     field(text, key)?.split_whitespace().next()?.parse().ok()
+}
+
+/// The name that the machine has in its network.
+#[cfg(unix)]
+pub(crate) fn name() -> String {
+    rustix::system::uname().nodename().to_string_lossy().into_owned()
+}
+
+/// The name that the machine has in its network.
+#[cfg(not(unix))]
+pub(crate) fn name() -> String {
+    std::env::var("COMPUTERNAME").unwrap_or_else(|_| "one machine".into())
+}
+
+/// What no other process of any machine of a shared folder is called, safe in a file name.
+pub(crate) fn process_name() -> String {
+    format!("{}-{}", file_stem(&name()), std::process::id())
 }

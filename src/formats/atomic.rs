@@ -1,6 +1,7 @@
 //! Files that are whole or not there, and names that are safe in a path.
 
 use super::file_names::file_name;
+use super::writer::Writer;
 use super::{Error, ErrorKind};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -64,16 +65,16 @@ pub fn remove_unfinished_files() {
     }
 }
 
-/// A name in the same folder (renaming across devices is a copy) that no other process or thread uses.
+/// A name in the same folder (renaming across devices is a copy) that no other machine, process or thread uses.
 fn unfinished(path: &Path) -> PathBuf {
     let name = file_name(path);
     // Threads of one process may write the same name: each takes a number of its own.
     let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
-    path.with_file_name(format!(".{name}.{}-{serial}.part", std::process::id()))
+    path.with_file_name(format!(".{name}.{}-{serial}.part", Writer::this()))
 }
 
-/// Removes what processes that are no more have left unfinished of this file. Where the system does not tell which processes are,
-/// after a day.
+/// Removes what processes that are no more have left unfinished of this file. Of another machine's, and where the system does not tell
+/// which processes are, that is what has stood still for a day.
 pub(super) fn remove_stale(path: &Path) {
     let Some(name) = path.file_name().map(|n| format!(".{}.", n.to_string_lossy())) else { return };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -81,16 +82,10 @@ pub(super) fn remove_stale(path: &Path) {
     for entry in entries.flatten() {
         let file = entry.file_name();
         let file = file.to_string_lossy();
-        let Some(rest) = file.strip_prefix(&name).and_then(|f| f.strip_suffix(".part")) else { continue };
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
-        let Ok(process) = digits.parse::<u32>() else { continue };
-        // Only Linux shows processes as folders; elsewhere age decides.
-        let gone = match fs::exists("/proc/self") {
-            Ok(true) => matches!(fs::exists(format!("/proc/{process}")), Ok(false)),
-            _ => (entry.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok()))
-                .is_some_and(|age| age.as_secs() > 86_400),
-        };
-        if gone {
+        let Some(rest) = file.strip_prefix(&name).filter(|f| f.ends_with(".part")) else { continue };
+        let Some(writer) = Writer::parse(rest) else { continue };
+        let written = entry.metadata().and_then(|m| m.modified());
+        if writer.is_gone(written.ok().and_then(|t| t.elapsed().ok())) {
             // Another process may have been quicker.
             let _ = fs::remove_file(entry.path());
         }
@@ -140,15 +135,19 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
-    /// No process has the largest number a process can have, so that both leftovers are of none that runs.
+    /// No process has the largest number a process can have, so that both leftovers of this machine are of none that runs.
     #[test]
     #[cfg(target_os = "linux")]
     fn what_a_killed_run_left_is_removed_and_what_is_being_written_stays() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        let own = format!(".a.csv.{}-7.part", std::process::id());
+        let this = Writer::this().to_string();
+        let dead = this.replace(&format!(".{}", std::process::id()), ".4294967295");
+        let own = format!(".a.csv.{this}-7.part");
+        let elsewhere = ".a.csv.00000000.4294967295-0.part";
+        let other = format!(".b.csv.{dead}-0.part");
         for name in
-            [".a.csv.4294967295-0.part", ".a.csv.4294967295.point.part", ".b.csv.4294967295-0.part", own.as_str()]
+            [&format!(".a.csv.{dead}-0.part"), &format!(".a.csv.{dead}.point.part"), &other, &own, elsewhere]
         {
             fs::write(at(name), b"ha").unwrap();
         }
@@ -156,7 +155,9 @@ mod tests {
         let mut left: Vec<_> =
             fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         left.sort();
-        assert_eq!(left, [own.as_str(), ".b.csv.4294967295-0.part", "a.csv"]);
+        let mut kept = [own.as_str(), elsewhere, other.as_str(), "a.csv"];
+        kept.sort();
+        assert_eq!(left, kept);
     }
 
     #[test]

@@ -35,6 +35,7 @@ mod rays;
 mod stl;
 mod stream;
 mod vtk;
+mod writer;
 
 pub use agf::{AgfGlass, read_agf};
 pub use atomic::{file_stem, remove_unfinished_files, write_atomic};

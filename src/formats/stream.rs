@@ -6,6 +6,7 @@
 use super::atomic::{Unfinished, remove_stale};
 use super::file_names::file_name;
 use super::npz::header;
+use super::writer::Writer;
 use super::{Error, ErrorKind, write_atomic};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -44,8 +45,8 @@ impl NpzStream {
         let name = file_name(path);
         remove_stale(path);
         for column in columns {
-            // The columns' names keep the files apart; the process' number keeps runs apart.
-            let beside = path.with_file_name(format!(".{name}.{}.{}.part", std::process::id(), column.name));
+            // The columns' names keep the files apart; the writer's keeps runs apart.
+            let beside = path.with_file_name(format!(".{name}.{}.{}.part", Writer::this(), column.name));
             stream.unfinished.push(Unfinished::register(&beside));
             let file = File::create(&beside).map_err(|e| Error::new(path, ErrorKind::Write(e)))?;
             stream.columns.push((*column, beside, BufWriter::with_capacity(1 << 16, file)));

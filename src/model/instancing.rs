@@ -4,8 +4,9 @@
 //! An instance on whose curved faces another one may lie stays in the first group: only in common coordinates can the mesher give both
 //! the same facets.
 
+use super::near_parts::near_another;
 use super::{Instance, Model, Part, PartId};
-use crate::math::{Aabb, BoxTree, FaceId, Frame, Ray};
+use crate::math::{Aabb, FaceId, Frame, Ray};
 use rustc_hash::FxHashMap;
 
 /// A part that is placed so often is traced in its own coordinates. Of fewer, one structure over all of them answers up to twice as
@@ -189,38 +190,6 @@ fn group(part: &Part, scale: f64) -> (Model, Aabb) {
     (model, part.tight_box(scale))
 }
 
-/// Of every instance, whether a curved face of another may lie on one of its own, by their boxes.
-fn near_another(model: &Model, often: &[bool], glue_mm: f64) -> Vec<bool> {
-    if glue_mm <= 0.0 {
-        return vec![false; model.instances.len()];
-    }
-    let curved: Vec<Vec<Aabb>> = model.parts.iter().zip(often).map(|(p, often)| p.curved_boxes(*often)).collect();
-    let (mut boxes, mut owners) = (Vec::new(), Vec::new());
-    for (k, instance) in model.instances.iter().enumerate() {
-        for face in &curved[instance.part.0 as usize] {
-            let corners = face.corners().map(|p| instance.placement.point(p));
-            boxes.push(Aabb::from_points(corners).grown(0.5 * glue_mm));
-            owners.push(k as u32);
-        }
-    }
-    let tree = BoxTree::new(&boxes);
-    let mut near = vec![false; model.instances.len()];
-    for (bounds, &owner) in boxes.iter().zip(&owners) {
-        let is_other = |k: u32| owners[k as usize] != owner;
-        near[owner as usize] = near[owner as usize] || tree.any_meeting(bounds, is_other);
-    }
-    near
-}
-
-impl Part {
-    /// Boxes around the faces that are not plane, in the part's coordinates: tight, or those of their control points.
-    fn curved_boxes(&self, are_tight: bool) -> Vec<Aabb> {
-        let faces = self.shells.iter().flat_map(|s| &s.faces);
-        let curved = faces.filter(|f| !matches!(f.analytic, super::Analytic::Plane { .. }));
-        curved.map(|f| if are_tight { f.tight_box() } else { f.surface.bounds() }).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -288,5 +257,18 @@ mod tests {
         model.instances[0].placement.origin.x += 3.0;
         let instancing = Instancing::new(&model, 1e-3).unwrap();
         assert_eq!((instancing.placements.len(), instancing.groups[0].instances.len()), (98, 36));
+    }
+
+    #[test]
+    fn a_cover_takes_what_it_touches_alone() {
+        // Its box holds all; between balls it touches none, and with 245 mm it goes through those at 5 and 495 mm.
+        for (radius, kept) in [(242.5, 100), (245.0, 98)] {
+            let mut model = row(100, 5.0);
+            model.parts.push(ball("cover", radius, 1));
+            let placement = Frame::translation(250.0 * Vector::X);
+            model.instances.push(Instance { name: String::new(), part: PartId(2), placement, colour: None });
+            let instancing = Instancing::new(&model, 1e-3).unwrap();
+            assert_eq!(instancing.placements.len(), kept);
+        }
     }
 }

@@ -13,6 +13,7 @@ mod account;
 mod bounds;
 mod face;
 mod instancing;
+mod near_parts;
 mod outline;
 mod part;
 mod placed;

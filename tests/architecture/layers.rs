@@ -132,6 +132,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "base64",
             "error",
             "file_names",
+            "writer",
             "atomic",
             "input",
             "printable",
@@ -215,7 +216,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "write",
         ],
     ),
-    ("model", &["part face", "placed", "outline", "bounds", "account", "tight_box", "instancing", "mod"]),
+    (
+        "model",
+        &["part face", "placed", "outline", "bounds", "account", "tight_box", "near_parts", "instancing", "mod"],
+    ),
     ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "units"]),
     (
         "intersect",

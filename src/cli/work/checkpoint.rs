@@ -5,6 +5,7 @@ use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::cli::machine;
 use crate::formats::{read_bytes, write_atomic};
 use crate::pipeline::{PreparedScene, fingerprint};
 use crate::simulate::PartialRun;
@@ -138,7 +139,7 @@ impl<'a> Checkpoint<'a> {
             Ok(()) => return Ok(self.file.clone()),
             Err(failure) => failure,
         };
-        let name = format!("lampyris-rescued-{}.tally", std::process::id());
+        let name = format!("lampyris-rescued-{}.tally", machine::process_name());
         let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
         let header = self.header_now();
         places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)

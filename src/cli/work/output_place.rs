@@ -1,6 +1,7 @@
 //! Where results go: tried before any work is done, and owned by one process at a time.
 
 use crate::cli::failure::Failure;
+use crate::cli::machine;
 use crate::formats::file_name;
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -8,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// Name of the lock of a folder of results.
 const FOLDER_LOCK: &str = ".lampyris.lock";
-/// Longest content of a lock file that is read: the number of a process.
-const LOCK_BYTES: u64 = 32;
+/// Longest content of a lock file that is read: the number of a process and the name of its machine.
+const LOCK_BYTES: u64 = 300;
 
 /// A folder, or a file, that no other lampyris writes while this value lives.
 ///
@@ -66,7 +67,7 @@ impl OutputPlace {
             if !is_file_at(&file, &lock) {
                 continue;
             }
-            let written = file.set_len(0).and_then(|()| write!(file, "{}", std::process::id()));
+            let written = file.set_len(0).and_then(|()| write!(file, "{} {}", std::process::id(), machine::name()));
             written.map_err(unwritable)?;
             return Ok(Self { lock, _file: file });
         }
@@ -80,12 +81,13 @@ impl Drop for OutputPlace {
     }
 }
 
-/// The failure that names the process whose id stands in the lock file.
+/// The failure that names the process that stands in the lock file.
 fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
     let mut owner = String::new();
     let read = file.rewind().and_then(|()| file.take(LOCK_BYTES).read_to_string(&mut owner));
-    let process = match (read, owner.trim().parse::<u32>()) {
-        (Ok(_), Ok(id)) => format!(" (process {id})"),
+    // On a shared folder the number of a process says nothing without its machine.
+    let process = match (read, owner.trim().split_once(' ')) {
+        (Ok(_), Some((id, machine))) => format!(" (process {id} on {machine})"),
         _ => String::new(),
     };
     Failure::running(format!("{}: another lampyris{process} is writing there", folder.display()))
@@ -169,7 +171,8 @@ mod tests {
         let folder = parent.path().join("a/b");
         let first = OutputPlace::folder(&folder).unwrap();
         let refused = OutputPlace::folder(&folder).unwrap_err().to_string();
-        assert!(refused.contains(&format!("process {}", std::process::id())), "{refused}");
+        let owner = format!("process {} on {}", std::process::id(), machine::name());
+        assert!(refused.contains(&owner), "{refused}");
         // Files in the folder are claimed apart: shards write beside one another.
         let shard = OutputPlace::file(&folder.join("1.tally")).unwrap();
         drop(OutputPlace::file(&folder.join("2.tally")).unwrap());

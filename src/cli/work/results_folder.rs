@@ -4,6 +4,7 @@ use super::lost_rays;
 use super::output_place::{make_folder, require_space, rescue_folders};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::cli::machine;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
@@ -55,7 +56,7 @@ pub(crate) fn write_anywhere(
     with_page: bool,
     console: &Console,
 ) -> Option<PathBuf> {
-    let name = format!("lampyris-rescued-{}", std::process::id());
+    let name = format!("lampyris-rescued-{}", machine::process_name());
     let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
     places.find(|folder| {
         let written = write(prepared, folder, run, sentences.to_vec(), with_page, console);

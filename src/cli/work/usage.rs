@@ -1,5 +1,6 @@
 //! What the parts of a run took, machine by machine.
 
+use crate::cli::machine;
 use crate::simulate::MergedSeconds;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ impl Usage {
     /// What this process took so far, as one part.
     pub(crate) fn of_process(wall_seconds: f64) -> Self {
         let usage = MachineUsage { parts: 1, cpu_seconds: cpu_seconds(), slowest_seconds: wall_seconds };
-        Self(BTreeMap::from([(machine_name(), usage)]))
+        Self(BTreeMap::from([(machine::name(), usage)]))
     }
 
     /// Adds what other parts took.
@@ -79,16 +80,6 @@ fn cpu_seconds() -> Option<f64> {
 #[cfg(not(unix))]
 fn cpu_seconds() -> Option<f64> {
     None
-}
-
-#[cfg(unix)]
-fn machine_name() -> String {
-    rustix::system::uname().nodename().to_string_lossy().into_owned()
-}
-
-#[cfg(not(unix))]
-fn machine_name() -> String {
-    std::env::var("COMPUTERNAME").unwrap_or_else(|_| "one machine".into())
 }
 
 #[cfg(test)]
