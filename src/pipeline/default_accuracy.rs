@@ -1,15 +1,17 @@
 //! A run that asks for no tolerance, normals or intersector is given them: what a pilot of its own rays finds sufficient.
 
-use super::intersectors::IntersectorChoice;
+use super::facets::tessellate_groups;
+use super::intersectors::{IntersectorChoice, farthest_start, in_one_scene};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
+use crate::intersect::Intersector;
 use crate::intersect::exact::Exact;
-use crate::mesh::FacetMesh;
+use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
-use crate::study::default_accuracy::{self, Chosen, Undecided};
-use crate::study::{MeasuredMesh, ModelMeshSource};
-use crate::tessellate;
+use crate::study::default_accuracy::{self, Chosen, PilotSource, TimedFacets, Undecided};
+use crate::tessellate::{self, GroupedFacets};
+use std::slice;
 use std::sync::Arc;
 
 /// What was chosen, as far as it changes the run.
@@ -17,7 +19,7 @@ pub(super) struct AccuracyChoice {
     pub(super) chosen: Chosen,
     pub(super) intersector: IntersectorChoice,
     /// Facets finer than the default ones, where these are taken.
-    pub(super) finer: Option<MeasuredMesh>,
+    pub(super) finer: Option<TimedFacets>,
 }
 
 /// Whether settings or scene say how fine the facets are, what normals they carry or what finds the hits.
@@ -33,19 +35,53 @@ pub(super) fn is_asked(meshing: &MeshingSettings, tracing: &TracingSettings, sce
     in_scene || facets || tracing.normals.is_some() || tracing.intersector.is_some()
 }
 
+/// Makes what a pilot compares, for a model in one piece or in groups.
+struct Source<'a> {
+    model: &'a Model,
+    /// The facets of the default tolerance, which say how the model is grouped.
+    made: &'a GroupedFacets,
+    /// All of the mesher but the tolerance.
+    mesher: &'a tessellate::Settings,
+    exact: Box<dyn Intersector + 'a>,
+}
+
+impl PilotSource for Source<'_> {
+    fn facets(&self, tolerance: [f64; 2]) -> TimedFacets {
+        let settings = tessellate::Settings { tolerance, ..self.mesher.clone() };
+        let (facets, seconds) = tessellate_groups(self.model, self.made.instancing.as_ref(), &settings);
+        TimedFacets { facets, seconds }
+    }
+
+    fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f> {
+        let instancing = facets.instancing.as_deref();
+        let octree = |(group, mesh)| {
+            let farthest_start = farthest_start(instancing, group);
+            let settings = octree::Settings { farthest_start, ..Default::default() };
+            Box::new(Octree::build(mesh, &settings)) as Box<dyn Intersector>
+        };
+        in_one_scene(instancing, facets.meshes().enumerate().map(octree).collect())
+    }
+
+    fn exact(&self) -> &dyn Intersector {
+        &*self.exact
+    }
+}
+
 /// Chooses for a run whose facets of the default tolerance are made.
 pub(super) fn choose(
-    (model, spline): (&Model, Arc<Exact>),
+    (model, splines): (&Model, &[Arc<Exact>]),
     bound: &BoundScene,
     run: &RunSettings,
-    (mesh, mesher): (&FacetMesh, &tessellate::Settings),
+    (facets, mesher): (&GroupedFacets, &tessellate::Settings),
     monitor: &dyn Monitor,
 ) -> AccuracyChoice {
+    let instancing = facets.instancing.as_deref();
+    let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
+    let splines = splines.iter().map(|spline| Box::new(&**spline) as Box<dyn Intersector>).collect();
+    let source = Source { model, made: facets, mesher, exact: in_one_scene(instancing, splines) };
     let (chosen, finer) = in_stage(monitor, Stage::Choosing, || {
-        let mut source = ModelMeshSource::with_spline(model, spline);
-        source.mesher = mesher.clone();
         let tolerance = mesher.tolerance;
-        default_accuracy::choose(&Undecided { model, bound, run, source: &source, facets: mesh, tolerance })
+        default_accuracy::choose(&Undecided { models, bound, run, source: &source, facets, tolerance })
     });
     monitor.chosen(&chosen);
     let intersector = match chosen.intersector {

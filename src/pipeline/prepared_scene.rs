@@ -8,9 +8,9 @@ use super::intersectors::{self, IntersectorChoice};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
+use crate::intersect::Intersector;
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
-use crate::intersect::{Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::simulate::scene::PowerUnit;
@@ -181,43 +181,17 @@ impl PreparedScene {
             return;
         }
         let run = RunSettings { sequences: false, ..self.run_settings() };
-        if self.facets.instancing.is_some() {
-            self.choose_without_pilot();
-            return;
-        }
-        let facets = (&self.facets.groups[0].mesh, &self.mesh_settings);
-        let model = (&self.job.loaded.model, self.splines().swap_remove(0));
+        let model = (&self.job.loaded.model, &*self.splines());
+        let facets = (&self.facets, &self.mesh_settings);
         let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
         if let Some(finer) = choice.finer {
-            self.facets = Tessellation { mesh: finer.mesh, ..Tessellation::default() }.into();
+            self.facets = finer.facets;
             self.tessellation_seconds += finer.seconds;
             // The settings tell what the facets are: those of the finer ones.
             self.mesh_settings.tolerance = choice.chosen.tolerance_mm;
         }
         self.choice = choice.intersector;
         self.chosen = Some(choice.chosen);
-    }
-
-    /// Takes the spline, which is right without a pilot: that compares one mesh with one spline. Ready meshes have no spline.
-    fn choose_without_pilot(&mut self) {
-        let is_ready = self.models().iter().flat_map(|m| &m.parts).any(|p| !p.tessellated.is_empty());
-        let (intersector, normals, name) = if is_ready {
-            (IntersectorKind::Octree, NormalMode::Bilinear, "octree")
-        } else {
-            (IntersectorKind::Exact, NormalMode::Exact, "exact")
-        };
-        self.choice = IntersectorChoice { intersector, normals };
-        self.chosen = Some(Chosen {
-            tolerance_mm: self.mesh_settings.tolerance,
-            normals,
-            intersector: name,
-            because: "parts are placed so often that they are traced in their own coordinates, without a pilot"
-                .into(),
-            pilot_rays: 0,
-            pilot_seconds: 0.0,
-            alternatives: Vec::new(),
-            geometric: None,
-        });
     }
 
     /// The models of the groups; of a scene in one piece the whole one.

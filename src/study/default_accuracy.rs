@@ -11,13 +11,12 @@
 //! might have done.
 
 use super::geometric_error::{GeometricError, MOST_CELLS, ReplicatedRun, compare, trace_replicates};
-use super::mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 use super::worst_figure::{Worst, worst_figure};
-use crate::intersect::NormalMode;
+use crate::intersect::{Intersector, NormalMode};
 use crate::math::Uv;
-use crate::mesh::FacetMesh;
 use crate::model::{Face, Model};
 use crate::simulate::{BoundScene, RunSettings};
+use crate::tessellate::GroupedFacets;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::time::Instant;
 
@@ -118,25 +117,44 @@ fn intersector_named<'d, D: Deserializer<'d>>(from: D) -> Result<IntersectorName
     found.ok_or_else(|| serde::de::Error::custom(format!("no run chooses {name}")))
 }
 
+/// Facets with the seconds that they took.
+#[derive(Clone, Debug)]
+pub struct TimedFacets {
+    /// Of the model in one piece or in groups.
+    pub facets: GroupedFacets,
+    /// Seconds to make them.
+    pub seconds: f64,
+}
+
+/// Makes what a pilot compares.
+pub trait PilotSource {
+    /// Facets within a tolerance `[min, max]`, mm.
+    fn facets(&self, tolerance: [f64; 2]) -> TimedFacets;
+    /// The octree over facets, with bilinear normals.
+    fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f>;
+    /// The certified spline.
+    fn exact(&self) -> &dyn Intersector;
+}
+
 /// A run that has to be given tolerance, normals and intersector.
 #[derive(Clone, Copy)]
 pub struct Undecided<'a> {
-    /// Its model.
-    pub model: &'a Model,
+    /// The models of its groups; of a model in one piece that one.
+    pub models: &'a [Model],
     /// The scene.
     pub bound: &'a BoundScene,
     /// Its settings: seed and rays decide, of a run that grows not how many; threads and shard do not.
     pub run: &'a RunSettings,
     /// Makes finer facets and the spline.
-    pub source: &'a dyn MeshSource,
+    pub source: &'a dyn PilotSource,
     /// Facets of the default tolerance.
-    pub facets: &'a FacetMesh,
+    pub facets: &'a GroupedFacets,
     /// That tolerance, mm.
     pub tolerance: [f64; 2],
 }
 
 /// Chooses; with the finer facets, where these are taken.
-pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
+pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let start = Instant::now();
     let Undecided { bound, tolerance, .. } = *undecided;
     if let Some(chosen) = undecided.without_pilot() {
@@ -175,15 +193,15 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<MeasuredMesh>) {
     }
     if let Some(factor) = undecided.finer_factor(&worst, &error) {
         let finer = tolerance.map(|t| t / factor);
-        let meshed = undecided.source.mesh(finer);
-        let error = compare(bound, [&undecided.trace_facets(&meshed.mesh, &settings), &spline]);
+        let made = undecided.source.facets(finer);
+        let error = compare(bound, [&undecided.trace_facets(&made.facets, &settings), &spline]);
         let finer_worst = worst_figure(&error, &settings, scale);
-        let seconds = error.seconds[0] * scale + meshed.seconds;
+        let seconds = error.seconds[0] * scale + made.seconds;
         // Between the two that are always there.
         alternatives.insert(1, alternative(finer, ON_FACETS, &finer_worst, seconds));
         if finer_worst.ratio <= 1.0 {
             let because = format!("at the default tolerance facets are too coarse ({})", worst.in_words());
-            return (chosen(ON_FACETS, finer, because, alternatives, Some(error)), Some(meshed));
+            return (chosen(ON_FACETS, finer, because, alternatives, Some(error)), Some(made));
         }
     }
     let because = format!("facets change the answer by more than its statistical error ({})", worst.in_words());
@@ -212,9 +230,9 @@ impl Undecided<'_> {
     /// What can be said without a pilot.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
-        let ((intersector, normals), because) = if self.facets.facets.is_empty() {
+        let ((intersector, normals), because) = if self.facets.is_empty() {
             (ON_FACETS, "there is no surface to meet")
-        } else if self.model.placed_faces().any(|p| p.face.is_none()) {
+        } else if self.faces().any(|face| face.is_none()) {
             (ON_FACETS, "the model holds ready meshes, which have no true surface")
         } else if self.is_flat() {
             (ON_FACETS, "all faces are flat, so that facets are the surface itself")
@@ -246,9 +264,14 @@ impl Undecided<'_> {
         self.bound.receivers.iter().any(|r| r.cell_count() > MOST_CELLS)
     }
 
+    /// The faces of all groups, those of a part that is placed often once; `None` for one of a ready mesh.
+    fn faces(&self) -> impl Iterator<Item = Option<&Face>> {
+        self.models.iter().flat_map(|model| model.placed_faces()).map(|placed| placed.face)
+    }
+
     /// Whether every face is a polygon in a plane.
     fn is_flat(&self) -> bool {
-        self.model.placed_faces().filter_map(|p| p.face).all(is_polygon)
+        self.faces().flatten().all(is_polygon)
     }
 
     /// The number of rays whose statistical error facets must stay below.
@@ -273,18 +296,17 @@ impl Undecided<'_> {
     }
 
     /// Traces the pilot on facets.
-    fn trace_facets(&self, mesh: &FacetMesh, settings: &RunSettings) -> ReplicatedRun {
-        let octree = self.source.build(mesh, FacetTree::Octree, NormalMode::Bilinear);
-        trace_replicates(self.bound, &*octree, settings)
+    fn trace_facets(&self, facets: &GroupedFacets, settings: &RunSettings) -> ReplicatedRun {
+        trace_replicates(self.bound, &*self.source.octree(facets), settings)
     }
 
     /// How much finer facets would have to be, where counted work foretells that they are cheaper than the spline.
     fn finer_factor(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
         let factor = MARGIN * worst.ratio;
+        let facets: usize = self.facets.meshes().map(|mesh| mesh.facets.len()).sum();
         // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
-        let work =
-            factor * self.facets.facets.len() as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
+        let work = factor * facets as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
         (factor <= MOST_FINER && work < hits * SPLINE_HIT).then_some(factor)
     }
 }

@@ -1,13 +1,13 @@
 //! Scenes of parts that are placed often: the same light as through one mesh of everything.
 
 use crate::files::fixture;
-use crate::support::World;
+use crate::support::{Shape, World};
 use lampyris::intersect::NormalMode;
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Intersector, polish::Polished};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::model::{Analytic, Instance, Model};
+use lampyris::model::{Analytic, Instance, Model, PartId};
 use lampyris::pipeline::{
     IntersectorKind, LoadedModel, MeshingSettings, PreparedScene, SceneJob, Silent, TraceRequest, TracingSettings,
 };
@@ -102,6 +102,124 @@ fn an_array_of_lenses_gives_the_light_of_one_mesh() {
         assert_eq!((check.facets_vs_exact.unexplained, check.octree_vs_bvh.disagree), (0, 0), "{check:?}");
         assert!(check.hits > 1000);
     }
+}
+
+/// A product that holds another one at these places, mm, each turned by half a turn about z or not.
+type Assembly = Vec<([f64; 3], bool)>;
+
+/// The file of the lens with assemblies around it, the innermost first.
+fn assembled(levels: &[Assembly]) -> Model {
+    let lens = std::fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    // The lens' product and shape, its axes and units: entities of the fixture.
+    let (mut child, mut shape) = (5, 10);
+    let mut lines = "#9000=DIRECTION('',(-1.,0.,0.));\n".to_owned();
+    for (level, places) in levels.iter().enumerate() {
+        let product = 10_000 * (level + 1);
+        let own = product + 1;
+        lines += &format!(
+            "#{product}=PRODUCT_DEFINITION('','',$,#9);\n#{own}=SHAPE_REPRESENTATION('',(#11),#185);\n\
+             #{}=PRODUCT_DEFINITION_SHAPE('','',#{product});\n#{}=SHAPE_DEFINITION_REPRESENTATION(#{},#{own});\n",
+            product + 2,
+            product + 3,
+            product + 2
+        );
+        for (k, ([x, y, z], turned)) in places.iter().enumerate() {
+            let id = |entity: usize| product + 10 * (k + 1) + entity;
+            let x_axis = if *turned { 9000 } else { 14 };
+            lines += &format!(
+                "#{}=CARTESIAN_POINT('',({x:?},{y:?},{z:?}));\n#{}=AXIS2_PLACEMENT_3D('',#{},#13,#{x_axis});\n\
+                 #{}=ITEM_DEFINED_TRANSFORMATION('','',#11,#{});\n\
+                 #{}=(REPRESENTATION_RELATIONSHIP('','',#{shape},#{own})\
+                 REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{})SHAPE_REPRESENTATION_RELATIONSHIP());\n\
+                 #{}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{product},#{child},$);\n\
+                 #{}=PRODUCT_DEFINITION_SHAPE('','',#{});\n\
+                 #{}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{},#{});\n",
+                id(0),
+                id(1),
+                id(0),
+                id(2),
+                id(1),
+                id(3),
+                id(2),
+                id(4),
+                id(5),
+                id(4),
+                id(6),
+                id(3),
+                id(5)
+            );
+        }
+        (child, shape) = (product, own);
+    }
+    let end = lens.rfind("ENDSEC;").unwrap();
+    let text = format!("{}{lines}{}", &lens[..end], &lens[end..]);
+    step::read_bytes("array.stp", text.as_bytes(), &step::Settings::default()).unwrap().model
+}
+
+/// Ten rows of nine lenses, every other row turned about: as rows in an array, and as ninety lenses in one.
+#[test]
+fn nested_assemblies_give_the_bits_of_one_level() {
+    let pitch = 45.0;
+    let [across, along] = [9, 10].map(|n: usize| move |k: usize| pitch * (k as f64 - 0.5 * (n as f64 - 1.0)));
+    let row: Assembly = (0..9).map(|k| ([across(k), 0.0, 0.0], false)).collect();
+    let rows: Assembly = (0..10).map(|k| ([0.0, along(k), 0.0], k % 2 == 1)).collect();
+    let place = |k: usize| {
+        let is_turned = k / 9 % 2 == 1;
+        let x = if is_turned { -across(k % 9) } else { across(k % 9) };
+        ([x, along(k / 9), 0.0], is_turned)
+    };
+    let [nested, flat] = [assembled(&[row, rows]), assembled(&[(0..90).map(place).collect()])];
+    assert_eq!((nested.instances.len(), nested.parts.len()), (90, 1));
+    let text = array_scene("[[material]]\npart = '*'\nmedium = 'glass'\n");
+    for (intersector, normals) in
+        [(IntersectorKind::Octree, NormalMode::Bilinear), (IntersectorKind::Exact, NormalMode::Exact)]
+    {
+        let [nested, flat] = [&nested, &flat].map(|model| prepared(model, &text, intersector, normals));
+        let groups = |p: &PreparedScene| p.facets.instancing.as_ref().map(|i| (i.groups.len(), i.placements.len()));
+        assert_eq!((groups(&nested), groups(&flat)), (Some((2, 90)), Some((2, 90))));
+        let [one, two] = [&nested, &flat].map(|p| p.trace(TraceRequest::default(), &Silent).unwrap().results);
+        assert_eq!(one.digest, two.digest);
+        are_close(&one, &in_one_piece(&nested), 1e-6);
+    }
+}
+
+/// A black dome over an array, which stands once, and whose box holds all lenses.
+#[test]
+fn a_cover_stands_beside_what_is_placed_often() {
+    let lens = step::read(&fixture("step/lens_planoconvex_nurbs.stp"), &step::Settings::default()).unwrap().model;
+    let mut model = repeated(lens, 9, 45.0);
+    let glass = format!("[[material]]\npart = '{}'\nmedium = 'glass'\n", model.parts[0].name);
+    let mut dome = World::default();
+    dome.part("dome", false, &[("inside", Shape::Sphere { centre: Point::ZERO, radius: 320.0, outward: false })]);
+    model.parts.extend(dome.model.parts);
+    model.instances.push(Instance { part: PartId(1), ..dome.model.instances[0].clone() });
+    let text = array_scene(&glass).replace("size = [500, 500]", "size = [400, 400]");
+    let prepared = prepared(&model, &text, IntersectorKind::Octree, NormalMode::Bilinear);
+    let instancing = prepared.facets.instancing.as_ref().expect("the dome touches no lens");
+    assert_eq!((instancing.placements.len(), instancing.groups[0].instances.len()), (81, 1));
+    let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
+    are_close(&run.results, &in_one_piece(&prepared), 1e-6);
+}
+
+/// Where nothing is said, a pilot of the run's own rays chooses, as for a model in one piece.
+#[test]
+fn a_pilot_chooses_for_what_is_placed_often() {
+    let lens = step::read(&fixture("step/lens_planoconvex_nurbs.stp"), &step::Settings::default()).unwrap().model;
+    let text = array_scene("[[material]]\npart = '*'\nmedium = 'glass'\n").replace("rays = 6000", "rays = 60000");
+    // One lens fewer than are placed in groups, and so many: what facets change is the same.
+    let [apart, grouped] = [7, 8].map(|columns| {
+        let mut model = repeated(lens.clone(), 8, 45.0);
+        model.instances.truncate(8 * columns + 7);
+        let scene = Scene::parse(&text, "array.toml", Path::new(".")).unwrap();
+        let loaded = LoadedModel { model, reports: Vec::new(), seconds: 0.0 };
+        PreparedScene::new(SceneJob::new(scene, loaded), &Silent).unwrap()
+    });
+    assert!(apart.facets.instancing.is_none() && grouped.facets.instancing.is_some());
+    let [apart, grouped] = [apart, grouped].map(|p| p.chosen.expect("nothing was asked"));
+    assert_eq!((apart.pilot_rays, grouped.pilot_rays), (4096, 4096));
+    assert_eq!((apart.intersector, apart.normals), (grouped.intersector, grouped.normals));
+    assert_eq!(apart.tolerance_mm, grouped.tolerance_mm);
+    assert_eq!(apart.alternatives.len(), grouped.alternatives.len());
 }
 
 /// Dies that stand on a plate: their plane faces touch, and light crosses from one medium into the other there.

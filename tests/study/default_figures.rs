@@ -4,14 +4,14 @@
 //! The long comparison over random scenes: `cargo test --release --test study default_figures -- --ignored --nocapture`.
 
 use crate::known_scenes::{self, KnownScene};
-use lampyris::intersect::NormalMode;
 use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
-use lampyris::study::default_accuracy::{Chosen, Undecided, choose};
+use lampyris::study::default_accuracy::{Chosen, PilotSource, TimedFacets, Undecided, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
 use lampyris::study::geometric_error::geometric_error;
-use lampyris::study::{MeshSource, ModelMeshSource, Random};
-use lampyris::tessellate::{self, tessellate};
+use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Random};
+use lampyris::tessellate::{self, GroupedFacets, Tessellation, tessellate};
 use lampyris::truck::{Conic, Lens};
 use std::path::Path;
 
@@ -34,13 +34,32 @@ fn default_answer(known: &KnownScene, rays: u64, threads: usize) -> Answer {
     default_answer_of(known, &RunSettings { rays, threads, ..settings })
 }
 
+/// What a pilot of a model in one piece compares.
+struct InOnePiece<'m>(ModelMeshSource<'m>);
+
+impl PilotSource for InOnePiece<'_> {
+    fn facets(&self, tolerance: [f64; 2]) -> TimedFacets {
+        let made = self.0.mesh(tolerance);
+        let facets = Tessellation { mesh: made.mesh, ..Tessellation::default() }.into();
+        TimedFacets { facets, seconds: made.seconds }
+    }
+
+    fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f> {
+        self.0.build(&facets.groups[0].mesh, FacetTree::Octree, NormalMode::Bilinear)
+    }
+
+    fn exact(&self) -> &dyn Intersector {
+        self.0.exact()
+    }
+}
+
 fn default_answer_of(known: &KnownScene, run: &RunSettings) -> Answer {
     let (bound, _) = bind(known);
     let mesher = tessellate::Settings::default();
-    let facets = tessellate(&known.model, &mesher).mesh;
-    let source = ModelMeshSource::new(&known.model);
+    let facets = tessellate(&known.model, &mesher).into();
+    let source = InOnePiece(ModelMeshSource::new(&known.model));
     let undecided = Undecided {
-        model: &known.model,
+        models: std::slice::from_ref(&known.model),
         bound: &bound,
         run,
         source: &source,
@@ -51,11 +70,11 @@ fn default_answer_of(known: &KnownScene, run: &RunSettings) -> Answer {
     let results = if chosen.intersector == "exact" {
         simulate(&bound, source.exact(), run, &|_| true)
     } else {
-        let mesh = finer.map_or(facets, |f| f.mesh);
-        let octree =
-            Octree::build(&mesh, &octree::Settings { normals: NormalMode::Bilinear, ..Default::default() });
+        let facets = finer.map_or(facets, |f| f.facets);
+        let mesh = &facets.groups[0].mesh;
+        let octree = Octree::build(mesh, &octree::Settings { normals: NormalMode::Bilinear, ..Default::default() });
         if chosen.normals == NormalMode::Exact {
-            simulate(&bound, &*source.polish(&octree, &mesh), run, &|_| true)
+            simulate(&bound, &*source.0.polish(&octree, mesh), run, &|_| true)
         } else {
             simulate(&bound, &octree, run, &|_| true)
         }
