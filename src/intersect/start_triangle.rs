@@ -7,11 +7,17 @@ const NUDGE: f64 = 1.0 / 1048576.0;
 /// The most by which it is moved, in units of [`Surroundings::reach`].
 pub(crate) const LONGEST_NUDGE: f64 = 1024.0;
 
+/// Height over the facet that it leaves to which the start of a grazing ray is lifted, in units of [`Surroundings::reach`]: 16 to 32 units
+/// in the last place of the largest coordinate, more than the rounding of a point computed on the facet, and of what asks where it lies.
+pub(super) const LIFT: f64 = 1.0 / 256.0;
+
 /// The triangle of a facet on which a ray starts.
 pub(super) struct StartTriangle {
     pub(super) second: bool,
     /// Twice the area long.
     pub(super) normal: Vector,
+    /// Its first corner, which both triangles of the facet have.
+    pub(super) corner: Point,
     middle: Point,
 }
 
@@ -25,12 +31,24 @@ impl StartTriangle {
         let second =
             c != d && named.map_or_else(|| is_over_second(corners, start), |triangle| triangle == Triangle::Second);
         let [p, q, r] = if second { [a, c, d] } else { [a, b, c] };
-        Self { second, normal: (q - p).cross(r - p), middle: (p + q + r) / 3.0 }
+        Self { second, normal: (q - p).cross(r - p), corner: p, middle: (p + q + r) / 3.0 }
     }
 
     /// Whether the start lies so near to the diagonal, or beyond, that its place does not tell which triangle is ahead.
     pub(super) fn is_at_diagonal(&self, corners: &[Point; 4], start: Point, reach: f64) -> bool {
         distance_to_segment(start, corners[0], corners[2]) <= reach || is_over_second(corners, start) != self.second
+    }
+
+    /// The side of the triangle that a ray goes to, along its normal; that of the normal where it runs in the plane.
+    pub(super) fn side(&self, direction: Vector) -> f64 {
+        if self.normal.dot(direction) < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Whether a start that lies `height` times the normal's length over the plane, on the side that the ray goes to, has been lifted: such
+    /// a ray sees what rises before it, by however little. Half of the lift may have been lost to rounding.
+    pub(super) fn is_lifted(&self, height: f64, reach: f64) -> bool {
+        let least = 0.5 * LIFT * reach;
+        height > 0.0 && height * height > least * least * self.normal.length_squared()
     }
 
     /// The start, moved towards the middle of the triangle.

@@ -295,6 +295,23 @@ mod tests {
     }
 
     #[test]
+    fn quanta_are_the_nearest_whole_numbers() {
+        for x in [0.5, 1.5, 2.5, 2.6, 1e9 + 0.75, 2f64.powi(51) - 0.25, 4.5e15] {
+            assert_eq!([round_quanta(x), round_quanta(-x)], [x.round_ties_even(), -x.round_ties_even()]);
+        }
+    }
+
+    #[test]
+    fn what_waits_is_part_of_what_is_flushed() {
+        let (mut grid, mut sums) = (Grid::new(3), vec![Sum::default(); 3]);
+        for (cell, quanta) in [(2, 5.0), (0, 7.0), (2, 11.0)] {
+            grid.add_deferred(cell, quanta);
+        }
+        grid.flush(&mut sums);
+        assert_eq!([0, 1, 2].map(|k: usize| sums[k].total), [7, 0, 16]);
+    }
+
+    #[test]
     fn sums_do_not_depend_on_order() {
         let quanta: Vec<f64> = (0..1000u64).map(|i| (i * 7919 % 1009) as f64 * 1e9).collect();
         let run = |order: &mut dyn Iterator<Item = usize>| {

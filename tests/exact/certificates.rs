@@ -157,3 +157,90 @@ fn tangencies_are_told_to_the_last_bit() {
         assert_eq!(answer.hit.map(|hit| hit.t), found.first().copied());
     }
 }
+
+#[test]
+fn a_contact_of_fourth_order_is_told_as_tangent() {
+    // z = x⁴/2¹⁸: at x = 0 the sheet does not bend, so that no box tells whether it is met there; 64·(2u − 1)⁴ has Bézier points of ±64.
+    let knots = [vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+    let places = [(-64.0, 64.0), (-32.0, -64.0), (0.0, 64.0), (32.0, -64.0), (64.0, 64.0)];
+    let points = places.iter().flat_map(|&(x, z)| [-32.0, 32.0].map(|y| Point::new(x, y, z).extend(1.0))).collect();
+    let exact = Exact::build(&model([Surface { degree: [4, 1], knots, points }]), &Settings::default());
+    let mut s = Stream(87);
+    let mut tangent = 0;
+    for _ in 0..100 {
+        // Below the sheet: nothing is met, and what is told to be met within rounding is no certified hit.
+        let height = 10f64.powf(s.within(-18.0, -14.0));
+        let ray = Ray::new(Point::new(-96.0, s.within(-16.0, 16.0), -height), Vector::X);
+        let answer = exact.first(&ray, &mut Cost::default());
+        let certified_miss = answer.hit.is_none() && answer.certainty == Certainty::Certified;
+        assert!(certified_miss || answer.certainty != Certainty::Certified, "{height:e} below: {answer:?}");
+        tangent += usize::from(answer.certainty == Certainty::Tangent);
+    }
+    assert!(tangent > 50, "{tangent} tangent");
+}
+
+#[test]
+fn a_face_that_a_ray_runs_along_is_met_inside_its_border_from_far_away() {
+    let turned = Frame::from_axis(Point::new(3.1, -2.7, 1.3), Vector::new(0.3, 0.5, 0.8), None);
+    let surface = sweep::plane(&turned, [[0.0, 100.0]; 2]);
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let mut s = Stream(89);
+    let mut near = 0;
+    for k in 0..2000 {
+        // At sines where the rounding of the way to the face moves the place along it by a hundredth of a millimetre to some.
+        let beside = 10f64.powf(s.within(-3.0, 0.0));
+        let x = if k % 2 == 0 { beside } else { 100.0 - beside };
+        let target = turned.point(Point::new(x, s.within(10.0, 90.0), 0.0));
+        let along = turned.x * if k % 4 < 2 { 1.0 } else { -1.0 } + turned.y * s.within(-0.5, 0.5);
+        let d = (along.normalize() - turned.z * 10f64.powf(s.within(-10.0, -8.0))).normalize();
+        let ray = Ray::new(target - d * 10f64.powf(s.within(5.0, 6.5)), d);
+        let [u, v] = surface.domain();
+        let start = Uv::new(u[0] + (u[1] - u[0]) * x / 100.0, 0.5 * (v[0] + v[1]));
+        let Some(truth) = referee::root(&surface, &ray, start) else { continue };
+        if truth.inside > 1e-6 {
+            near += usize::from(truth.inside < 1.0);
+            let answer = exact.first(&ray, &mut Cost::default());
+            let met = answer.hit.is_some_and(|hit| (hit.t - truth.t).abs() < 1e-5);
+            assert!(met || answer.certainty != Certainty::Certified, "{truth:?} by {ray:?}: {answer:?}");
+        }
+    }
+    assert!(near > 500, "{near} near the border");
+}
+
+#[test]
+fn of_a_sheet_that_bends_by_less_than_its_rounding_no_later_root_is_certified() {
+    // z = bend·(x/64)²: across a ray that runs along it obliquely, both coordinates are of the sheet's size and round by more than it bends.
+    let knots = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let mut s = Stream(91);
+    let mut double = 0;
+    for _ in 0..2400 {
+        let bend = 10f64.powf(s.within(-20.0, -11.0));
+        let height = [bend, -bend, bend];
+        let at = |k: usize| 64.0 * k as f64 - 64.0;
+        let points = (0..9).map(|k| Point::new(at(k / 3), at(k % 3), height[k / 3]).extend(1.0)).collect();
+        let surface = Surface { degree: [2, 2], knots: [knots.to_vec(), knots.to_vec()], points };
+        let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+        let along = Vector::new(1.0, s.within(-0.8, 0.8), 0.0).normalize();
+        let d = (along + Vector::Z * bend * s.within(-2e-3, 2e-3)).normalize();
+        let (half, y) = (10f64.powf(s.within(-1.5, 1.7)), s.within(-16.0, 16.0));
+        let ray = Ray::new(Point::new(0.0, y, bend * (half / 64.0).powi(2)) - d * 150.0, d);
+        let mut roots: Vec<f64> = [-60.0, -30.0, -10.0, -3.0, -1.0, 0.1, 1.0, 3.0, 10.0, 30.0, 60.0]
+            .iter()
+            .filter_map(|x| referee::root(&surface, &ray, Uv::new(0.5 + x / 128.0, 0.5 + y / 128.0)))
+            .filter(|root| root.inside > 1e-3)
+            .map(|root| root.t)
+            .collect();
+        roots.sort_by(f64::total_cmp);
+        let [Some(&first), Some(&last)] = [roots.first(), roots.last()] else { continue };
+        if last - first > 1e-2 {
+            double += 1;
+            let answer = exact.first(&ray, &mut Cost::default());
+            let met = answer.hit.is_some_and(|hit| (hit.t - first).abs() < 1e-5);
+            assert!(
+                met || answer.certainty != Certainty::Certified,
+                "bend {bend:e}: {answer:?} for {first} and {last}"
+            );
+        }
+    }
+    assert!(double > 500, "{double} with two roots");
+}

@@ -138,9 +138,15 @@ impl Verdicts {
 }
 
 fn judge(surface: &Surface, exact: &Exact, ray: &Ray, aimed: Uv, size: f64, what: &str, out: &mut Verdicts) {
-    let started = Instant::now();
-    let answer = exact.first(ray, &mut Cost::default());
-    let seconds = started.elapsed().as_secs_f64();
+    let timed = || {
+        let started = Instant::now();
+        (exact.first(ray, &mut Cost::default()), started.elapsed().as_secs_f64())
+    };
+    let (answer, mut seconds) = timed();
+    if seconds > out.slowest.0 {
+        // Being interrupted by other work takes milliseconds too.
+        seconds = (0..4).fold(seconds, |least, _| least.min(timed().1));
+    }
     if seconds > out.slowest.0 {
         out.slowest = (seconds, what.into());
     }
@@ -244,7 +250,8 @@ fn no_certified_answer_on_many_hostile_faces_is_wrong() {
     for (kind, row) in KINDS.iter().zip(&table) {
         let share = |v: &Verdicts| 1000.0 * v.flagged as f64 / (v.flagged + v.certified).max(1) as f64;
         let cells: Vec<String> = row.iter().map(|v| format!("{:6.1}", share(v))).collect();
-        println!("{kind:32} {}", cells.join(" "));
+        let slowest = row.iter().map(|v| 1e3 * v.slowest.0).fold(0.0, f64::max);
+        println!("{kind:32} {}   slowest {slowest:.2} ms", cells.join(" "));
     }
     let out = table.into_iter().flatten().fold(Verdicts::default(), Verdicts::merge);
     let (certified, flagged) = (out.certified, out.flagged);

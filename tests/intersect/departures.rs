@@ -51,8 +51,9 @@ fn crumpled(n: usize, m: usize, share: f64, map: impl Fn(Vector) -> Point) -> Fa
 fn grazing_rays_that_start_on_the_diagonal_of_a_folded_quad_stay_inside() {
     for (size, shift) in [(50.0, 0.0), (50.0, 1e6), (5e-5, 0.0)] {
         let middle = Point::new(shift, -shift, shift);
-        // Folds lower than 2⁻⁴⁰ of the largest coordinate are taken for flat: a kilometre away those of a nanometre.
-        for share in [0.03, 1e-4, if shift > 0.0 { 1e-6 } else { 1e-7 }] {
+        // A kilometre away folds of down to a nanometre, where a start is rounded by a ten-thousandth of that.
+        let smallest: &[f64] = if shift > 0.0 { &[1e-6, 1e-7, 2e-8] } else { &[1e-7] };
+        for &share in [0.03, 1e-4].iter().chain(smallest) {
             let mesh = crumpled(16, 9, share, |v| v * size + middle);
             let octree = Octree::build(&mesh, &octree::Settings::default());
             let mut r = Random(78);

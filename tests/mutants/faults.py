@@ -75,7 +75,7 @@ FAULTS = [
     # The proof of facets.
     ("Taylor bound a third", PROOF + "deviation.rs", "/ («8.0» * lightest))", "24.0", "tessellate lib:proof"),
     ("mixed derivative forgotten", PROOF + "deviation.rs", "(most[0] + «2.0 * most[1]» + most[2])", "0.0", "tessellate lib:proof"),
-    ("lightest weight forgotten", PROOF + "deviation.rs", "lightest = lightest.min(«w_min»);", "w_max", "tessellate lib:proof"),
+    ("lightest weight forgotten", PROOF + "deviation.rs", "lightest = lightest.min(«w_min»);", "w_max", "lib:proof tessellate"),
     ("height of the quad forgotten", PROOF + "flat_quad.rs", "let flat = sides - «quad.height»;", "0.0", "tessellate lib:proof"),
     ("limit of the quad thrice", PROOF + "flat_quad.rs", "let sides = «limit * quad.cosine» - self.margin;", "3.0 * limit", "tessellate lib:proof"),
     # Tallies.
@@ -84,11 +84,11 @@ FAULTS = [
     ("a waiting cell is lost", "src/simulate/tally.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:tally simulate"),
     ("error without its correction", "src/simulate/tally.rs", "(squares - total * total / k).max(0.0) * «k» / (k - 1.0)", "1.0", "lib:tally simulate"),
     # Contacts.
-    ("partner looks the same way", KERNEL + "contact.rs", "other.body != at.face.body && opposite && «against»", "!against", "simulate"),
-    ("coating of the wrong face", KERNEL + "contact.rs", "[false, false] if «entering» => ContactSurface::Partner(partner),", "!entering", "simulate"),
-    ("coating of a partner forgotten", KERNEL + "contact.rs", "[true, false] => «ContactSurface::Partner(partner)»,", "ContactSurface::Bare", "simulate"),
-    ("rounding of places a thousandth", KERNEL + "tolerances.rs", "«ROUNDING_MM + ROUNDING_SHARE * distance»", "1e-3 * (ROUNDING_MM + ROUNDING_SHARE * distance)", "simulate"),
-    ("what a ray leaves forgotten", KERNEL + "step.rs", "let mut next = «Ray::new(at.point, direction).with_departure(at.departure())»;", "Ray::new(at.point, direction)", "simulate"),
+    ("partner looks the same way", KERNEL + "contact.rs", "other.body != at.face.body && opposite && «against»", "!against", "simulate:of_two_coatings simulate"),
+    ("coating of the wrong face", KERNEL + "contact.rs", "[false, false] if «entering» => ContactSurface::Partner(partner),", "!entering", "simulate:contacts simulate"),
+    ("coating of a partner forgotten", KERNEL + "contact.rs", "[true, false] => «ContactSurface::Partner(partner)»,", "ContactSurface::Bare", "simulate:contacts simulate"),
+    ("rounding of places a thousandth", KERNEL + "tolerances.rs", "«ROUNDING_MM + ROUNDING_SHARE * distance»", "1e-3 * (ROUNDING_MM + ROUNDING_SHARE * distance)", "simulate:laid simulate"),
+    ("what a ray leaves forgotten", KERNEL + "step.rs", "let mut next = «Ray::new(at.point, direction).with_departure(at.departure())»;", "Ray::new(at.point, direction)", "simulate:closed simulate"),
     # Optics.
     ("mirror image of the wrong length", "src/optics/refraction.rs", "unit(d - n * («2.0» * d.dot(n)))", "1.999", "lib:refraction simulate"),
     ("total reflection misjudged", "src/optics/refraction.rs", "(sin2_t < «1.0»).then(", "0.999", "lib:refraction simulate"),

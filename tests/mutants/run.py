@@ -104,9 +104,10 @@ def build(copy, jobs, areas):
     chosen = [word for area in areas for word in (["--lib"] if area == "lib" else ["--test", area])]
     command = ["cargo", "test", "--offline", "--no-run", "--message-format", "json-render-diagnostics", "-j", str(jobs), *chosen]
     env = {**os.environ, "CARGO_TARGET_DIR": str(copy / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
-    done = subprocess.run(command, cwd=copy, stdout=subprocess.PIPE, text=True, env=env)
+    done = subprocess.run(command, cwd=copy, capture_output=True, text=True, env=env)
     if done.returncode != 0:
-        sys.exit("the list is in error: its faults do not compile")
+        # Only then: every fault makes a warning or two.
+        sys.exit(f"{done.stderr}\nthe list is in error: its faults do not compile")
     programs = {}
     for line in done.stdout.splitlines():
         message = json.loads(line)

@@ -159,6 +159,37 @@ fn a_coating_between_glued_bodies_is_met_once_whosever_face_it_is_on() {
     }
 }
 
+/// A mirror on one of two glued slabs, black on the other: the face that the light is leaving says what happens.
+#[test]
+fn of_two_coatings_between_glued_bodies_that_counts_which_the_light_leaves() {
+    let slab = |from: f64, to: f64| [Point::new(-50.0, -50.0, from), Point::new(50.0, 50.0, to)];
+    let (front, through) = (0.04, 0.96);
+    let mirrored = front + through * through * 0.9 / (1.0 - front * 0.9);
+    for (gap, z, direction, expected) in [
+        (0.0, -10.0, 1.0, mirrored),
+        (2e-4, -10.0, 1.0, mirrored),
+        (0.0, 20.0, -1.0, front),
+        (2e-4, 20.0, -1.0, front),
+    ] {
+        let mut world = World::default();
+        let ([a, b], [c, d]) = (slab(0.0, 3.3), slab(3.3 + gap, 7.7));
+        world.cuboid("low", a, b).cuboid("high", c, d);
+        let text = format!(
+            "[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\n{MEDIA}
+            [[material]]\npart = 'low'\nmedium = 'glass'\n[[material]]\npart = 'high'\nmedium = 'glass'
+            [[material]]\npart = 'low'\nface = 'z1'\nsurface = 'mirror'\nreflectance = 0.9
+            [[material]]\npart = 'high'\nface = 'z0'\nsurface = 'absorber'
+            [[source]]\nkind = 'collimated'\nat = [0, 0, {z:?}]\ndirection = [0.02, 0.01, {direction:?}]\nradius = 5
+            [[receiver]]\nname = 'above'\nat = [0, 0, 30]\nsize = [90, 90]
+            [[receiver]]\nname = 'below'\nat = [0, 0, -30]\nsize = [90, 90]\n"
+        );
+        let results = world.run(&text, |_| ());
+        let [above, below] = [0, 1].map(|k| results.receivers[k].power);
+        let [back, on] = if direction > 0.0 { [below, above] } else { [above, below] };
+        assert!((back - expected).abs() < 3e-5 && on == 0.0, "{gap} {direction}: {back} back, {on} on");
+    }
+}
+
 /// Eight glued blocks are one block, also for light that passes within the glue distance of the edges where four of them meet.
 #[test]
 fn light_along_the_edges_of_glued_blocks_is_not_lost() {

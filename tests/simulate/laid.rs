@@ -1,7 +1,7 @@
 //! Sources laid exactly on faces, edges and corners of solids: their light starts on the side it goes to, and none is lost.
 
-use crate::support::World;
-use lampyris::math::Point;
+use crate::support::{Shape, World};
+use lampyris::math::{Frame, Point, Vector};
 
 const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
 
@@ -68,5 +68,31 @@ fn a_point_on_a_clear_block_shines_in_and_out() {
         let r = world.run(&text, |_| ());
         assert_eq!(r.lost_rays, 0, "{at}: {:?}", r.ledger.first());
         assert!((r.power.cut_off - inside * caught).abs() < 0.015, "{at}: {:?}", r.power);
+    }
+}
+
+/// A kilometre from the origin the plane of a receiver is rounded by 1e-10 mm, and a grazing ray meets it a hundred times as far off
+/// the face that it lies in.
+#[test]
+fn a_receiver_in_a_black_face_far_away_counts_all_light() {
+    for k in 0..12 {
+        let centre = Point::new(1e6, -0.7e6, 0.9e6) + Vector::splat(0.37 * f64::from(k));
+        let frame = Frame::from_axis(centre, Vector::new(0.3, 0.5, 0.8), None);
+        let mut world = World::default();
+        world.part("plate", false, &[("top", Shape::Rectangle { frame, half: [100.0, 100.0] })]);
+        let beside = centre + frame.x * (3.1 + f64::from(k)) - frame.y * 7.3;
+        let list = |v: Vector| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let down = frame.x - frame.z * 0.01;
+        let text = format!(
+            "[run]\nrays = 200\n[[material]]\npart = 'plate'\nsurface = 'absorber'
+            [[source]]\nkind = 'collimated'\nat = {}\ndirection = {}\nradius = 0.05
+            [[receiver]]\nname = 'on the plate'\nat = {}\nnormal = {}\nsize = [60, 60]\n",
+            list(centre - down * 50.0),
+            list(down),
+            list(beside),
+            list(frame.z),
+        );
+        let r = world.run(&text, |_| ());
+        assert!((r.power.received - 1.0).abs() < 1e-9, "{k}: {:?}", r.power);
     }
 }

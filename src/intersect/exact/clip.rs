@@ -43,10 +43,6 @@ const REGULAR: f64 = 1e-6;
 const TANGENT_SINE: f64 = 1e-3;
 /// A box of this size that still holds more than one root is asked for a tangency: most rays that graze a surface have found theirs.
 const TANGENCY_BOX: f64 = 1.0 / 64.0;
-/// Clipping steps that looking for a bend counts as: two microseconds.
-const BEND_WORK: u32 = 4;
-/// Clipping steps that a tangency counts as: its search takes 150 to 300 microseconds.
-const TANGENCY_WORK: u32 = 400;
 /// How far beyond its leaf a net from 32 digits is looked at, as a share of the leaf.
 const CRACK: f64 = 1e-8;
 /// Clipping steps that a net from 32 digits counts as: fifty microseconds.
@@ -295,14 +291,12 @@ impl Exact {
         let is_around =
             |p: [f64; 2]| (0..2).all(|k| (p[k] - 0.5 * (node.rect[k][0] + node.rect[k][1])).abs() <= side);
         // Which of two roots a ray leaves that starts off them by rounding, 32 digits do not tell either.
-        if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < TANGENCY_WORK {
+        if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < tangency::WORK {
             return false;
         }
-        query.budget -= BEND_WORK;
         let Some(roots) = tangency::roots(self, query, clipping.leaf, &clipping.seen, node.rect) else {
             return false;
         };
-        query.budget = query.budget.saturating_sub(TANGENCY_WORK);
         for root in roots {
             self.offer_settled(query, clipping.index, &root, [settlement::LOOSE; 2]);
         }

@@ -44,8 +44,10 @@ impl Exact {
     /// Offers a root at its place in 32 digits, if that lies on the leaf; flags what stays open.
     #[cold]
     pub(super) fn settle(&self, query: &mut Query, index: u32, found: Candidate, margin: [f64; 2]) {
-        // Charged to the ray's budget, so that a ray along a border, of which every root is open, ends as others
-        // do.
+        // Charged to the ray's budget and given up with it, so that a ray along a border, of which every root is open, ends as others do.
+        if query.budget == 0 {
+            return self.leave_open(query, index, found);
+        }
         query.budget = query.budget.saturating_sub(WORK);
         let leaf = &self.leaves[index as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];

@@ -45,6 +45,11 @@ const ON_CURVE: f64 = 1e-20;
 /// Relative error of a height in 32 digits: a thousand roundings of 2⁻¹⁰⁴, twenty times over.
 const HEIGHT_ROUNDING: f64 = 1e-27;
 
+/// Clipping steps that looking for a bend counts as: two microseconds.
+const BEND_WORK: u32 = 4;
+/// Clipping steps that the search in 32 digits counts as, whether it finds or not: 150 to 300 microseconds.
+pub(super) const WORK: u32 = 400;
+
 type Number = DoubleDouble;
 type Range = [f64; 2];
 
@@ -71,14 +76,15 @@ struct Heights {
 
 /// The roots in a box where the ray touches the surface; `None` where that does not tell.
 ///
-/// The box is one of a leaf's parameters.
+/// The box is one of a leaf's parameters. What it takes is charged to the query's budget.
 pub(super) fn roots(
     exact: &Exact,
-    query: &Query,
+    query: &mut Query,
     leaf: &Leaf,
     seen: &SeenLeaf,
     rect: [[f64; 2]; 2],
 ) -> Option<SmallVec<[SettledRoot; 2]>> {
+    query.budget = query.budget.saturating_sub(BEND_WORK);
     // Of a sliver, which cuts leave along the ray, the square around it: the curve needs room to bend.
     let side = rect.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
     let wide = rect.map(|[low, high]| [-1.0, 1.0].map(|sign| 0.5 * (low + high) + sign * (0.5 + ROOM) * side));
@@ -98,6 +104,7 @@ pub(super) fn roots(
         return None;
     }
     let reference = exact.geometry.reference(&exact.geometry.patches[leaf.patch as usize]);
+    query.budget = query.budget.saturating_sub(WORK);
     simd::dispatch(Search { reference, query, leaf, frame: seen.frame, net: &net, bend: &bend, from, extent })
 }
 
