@@ -15,6 +15,8 @@ const FARTHEST: f64 = 2.0;
 const NEARER: f64 = 1e-9;
 /// Share by which the sags along u and v must differ to decide where a cell is cut; else its longer side is.
 const SAG_DIFFERENCE: f64 = 0.05;
+/// Where a line is looked at besides its middle.
+const QUARTERS: [f64; 2] = [0.25, 0.75];
 
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(in crate::tessellate) type Corners = [(Uv, Point); 4];
@@ -67,9 +69,15 @@ impl CandidateFacet {
         Self { p, sag: [u, v] }
     }
 
-    /// The parameter across which the cell is cut when it does not fit.
-    pub(in crate::tessellate) fn cut_direction(&self) -> usize {
-        let [u, v] = self.sag;
+    /// The parameter across which the cell is cut when it does not fit within `limit`.
+    pub(in crate::tessellate) fn cut_direction(&self, surface: &FaceSurface<'_>, cell: Cell, limit: f64) -> usize {
+        let [mut u, mut v] = self.sag;
+        // A profile like an S passes through the middle of its chord: by the middle alone a trumpet was cut into 100,000 columns, and
+        // never across. Where middles do not tell why a cell fails, quarters are looked at.
+        if u.max(v) <= limit {
+            let [along_u, along_v] = self.quarter_sags(surface, cell);
+            (u, v) = (u.max(along_u), v.max(along_v));
+        }
         let p = &self.p;
         let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
         // Only where one sag is clearly larger: on a ball both are alike, and rounding would make a different tree
@@ -80,6 +88,19 @@ impl CandidateFacet {
         let along_u = length(0, 1, 2, 1).max(length(0, 1, 1, 1));
         let along_v = length(1, 0, 1, 2).max(length(1, 0, 1, 1));
         if along_u >= along_v { 0 } else { 1 }
+    }
+
+    /// Largest distance of the quarters of the two middle lines from their chords, for the one along u and the one along v.
+    fn quarter_sags(&self, surface: &FaceSurface<'_>, cell: Cell) -> [f64; 2] {
+        let chords = [[self.p[0][1], self.p[2][1]], [self.p[1][0], self.p[1][2]]];
+        [0, 1].map(|d| {
+            let off = QUARTERS.map(|share| {
+                let mut at = cell.center();
+                at[d] = cell.lo[d] + (cell.hi[d] - cell.lo[d]) * share;
+                distance_to_chord(surface.point(at), &chords[d])
+            });
+            off[0].max(off[1])
+        })
     }
 
     /// Places of the corners, in the order of [`Cell::corners`].
@@ -115,5 +136,30 @@ impl CandidateFacet {
         }
         let (p, uv) = (self.places(), cell.corners());
         quad_bound(prover, &std::array::from_fn(|k| (uv[(k + r) % 4], p[(k + r) % 4])), limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Homogeneous;
+    use crate::nurbs::Surface;
+    use crate::tessellate::settings::ToleranceField;
+
+    #[test]
+    fn a_profile_like_an_s_is_cut_across() {
+        // Along v from (0, 0) to (6, 6) through the middle of the chord; along u an arc that sags by 0.01.
+        let profile = [(0.0, 0.0), (0.0, 3.0), (6.0, 3.0), (6.0, 6.0)];
+        let points = [0.0, 1.0, 2.0]
+            .map(|u| profile.map(|(x, z)| Homogeneous::new(x, u, z + if u == 1.0 { 0.02 } else { 0.0 }, 1.0)));
+        let knots = [[vec![0.0; 3], vec![1.0; 3]].concat(), [vec![0.0; 4], vec![1.0; 4]].concat()];
+        let spline = Surface { degree: [2, 3], knots, points: points.as_flattened().to_vec() };
+        let field = ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
+        let surface = FaceSurface::new(&spline, false, field);
+        let cell = Cell { lo: Uv::ZERO, hi: Uv::ONE };
+        let candidate = CandidateFacet::new(&surface, cell);
+        // The curve's farthest from its chord: by symmetry on either side of the middle, and none in it.
+        assert!(candidate.sag[0] > 0.009 && candidate.sag[1] < 1e-12, "{:?}", candidate.sag);
+        assert_eq!(candidate.cut_direction(&surface, cell, 0.1), 1);
     }
 }

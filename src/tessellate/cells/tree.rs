@@ -170,7 +170,8 @@ impl Tree<'_, '_> {
             return;
         }
         let (direction, at) = crease.unwrap_or_else(|| {
-            let d = candidate.cut_direction();
+            let d =
+                candidate.cut_direction(self.surface, cell, self.surface.tolerance(cell.center()) * branch.slack);
             (d, self.cut_parameter(cell, d))
         });
         // Parameters have no more digits between the two.
