@@ -208,6 +208,34 @@ fn a_plain_torus_may_mean_the_inner_part_of_one_that_touches_itself() {
     assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
 }
 
+#[test]
+fn a_canal_with_a_pole_at_both_ends_in_one_point_is_closed_at_the_right_one() {
+    // A circle of radius 1 turned about its own tangent by a quarter, as a rational spline: both ends of v are the origin. The face
+    // is the half above z = 0, which ends at the upper end of v.
+    let circle = [(0., 0.), (0., -1.), (1., -1.), (2., -1.), (2., 0.), (2., 1.), (1., 1.), (0., 1.), (0., 0.)];
+    let half = 0.5f64.sqrt();
+    let (mut list, mut rows, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, (along_x, along_y)) in [(1., 0.), (1., 1.), (0., 1.)].into_iter().enumerate() {
+        let first = 100 + 9 * i as u32;
+        list.extend((first..).zip(circle.map(|(r, z)| [r * along_x, r * along_y, z])));
+        rows.push((first..first + 9).map(|k| format!("#{k}")).collect::<Vec<_>>().join(","));
+        let weight = |j: usize| [1.0, half][i % 2] * [1.0, half][j % 2];
+        weights.push((0..9).map(|j| format!("{:?}", weight(j))).collect::<Vec<_>>().join(","));
+    }
+    let surface = points(&list)
+        + &format!(
+            "#39=(BOUNDED_SURFACE()B_SPLINE_SURFACE(2,2,(({})),.UNSPECIFIED.,.F.,.F.,.F.)\
+             B_SPLINE_SURFACE_WITH_KNOTS((3,3),(3,2,2,2,3),(0.,1.),(0.,0.25,0.5,0.75,1.),.UNSPECIFIED.)\
+             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_SURFACE((({})))REPRESENTATION_ITEM('')SURFACE());\n",
+            rows.join("),("),
+            weights.join("),(")
+        );
+    let import = import(&gore(&surface, 0.0, 2.0, [1.0, 0.0], 1.0));
+    // Half of the tube of a torus whose radii are both 1, over a quarter turn.
+    close(area(&import), 0.5 * PI * PI, 1e-4);
+    assert_eq!((import.report.faces.converted, import.report.faces.repaired), (1, 0), "{:?}", import.report);
+}
+
 /// The unit square with other geometry for its first edge.
 fn square_along(curve: &str) -> String {
     square([".T."; 4], [0, 1, 2, 3])

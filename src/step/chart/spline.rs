@@ -49,20 +49,21 @@ impl SplineChart {
         let [nu, nv] = surface.counts();
         let at = |i: usize, j: usize| surface.points[i * nv + j].position();
         let equal = |a: Point, b: Point| (a - b).length() <= near;
-        let closed =
-            [(0..nv).all(|j| equal(at(0, j), at(nu - 1, j))), (0..nu).all(|i| equal(at(i, 0), at(i, nv - 1)))];
         let collapsed = [
             [0, nu - 1].map(|i| (1..nv).all(|j| equal(at(i, 0), at(i, j)))),
             [0, nv - 1].map(|j| (1..nu).all(|i| equal(at(0, j), at(i, j)))),
         ];
+        let meet =
+            [(0..nv).all(|j| equal(at(0, j), at(nu - 1, j))), (0..nu).all(|i| equal(at(i, 0), at(i, nv - 1)))];
+        // Sides that contract to one and the same point are poles, no seam: a step over one would leave the unwrapped plane.
+        let closed = [0, 1].map(|d| meet[d] && collapsed[d] == [false; 2]);
         let expected = Cell::new(FIRST_EXPECTATION_MM);
         Self { surface, size, closed, collapsed, patches: OnceLock::new(), expected }
     }
 
     pub(super) fn period(&self) -> [Option<f64>; 2] {
         let domain = self.surface.domain();
-        // Sides that contract to one and the same point are poles, no seam.
-        [0, 1].map(|d| (self.closed[d] && self.collapsed[d] == [false; 2]).then(|| domain[d][1] - domain[d][0]))
+        [0, 1].map(|d| self.closed[d].then(|| domain[d][1] - domain[d][0]))
     }
 
     /// The sides that are one point, as poles.

@@ -226,10 +226,13 @@ impl Connection<'_> {
         let (from, start) = (last.end(), next.start());
         let near = chart.nearest_representative(start, from);
         let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
-        let pole = chart.poles.iter().find(|pole| {
+        let near_pole = |pole: &&Pole| {
             (pole.point - p).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
                 && (pole.point - q).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
-        });
+        };
+        // Of two in one point, as at the ends of a canal that touches itself, the one that both pieces run into.
+        let off = |pole: &Pole| (from[pole.fixed] - pole.at).abs() + (near[pole.fixed] - pole.at).abs();
+        let pole = chart.poles.iter().filter(near_pole).min_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(pole) = pole else {
             let distance = (p - q).length();
             // A little apart is one point written twice; more than that is bridged, and told.
