@@ -35,6 +35,8 @@ const MAX_ROUNDS: u32 = 3;
 /// The same where borders cross or leave nothing: the fourth holds chords to 1/256 of the tolerance. Two rims 2 µm apart cross before it at
 /// 0.2 mm; a border that crosses itself in the file gains nothing, and with two more rounds such a face trebled the facets of a turbine.
 const MAX_ROUNDS_OF_REPAIRED: u32 = 4;
+/// The same with the rounds in which edges whose chords cross take each other's corners: a few near a cusp, each nearer to it.
+const MAX_ROUNDS_OF_CROSSING: u32 = MAX_ROUNDS_OF_REPAIRED + 4;
 /// Samples of an edge up to which its chords may be why its face comes to nothing.
 const FEW_CHORDS: usize = 500;
 
@@ -93,12 +95,13 @@ fn mesh_part(
         }
     }
     let mut denser = vec![0u32; part.edges.len()];
+    let mut further: Vec<Vec<f64>> = vec![Vec::new(); part.edges.len()];
     // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
     let mut round = 0;
     let (divisions, shared, mut meshes) = loop {
-        let (divisions, shared) = edges::divide(part, &known, &sides, &denser, &mut own);
+        let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
             let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
             mesh_face(&FaceInput { part, face, surface, divisions: &divisions, shared: &shared, settings, taken })
@@ -120,14 +123,19 @@ fn mesh_part(
                 all.map(renew).collect()
             }
         };
-        let coarse = coarse_edges(&faces, &meshes, &divisions, round);
         // A last round that asks for more is taken as it is; what does not hold is counted.
-        if coarse.is_empty() || round == MAX_ROUNDS_OF_REPAIRED {
-            break (divisions, shared, meshes);
-        }
-        round += 1;
-        for e in coarse {
-            denser[e] = round;
+        let coarse = coarse_edges(&faces, &meshes, &divisions, round);
+        if round < MAX_ROUNDS_OF_REPAIRED && !coarse.is_empty() {
+            round += 1;
+            coarse.into_iter().for_each(|e| denser[e] = round);
+        } else {
+            // Where shorter chords still cross, as between arcs that touch, each gets the other's corners.
+            let facing: Vec<(EdgeId, f64)> = meshes.iter().flatten().flat_map(|m| m.facing.clone()).collect();
+            if facing.is_empty() || round == MAX_ROUNDS_OF_CROSSING {
+                break (divisions, shared, meshes);
+            }
+            round = round.max(MAX_ROUNDS_OF_REPAIRED) + 1;
+            facing.into_iter().for_each(|(edge, t)| further[edge.0 as usize].push(t));
         }
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };

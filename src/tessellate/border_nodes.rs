@@ -2,6 +2,7 @@
 
 use super::border::polygons::{BorderPolygons, BorderSide};
 use super::cells::cell::Subdivision;
+use super::crossing_chords::Followed;
 use super::face_surface::FaceSurface;
 use super::imprint::{Imprint, ImprintEnd};
 use super::nodes::{Node, Nodes, Position, edge_key};
@@ -27,8 +28,8 @@ pub(super) struct BorderNodes {
     /// Pairs of nodes, loop by loop.
     pub(super) segments: Vec<[u32; 2]>,
     pub(super) chords: BorderChords,
-    /// The edge that a segment follows.
-    pub(super) followed: FxHashMap<[u32; 2], EdgeId>,
+    /// The piece of an edge that a segment follows.
+    pub(super) followed: FxHashMap<[u32; 2], Followed>,
     /// Segments that are one point in space.
     poles: Vec<[u32; 2]>,
     /// Positions of vertices that the file has twice, where loops touch.
@@ -100,7 +101,7 @@ impl BorderNodes {
         // A side is known by its two nodes, whichever way it runs.
         let names = along_edges.iter().map(|s| edge_key(s.nodes[0], s.nodes[1]));
         out.chords.extend(names.clone().zip(chords));
-        out.followed.extend(names.zip(along_edges.iter().map(|s| s.edge)));
+        out.followed.extend(names.zip(along_edges.iter().map(|s| Followed { edge: s.edge, t: s.t })));
         out
     }
 

@@ -7,6 +7,7 @@ use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
 use super::cells::tree;
+use super::crossing_chords::facing_samples;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
@@ -129,8 +130,10 @@ pub(super) fn mesh_with_imprint(
     // Where the budget has ended, shorter chords only cost more.
     let unproved = if cells.exhausted { Vec::new() } else { transition.unproved_chords(&chords, &followed) };
     let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
-    let mut coarse: Vec<EdgeId> = coarse.filter_map(|s| followed.get(&edge_key(s[0], s[1])).copied()).collect();
+    let mut coarse: Vec<EdgeId> = coarse.filter_map(|s| Some(followed.get(&edge_key(s[0], s[1]))?.edge)).collect();
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
+    let Transition { conflicts, crossed, .. } = &transition;
+    let facing = facing_samples(part, &transition.nodes, &followed, conflicts, crossed);
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
     let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
     let mut emission = Emission::new(surface, &transition.nodes);
@@ -147,7 +150,7 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::Empty);
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
-    Ok((FaceMesh { own, coarse, coincident, repaired, ..made }, carrier))
+    Ok((FaceMesh { own, coarse, facing, coincident, repaired, ..made }, carrier))
 }
 
 /// What was given up, the gravest first.

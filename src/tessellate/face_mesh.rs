@@ -33,6 +33,8 @@ pub(super) struct FaceMesh {
     pub(super) facets: Vec<MeshedFacet>,
     /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
     pub(super) coarse: Vec<EdgeId>,
+    /// Further samples that edges should have, so that chords of two of them do not cross.
+    pub(super) facing: Vec<(EdgeId, f64)>,
     /// Shared positions that are one: vertices of the file in one place, where loops touch.
     pub(super) coincident: Vec<[u32; 2]>,
     /// What was given up.

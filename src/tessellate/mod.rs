@@ -20,6 +20,7 @@ mod border;
 mod border_nodes;
 mod cells;
 mod contact;
+mod crossing_chords;
 mod emission;
 mod evaluation;
 mod face;

@@ -405,6 +405,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "imprint",
             "border",
             "cells",
+            "crossing_chords",
             "border_nodes",
             "emission",
             "fallback",

@@ -229,3 +229,47 @@ fn slivers_are_faces() {
         assert!((r.area_mm2 / (10.0 * width) - 1.0).abs() < 1e-5, "{width}: {}", r.area_mm2);
     }
 }
+
+/// An arc of a circle that touches the x axis from above in the origin, up to an angle about its centre: the curve in space, and in a
+/// plane whose parameters are lengths.
+fn touching_arc(radius: f64, angle: f64) -> (Curve, UvCurve) {
+    let weight = (0.5 * angle).cos();
+    let middle = Point::new(radius * (0.5 * angle).tan(), 0.0, 0.0);
+    let end = Point::new(radius * angle.sin(), radius * (1.0 - angle.cos()), 0.0);
+    let points = vec![Point::ZERO.extend(1.0), (middle * weight).extend(weight), end.extend(1.0)];
+    let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let flat = points.iter().map(|p| Point::new(p.x, p.y, p.w)).collect();
+    (Curve { degree: 2, knots: knots.clone(), points }, UvCurve { degree: 2, knots, points: flat })
+}
+
+#[test]
+fn chords_of_two_arcs_that_touch_do_not_cross() {
+    // Between circles of 66 and 65 mm that touch: near the cusp they are nearer to each other than any chord to its arc.
+    let (radii, angles) = ([66.0, 65.0], [0.5, 0.45]);
+    let [(outer, outer_uv), (inner, inner_uv)] = [0, 1].map(|k| touching_arc(radii[k], angles[k]));
+    let [a, b] = [outer.evaluate(1.0), inner.evaluate(1.0)];
+    let line = Curve { degree: 1, knots: vec![0.0, 0.0, 1.0, 1.0], points: vec![a.extend(1.0), b.extend(1.0)] };
+    let line_uv = UvCurve::line(a.truncate(), b.truncate(), [0.0, 1.0]);
+    let edge = |curve, [from, to]: [u32; 2]| Edge { curve, vertices: [VertexId(from), VertexId(to)], entity: None };
+    let side = |edge, reversed, uv| EdgeUse { edge: Some(EdgeId(edge)), reversed, uv };
+    let uses = vec![side(0, false, outer_uv), side(1, false, line_uv), side(2, true, inner_uv)];
+    let surface = sweep::plane(&Frame::IDENTITY, [[-1.0, 40.0], [-1.0, 10.0]]);
+    let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(surface) };
+    let part = Part {
+        vertices: vec![Point::ZERO, a, b],
+        edges: vec![edge(outer, [0, 1]), edge(line, [1, 2]), edge(inner, [0, 2])],
+        shells: vec![Shell { faces: vec![face], ..Shell::default() }],
+        ..Part::default()
+    };
+    let model = Model::from_part(part);
+    // The triangle of the chords of both, with the segments beyond them.
+    let segment = |k: usize| 0.5 * radii[k] * radii[k] * (angles[k] - angles[k].sin());
+    let expected = 0.5 * a.truncate().perp_dot(b.truncate()) + segment(0) - segment(1);
+    for tolerance in [0.2, 0.1, 0.05, 0.02] {
+        let made = tessellate(&model, &measured(tolerance));
+        assert_eq!(made.report.repaired, [], "{tolerance}");
+        assert_eq!(made.report.certified, made.report.facets, "{tolerance}");
+        // Chords of both sag alike; what is left is less than a tolerance along the line.
+        assert!((made.report.area_mm2 - expected).abs() < 0.05 * expected, "{} {expected}", made.report.area_mm2);
+    }
+}

@@ -36,7 +36,7 @@ pub(in crate::tessellate) fn divide(
     part: &Part,
     faces: &[(&Face, &FaceSurface<'_>)],
     sides: &[Vec<EdgeSide<'_, '_>>],
-    denser: &[u32],
+    (denser, further): (&[u32], &[Vec<f64>]),
     own: &mut Vec<OwnDivision>,
 ) -> (Vec<Division>, Vec<Point>) {
     // Most edges are as before in a further round, and dividing is the dearest part of it.
@@ -52,7 +52,18 @@ pub(in crate::tessellate) fn divide(
     opposite_sides::equalise(part, faces, sides, denser, &mut times);
     open_lenses(part, faces, &mut times);
     separate_twins(part, sides, &mut times);
-    positions(part, times)
+    positions(part, with_further(times.into_iter(), further))
+}
+
+/// Each edge's samples and further ones, which may come in any order.
+fn with_further(times: impl Iterator<Item = Vec<f64>>, further: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let merge = |(mut t, further): (Vec<f64>, &Vec<f64>)| {
+        t.extend(further);
+        t.sort_by(f64::total_cmp);
+        t.dedup();
+        t
+    };
+    times.zip(further).map(merge).collect()
 }
 
 /// The divisions with further parameters, those of each edge in any order, and the shared positions.
@@ -61,14 +72,7 @@ pub(in crate::tessellate) fn divide_more(
     divisions: &[Division],
     further: &[Vec<f64>],
 ) -> (Vec<Division>, Vec<Point>) {
-    let merged = divisions.iter().zip(further).map(|(division, further)| {
-        let mut t = division.t.clone();
-        t.extend(further);
-        t.sort_by(f64::total_cmp);
-        t.dedup();
-        t
-    });
-    positions(part, merged.collect())
+    positions(part, with_further(divisions.iter().map(|d| d.t.clone()), further))
 }
 
 /// Divisions at these parameters, and the shared positions.

@@ -4,6 +4,7 @@
 use crate::math::Uv;
 use crate::model::EdgeId;
 use crate::tessellate::border::bands::BorderBands;
+use crate::tessellate::crossing_chords::Followed;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
 use crate::tessellate::proof::border_chord::BorderChords;
@@ -51,7 +52,7 @@ impl Transition {
     pub(in crate::tessellate) fn unproved_chords(
         &self,
         chords: &BorderChords,
-        followed: &FxHashMap<[u32; 2], EdgeId>,
+        followed: &FxHashMap<[u32; 2], Followed>,
     ) -> Vec<[u32; 2]> {
         let sides = |f: &ProvedFacet<3>| {
             let (t, xi) = (f.nodes, f.tolerance);
@@ -64,13 +65,14 @@ impl Transition {
         }
         // By edge of the file, whose gap is the same whichever of its chords fails.
         let mut gaps: FxHashMap<EdgeId, f64> = FxHashMap::default();
-        for (side, edge) in followed {
+        for (side, piece) in followed {
             if let Some(chord) = chords.get(side) {
-                let gap = gaps.entry(*edge).or_insert(0.0);
+                let gap = gaps.entry(piece.edge).or_insert(0.0);
                 *gap = gap.max(chord.gap);
             }
         }
-        let gap = |side: &[u32; 2]| followed.get(side).and_then(|e| gaps.get(e)).copied().unwrap_or(f64::INFINITY);
+        let gap =
+            |side: &[u32; 2]| followed.get(side).and_then(|f| gaps.get(&f.edge)).copied().unwrap_or(f64::INFINITY);
         // A gap near the tolerance cannot be mended by shorter chords, which follow the edge and not the surface.
         at_border.into_iter().filter(|(side, xi)| gap(side) < WIDEST_GAP * xi).map(|(side, _)| side).collect()
     }
@@ -145,6 +147,7 @@ pub(in crate::tessellate) fn triangulate(
         cdt: Cdt::new(),
         border: FxHashMap::default(),
         handles: Vec::new(),
+        owners: Vec::new(),
     };
     // All points first: constraints between points that come later would have to be split.
     mesh.insert_nodes(&segments, &imprinted)?;
@@ -216,6 +219,8 @@ pub(super) struct Refinement<'s, 'a> {
     pub(super) border: FxHashMap<[u32; 2], u32>,
     /// Of those nodes that are in the triangulation.
     pub(super) handles: Vec<Option<FixedVertexHandle>>,
+    /// The first node of each vertex, by its index: the library keeps the data of the last.
+    owners: Vec<u32>,
 }
 
 impl Refinement<'_, '_> {
@@ -240,8 +245,9 @@ impl Refinement<'_, '_> {
         // Two nodes in one place of the parameter plane, as where a trim touches itself.
         if self.cdt.num_vertices() == before {
             // The place was taken: its first owner keeps it.
-            let first = self.handles.iter().position(|&h| h == Some(handle)).map_or(n, |first| first as u32);
-            self.cdt.vertex_data_mut(handle).node = first;
+            self.cdt.vertex_data_mut(handle).node = self.owners[handle.index()];
+        } else {
+            self.owners.push(n);
         }
         Some(handle)
     }

@@ -1,0 +1,82 @@
+//! Chords of a face's border that cross in the parameter plane, and the samples that keep them apart.
+//!
+//! Between two arcs that touch, chords cross however short they are: near the cusp the arcs are nearer to each other than any chord to
+//! its arc. With corners in the same places on both they bend alike and stay apart.
+
+use super::nodes::{Nodes, edge_key};
+use crate::math::{Point, Uv};
+use crate::model::{EdgeId, Part};
+use crate::nurbs::Curve;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+use rustc_hash::FxHashMap;
+
+/// The piece of an edge that a segment of the border follows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Followed {
+    pub(super) edge: EdgeId,
+    /// From where to where, in the edge's parameter.
+    pub(super) t: [f64; 2],
+}
+
+/// Pairs of segments that are looked at: faces that cross themselves everywhere gain nothing by more.
+const MAX_PAIRS: usize = 2000;
+/// Share of a chord that a further corner keeps from its ends.
+const CLEAR_OF_ENDS: f64 = 0.02;
+/// Steps by a third that find the nearest place on a chord's arc: to a millionth of it.
+const NEAREST_STEPS: usize = 34;
+
+/// For chords of different edges that cross, the parameters at which each faces the other's ends.
+pub(super) fn facing_samples(
+    part: &Part,
+    nodes: &Nodes,
+    followed: &FxHashMap<[u32; 2], Followed>,
+    conflicts: &[[u32; 2]],
+    crossed: &[[u32; 2]],
+) -> Vec<(EdgeId, f64)> {
+    let known = |s: &[u32; 2]| Some((*s, *followed.get(&edge_key(s[0], s[1]))?));
+    let others: Vec<([u32; 2], Followed)> = crossed.iter().filter_map(known).collect();
+    let pairs = conflicts.iter().filter_map(known).flat_map(|a| others.iter().map(move |b| (a, *b)));
+    let uv = |s: [u32; 2]| s.map(|n| nodes[n].uv);
+    let place = |s: [u32; 2]| s.map(|n| nodes[n].place);
+    let sag = |(ends, on): ([u32; 2], Followed)| {
+        let curve = &part.edges[on.edge.0 as usize].curve;
+        distance_to_chord(curve.evaluate(0.5 * (on.t[0] + on.t[1])), &place(ends))
+    };
+    // Edges that cross farther than their chords sag do so themselves: corners in one place would only hide it.
+    let is_for_sag = |a: ([u32; 2], Followed), b: ([u32; 2], Followed)| {
+        let beyond = |ends: [Point; 2], chord: &[Point; 2]| ends.map(|p| distance_to_chord(p, chord));
+        let (p, q) = (place(a.0), place(b.0));
+        let depth = beyond(p, &q).into_iter().chain(beyond(q, &p)).fold(f64::INFINITY, f64::min);
+        depth <= sag(a) + sag(b)
+    };
+    let mut samples = Vec::new();
+    let crossing = pairs.filter(|(a, b)| a.1.edge != b.1.edge && do_cross(uv(a.0), uv(b.0)));
+    for (a, b) in crossing.filter(|(a, b)| is_for_sag(*a, *b)).take(MAX_PAIRS) {
+        for (ends, on) in [(a.0, b.1), (b.0, a.1)] {
+            let curve = &part.edges[on.edge.0 as usize].curve;
+            let facing = ends.iter().filter_map(|&n| place_between(curve, on.t, nodes[n].place));
+            samples.extend(facing.map(|t| (on.edge, t)));
+        }
+    }
+    samples
+}
+
+/// Whether two segments have a point between the ends of both.
+fn do_cross([a, b]: [Uv; 2], [c, d]: [Uv; 2]) -> bool {
+    let side = |p: Uv, q: Uv, x: Uv| (q - p).perp_dot(x - p);
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
+}
+
+/// The parameter of the place nearest to `p` on a short piece of a curve; `None` where that is an end.
+fn place_between(curve: &Curve, [t0, t1]: [f64; 2], p: Point) -> Option<f64> {
+    let off = |t: f64| (curve.evaluate(t) - p).length();
+    let (mut lo, mut hi) = (t0.min(t1), t0.max(t1));
+    let margin = CLEAR_OF_ENDS * (hi - lo);
+    let inside = lo + margin..hi - margin;
+    for _ in 0..NEAREST_STEPS {
+        let (x, y) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+        if off(x) < off(y) { hi = y } else { lo = x }
+    }
+    let t = 0.5 * (lo + hi);
+    inside.contains(&t).then_some(t)
+}
