@@ -244,6 +244,16 @@ fn square_along(curve: &str) -> String {
 }
 
 #[test]
+fn a_line_that_passes_both_vertices_by_gives_way_to_them() {
+    // Of the edge from (0, 0, 0) to (1, 0, 0): half a millimetre beside it and 0.4 above.
+    let line = "#80=LINE('',#81,#82);\n#81=CARTESIAN_POINT('',(0.3,-0.5,0.4));\n#82=VECTOR('',#83,1.);\n#83=DIRECTION('',(1.,0.,0.));\n";
+    let import = import(&square_along(line));
+    close(area(&import), 1.0, 1e-12);
+    assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
+    assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
+}
+
+#[test]
 fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
     let plane = "#81=PCURVE('',#21,#82);\n#82=DEFINITIONAL_REPRESENTATION('',(#83),$);\n#83=LINE('',#84,#85);\n\
                  #84=CARTESIAN_POINT('',(0.,0.));\n#85=VECTOR('',#86,1.);\n#86=DIRECTION('',(1.,0.));\n";

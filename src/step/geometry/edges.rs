@@ -9,6 +9,8 @@ use super::{Geometry, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
+/// What is told of a line that passes both vertices by.
+const PASSED_BY: &str = "the line of an edge passes both its vertices by: it runs between them";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -19,6 +21,8 @@ pub(crate) struct TrimmedEdge {
     pub(crate) curve: Option<Curve>,
     /// Distance between the curve's ends and the vertices, mm.
     pub(crate) gap: f64,
+    /// What had to be put right.
+    pub(crate) repair: Option<&'static str>,
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
@@ -55,7 +59,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let Some(curve) = curve else {
             // No geometry: straight.
             let curve = (!closed).then(|| Curve::line(p, q, [0.0, (q - p).length()]));
-            return Ok(TrimmedEdge { curve, gap: 0.0 });
+            return Ok(TrimmedEdge { curve, gap: 0.0, repair: None });
         };
         let directed = self.curve(curve, 0)?;
         trim_to_vertices(&directed, p, q, closed, sense)
@@ -77,6 +81,15 @@ pub(crate) fn trim_to_vertices(
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
     let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
+    if let CurveShape::Line { origin, direction } = shape {
+        let miss = |t: f64, vertex: Point| (*origin + *direction * t - vertex).length();
+        let (miss_a, miss_b) = (miss(ta, a), miss(tb, b));
+        // A line that passes both vertices by is another edge's: of what this one is its vertices tell all.
+        if miss_a.min(miss_b) > LOOSE_VERTEX_MM && (p - q).length() > LOOSE_VERTEX_MM {
+            let curve = Curve::line(p, q, [0.0, (q - p).length()]);
+            return Some(TrimmedEdge { curve: Some(curve), gap: 0.0, repair: Some(PASSED_BY) });
+        }
+    }
     match shape.period() {
         Some(period) => {
             let noise = EMPTY_SHARE * period;
@@ -98,7 +111,7 @@ pub(crate) fn trim_to_vertices(
                 if tb - ta < noise || period - (tb - ta) < noise && coincident(p, q, accuracy) {
                     // Two vertices in one place: the whole curve, or nothing of it.
                     return if coincident(p, q, accuracy) {
-                        Some(TrimmedEdge { curve: None, gap: 0.0 })
+                        Some(TrimmedEdge { curve: None, gap: 0.0, repair: None })
                     } else {
                         None
                     };
@@ -112,7 +125,7 @@ pub(crate) fn trim_to_vertices(
                     if coincident(p, q, accuracy)
                         && (curve.evaluate(d0) - curve.evaluate(d1)).length() > LOOSE_VERTEX_MM
                     {
-                        return Some(TrimmedEdge { curve: None, gap: 0.0 });
+                        return Some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
                     }
                     (ta, tb) = (d0, d1);
                 }
@@ -123,13 +136,17 @@ pub(crate) fn trim_to_vertices(
                 return finish(curve, !forward, p, q);
             }
             if !(tb - ta > 0.0) || (a - b).length() < EQUAL_POINTS_MM && matches!(shape, CurveShape::Line { .. }) {
-                return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0 });
+                return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge {
+                    curve: None,
+                    gap: 0.0,
+                    repair: None,
+                });
             }
         }
     }
     let length_scale = EMPTY_PARAMETER * (ta.abs() + tb.abs());
     if !(tb - ta > length_scale) {
-        return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0 });
+        return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
     }
     finish(shape.segment(ta, tb), forward, p, q)
 }
@@ -145,7 +162,7 @@ fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
     if extent < EMPTY_EDGE_MM {
-        return Some(TrimmedEdge { curve: None, gap });
+        return Some(TrimmedEdge { curve: None, gap, repair: None });
     }
-    Some(TrimmedEdge { curve: Some(curve), gap })
+    Some(TrimmedEdge { curve: Some(curve), gap, repair: None })
 }

@@ -231,7 +231,11 @@ fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge>
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();
-            Ok(TrimmedEdge { curve: (length > EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length])), gap: 0.0 })
+            Ok(TrimmedEdge {
+                curve: (length > EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length])),
+                gap: 0.0,
+                repair: None,
+            })
         }
     }
 }
@@ -268,6 +272,7 @@ fn face_edges<'e>(
             let edge = edges[k].as_ref()?;
             // The widest gap between an edge and its vertices tells how loosely points of this face hold together.
             found.gap = found.gap.max(edge.gap);
+            found.repairs.extend(edge.repair.filter(|r| !found.repairs.contains(r)));
             // An edge without length leaves no gap in its loop.
             let Some(curve) = &edge.curve else { continue };
             found.bounds = found.bounds.union(curve.bounds());
