@@ -16,7 +16,8 @@
 //!
 //! Guarantee when cured: bit for bit the hits of the octree. Weakness: slower by what f64 leaves cost.
 
-use super::facet::{FacetHit, FacetRay, Nearest, Surroundings, is_usable};
+use super::facet::{FacetHit, FacetRay, Nearest, Surroundings};
+use super::facet_triangles::TriangleCode;
 use super::{Cost, Footprint, Hit, Intersector, NormalMode, normals};
 use crate::math::{Aabb, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
@@ -109,8 +110,8 @@ pub struct Bvh<'m> {
     normals: NormalMode,
     tree: Tree,
     leaves: Leaves,
-    /// Facet and triangle (lowest bit) of each leaf primitive.
-    codes: Vec<u32>,
+    /// The triangle of each leaf primitive.
+    codes: Vec<TriangleCode>,
     center: Point,
     bounds: Aabb,
     /// Units of the tree in a millimetre: a power of two, so that scaling does not round; 1 as shipped.
@@ -149,14 +150,7 @@ impl<'m> Bvh<'m> {
         let center = if bounds.is_empty() { Point::ZERO } else { bounds.center() };
         let size = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
         let scale = if settings.cured { unit_scale(size) } else { 1.0 };
-        // A code is a facet and which of its triangles it is: obvhs knows triangles alone.
-        let codes: Vec<u32> = (0..mesh.facets.len())
-            .filter(|&f| mesh.corners(f).iter().all(|&p| is_usable(p)))
-            .flat_map(|f| {
-                let one = (f as u32) << 1;
-                std::iter::once(one).chain((!mesh.facets[f].is_triangle()).then_some(one | 1))
-            })
-            .collect();
+        let codes = TriangleCode::enumerate(mesh);
         let params = match settings.quality {
             Quality::Medium => BvhBuildParams::medium_build(),
             Quality::VerySlow => BvhBuildParams::very_slow_build(),
@@ -184,9 +178,9 @@ impl<'m> Bvh<'m> {
             Tree::Binary(b) => &b.primitive_indices,
             Tree::Wide(b) => &b.primitive_indices,
         };
-        let codes: Vec<u32> = order.iter().map(|&i| codes[i as usize]).collect();
+        let codes: Vec<TriangleCode> = order.iter().map(|&i| codes[i as usize]).collect();
         let leaves = if settings.cured {
-            Leaves::Cured(codes.iter().map(|&c| mesh.corners((c >> 1) as usize)).collect())
+            Leaves::Cured(codes.iter().map(|&c| mesh.corners(c.facet() as usize)).collect())
         } else {
             Leaves::Shipped(codes.iter().map(|&c| RtTriangle::from(&triangle32(mesh, c))).collect())
         };
@@ -217,14 +211,12 @@ impl<'m> Bvh<'m> {
         let (found, t) = self.walk(ray32, cost, |ray, id| {
             // As shipped there are no departures; the facet that is left is passed over, or each such ray would hit
             // its own start.
-            if own == Some(self.codes[id] >> 1) { f32::INFINITY } else { triangles[id].intersect(ray) }
+            if own == Some(self.codes[id].facet()) { f32::INFINITY } else { triangles[id].intersect(ray) }
         });
         let found = found?;
-        let code = self.codes[found];
         // Their weights are those of the second and third corner for edges v0 − v1 and v2 − v0.
         let weights = triangles[found].compute_barycentric(&ray32);
-        let (b1, b2) = (f64::from(weights.x), f64::from(weights.y));
-        Some(FacetHit { t: f64::from(t), facet: code >> 1, second: code & 1 == 1, b: [1.0 - b1 - b2, b1, b2] })
+        Some(self.codes[found].hit(f64::from(t), [weights.x, weights.y].map(f64::from)))
     }
 
     /// The nearest hit with the tree of obvhs and the facet test of the octree.
@@ -257,8 +249,8 @@ impl<'m> Bvh<'m> {
         self.walk(ray32, cost, |_, id| {
             let before = best.t;
             facet_ray.test(
-                self.codes[id] >> 1,
-                1 << (self.codes[id] & 1),
+                self.codes[id].facet(),
+                1 << u32::from(self.codes[id].is_second()),
                 corners[id].each_ref(),
                 &self.surroundings,
                 &mut best,
@@ -359,20 +351,14 @@ fn depth(tree: &CwBvh) -> u32 {
     deepest
 }
 
-/// Corners of the triangle with this code.
-fn triangle(mesh: &FacetMesh, code: u32) -> [Point; 3] {
-    let [a, b, c, d] = mesh.corners((code >> 1) as usize);
-    if code & 1 == 0 { [a, b, c] } else { [a, c, d] }
-}
-
-fn triangle32(mesh: &FacetMesh, code: u32) -> Triangle {
-    let [v0, v1, v2] = triangle(mesh, code).map(|p| p.as_vec3a());
+fn triangle32(mesh: &FacetMesh, code: TriangleCode) -> Triangle {
+    let [v0, v1, v2] = code.corners(mesh).map(|p| p.as_vec3a());
     Triangle { v0, v1, v2 }
 }
 
 /// The box of a triangle about the middle of the mesh, grown by `pad` millimetres, in units of the tree.
-fn outer_box(mesh: &FacetMesh, code: u32, center: Point, pad: f64, scale: f64) -> Bounded {
-    let corners = triangle(mesh, code).map(|p| p - center);
+fn outer_box(mesh: &FacetMesh, code: TriangleCode, center: Point, pad: f64, scale: f64) -> Bounded {
+    let corners = code.corners(mesh).map(|p| p - center);
     let low = corners.into_iter().fold(Vector::INFINITY, Vector::min) - pad;
     let high = corners.into_iter().fold(Vector::NEG_INFINITY, Vector::max) + pad;
     Bounded(Box32 { min: (low * scale).as_vec3a(), max: (high * scale).as_vec3a() })

@@ -3,9 +3,12 @@
 //! All intersectors answer through [`Intersector`]; all of them always count what they do in a [`Cost`].
 
 pub mod bvh;
+#[cfg(feature = "contenders")]
+pub mod contenders;
 pub mod exact;
 mod facet;
 mod facet_hit;
+mod facet_triangles;
 pub mod instanced;
 mod normals;
 pub mod octree;

@@ -26,6 +26,8 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),
         (&["study", "stability", "--rays", "5"], "its questions are fixed"),
         (&["study", "accuracy", "--rays-in", "a.csv"], "study accuracy does not take --rays-in"),
+        (&["study", "effects", "--embree", "libembree4.so"], "study effects does not take --embree"),
+        (&["study", "bvh", "--embree", "no/such/library.so"], "no/such/library.so cannot be used as Embree"),
         (&["study", "bvh", "--rays-in", "a.csv", "--rays", "5"], "the file of --rays-in has all of them"),
         (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
         (&["tarce"], "trace"),

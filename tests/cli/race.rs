@@ -15,12 +15,14 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
-    // Six entrants, four kinds of rays; batch and single on one thread, batch on two.
-    assert_eq!(rows.len(), 6 * 4 * 3);
+    // Eight entrants, four kinds of rays; batch and single on one thread, batch on two.
+    assert_eq!(rows.len(), 8 * 4 * 3);
     for row in rows {
         assert!(row["mrays_per_s_median"].as_f64().unwrap() > 0.0, "{row}");
         assert!(row["facets"].as_u64().unwrap() > 100, "{row}");
-        if row["intersector"] != "cwbvh as shipped" {
+        // These three work in f32, or take starts on facets for what they are, rounded.
+        let as_shipped = ["cwbvh as shipped", "parry3d", "bvh"].iter().any(|name| row["intersector"] == *name);
+        if !as_shipped {
             assert_eq!((&row["wrong"], &row["undecided"]), (&Value::from(0), &Value::from(0)), "{row}");
             assert_eq!(row["differs"], 0, "{row}");
         }
@@ -29,7 +31,7 @@ fn the_race_writes_rows_pictures_and_the_octree() {
         assert!(rows.iter().any(|r| r["threads"] == threads && r["rays_kind"] == "adversarial"));
     }
     let surface: Vec<_> = rows.iter().filter(|r| r["rays_kind"] == "surface").collect();
-    assert_eq!(surface.len(), 6 * 3);
+    assert_eq!(surface.len(), 8 * 3);
     assert!(surface.iter().all(|r| r["hits"].as_u64() > Some(0) && r["hits"].as_u64() <= r["rays"].as_u64()));
     let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let text = String::from_utf8(read("octree.txt")).unwrap();
@@ -65,8 +67,8 @@ fn the_race_asks_the_rays_of_a_file_and_keeps_them() {
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
-    // Six entrants, batch and single.
-    assert_eq!(rows.len(), 6 * 2);
+    // Eight entrants, batch and single.
+    assert_eq!(rows.len(), 8 * 2);
     for row in rows {
         assert_eq!(
             (&row["rays_kind"], &row["rays"], &row["hits"]),

@@ -1,5 +1,7 @@
 //! The contract of intersectors on facets, and the shortcuts of the octree that must change no answer.
 
+#[cfg(feature = "contenders")]
+mod contenders;
 mod departures;
 mod facets;
 mod horizon;

@@ -90,6 +90,9 @@ pub(crate) enum Command {
         /// `bvh`: ask the rays of a file (CSV, NPZ, TM-25, Zemax, LightTools, or records as `check --rays-out` writes them)
         #[arg(long, value_name = "FILE")]
         rays_in: Option<PathBuf>,
+        /// `bvh`: compare with Embree 4 too, a library such as libembree4.so.4 of your own
+        #[arg(long, value_name = "LIBRARY")]
+        embree: Option<PathBuf>,
         #[command(flatten)]
         page: PageOption,
         #[command(flatten)]
@@ -362,7 +365,7 @@ pub(crate) enum StudyKind {
     Complexity,
     /// Rays through edges, vertices, tangents and other trouble
     Stability,
-    /// Octree against bounding-volume hierarchies
+    /// Octree against bounding-volume hierarchies of four authors
     Bvh,
     /// What each optical effect costs
     Effects,

@@ -1,5 +1,6 @@
-//! `lampyris study bvh`: the octree against obvhs' hierarchies on the same facets and rays, its own or those of a file, in alternating
-//! rounds, on one thread and on all; answers that differ are judged with twice the digits, and the rays are kept for other programs.
+//! `lampyris study bvh`: the octree against the hierarchies of obvhs, parry3d and bvh, and Embree's where its library is named, on the
+//! same facets and rays, its own or those of a file, in alternating rounds, on one thread and on all; answers that differ are judged
+//! with twice the digits, and the rays are kept for other programs.
 
 use super::demo;
 use crate::cli::arguments::command::PlacedLimit;
@@ -11,6 +12,7 @@ use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::{input_files, threads};
 use crate::formats::{NpyArray, write_npz};
 use crate::intersect::bvh::{self, Bvh};
+use crate::intersect::contenders::{BinaryBvh, Embree, EmbreeError, EmbreeLibrary, Parry, Primitives};
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Cost, Footprint, Hit, Intersector};
 use crate::math::{Aabb, Ray};
@@ -26,6 +28,7 @@ use crate::tessellate::{self, tessellate};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Tolerances, mm: about 20 thousand, 200 thousand and 1.5 million facets on the lamp.
 const TOLERANCES: [f64; 3] = [0.02, 0.0018, 0.000125];
@@ -49,6 +52,8 @@ pub(crate) struct BvhCommand<'a> {
     pub(crate) file: Option<&'a Path>,
     /// Rays to ask in place of its own.
     pub(crate) rays_in: Option<&'a Path>,
+    /// The library of Embree to compare with.
+    pub(crate) embree: Option<&'a Path>,
     /// Where the rays are written that were asked.
     pub(crate) folder: &'a Path,
     pub(crate) meshing: &'a MeshingSettings,
@@ -62,6 +67,7 @@ pub(crate) fn run(
 ) -> Result<BvhBenchmark, Failure> {
     // Read first: a file that is no list of rays must not cost the time of meshing.
     let given = command.rays_in.map(read_rays).transpose()?;
+    let embree = command.embree.map(open_embree).transpose()?;
     let loaded = match command.file {
         None => demo::lamp()?.1,
         Some(path) => match input_files::either(path, PlacedLimit::default(), console)? {
@@ -85,10 +91,23 @@ pub(crate) fn run(
         for (kind, rays) in &kinds {
             write_rays(&command.folder.join(format!("rays/{kind}-{}.npz", mesh.facets.len())), rays)?;
         }
-        benchmark.measure_mesh(&name, &mesh, &octree, &kinds, threads);
+        benchmark.measure_mesh((&name, &mesh), &octree, &kinds, embree.as_ref(), threads)?;
     }
     benchmark.answer = sentence(&benchmark.rows);
     Ok(benchmark)
+}
+
+/// A library of Embree and where it lies.
+type OpenEmbree<'p> = (&'p Path, Arc<EmbreeLibrary>);
+
+fn open_embree(path: &Path) -> Result<OpenEmbree<'_>, Failure> {
+    Ok((path, EmbreeLibrary::open(path).map_err(unusable_embree)?))
+}
+
+fn unusable_embree(error: EmbreeError) -> Failure {
+    Failure::arguments(error.to_string()).with_help(
+        "name the library of Embree 4, such as libembree4.so.4, by its whole path, or leave --embree out",
+    )
 }
 
 /// The kind of rays that come from a file.
@@ -146,30 +165,49 @@ struct Question<'a> {
 
 impl BvhBenchmark {
     /// All intersectors on one mesh.
-    fn measure_mesh(&mut self, model: &str, mesh: &FacetMesh, octree: &Octree, kinds: &Kinds, threads: usize) {
+    fn measure_mesh(
+        &mut self,
+        (model, mesh): (&str, &FacetMesh),
+        octree: &Octree,
+        kinds: &Kinds,
+        embree: Option<&OpenEmbree>,
+        threads: usize,
+    ) -> Result<(), Failure> {
         let textbook = Octree::build(mesh, &octree::Settings::textbook());
         let binary = Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..Default::default() });
         let cured = Bvh::build(mesh, &bvh::Settings::default());
         let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..Default::default() });
         let slow = Bvh::build(mesh, &bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() });
-        let entrants = [
+        let (parry, f64_bvh) = (Parry::build(mesh), BinaryBvh::build(mesh));
+        let mut entrants = vec![
             Entrant { name: "octree", build: "T = 128", who: octree },
             Entrant { name: "octree, textbook", build: "T = 8", who: &textbook },
             Entrant { name: "bvh2", build: "medium", who: &binary },
             Entrant { name: "cwbvh", build: "medium", who: &cured },
             Entrant { name: "cwbvh", build: "very slow", who: &slow },
             Entrant { name: "cwbvh as shipped", build: "medium", who: &shipped },
+            Entrant { name: "parry3d", build: "binned", who: &parry },
+            Entrant { name: "bvh", build: "f64", who: &f64_bvh },
         ];
+        let of_embree = |primitives| {
+            let built = embree.map(|(path, library)| Embree::build(library, path, mesh, primitives));
+            built.transpose().map_err(unusable_embree)
+        };
+        let (triangles, quads) = (of_embree(Primitives::Triangles)?, of_embree(Primitives::Quads)?);
+        for (build, built) in [("triangles", &triangles), ("quads", &quads)] {
+            entrants.extend(built.as_ref().map(|who| Entrant { name: "embree", build, who }));
+        }
         let mut shape = OctreeShape::new(octree);
         for (kind, rays) in kinds {
             let cost = self.measure_rays(&Question { model, mesh, kind, rays }, &entrants, threads);
             shape.costs.push(((*kind).into(), cost));
         }
         self.shapes.push(shape);
+        Ok(())
     }
 
     /// All intersectors on rays of one kind, on one thread and on all; what the first of them, the octree, did for them.
-    fn measure_rays(&mut self, question: &Question, entrants: &[Entrant; 6], threads: usize) -> Cost {
+    fn measure_rays(&mut self, question: &Question, entrants: &[Entrant], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
         // The octree's answers are what others are compared with; who is right is asked of the arbiter.
         let truth = answers(entrants[0].who, rays).0;

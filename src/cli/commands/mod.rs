@@ -41,12 +41,13 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             trace::run(&command, console)
         }
         Command::Check(command) => check::run(&command, console),
-        Command::Study { kind, file, output, rays_in, page, meshing, tracing } => {
+        Command::Study { kind, file, output, rays_in, embree, page, meshing, tracing } => {
             let command = study::StudyCommand {
                 kind,
                 file: file.as_deref(),
                 output: output.as_ref(),
                 rays_in: rays_in.as_deref(),
+                embree: embree.as_deref(),
                 page,
                 meshing: meshing.settings(),
                 tracing: tracing.settings(),

@@ -41,6 +41,8 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) output: Option<&'a PathBuf>,
     /// Rays to ask in place of those of the study.
     pub(crate) rays_in: Option<&'a Path>,
+    /// The library of Embree to compare with.
+    pub(crate) embree: Option<&'a Path>,
     pub(crate) page: PageOption,
     pub(crate) meshing: MeshingSettings,
     pub(crate) tracing: TracingSettings,
@@ -93,6 +95,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
         ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
         ("--angle", m.angle_deg.is_some(), faceted, "it goes through facets of its own"),
+        ("--embree", command.embree.is_some(), kind == Bvh, "it compares those that it is about"),
         ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it asks rays of its own"),
         (
             "--rays",
@@ -129,6 +132,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
             let race = BvhCommand {
                 file: command.file,
                 rays_in: command.rays_in,
+                embree: command.embree,
                 folder: &folder,
                 meshing: &command.meshing,
                 tracing: &command.tracing,
