@@ -48,6 +48,7 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
+    /// Stands before the first line of `text`; `path` is what errors name. Blank lines are passed over, but counted.
     pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
         let lines = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim())).filter(|(_, l)| !l.is_empty());
         Self { path, lines: Box::new(lines), at: 0 }

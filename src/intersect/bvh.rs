@@ -5,7 +5,7 @@
 //! about 1e-5 mm, one ray in eight aimed at an edge slips through, and some rays miss everything. `cured` mends what
 //! can be mended from outside, so that answers are those of the octree:
 //! 1. hits come from the f64 test of `intersect::facet`, the nearest one is kept in f64;
-//! 2. boxes are taken about the middle of the mesh, rounded outward and padded for the rounding of node tests;
+//! 2. boxes are taken about the middle of the mesh and padded by more than their rounding and that of node tests;
 //! 3. +0.0 is added to directions, for CwBvh orders children wrongly for −0.0;
 //! 4. inverse directions near zero are ±1e30 instead of ±1/f32::EPSILON;
 //! 5. a tree too deep for the fixed stack of CwBvh is walked as the binary tree;
@@ -160,7 +160,7 @@ impl<'m> Bvh<'m> {
             Tree::Empty
         } else if settings.cured {
             let pad = size * BOX_ROOM;
-            let boxes: Vec<Bounded> = codes.iter().map(|&c| outer_box(mesh, c, center, pad, scale)).collect();
+            let boxes: Vec<Bounded> = codes.iter().map(|&c| padded_box(mesh, c, center, pad, scale)).collect();
             match settings.kind {
                 Kind::Bvh2 => Tree::Binary(build_bvh2(&boxes, params, &mut core)),
                 Kind::CwBvh => wide_or_binary(&boxes, &params),
@@ -356,8 +356,9 @@ fn triangle32(mesh: &FacetMesh, code: TriangleCode) -> Triangle {
     Triangle { v0, v1, v2 }
 }
 
-/// The box of a triangle about the middle of the mesh, grown by `pad` millimetres, in units of the tree.
-fn outer_box(mesh: &FacetMesh, code: TriangleCode, center: Point, pad: f64, scale: f64) -> Bounded {
+/// The box of a triangle relative to `center`, mm, grown by `pad` mm and times `scale`; rounded to the nearest f32, which `pad` must
+/// exceed.
+fn padded_box(mesh: &FacetMesh, code: TriangleCode, center: Point, pad: f64, scale: f64) -> Bounded {
     let corners = code.corners(mesh).map(|p| p - center);
     let low = corners.into_iter().fold(Vector::INFINITY, Vector::min) - pad;
     let high = corners.into_iter().fold(Vector::NEG_INFINITY, Vector::max) + pad;

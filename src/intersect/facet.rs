@@ -349,7 +349,7 @@ impl Line {
         let at = |k: usize| [x[k], y[k], z[k]];
         for (bit, edges, [a, b, c]) in [(1, edges[0], [0, 1, 2]), (2, edges[1], [0, 2, 3])] {
             if triangles & bit != 0 {
-                let edges = if edges.contains(&0.0) { exact_edges(at(a), at(b), at(c)) } else { edges };
+                let edges = if edges.contains(&0.0) { edges_with_exact_signs(at(a), at(b), at(c)) } else { edges };
                 if one_sided(edges) {
                     self.keep(facet, bit == 2, edges, [z[a], z[b], z[c]], best);
                 }
@@ -386,9 +386,10 @@ fn one_sided(e: [f64; 3]) -> bool {
     !(below & above)
 }
 
-/// The edge functions with their exact signs.
+/// The edge functions c × b, a × c and b × a of sheared corners (of x and y alone), in the order and with the sign that `quad` uses.
+/// Their signs are exact, zero means on the line; their sizes are rounded.
 #[cold]
-fn exact_edges(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
+fn edges_with_exact_signs(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {
     let zero = Coord { x: 0.0, y: 0.0 };
     // The shear has rounded already, but alike for all facets at the edge; from there on the signs are exact.
     let edge = |p: [f64; 3], q: [f64; 3]| orient2d(Coord { x: p[0], y: p[1] }, Coord { x: q[0], y: q[1] }, zero);

@@ -84,7 +84,7 @@ impl View {
             let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
             // Each part by its share of the triangles, but enough to be recognised.
             let limit = (SHOWN * traced.triangles.len()).div_ceil(total.max(1)).max(2000);
-            let (FaceTriangles { points, faces, triangles }, cell) = simplified(traced, limit);
+            let (FaceTriangles { points, faces, triangles }, cell) = merge_corners(traced, limit);
             merged = merged.max(cell);
             let labels =
                 runs(&faces).filter_map(|(first, f)| Some((first, facets.labels.get(f as usize)?.clone())));
@@ -304,9 +304,11 @@ fn used(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
     (kept, triangles)
 }
 
-/// Merges corners within cells of a grid until no more than `limit` triangles remain: no holes, unlike leaving triangles out.
-/// Also gives the cell size in mm, 0 when nothing had to be merged.
-fn simplified(traced: FaceTriangles, limit: usize) -> (FaceTriangles, f64) {
+/// Merges corners of a face that lie in one cell of a grid, and enlarges the cells until at most `limit` triangles remain.
+///
+/// Opens no holes within a face, unlike leaving triangles out; between faces cracks of about a cell may open. Returns the size of the
+/// cells too, mm: 0 where the triangles are returned as they came, being few enough or, after forty enlargements, still too many.
+fn merge_corners(traced: FaceTriangles, limit: usize) -> (FaceTriangles, f64) {
     if traced.triangles.len() <= limit {
         return (traced, 0.0);
     }
@@ -386,7 +388,7 @@ mod tests {
         let triangles: Vec<[u32; 3]> = quads.flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]]).collect();
         let faces = vec![0; points.len()];
         let (FaceTriangles { points: merged, triangles: kept, .. }, cell) =
-            simplified(FaceTriangles { points, faces, triangles }, 5000);
+            merge_corners(FaceTriangles { points, faces, triangles }, 5000);
         assert!(kept.len() <= 5000 && kept.len() > 1000 && cell > 0.0);
         let far = merged.iter().map(|p| p[0]).fold(0f32, f32::max);
         assert!(f64::from(far) > 19.9 - cell);

@@ -15,7 +15,13 @@ impl Placement {
 }
 
 impl Scene {
-    /// Puts the models of the scene, read in its order, where they stand, and makes one model of them.
+    /// Makes one model of the scene's models, given in the order of its `[[model]]` entries, each at its placement.
+    ///
+    /// Entries with the same file, unit and scale share parts: those of the later model are dropped if their names and numbers of faces
+    /// are those of the first. Instances of an entry with a name are called `entry/instance`.
+    ///
+    /// # Errors
+    /// Where there are more or fewer models than entries, or a scale is not positive and finite.
     pub fn assemble(&self, models: Vec<Model>) -> Result<Model, Error> {
         if models.len() != self.models.len() {
             let message = format!("{} models for {} [[model]] entries", models.len(), self.models.len());

@@ -121,7 +121,7 @@ pub(super) fn mesh_with_imprint(
     }
     transition.triangles.extend(&grid.triangles);
     // What covers more or less than the border bounds proves nothing, however near to the surface each of its facets lies.
-    let is_covered = covers_border(&transition, &grid.quads, &polygons);
+    let is_covered = covers_area_of_border(&transition, &grid.quads, &polygons);
     if !is_covered {
         transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
         grid.quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
@@ -173,9 +173,10 @@ fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
     all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect()
 }
 
-/// Whether facets cover as much of the parameter plane as the border bounds: more where they lie over each other or beyond a border that
+/// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]: a gap and an overlap of one size are
+/// not told. They cover more where they lie over each other or beyond a border that
 /// crosses itself, less where something is left out.
-fn covers_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
+fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
     // Only ratios and signs are compared: halving each would change none.
     let doubled_area = |corners: &[Uv]| -> f64 {
         let o = corners[0];

@@ -59,7 +59,8 @@ impl OctreeShape {
     }
 }
 
-/// Writes `octree.txt` for all trees, `octree.vtu` and `octree.glb` for the first.
+/// Writes the statistics of all trees to `octree.txt`, and the boxes of the first, that of the coarsest facets, to `octree.vtu` and
+/// `octree.glb`: at most [`MOST_BOXES`], without the deepest. The folder must be there; files in it are replaced.
 pub(crate) fn write_octree_files(folder: &Path, shapes: &[OctreeShape]) -> Result<(), Failure> {
     let text: Vec<String> = shapes.iter().map(OctreeShape::summary).collect();
     write_atomic(&folder.join("octree.txt"), |w| w.write_all(text.join("\n").as_bytes()))?;

@@ -33,7 +33,7 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     if !lit.is_empty() {
         sections.push(receivers::section(&lit));
     }
-    sections.push(Section::new("All rows").with_block(rows_table(kind, &rows)));
+    sections.push(Section::new("All rows").with_block(all_rows_table(kind, &rows)));
     Report { title, answer, sections, provenance }
 }
 
@@ -64,8 +64,9 @@ fn heading(key: &str) -> (String, &'static str) {
     (title, unit)
 }
 
-/// Every row with every key.
-fn rows_table(kind: &str, rows: &[&Value]) -> Table {
+/// A table of all rows with a column for each key, in the order in which keys first appear; missing values are empty. Titles and units
+/// follow from the keys. `kind` names the table and its file, `{kind}-rows.csv`.
+fn all_rows_table(kind: &str, rows: &[&Value]) -> Table {
     let mut keys: Vec<&str> = Vec::new();
     for key in rows.iter().filter_map(|r| r.as_object()).flat_map(|o| o.keys()) {
         if !keys.contains(&key.as_str()) {

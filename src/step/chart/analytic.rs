@@ -27,7 +27,8 @@ pub(super) fn locate_cone(frame: &Frame, radius: f64, half_angle: f64, p: Point)
     Uv::new(longitude(q, signed), v)
 }
 
-/// Point and derivatives of a cone: u is the longitude, v the height along the axis.
+/// Point and first derivatives of a cone of `radius` at v = 0: u is the longitude and `half_angle` its slope, both in radians, v the
+/// height along the axis in units of the frame. Beyond the apex the radius is negative.
 pub(super) fn cone(frame: &Frame, radius: f64, half_angle: f64, uv: Uv) -> Derivatives {
     let (s, c) = uv.x.sin_cos();
     let slope = half_angle.tan();

@@ -254,8 +254,11 @@ impl Chart {
         }
     }
 
-    /// The spline's parameters over `domain` at a point of the chart.
-    pub(in crate::step) fn to_surface(&self, domain: [[f64; 2]; 2], uv: Uv) -> Uv {
+    /// Turns the chart's parameters into those of the spline that is made over `domain`, the ranges of u and v.
+    ///
+    /// Angles, in radians, become the parameter of the rational arc; other directions stay as they are. Nothing is clamped: beyond the
+    /// domain the outer pieces go on.
+    pub(in crate::step) fn spline_parameters(&self, domain: [[f64; 2]; 2], uv: Uv) -> Uv {
         let [u, v] = self.angular_directions();
         let one = |d: usize, angular: bool| {
             if angular { conic::parameter_of_angle(domain[d], uv[d]) } else { uv[d] }

@@ -95,7 +95,8 @@ pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     (flat && r > 0.0).then(|| Plane { azimuth: far.y.atan2(far.x), crosses })
 }
 
-/// Point and derivatives of a surface of revolution: u is the angle, v the meridian's parameter.
+/// Point (mm) and first derivatives of the surface that `meridian` makes, turned about the frame's z axis. The meridian is in the
+/// model's coordinates, not in the frame's; u is the angle in radians, v the meridian's parameter.
 pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives {
     let d = meridian.derivatives(uv.y);
     let (m, t) = (frame.local_point(d.point), frame.local_direction(d.first) / frame.scale);

@@ -9,7 +9,9 @@ const POWERS: [f64; 23] = [
     1e20, 1e21, 1e22,
 ];
 
-/// Reads a number at `at`; gives it with the position behind it.
+/// Reads an integer or real at byte `at` and returns it with the position after it.
+///
+/// Integers beyond 64 bits become reals, and FORTRAN's `D` marks an exponent too. `None` without digits, or where the value overflows.
 pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
     let mut i = at;
     let negative = source.get(i) == Some(&b'-');

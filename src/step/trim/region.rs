@@ -21,7 +21,7 @@ impl<'t, 'e> Region<'t, 'e> {
 
     /// The spline's parameters of a place in the chart.
     pub(super) fn parameters(&self, uv: Uv) -> Uv {
-        self.task.chart.to_surface(self.domain, uv)
+        self.task.chart.spline_parameters(self.domain, uv)
     }
 
     /// An edge in the spline's parameters, following the piece in the chart's.

@@ -187,8 +187,9 @@ impl<'r> CellPairs<'r> {
         }
     }
 
-    /// The geometric error of each cell, and how many cells a side were pooled at most.
-    pub(super) fn layer(&self) -> (Vec<f64>, usize) {
+    /// The estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side of the largest
+    /// block of cells that share one, for rays were few. What noise is left after pooling is in it; blocks without rays have 0.
+    pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
         let mut stack = vec![Block { x: 0, y: 0, side: self.whole() }];

@@ -205,7 +205,7 @@ fn channel_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize, channe
         name: result.name.clone(),
         total: estimate::channel(runs, k, channel, worth),
         statistical: result.error,
-        cells: CellPairs::new(bound, runs, k, 1 + channel).map_or_else(Vec::new, |cells| cells.layer().0),
+        cells: CellPairs::new(bound, runs, k, 1 + channel).map_or_else(Vec::new, |cells| cells.cell_errors().0),
     }
 }
 
@@ -218,7 +218,7 @@ impl ReceiverError {
         self.map = cells.map();
         self.statistical.peak = peak.statistical;
         self.statistical.map = self.map.statistical;
-        (self.cells, self.pooled_cells) = cells.layer();
+        (self.cells, self.pooled_cells) = cells.cell_errors();
     }
 
     /// Whether the cells were compared; of grids of millions they are not.

@@ -231,14 +231,15 @@ impl Refinement<'_, '_> {
         let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
         segments.iter().chain(imprinted).flatten().for_each(|&n| used[n as usize] = true);
         for (n, used) in (0..).zip(used) {
-            let handle = if used { Some(self.insert(n)?) } else { None };
+            let handle = if used { Some(self.insert_node(n)?) } else { None };
             self.handles.push(handle);
         }
         Some(())
     }
 
-    /// Inserts a node; `None` where its parameters are no numbers that the library takes.
-    pub(super) fn insert(&mut self, n: u32) -> Option<FixedVertexHandle> {
+    /// Inserts a node at its scaled parameters and returns its vertex, which is the older one where the place is taken. The caller
+    /// keeps it in `handles`. `None` where scaled parameters are not finite or 1e30 and more; those below 1e-30 become zero.
+    pub(super) fn insert_node(&mut self, n: u32) -> Option<FixedVertexHandle> {
         let at = self.scaled(self.nodes[n].uv)?;
         let before = self.cdt.num_vertices();
         let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;

@@ -80,7 +80,7 @@ impl Refinement<'_, '_> {
             }
             let mark = self.nodes.mark();
             let node = self.nodes.push_own(uv, place);
-            match self.insert(node) {
+            match self.insert_node(node) {
                 Some(handle) => {
                     self.handles.push(Some(handle));
                     done = true;

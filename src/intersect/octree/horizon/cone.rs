@@ -37,7 +37,7 @@ pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Op
         limit.lower(axis.dot(base.normal));
     }
     for (base, other) in bases.iter().flatten() {
-        base.meet(other, &mut limit);
+        base.narrow_to_avoid(other, &mut limit);
         base.search(tree, facet, &mut limit);
     }
     let angle = limit.sine.clamp(0.0, 1.0).asin();
@@ -112,7 +112,7 @@ impl Base {
                     let block = &tree.blocks[index];
                     // Its own facet is asked separately, triangle by triangle.
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
-                        self.meet(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
+                        self.narrow_to_avoid(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
                     }
                 }
                 Target::End => {}
@@ -136,8 +136,9 @@ impl Base {
         beside <= 0.0 || along > limit.cosine * beside.sqrt() - limit.sine * radius
     }
 
-    /// Narrows the cone to what does not reach a facet, the hull of which may be more than the facet.
-    fn meet(&self, corners: &[Point; 4], limit: &mut Limit) {
+    /// Narrows `limit` until no ray that leaves this triangle within the cone meets a facet, whose last two corners are one if it is a
+    /// triangle. The hull of all four is tried first; only if the cone may reach that are the two triangles judged, each by itself.
+    fn narrow_to_avoid(&self, corners: &[Point; 4], limit: &mut Limit) {
         if !self.is_off(corners, limit) {
             let [a, b, c, d] = *corners;
             // The hull of a folded quad is more than the quad: its triangles may be off where the hull is not.
