@@ -213,8 +213,8 @@ fn of_a_sheet_that_bends_by_less_than_its_rounding_no_later_root_is_certified() 
     let knots = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
     let mut s = Stream(91);
     let mut double = 0;
-    for _ in 0..2400 {
-        let bend = 10f64.powf(s.within(-20.0, -11.0));
+    for _ in 0..800 {
+        let bend = 10f64.powf(s.within(-20.0, -16.0));
         let height = [bend, -bend, bend];
         let at = |k: usize| 64.0 * k as f64 - 64.0;
         let points = (0..9).map(|k| Point::new(at(k / 3), at(k % 3), height[k / 3]).extend(1.0)).collect();
@@ -242,5 +242,5 @@ fn of_a_sheet_that_bends_by_less_than_its_rounding_no_later_root_is_certified() 
             );
         }
     }
-    assert!(double > 500, "{double} with two roots");
+    assert!(double > 200, "{double} with two roots");
 }

@@ -154,7 +154,7 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         // SAFETY: the features were found.
         return unsafe { run_avx2(kernel) };
     }
-    kernel.run::<Portable>()
+    run_portable(kernel)
 }
 
 /// Runs a kernel with AVX-512, else AVX2, where the processor has it: for loops that gain by registers of 64 bytes.
@@ -166,6 +166,11 @@ pub(crate) fn dispatch_widest<K: Kernel>(kernel: K) -> K::Output {
         return unsafe { run_avx512(kernel) };
     }
     dispatch(kernel)
+}
+
+/// A function like the others, so that without optimisation its variables do not lie on the stack of theirs.
+pub(crate) fn run_portable<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Portable>()
 }
 
 #[cfg(target_arch = "x86_64")]
