@@ -2,8 +2,8 @@
 
 use super::error::Error;
 use super::prepared_scene::PreparedScene;
-use crate::formats::read_bytes;
-use crate::simulate::{Fingerprint, RunSettings, grows};
+use crate::formats::open_file;
+use crate::simulate::{Fingerprint, FingerprintHasher, RunSettings, grows};
 
 /// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
 ///
@@ -34,15 +34,19 @@ pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
         prepared.mesh_settings,
         prepared.choice
     );
-    let mut pieces = vec![words.into_bytes(), scene.origin.text.as_deref().unwrap_or("").as_bytes().to_vec()];
+    let mut hasher = FingerprintHasher::default();
+    hasher.add(words.as_bytes());
+    hasher.add(scene.origin.text.as_deref().unwrap_or("").as_bytes());
     // By their bytes: a file that changed changes the run.
     let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
     let files = files.chain(scene.media.iter().filter_map(|m| m.file.as_ref()));
     for file in files {
         let path = scene.resolve(file);
-        let read = read_bytes(&path).map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
-        pieces.push(read);
+        let mut read = || {
+            let mut file = open_file(&path)?;
+            hasher.add_read(file.metadata()?.len(), &mut file)
+        };
+        read().map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
     }
-    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
-    Ok(Fingerprint::new(&pieces))
+    Ok(hasher.finish())
 }

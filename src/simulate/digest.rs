@@ -11,16 +11,33 @@ impl Fnv {
 
     /// The hash of these pieces; where one ends and the next begins counts.
     pub(crate) fn hash(pieces: &[&[u8]]) -> u128 {
-        let mut h = Self(Self::START);
-        for piece in pieces {
-            // With its length, so that two pieces cannot be divided otherwise and hash alike.
-            h.absorb(&(piece.len() as u64).to_le_bytes());
-            h.absorb(piece);
-        }
+        let mut h = Self::new();
+        pieces.iter().for_each(|piece| h.absorb_piece(piece));
         h.0
     }
 
-    fn absorb(&mut self, bytes: &[u8]) {
+    /// Of nothing yet.
+    pub(super) fn new() -> Self {
+        Self(Self::START)
+    }
+
+    /// Absorbs a piece.
+    pub(super) fn absorb_piece(&mut self, piece: &[u8]) {
+        self.begin_piece(piece.len() as u64);
+        self.absorb(piece);
+    }
+
+    /// Absorbs the length of a piece that follows in parts: with it two pieces cannot be divided otherwise and hash alike.
+    pub(super) fn begin_piece(&mut self, length: u64) {
+        self.absorb(&length.to_le_bytes());
+    }
+
+    /// The hash of all that was absorbed.
+    pub(super) fn finish(self) -> u128 {
+        self.0
+    }
+
+    pub(super) fn absorb(&mut self, bytes: &[u8]) {
         for &b in bytes {
             self.0 = (self.0 ^ u128::from(b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013B);
         }

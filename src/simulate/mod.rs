@@ -63,7 +63,7 @@ pub use face_results::{FaceResult, FaceResults};
 pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
 pub use listed_rays::{ListedEnd, listed_ends, ray_lists};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
-pub use partial_run::{Fingerprint, PartialRun};
+pub use partial_run::{Fingerprint, FingerprintHasher, PartialRun};
 pub use plan::GROWING_REPLICATE;
 pub use receiver_results::{ChannelResult, ReceiverResult};
 pub use results::{Absorbed, EffectsUsed, Power, Results};

@@ -12,7 +12,7 @@ use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 
 /// The replicates of a run that are done.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -211,6 +211,47 @@ impl Fingerprint {
         Self(format!("{:032x}", Fnv::hash(pieces)))
     }
 }
+
+/// A fingerprint in the making, of pieces that need not be in memory together.
+pub struct FingerprintHasher(Fnv);
+
+impl Default for FingerprintHasher {
+    fn default() -> Self {
+        Self(Fnv::new())
+    }
+}
+
+impl FingerprintHasher {
+    /// Adds a piece.
+    pub fn add(&mut self, piece: &[u8]) {
+        self.0.absorb_piece(piece);
+    }
+
+    /// Adds a piece of this length that is read block by block: the same as one that is in memory.
+    ///
+    /// # Errors
+    /// When it cannot be read, or ends before this length.
+    pub fn add_read(&mut self, length: u64, from: &mut dyn Read) -> io::Result<()> {
+        self.0.begin_piece(length);
+        let mut block = vec![0; READ_BLOCK];
+        let mut left = length;
+        while left > 0 {
+            let part = &mut block[..left.min(READ_BLOCK as u64) as usize];
+            from.read_exact(part)?;
+            self.0.absorb(part);
+            left -= part.len() as u64;
+        }
+        Ok(())
+    }
+
+    /// The fingerprint of all pieces, in the order in which they were added.
+    pub fn finish(self) -> Fingerprint {
+        Fingerprint(format!("{:032x}", self.0.finish()))
+    }
+}
+
+/// Bytes of a file that are hashed at a time: ray files have gigabytes.
+const READ_BLOCK: usize = 1 << 16;
 
 /// Whether tallies have the same receivers, faces and bodies, cell by cell.
 fn same_shape(a: &Tallies, b: &Tallies) -> bool {

@@ -3,6 +3,7 @@
 use crate::support::lampyris_in;
 use lampyris::formats::{Flux, LightRay, SpectralData, Tm25, write_tm25};
 use lampyris::math::{Point, Vector};
+use lampyris::simulate::{Fingerprint, FingerprintHasher};
 use serde_json::Value;
 use std::path::Path;
 
@@ -174,4 +175,17 @@ fn every_ray_of_a_list_has_its_end() {
     std::fs::write(folder.path().join("point.toml"), format!("[run]\nrays = 400\n[[source]]\n{SCREEN}")).unwrap();
     let (code, _, err) = ends("point.toml", "ends.csv");
     assert!(code == 2 && err.contains("no source of this scene is a list of rays"), "{err}");
+}
+
+/// Parts of a run belong together by a hash of its files, which are read block by block: the same hash as of their bytes at once, so that
+/// a ray file is not in memory a second time.
+#[test]
+fn a_file_that_is_read_in_blocks_hashes_as_its_bytes() {
+    let bytes: Vec<u8> = (0..200_005u32).map(|k| (k * 7 % 251) as u8).collect();
+    let mut hasher = FingerprintHasher::default();
+    hasher.add(b"scene");
+    hasher.add_read(bytes.len() as u64, &mut bytes.as_slice()).unwrap();
+    assert_eq!(hasher.finish(), Fingerprint::new(&[b"scene", &bytes]));
+    let mut hasher = FingerprintHasher::default();
+    assert!(hasher.add_read(8, &mut [1, 2].as_slice()).is_err(), "a file that became shorter");
 }
