@@ -11,6 +11,10 @@ use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 /// A figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
 pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
+    // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
+    if *value == 0.0 && *statistical > 0.0 && geometric.is_none_or(|g| g == 0.0) {
+        return format!("0 {unit} (no ray arrived: at most {}, 95 %)", figures(3.0 * statistical, 2));
+    }
     let value = figures(*value, digits);
     match geometric {
         None => format!(

@@ -5,6 +5,7 @@ use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
 use crate::simulate::scene::FarFieldType;
 use crate::simulate::{ChannelResult, ReceiverResult};
+use crate::study::figures::{cell_errors, channel_cell_errors};
 
 /// The cells of a receiver with their axes; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
@@ -36,7 +37,7 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         axes: [axis(0), axis(1)],
         values: on_receiver(r, &r.cells),
         // Where errors were not kept for cells there are none.
-        error: (r.errors.len() == r.cells.len()).then(|| r.errors.clone()),
+        error: (r.errors.len() == r.cells.len()).then(|| cell_errors(r)),
         geometric: None,
         layers: r.channels.iter().map(|channel| layer(r, channel)).collect(),
     })
@@ -59,7 +60,7 @@ fn layer(r: &ReceiverResult, channel: &ChannelResult) -> Layer {
         },
         unit: channel.unit.into(),
         values: on_receiver(r, &channel.cells),
-        error: channel.errors.clone(),
+        error: channel_cell_errors(r, channel),
         geometric: None,
     }
 }

@@ -106,6 +106,11 @@ impl Plan {
         }
     }
 
+    /// Quanta of a ray of the source whose rays weigh most.
+    pub(crate) fn heaviest_ray(&self) -> f64 {
+        self.shares.iter().map(|share| share.quanta).fold(0.0, f64::max)
+    }
+
     /// Whether it is divided into replicates of a fixed size, so that further ones may follow.
     pub(crate) fn grows(&self) -> bool {
         self.replicate_rays.is_some()

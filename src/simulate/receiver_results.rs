@@ -54,6 +54,12 @@ pub struct ReceiverResult {
     /// Standard error of each cell, in `unit`.
     #[serde(skip)]
     pub errors: Vec<f64>,
+    /// What one ray, as it leaves the source whose rays weigh most, adds to `power`.
+    #[serde(skip)]
+    pub ray_power: f64,
+    /// The same in each cell, in `unit`.
+    #[serde(skip)]
+    pub ray_cells: Vec<f64>,
     /// The cells that lie off a disc, rising; other receivers have none.
     #[serde(skip)]
     pub off: Vec<usize>,
@@ -90,8 +96,14 @@ fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S:
 }
 
 impl ReceiverResult {
-    /// The figures of receiver `i`: sums of quanta turned into densities and their errors.
-    pub(super) fn new(r: &Receiver, i: usize, tallies: &Tallies, quantum: f64, unit: PowerUnit) -> Self {
+    /// The figures of receiver `i`: sums of quanta turned into densities and their errors; `ray` is the most quanta of a ray.
+    pub(super) fn new(
+        r: &Receiver,
+        i: usize,
+        tallies: &Tallies,
+        [quantum, ray]: [f64; 2],
+        unit: PowerUnit,
+    ) -> Self {
         let grid = r.cells.map(|n| n as usize);
         let degrees = |low: [f64; 2], high: [f64; 2]| {
             let half = [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees());
@@ -168,6 +180,8 @@ impl ReceiverResult {
             channels,
             cells,
             errors,
+            ray_power: ray * quantum,
+            ray_cells: (0..r.cell_count()).map(|k| ray * per(k)).collect(),
             off,
         }
     }

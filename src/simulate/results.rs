@@ -179,7 +179,9 @@ impl Results {
                 .receivers
                 .iter()
                 .enumerate()
-                .map(|(i, r)| ReceiverResult::new(r, i, &tallies, quantum, bound.scene.run.unit))
+                .map(|(i, r)| {
+                    ReceiverResult::new(r, i, &tallies, [quantum, plan.heaviest_ray()], bound.scene.run.unit)
+                })
                 .collect(),
             sequences: sequences(bound, &tallies, quantum),
             faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, quantum)),

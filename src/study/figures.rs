@@ -1,4 +1,7 @@
 //! The figures that a run prints for each receiver, each with both its errors.
+//!
+//! Where no ray arrived the spread of the rays tells nothing, and is no error of 0: what one ray adds is stated instead. Three times that is
+//! the limit of 95 % of what may be there (the rule of three: of n rays none arrives with probability e⁻³ where 3/n of them should).
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
@@ -111,6 +114,35 @@ pub fn figures(results: &Results, surface: Surface<'_>, unit: &str) -> Vec<Recei
     receivers.map(|(k, r)| Errors::new(results, surface, k).figures(r, unit)).collect()
 }
 
+/// Statistical error of each cell of a receiver: what one ray adds where none arrived.
+pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
+    let stated = |k: usize| if r.cells[k] > 0.0 { r.errors[k] } else { r.ray_cells[k] };
+    (0..r.cells.len()).map(stated).collect()
+}
+
+/// The same of a channel. A ray's lumens or CIE values are those of the mean ray on the receiver.
+pub fn channel_cell_errors(r: &ReceiverResult, c: &ChannelResult) -> Vec<f64> {
+    let worth = channel_worth(r, c);
+    let stated = |k: usize| if c.cells[k] > 0.0 { c.errors[k] } else { worth * r.ray_cells[k] };
+    (0..c.cells.len()).map(stated).collect()
+}
+
+/// What a channel counts of the light, as a share of its power: all that falls into a bin.
+fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
+    let is_weighted = matches!(c.name.as_str(), "lm" | "X" | "Y" | "Z");
+    // Where no light arrived nothing is known of its colour: that of the eye's peak is the most it can be worth.
+    if !is_weighted {
+        1.0
+    } else if r.power > 0.0 {
+        c.total / r.power
+    } else {
+        PEAK_EFFICACY
+    }
+}
+
+/// Most lumens of a watt, those of 555 nm (CIE 1924).
+const PEAK_EFFICACY: f64 = 683.0;
+
 /// Seconds that the next halving of either error would cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Halving {
@@ -174,7 +206,8 @@ impl<'a> Errors<'a> {
     /// The figures of a receiver, each with both its errors.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
         let power = self.geometric(self.lost_power, |m| m.power.geometric());
-        let power = Figure::new(r.power, unit, r.power_error, power);
+        let is_dark = r.power <= 0.0;
+        let power = Figure::new(r.power, unit, if is_dark { r.ray_power } else { r.power_error }, power);
         let channels = self.channels(r, unit);
         // Absorbed power has neither cells nor places.
         if r.kind == "absorbed" {
@@ -199,9 +232,14 @@ impl<'a> Errors<'a> {
             let geometric = self.geometric(0.0, |m| paired(m).geometric());
             Some(Figure::new(value, length, statistical, geometric))
         };
+        let largest = if is_dark {
+            r.ray_cells.iter().copied().fold(0.0, f64::max)
+        } else {
+            error_of_maximum(&r.cells, &r.errors)
+        };
         ReceiverFigures {
             power,
-            max: Some(Figure::new(r.max, r.unit, error_of_maximum(&r.cells, &r.errors), max)),
+            max: Some(Figure::new(r.max, r.unit, largest, max)),
             rms_1: along(r.rms[0], r.rms_error[0], &|m| m.rms[0]),
             rms_2: along(r.rms[1], r.rms_error[1], &|m| m.rms[1]),
             centroid_1: along(r.centroid[0], r.centroid_error[0], &|m| m.centroid[0]),
@@ -216,7 +254,8 @@ impl<'a> Errors<'a> {
             let measured = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
             let geometric = self.geometric(self.lost_share * c.total, measured);
             let unit = c.total_unit(unit);
-            ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, c.error, geometric) }
+            let statistical = if c.total > 0.0 { c.error } else { channel_worth(r, c) * r.ray_power };
+            ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, statistical, geometric) }
         };
         r.channels.iter().enumerate().map(of_channel).collect()
     }

@@ -70,6 +70,27 @@ impl Worst {
             return "not at all".into();
         }
         let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {s:.1e} of it"));
-        format!("{} {by}, {:.2} of its standard error", self.figure, self.ratio)
+        format!("{} {by}, {} of its standard error", self.figure, two_digits(self.ratio))
+    }
+}
+
+/// A number with two significant digits: more are noise, as the pilot has a few thousand rays.
+fn two_digits(value: f64) -> String {
+    if value <= 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let unit = 10f64.powf(value.log10().floor() - 1.0);
+    let decimals = (-unit.log10()).round().max(0.0) as usize;
+    format!("{:.decimals$}", (value / unit).round() * unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::two_digits;
+
+    #[test]
+    fn two_digits_are_told() {
+        let told = [477.48, 12.3, 4.04, 0.519, 0.0123, 99.7].map(two_digits);
+        assert_eq!(told, ["480", "12", "4.0", "0.52", "0.012", "100"]);
     }
 }

@@ -8,3 +8,4 @@ mod grids;
 mod ray_sets;
 #[cfg(feature = "report")]
 mod report_page;
+mod unreached;
