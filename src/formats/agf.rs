@@ -17,7 +17,7 @@ pub struct AgfGlass {
     pub formula: u32,
     /// Coefficients of the formula, λ in µm.
     pub coefficients: Vec<f64>,
-    /// Wavelengths that the formula holds for, µm.
+    /// Lowest and highest wavelength that the formula holds for, µm; `None` where the file does not say.
     pub range_um: Option<[f64; 2]>,
     /// Internal transmittance: wavelength µm, share, thickness mm.
     pub transmittance: Vec<[f64; 3]>,
@@ -27,8 +27,8 @@ pub struct AgfGlass {
 const NM_PER_UM: f64 = 1e3;
 
 impl AgfGlass {
-    /// Absorption coefficients by wavelength, `[nm, 1/mm]`, rising: Beer's law solved for them. Transmittances of 0, which would be an
-    /// infinite coefficient, and wavelengths that come twice are left out.
+    /// Absorption coefficients by wavelength, `[nm, 1/mm]`, wavelengths rising: Beer's law solved for them. Transmittances of 0, which
+    /// would be an infinite coefficient, are left out; above 1 they count as 1, and of a wavelength that comes twice the first counts.
     pub fn absorption(&self) -> Vec<[f64; 2]> {
         let known = self.transmittance.iter().filter(|[um, share, mm]| *um > 0.0 && *share > 0.0 && *mm > 0.0);
         let mut points: Vec<[f64; 2]> =
@@ -39,7 +39,7 @@ impl AgfGlass {
     }
 }
 
-/// Reads the glasses of a catalogue.
+/// Reads the glasses of a catalogue, in the file's order.
 ///
 /// # Errors
 /// When the file cannot be read, holds no glass, or has a line with a word in place of a number; the message names the line.
@@ -83,7 +83,7 @@ pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
     Ok(glasses)
 }
 
-/// The text of a file in any of its encodings; what is no letter of UTF-8 stands in comments alone.
+/// Decodes a file by its byte order mark, as UTF-8 without one; bytes that are no character become U+FFFD, which stand in comments alone.
 fn decoded(bytes: &[u8]) -> String {
     let wide = |unit: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| unit([c[0], c[1]])).collect();

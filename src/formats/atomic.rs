@@ -15,12 +15,13 @@ static SERIAL: AtomicU32 = AtomicU32::new(0);
 /// Files that this process has begun and not finished.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Writes a file beside its final name and renames it when `write` has succeeded, so that the name never holds half a file.
+/// Writes a file beside its final name and renames it when `write` has succeeded, so that the name never holds half a file. An older
+/// file or link of that name is replaced, and parts that dead processes left of it are removed.
 ///
 /// # Errors
 /// When the folder cannot be written or `write` fails; the unfinished file is removed and an older file of that name stays.
 pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
-    let beside = unfinished(path);
+    let beside = part_path(path);
     // Before its own file is made: a run that was killed must not leave a part for ever.
     remove_stale(path);
     let attempt = || -> io::Result<()> {
@@ -45,6 +46,7 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
 pub(super) struct Unfinished(PathBuf);
 
 impl Unfinished {
+    /// Lists a path for [`remove_unfinished_files`] until the value is dropped, which does not remove the file.
     pub(super) fn register(path: &Path) -> Self {
         // A thread that failed while it held the lock left the list whole.
         UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).push(path.to_path_buf());
@@ -58,7 +60,7 @@ impl Drop for Unfinished {
     }
 }
 
-/// Removes what this process has begun to write and not finished, for a process that is about to end.
+/// Removes what this process has begun to write and not finished, for a process that is about to end. Failures are passed over.
 pub fn remove_unfinished_files() {
     for path in UNFINISHED.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
         let _ = fs::remove_file(path);
@@ -95,8 +97,8 @@ pub(super) fn remove_stale(path: &Path) {
 /// Longest stem of a file name, bytes: file systems take 255, of which extensions and the names of unfinished files need some.
 const LONGEST_STEM: usize = 120;
 
-/// A name that is safe in a path: what is no letter, digit, `-` or `_` becomes `_`. A name too long for a file system is cut,
-/// and ends in a hash of the whole, so that long names that begin alike stay apart.
+/// Turns a name into one that is safe in a path: what is no letter, digit, `-` or `_` becomes `_`. One of more than 120 bytes is cut,
+/// and ends in a hash of the whole, so that long names that begin alike stay apart. An empty one becomes `unnamed`.
 ///
 /// ```
 /// assert_eq!(lampyris::formats::file_stem("far field"), "far_field");

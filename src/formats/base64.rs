@@ -1,6 +1,6 @@
 //! Bytes as text, for data that stands within HTML, SVG and VTK files.
 
-/// Standard base64 (RFC 4648 §4, with padding).
+/// Encodes bytes in standard base64 (RFC 4648 §4, with padding), on one line; no bytes give an empty text.
 ///
 /// ```
 /// // RFC 4648, section 10.

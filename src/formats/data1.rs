@@ -12,23 +12,23 @@ use std::path::Path;
 /// # Errors
 /// When the file cannot be written.
 pub fn write_data1(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
-    write_atomic(path, |w| ray_block(w, rays))
+    write_atomic(path, |w| write_ray_block(w, rays))
 }
 
-/// Reads the rays of a Data_1 file; directions are brought to unit length.
+/// Reads the rays of a Data_1 file, without wavelengths; directions are brought to unit length.
 ///
 /// # Errors
 /// When the file cannot be read, a line does not hold a ray, or the count is not that of the lines.
 pub fn read_data1(path: &Path) -> Result<Vec<LightRay>, Error> {
     let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut lines = Lines::new(path, &text);
-    let rays = lines.rays()?;
-    lines.end()?;
+    let rays = lines.read_rays()?;
+    lines.expect_end()?;
     Ok(rays)
 }
 
-/// The count and the lines of a list of rays.
-pub(super) fn ray_block(w: &mut dyn Write, rays: &[LightRay]) -> io::Result<()> {
+/// Writes the number of rays, then each on a line: origin (mm), direction, power.
+pub(super) fn write_ray_block(w: &mut dyn Write, rays: &[LightRay]) -> io::Result<()> {
     writeln!(w, "{}", rays.len())?;
     for ray in rays {
         let [x, y, z, dx, dy, dz, power] = ray.numbers();
@@ -44,6 +44,7 @@ const MOST_COUNTED: f64 = 1e15;
 pub(super) struct Lines<'a> {
     path: &'a Path,
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
+    /// Number of the line read last, from 1; 0 before any.
     at: usize,
 }
 
@@ -54,13 +55,14 @@ impl<'a> Lines<'a> {
         Self { path, lines: Box::new(lines), at: 0 }
     }
 
+    /// An error at the line read last, or the first before any.
     pub(super) fn error(&self, message: impl Into<String>) -> Error {
         // Before the first line the file is at fault as a whole; places count from one.
         Error::at_line(self.path, self.at.max(1), message)
     }
 
-    /// The next line's `count` finite numbers, which are `what`.
-    pub(super) fn numbers(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+    /// Reads the next line, which must hold `count` finite numbers and nothing else; `what` names them in the error.
+    pub(super) fn read_numbers(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
         let Some((n, line)) = self.lines.next() else {
             return Err(self.error(format!("the file ends where {what} should follow")));
         };
@@ -74,29 +76,29 @@ impl<'a> Lines<'a> {
         Ok(numbers)
     }
 
-    /// The next line's whole numbers, zero or more.
-    pub(super) fn counts<const N: usize>(&mut self, what: &str) -> Result<[usize; N], Error> {
-        let numbers = self.numbers(N, what)?;
+    /// Reads the next line, which must hold `N` whole numbers of zero or more; `what` names them in the error.
+    pub(super) fn read_counts<const N: usize>(&mut self, what: &str) -> Result<[usize; N], Error> {
+        let numbers = self.read_numbers(N, what)?;
         if numbers.iter().any(|x| *x < 0.0 || x.fract() != 0.0 || *x > MOST_COUNTED) {
             return Err(self.error(format!("whole numbers must stand here: {what}")));
         }
         Ok(std::array::from_fn(|i| numbers[i] as usize))
     }
 
-    /// The rays behind their number.
-    pub(super) fn rays(&mut self) -> Result<Vec<LightRay>, Error> {
-        let [count] = self.counts("the number of rays")?;
+    /// Reads the number of rays and then so many lines of a ray each; an error where one is missing or holds none.
+    pub(super) fn read_rays(&mut self) -> Result<Vec<LightRay>, Error> {
+        let [count] = self.read_counts("the number of rays")?;
         // No capacity from the count: a file may lie about it.
         let mut rays = Vec::new();
         for _ in 0..count {
-            let numbers = self.numbers(7, "origin, direction and power of a ray")?;
+            let numbers = self.read_numbers(7, "origin, direction and power of a ray")?;
             rays.push(LightRay::from_numbers(&numbers).map_err(|m| self.error(m))?);
         }
         Ok(rays)
     }
 
-    /// Refuses what follows the last ray.
-    pub(super) fn end(&mut self) -> Result<(), Error> {
+    /// Checks that no line that is not blank is left, and refuses it by its number.
+    pub(super) fn expect_end(&mut self) -> Result<(), Error> {
         // More lines than promised mean that the count or the file is wrong; which, nobody can tell.
         match self.lines.next() {
             None => Ok(()),
@@ -107,14 +109,14 @@ impl<'a> Lines<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rays::tests::some;
+    use super::super::rays::tests::some_rays;
     use super::*;
 
     #[test]
     fn rays_survive() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("light.data1");
-        let rays = some(50, false);
+        let rays = some_rays(50, false);
         write_data1(&path, &rays).unwrap();
         let back = read_data1(&path).unwrap();
         assert!(rays.iter().zip(&back).all(|(a, b)| a.origin == b.origin

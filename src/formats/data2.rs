@@ -18,6 +18,7 @@ pub struct Data2Facet {
     pub index_ratio: f64,
 }
 
+/// Writes the number of facets and each facet, in mm, on a line; numbers read back bit for bit.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
     write_atomic(path, |w| {
@@ -34,7 +35,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     })
 }
 
-/// Reads the facets of a Data_2 file.
+/// Reads the facets of a Data_2 file as they stand: normals are neither checked nor brought to unit length.
 ///
 /// # Errors
 /// When the file cannot be read, a line does not hold sixteen finite numbers, or the count is not that of the lines.

@@ -3,7 +3,7 @@
 //! The first line holds the two sizes of the grid, rows first; then follows each row of `Results` on a line; then the number of
 //! rays and the rays as in Data_1: origin (the point of arrival), direction, power.
 
-use super::data1::{Lines, ray_block};
+use super::data1::{Lines, write_ray_block};
 use super::input::read_text;
 use super::rays::LightRay;
 use super::{Error, ErrorKind, write_atomic};
@@ -20,7 +20,7 @@ pub struct Data3 {
     pub rays: Vec<LightRay>,
 }
 
-/// Writes a Data_3 file.
+/// Writes a Data_3 file; wavelengths of rays have no place in it.
 ///
 /// # Errors
 /// When the results do not fill their size or the file cannot be written.
@@ -38,33 +38,33 @@ pub fn write_data3(path: &Path, data: &Data3) -> Result<(), Error> {
             }
             writeln!(w)?;
         }
-        ray_block(w, &data.rays)
+        write_ray_block(w, &data.rays)
     })
 }
 
-/// Reads a Data_3 file.
+/// Reads a Data_3 file; directions of rays are brought to unit length.
 ///
 /// # Errors
 /// When the file cannot be read or is not laid out as [`write_data3`] does; the message names the line.
 pub fn read_data3(path: &Path) -> Result<Data3, Error> {
     let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut lines = Lines::new(path, &text);
-    let [rows, columns] = lines.counts("rows and columns of the results")?;
+    let [rows, columns] = lines.read_counts("rows and columns of the results")?;
     let mut results = Vec::new();
     // Rows without columns have no lines.
     if columns > 0 {
         for _ in 0..rows {
-            results.extend(lines.numbers(columns, "a row of results")?);
+            results.extend(lines.read_numbers(columns, "a row of results")?);
         }
     }
-    let rays = lines.rays()?;
-    lines.end()?;
+    let rays = lines.read_rays()?;
+    lines.expect_end()?;
     Ok(Data3 { size: [rows, columns], results, rays })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::rays::tests::some;
+    use super::super::rays::tests::some_rays;
     use super::*;
 
     #[test]
@@ -72,7 +72,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("out.data3");
         let results = (0..12).map(|i| f64::from(i) / 7.0).collect();
-        let data = Data3 { size: [3, 4], results, rays: some(5, false) };
+        let data = Data3 { size: [3, 4], results, rays: some_rays(5, false) };
         write_data3(&path, &data).unwrap();
         let back = read_data3(&path).unwrap();
         assert_eq!((back.size, &back.results, back.rays.len()), (data.size, &data.results, 5));

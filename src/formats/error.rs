@@ -28,7 +28,7 @@ pub enum ErrorKind {
     Extension {
         /// What was given.
         given: String,
-        /// What is known, for people.
+        /// The extensions that are known, for people.
         known: &'static str,
     },
     /// The content is not what the format says.
@@ -42,7 +42,7 @@ impl Error {
         Self { path: path.to_owned(), line: None, kind: Box::new(kind) }
     }
 
-    /// A content error at a line, counted from 1.
+    /// An error about the content of a file ([`ErrorKind::Malformed`]) at a line, counted from 1.
     pub fn at_line(path: &Path, line: usize, message: impl Into<String>) -> Self {
         Self { path: path.to_owned(), line: Some(line), kind: Box::new(ErrorKind::Malformed(message.into())) }
     }
@@ -52,7 +52,7 @@ impl Error {
         &self.kind
     }
 
-    /// The file and, where it is known, the line: `scene.csv:12`.
+    /// The path and, where it is known, the line, for people: `scene.csv:12`.
     fn place(&self) -> String {
         match self.line {
             Some(line) => format!("{}:{line}", self.path.display()),

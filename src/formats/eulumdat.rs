@@ -86,7 +86,7 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     })
 }
 
-/// Writes an EULUMDAT file: all C-planes, without symmetry, or the one plane of a rotational distribution.
+/// Writes an EULUMDAT file: all C-planes, without symmetry, or the one plane of a rotational distribution. There must be a plane.
 ///
 /// Numbers have six decimals. Absolute photometry is written with the flux of the distribution itself and −1 lamps.
 ///
@@ -158,7 +158,7 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::photometry::tests::{of, steps};
+    use super::super::photometry::tests::{photometry_of, steps};
     use super::*;
 
     fn round_trip(p: &Photometry) -> Photometry {
@@ -173,12 +173,12 @@ mod tests {
         let cases = [
             Photometry {
                 lamp_lumens: Some(2500.0),
-                ..of(PhotometricType::C, &steps(0.0, 360.0, 24), &steps(0.0, 90.0, 18), |h, v| {
+                ..photometry_of(PhotometricType::C, &steps(0.0, 360.0, 24), &steps(0.0, 90.0, 18), |h, v| {
                     500.0 + (h - 180.0).abs() - v
                 })
             },
-            of(PhotometricType::C, &steps(0.0, 90.0, 6), &steps(0.0, 180.0, 36), |h, v| 500.0 + h - v),
-            of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 18), |_, v| 800.0 - v),
+            photometry_of(PhotometricType::C, &steps(0.0, 90.0, 6), &steps(0.0, 180.0, 36), |h, v| 500.0 + h - v),
+            photometry_of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 18), |_, v| 800.0 - v),
         ];
         for p in &cases {
             let back = round_trip(p);
@@ -214,9 +214,9 @@ mod tests {
     #[test]
     fn what_cannot_be_said_is_refused() {
         let path = Path::new("/tmp/x.ldt");
-        let beam = of(PhotometricType::A, &[-1.0, 1.0], &[-1.0, 1.0], |_, _| 1.0);
+        let beam = photometry_of(PhotometricType::A, &[-1.0, 1.0], &[-1.0, 1.0], |_, _| 1.0);
         assert!(write_eulumdat(path, &beam).unwrap_err().to_string().contains("type C"));
-        let part = of(PhotometricType::C, &[10.0, 20.0], &[0.0, 90.0], |_, _| 1.0);
+        let part = photometry_of(PhotometricType::C, &[10.0, 20.0], &[0.0, 90.0], |_, _| 1.0);
         assert!(write_eulumdat(path, &part).unwrap_err().to_string().contains("whole turn"));
         for text in ["", "x\n1\n1\n-5\n0\n-7\n", "a\n1\n1\n1e30\n0\n1e30\n0\n"] {
             assert!(parse_eulumdat(path, text).is_err());
@@ -227,8 +227,11 @@ mod tests {
     fn damaged_files_are_refused_or_read_but_never_panic() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ldt");
-        write_eulumdat(&path, &of(PhotometricType::C, &steps(0.0, 360.0, 4), &[0.0, 90.0], |_, v| 90.0 - v))
-            .unwrap();
+        write_eulumdat(
+            &path,
+            &photometry_of(PhotometricType::C, &steps(0.0, 360.0, 4), &[0.0, 90.0], |_, v| 90.0 - v),
+        )
+        .unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         for cut in 0..text.len() {
             let _ = parse_eulumdat(&path, &text[..cut]);

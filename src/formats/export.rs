@@ -8,7 +8,7 @@ use std::path::Path;
 /// Extensions [`write_facets`] knows, for people.
 pub const FACET_EXTENSIONS: &str = ".obj .ply .stl .vtu .glb .data2";
 
-/// Writes facets in the format that the extension names: one of [`FACET_EXTENSIONS`].
+/// Writes facets in the format that the extension names, in any case: one of [`FACET_EXTENSIONS`]. An older file is replaced.
 ///
 /// # Errors
 /// For an unknown extension, and when the file cannot be written.

@@ -37,14 +37,14 @@ pub struct Group {
 }
 
 impl Group {
-    /// An opaque group.
+    /// An opaque group through which no light passes; `colour` is sRGB in `[0, 1]`.
     pub fn solid(name: &str, colour: [f64; 3]) -> Self {
         Self { name: name.into(), colour, opacity: 1.0, index_ratio: 1.0 }
     }
 }
 
 impl<'a> Facets<'a> {
-    /// A mesh of one group.
+    /// A mesh of one group in a light grey-blue, with nothing measured and nothing beside the facets.
     pub fn plain(mesh: &'a FacetMesh, name: &str) -> Self {
         let group = Group::solid(name, [0.62, 0.68, 0.75]);
         Self {
@@ -58,14 +58,14 @@ impl<'a> Facets<'a> {
         }
     }
 
-    /// Index into `groups` of a face.
+    /// Index into `groups` of a face: 0 where none is stated for it, or one that is not there.
     pub fn group_of(&self, face: FaceId) -> usize {
         let g = self.group_of_face.get(face.index()).map_or(0, |&g| g as usize);
         // A face without a group belongs to the first: files for show must not fail for it.
         if g < self.groups.len() { g } else { 0 }
     }
 
-    /// The facets of each group, in the mesh's order.
+    /// Indices of the facets of each group, in the mesh's order; a list may be empty.
     pub(crate) fn by_group(&self) -> Vec<Vec<usize>> {
         let mut lists = vec![Vec::new(); self.groups.len()];
         for (i, facet) in self.mesh.facets.iter().enumerate() {
@@ -75,7 +75,7 @@ impl<'a> Facets<'a> {
     }
 }
 
-/// Unit normal of a flat quad (of its two diagonals), zero for a facet without area.
+/// Unit normal of a facet taken as flat, by its two diagonals; zero for a facet without area.
 pub(super) fn flat_normal(mesh: &FacetMesh, facet: usize) -> Vector {
     let [a, b, c, d] = mesh.corners(facet);
     // With c = d the diagonals are two edges of the triangle, so one formula serves both.

@@ -20,8 +20,8 @@ struct Buffer {
 }
 
 impl Buffer {
-    /// Adds bytes as a view of the buffer for vertices or indices (`target`); returns its number.
-    fn view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
+    /// Adds bytes, padded to four, as a view of the buffer; `target` is glTF's code for vertices or indices. Returns the view's number.
+    fn add_view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
         let start = self.bytes.len();
         self.bytes.extend(bytes);
         let length = self.bytes.len() - start;
@@ -33,9 +33,9 @@ impl Buffer {
         self.views.len() - 1
     }
 
-    /// Adds vectors with their bounds; returns the number of their accessor.
-    fn vectors(&mut self, list: &[[f32; 3]]) -> usize {
-        let view = self.view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
+    /// Adds vectors of vertices with their bounds, at least one; returns the number of their accessor.
+    fn add_vectors(&mut self, list: &[[f32; 3]]) -> usize {
+        let view = self.add_view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
         // The standard asks for the bounds of positions; for normals they do no harm.
         let bound = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
             (0..3).map(|k| list.iter().fold(start, |m, p| pick(m, p[k]))).collect()
@@ -47,24 +47,26 @@ impl Buffer {
         self.accessors.len() - 1
     }
 
-    fn indices(&mut self, list: &[u32]) -> usize {
-        let view = self.view(list.iter().flat_map(|x| x.to_le_bytes()), 34963);
+    /// Adds indices of vertices; returns the number of their accessor.
+    fn add_indices(&mut self, list: &[u32]) -> usize {
+        let view = self.add_view(list.iter().flat_map(|x| x.to_le_bytes()), 34963);
         self.accessors
             .push(json!({"bufferView": view, "componentType": 5125, "count": list.len(), "type": "SCALAR"}));
         self.accessors.len() - 1
     }
 }
 
-fn single(p: Vector) -> [f32; 3] {
+/// A vector in single precision.
+fn to_f32(p: Vector) -> [f32; 3] {
     [p.x as f32, p.y as f32, p.z as f32]
 }
 
-/// Display values (sRGB) to the linear ones that glTF wants.
-fn linear(c: f64) -> f64 {
+/// Turns a display value (sRGB) in `[0, 1]` into the linear one that glTF wants.
+fn linear_from_srgb(c: f64) -> f64 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The mesh of a group's facets about `middle`, for which vertices are numbered anew.
+/// Adds the facets of `list` to the buffer, positions relative to `middle`, vertices numbered anew; returns their mesh for the document.
 fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Point, material: usize) -> Value {
     let mesh = facets.mesh;
     // Vertices that a group does not use would be sent with every group.
@@ -75,8 +77,8 @@ fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Poin
             *local.entry(v).or_insert_with(|| {
                 // Subtracted in double precision: what is rounded to single precision is the small rest.
                 let vertex = &mesh.vertices[v as usize];
-                positions.push(single(mesh.positions[vertex.position as usize] - middle));
-                normals.push(single(vertex.normal));
+                positions.push(to_f32(mesh.positions[vertex.position as usize] - middle));
+                normals.push(to_f32(vertex.normal));
                 positions.len() as u32 - 1
             })
         });
@@ -86,13 +88,15 @@ fn group_mesh(buffer: &mut Buffer, facets: &Facets, list: &[usize], middle: Poin
             triangles.extend([corners[0], corners[2], corners[3]]);
         }
     }
-    let (position, normal) = (buffer.vectors(&positions), buffer.vectors(&normals));
-    let indices = buffer.indices(&triangles);
+    let (position, normal) = (buffer.add_vectors(&positions), buffer.add_vectors(&normals));
+    let indices = buffer.add_indices(&triangles);
     json!({"primitives": [{
         "attributes": {"POSITION": position, "NORMAL": normal}, "indices": indices, "material": material, "mode": 4
     }]})
 }
 
+/// Writes a mesh of triangles for each group that has facets, and ray paths of two points and more as lines; without both a document of
+/// empty nodes.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let bounds = facets.mesh.bounds();
     // About the model's middle, where single precision has most to give; the node's translation puts it back.
@@ -103,7 +107,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         if list.is_empty() {
             continue;
         }
-        let [r, g, b] = group.colour.map(linear);
+        let [r, g, b] = group.colour.map(linear_from_srgb);
         materials.push(json!({"name": group.name, "doubleSided": true,
             "alphaMode": if group.opacity < 1.0 { "BLEND" } else { "OPAQUE" },
             "pbrMetallicRoughness": {"baseColorFactor": [r, g, b, group.opacity], "metallicFactor": 0.1, "roughnessFactor": 0.5}}));
@@ -111,7 +115,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         nodes.push(json!({"name": group.name, "mesh": meshes.len() - 1}));
     }
     if let Some(paths) = facets.paths.filter(|p| p.lines().any(|line| line.len() > 1)) {
-        let points: Vec<[f32; 3]> = paths.points.iter().map(|&p| single(p - middle)).collect();
+        let points: Vec<[f32; 3]> = paths.points.iter().map(|&p| to_f32(p - middle)).collect();
         let mut segments = Vec::new();
         let mut start = 0;
         for &end in &paths.ends {
@@ -121,7 +125,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         }
         materials.push(json!({"name": "ray paths", "extensions": {"KHR_materials_unlit": {}},
             "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.6, 0.1, 1.0]}}));
-        let (position, indices) = (buffer.vectors(&points), buffer.indices(&segments));
+        let (position, indices) = (buffer.add_vectors(&points), buffer.add_indices(&segments));
         meshes.push(json!({"primitives": [{
             "attributes": {"POSITION": position}, "indices": indices, "material": materials.len() - 1, "mode": 1}]}));
         nodes.push(json!({"name": "ray paths", "mesh": meshes.len() - 1}));
@@ -150,14 +154,14 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     container(path, &document, &buffer.bytes)
 }
 
-/// Takes the empty list of children away, which glTF forbids.
+/// Removes the list of children of the first node, which glTF forbids to be empty.
 fn nodes_without_children(document: &mut Value) {
     if let Some(node) = document["nodes"][0].as_object_mut() {
         node.remove("children");
     }
 }
 
-/// The two chunks of a GLB file, each padded to four bytes.
+/// Writes a GLB file of the document, padded to four bytes, and the binary chunk, which must be and is left out when empty.
 fn container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
     let mut text = document.to_string().into_bytes();
     while !text.len().is_multiple_of(4) {

@@ -58,13 +58,13 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// What is measured with its unit, as the name of a column or array: `X_lx`.
+    /// Name of a column or array, of the quantity and its unit: `X_lx`.
     pub fn column(&self) -> String {
         column(&self.quantity, &self.unit)
     }
 }
 
-/// A quantity with its unit as a name without blanks, commas and slashes.
+/// Joins a quantity and its unit to a name without blanks and commas, with `_per_` for a slash of the unit.
 fn column(quantity: &str, unit: &str) -> String {
     format!("{}_{}", quantity.replace([' ', ','], "_"), unit.replace('/', "_per_").replace('²', "2"))
 }
@@ -83,12 +83,12 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Width of a cell.
+    /// Width of a cell in the axis' unit; of an axis without cells the whole range.
     pub fn step(&self) -> f64 {
         (self.range[1] - self.range[0]) / self.cells.max(1) as f64
     }
 
-    /// Centre of a cell.
+    /// Centre of a cell, counted from 0, in the axis' unit.
     pub fn center(&self, cell: usize) -> f64 {
         self.range[0] + (cell as f64 + 0.5) * self.step()
     }
@@ -100,12 +100,13 @@ impl Axis {
 }
 
 impl Grid {
-    /// What is measured with its unit, as the name of a column or array: `luminous_intensity_cd`.
+    /// Name of a column or array, of the quantity and its unit: `luminous_intensity_cd`.
     pub fn column(&self) -> String {
         column(&self.quantity, &self.unit)
     }
 
-    /// Both errors of the values, and the geometric ones of the layers, under the names that every format gives them, where they are known.
+    /// Lists both errors of the values, where both are known, and the geometric ones of the layers that have them, under the names that
+    /// every format gives them.
     pub(super) fn error_layers(&self) -> impl Iterator<Item = (String, &Vec<f64>)> {
         let both = self.error.as_ref().zip(self.geometric.as_ref());
         let of_values = both.into_iter().flat_map(|(statistical, geometric)| {
@@ -178,7 +179,7 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
 /// that of a layer, where they are known.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// When values do not fill the grid, and when the file cannot be written.
 pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
     let [a, b] = &grid.axes;
     let edges =

@@ -56,31 +56,31 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
         .collect();
     let mut numbers = Numbers { path, words: &rest, at: 0, last_line: tilt_line };
     numbers.skip_tilt_table(tilt)?;
-    let lamps = numbers.next("number of lamps")?;
-    let lumens_per_lamp = numbers.next("lumens per lamp")?;
-    let multiplier = numbers.next("candela multiplier")?;
-    let rows = numbers.count("number of vertical angles")?;
-    let planes = numbers.count("number of horizontal angles")?;
-    let kind = match numbers.next("photometric type")? {
+    let lamps = numbers.read_number("number of lamps")?;
+    let lumens_per_lamp = numbers.read_number("lumens per lamp")?;
+    let multiplier = numbers.read_number("candela multiplier")?;
+    let rows = numbers.read_count("number of vertical angles")?;
+    let planes = numbers.read_count("number of horizontal angles")?;
+    let kind = match numbers.read_number("photometric type")? {
         1.0 => PhotometricType::C,
         2.0 => PhotometricType::B,
         3.0 => PhotometricType::A,
         other => return Err(numbers.error(format!("photometric type {other}: must be 1 (C), 2 (B) or 3 (A)"))),
     };
-    let unit = match numbers.next("unit type")? {
+    let unit = match numbers.read_number("unit type")? {
         1.0 => FOOT,
         2.0 => 1000.0,
         other => return Err(numbers.error(format!("unit type {other}: must be 1 (feet) or 2 (metres)"))),
     };
-    let opening = numbers.list(3, "width, length and height")?;
-    let ballast = numbers.next("ballast factor")?;
-    let lamp_factor = numbers.next("ballast-lamp photometric factor")?;
+    let opening = numbers.read_list(3, "width, length and height")?;
+    let ballast = numbers.read_number("ballast factor")?;
+    let lamp_factor = numbers.read_number("ballast-lamp photometric factor")?;
     // LM-63-2019 keeps a code for how the file was made in the field that held the ballast-lamp factor.
     let factor = if text.trim_start().starts_with("IES:LM-63-2019") { ballast } else { ballast * lamp_factor };
-    let watts = numbers.next("input watts")?;
-    let vertical_deg = numbers.ascending(rows, "vertical angles")?;
-    let horizontal_deg = numbers.ascending(planes, "horizontal angles")?;
-    let mut candela = numbers.list(rows.saturating_mul(planes), "candela values")?;
+    let watts = numbers.read_number("input watts")?;
+    let vertical_deg = numbers.read_ascending(rows, "vertical angles")?;
+    let horizontal_deg = numbers.read_ascending(planes, "horizontal angles")?;
+    let mut candela = numbers.read_list(rows.saturating_mul(planes), "candela values")?;
     candela.iter_mut().for_each(|c| *c *= multiplier * factor);
     if let Some(bad) = candela.iter().find(|c| !(**c >= 0.0 && c.is_finite())) {
         return Err(numbers.error(format!("an intensity of {bad} cd; intensities must be zero or more")));
@@ -100,20 +100,23 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
 /// The free-format numbers after the TILT line, each with its line.
 struct Numbers<'a> {
     path: &'a Path,
+    /// Each word with the number of its line.
     words: &'a [(usize, &'a str)],
+    /// Index of the next word.
     at: usize,
+    /// Line of the word read last, or of TILT before any.
     last_line: usize,
 }
 
 impl Numbers<'_> {
-    /// Reads over the table that a TILT line announces.
+    /// Reads over the table that a TILT line announces; an error where it refers to another file.
     fn skip_tilt_table(&mut self, tilt: &str) -> Result<(), Error> {
         match tilt.to_uppercase().as_str() {
             "NONE" => Ok(()),
             "INCLUDE" => {
-                self.next("lamp-to-luminaire geometry")?;
-                let count = self.count("number of tilt angles")?;
-                self.list(count.saturating_mul(2), "tilt table").map(|_| ())
+                self.read_number("lamp-to-luminaire geometry")?;
+                let count = self.read_count("number of tilt angles")?;
+                self.read_list(count.saturating_mul(2), "tilt table").map(|_| ())
             }
             _ => Err(self.error(format!(
                 "TILT={tilt} refers to another file; write TILT=NONE, or TILT=INCLUDE with its table"
@@ -121,12 +124,13 @@ impl Numbers<'_> {
         }
     }
 
+    /// An error at the line of the number read last.
     fn error(&self, message: String) -> Error {
         Error::at_line(self.path, self.last_line, message)
     }
 
-    /// The next number; `what` names it in the message.
-    fn next(&mut self, what: &str) -> Result<f64, Error> {
+    /// Reads the next number, which must be finite; `what` names it in the error.
+    fn read_number(&mut self, what: &str) -> Result<f64, Error> {
         let Some(&(line, word)) = self.words.get(self.at) else {
             return Err(self.error(format!("the file ends where the {what} should follow")));
         };
@@ -138,9 +142,9 @@ impl Numbers<'_> {
         }
     }
 
-    /// The next number as a count.
-    fn count(&mut self, what: &str) -> Result<usize, Error> {
-        let x = self.next(what)?;
+    /// Reads the next number, which must be whole, at least 1 and no more than the file has numbers.
+    fn read_count(&mut self, what: &str) -> Result<usize, Error> {
+        let x = self.read_number(what)?;
         // No count can exceed the numbers that are there: a lie about it costs no memory.
         if x >= 1.0 && x.fract() == 0.0 && x <= self.words.len() as f64 {
             Ok(x as usize)
@@ -149,19 +153,19 @@ impl Numbers<'_> {
         }
     }
 
-    /// So many numbers.
-    fn list(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+    /// Reads `count` numbers; an error where fewer are left.
+    fn read_list(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
         // Asked before the loop, so that the message names what the file promises.
         let left = self.words.len() - self.at;
         if count > left {
             return Err(self.error(format!("{count} numbers should follow ({what}), but only {left} do")));
         }
-        (0..count).map(|_| self.next(what)).collect()
+        (0..count).map(|_| self.read_number(what)).collect()
     }
 
-    /// So many numbers, each above the one before.
-    fn ascending(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
-        let list = self.list(count, what)?;
+    /// Reads `count` numbers, each above the one before.
+    fn read_ascending(&mut self, count: usize, what: &str) -> Result<Vec<f64>, Error> {
+        let list = self.read_list(count, what)?;
         // Interpolation divides by the steps.
         match list.windows(2).find(|p| p[1] <= p[0]) {
             Some(p) => Err(self.error(format!("{what} must ascend, but {} follows {}", p[1], p[0]))),
@@ -179,7 +183,8 @@ pub fn write_ies(path: &Path, p: &Photometry) -> Result<(), Error> {
     write_atomic(path, |w| w.write_all(text.as_bytes()))
 }
 
-/// The text of an LM-63-2002 file, with absolute photometry where the lamp's lumens are not known.
+/// The text of an LM-63-2002 file, with absolute photometry where the lamp's lumens are not known; an error, for people, where intensities
+/// do not fill their planes.
 fn ies_text(p: &Photometry) -> Result<String, String> {
     let (planes, rows) = (p.horizontal_deg.len(), p.vertical_deg.len());
     if planes == 0 || rows == 0 || p.candela.len() != planes * rows {
@@ -216,13 +221,14 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
 struct Lines(String);
 
 impl Lines {
+    /// Adds a line; what is longer than the format allows is cut off.
     fn line(&mut self, text: &str) {
         // Cut rather than broken: the rest of a keyword on a line of its own would be a line of the format.
         self.0.extend(text.chars().take(LONGEST_LINE));
         self.0.push_str("\r\n");
     }
 
-    /// Numbers in lines that are not too long.
+    /// Adds numbers on lines of their own that are not too long; a number longer than a line is cut off.
     fn numbers(&mut self, numbers: &[f64]) {
         let mut line = String::new();
         for number in numbers {
@@ -243,7 +249,7 @@ impl Lines {
 
 #[cfg(test)]
 mod tests {
-    use super::super::photometry::tests::{of, steps};
+    use super::super::photometry::tests::{photometry_of, steps};
     use super::*;
 
     const TEXT: &str = "IESNA:LM-63-1995\n[TEST] 42\n[MANUFAC] A,\n[MORE] and B\nTILT=INCLUDE\n1\n3\n0 45 90\n1.0 .95 .9\n\
@@ -271,8 +277,9 @@ mod tests {
     fn what_is_written_reads_back_bit_for_bit() {
         let folder = tempfile::tempdir().unwrap();
         for kind in [PhotometricType::A, PhotometricType::B, PhotometricType::C] {
-            let p =
-                of(kind, &steps(0.0, 90.0, 37), &steps(0.0, 90.0, 41), |h, v| (1.0 + h).sqrt() * 1e3 / (1.0 + v));
+            let p = photometry_of(kind, &steps(0.0, 90.0, 37), &steps(0.0, 90.0, 41), |h, v| {
+                (1.0 + h).sqrt() * 1e3 / (1.0 + v)
+            });
             let path = folder.path().join("a.ies");
             write_ies(&path, &p).unwrap();
             assert_eq!(read_ies(&path).unwrap(), p);
@@ -283,7 +290,9 @@ mod tests {
 
     #[test]
     fn an_independent_reader_finds_the_same_intensities() {
-        let p = of(PhotometricType::C, &steps(0.0, 180.0, 4), &steps(0.0, 90.0, 6), |h, v| 10.0 + h + 2.0 * v);
+        let p = photometry_of(PhotometricType::C, &steps(0.0, 180.0, 4), &steps(0.0, 90.0, 6), |h, v| {
+            10.0 + h + 2.0 * v
+        });
         let text = ies_text(&Photometry { lamp_lumens: Some(1000.0), ..p.clone() }).unwrap();
         let other = eulumdat::IesParser::parse(&text).unwrap();
         for (i, plane) in other.intensities.iter().enumerate().take(5) {

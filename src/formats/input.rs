@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Opens a file for reading.
+/// Opens an ordinary file, or a link to one, for reading.
 ///
 /// # Errors
 /// When it is missing, or a folder, pipe, socket or device.
@@ -21,7 +21,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// The bytes of a file, at most as many as it had when it was opened.
+/// Reads the bytes of a file, at most as many as it had when it was opened.
 ///
 /// # Errors
 /// As [`open_file`], and when reading fails.
@@ -34,7 +34,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a file.
+/// Reads the text of a file in UTF-8; a byte order mark stays at its start.
 ///
 /// # Errors
 /// As [`read_bytes`], and when the bytes are no UTF-8.

@@ -42,7 +42,7 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
     write_atomic(path, |w| w.write_all(&bytes))
 }
 
-/// The head of an array of these numbers.
+/// The NPY head of an array; `numbers` is NumPy's name of their type, such as `<f8`.
 pub(super) fn header(numbers: &str, shape: &[usize]) -> Vec<u8> {
     // A tuple of one number needs its comma.
     let dims: String = shape.iter().map(|n| format!("{n}, ")).collect();

@@ -4,7 +4,7 @@ use super::facets::Facets;
 use super::{Error, printable_line, write_atomic};
 use std::path::Path;
 
-/// Writes positions, normals and quads; numbers read back bit for bit.
+/// Writes positions (mm), normals, quads and triangles, by group; numbers read back bit for bit. Groups without facets are left out.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
     // Rust prints the shortest decimals that read back the same bits.

@@ -29,7 +29,7 @@ pub struct Photometry {
     pub candela: Vec<f64>,
     /// Lumens of the lamps inside, all together; `None` for absolute photometry.
     pub lamp_lumens: Option<f64>,
-    /// Electrical power.
+    /// Electrical power, W.
     pub watts: f64,
     /// Width, length and height of the luminous opening, mm; negative where LM-63 means round shapes.
     pub opening_mm: [f64; 3],
@@ -50,7 +50,7 @@ pub enum PhotometricType {
 }
 
 impl PhotometricType {
-    /// The direction of two angles in degrees.
+    /// The unit direction of two angles in degrees, C or H first.
     ///
     /// Components for type C: along the plane C 0, the plane C 90, and the main axis (γ = 0, down for a luminaire). For A and B:
     /// to positive H, to positive V, and forward. Seen along the main axis, C runs counterclockwise, as in the plan of a luminaire
@@ -66,7 +66,8 @@ impl PhotometricType {
         }
     }
 
-    /// The angles of a direction in degrees: C in `[0, 360)`, γ in `[0, 180]`, H and V about 0.
+    /// The angles of a direction of any length, degrees: C in `[0, 360)`, γ in `[0, 180]`; H and V about 0, the one from the polar plane
+    /// within ±90, the other within ±180.
     pub fn angles_deg(self, d: Vector) -> [f64; 2] {
         let [h, v] = match self {
             Self::C => {
@@ -84,7 +85,7 @@ impl PhotometricType {
 }
 
 impl Photometry {
-    /// The same intensities over all planes that symmetry implies.
+    /// Returns the same intensities over all planes that symmetry implies.
     ///
     /// Type C: one plane, or planes that end at 90°, 180°, or run from 90° to 270°, become planes from 0° to 360°.
     /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is,
@@ -162,7 +163,7 @@ impl Photometry {
     }
 }
 
-/// Integrals of the hat functions of nodes in degrees, from those of the falling and rising half on each interval in radians.
+/// Integrals of the hat functions of nodes in degrees; `halves` gives those of the falling and the rising half on an interval in radians.
 fn hat_integrals(nodes_deg: &[f64], halves: impl Fn(f64, f64) -> [f64; 2]) -> Vec<f64> {
     let mut sums = vec![0.0; nodes_deg.len()];
     for (i, pair) in nodes_deg.windows(2).enumerate() {
@@ -173,7 +174,7 @@ fn hat_integrals(nodes_deg: &[f64], halves: impl Fn(f64, f64) -> [f64; 2]) -> Ve
     sums
 }
 
-/// `∫ (b−x)/(b−a) sin x dx` and `∫ (x−a)/(b−a) sin x dx` over `[a, b]`.
+/// Computes `∫ (b−x)/(b−a) sin x dx` and `∫ (x−a)/(b−a) sin x dx` over `[a, b]`, radians, `a < b`.
 fn sine_integrals(a: f64, b: f64) -> [f64; 2] {
     // By parts: what the integral of cos x leaves is the mean of the cosine over the interval.
     let mean = (b.sin() - a.sin()) / (b - a);
@@ -185,7 +186,7 @@ pub(super) mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    pub(in crate::formats) fn of(
+    pub(in crate::formats) fn photometry_of(
         kind: PhotometricType,
         h: &[f64],
         v: &[f64],
@@ -234,33 +235,35 @@ pub(super) mod tests {
             (PhotometricType::A, [-180.0, 180.0], [-90.0, 90.0]),
             (PhotometricType::B, [-90.0, 90.0], [-180.0, 180.0]),
         ] {
-            let p = of(kind, &steps(h[0], h[1], 8), &steps(v[0], v[1], 8), |_, _| 1.0);
+            let p = photometry_of(kind, &steps(h[0], h[1], 8), &steps(v[0], v[1], 8), |_, _| 1.0);
             assert!((p.flux() - 4.0 * PI).abs() < 1e-12, "{kind:?}");
         }
         // π lumens from cos γ; the interpolation error falls with the square of the step.
         let error = |n| {
-            (of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, n), |_, v| v.to_radians().cos()).flux() - PI).abs()
+            (photometry_of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, n), |_, v| v.to_radians().cos()).flux()
+                - PI)
+                .abs()
         };
         assert!(error(90) < 2e-4 && (3.9..4.1).contains(&(error(45) / error(90))));
     }
 
     #[test]
     fn symmetry_is_expanded_to_whole_turns() {
-        let quarter = of(PhotometricType::C, &[0.0, 45.0, 90.0], &[0.0, 90.0], |h, v| h + v);
+        let quarter = photometry_of(PhotometricType::C, &[0.0, 45.0, 90.0], &[0.0, 90.0], |h, v| h + v);
         let whole = quarter.expanded();
         assert_eq!(whole.horizontal_deg, [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0, 360.0]);
         let first: Vec<f64> = whole.candela.iter().step_by(2).copied().collect();
         assert_eq!(first, [0.0, 45.0, 90.0, 45.0, 0.0, 45.0, 90.0, 45.0, 0.0]);
-        let half = of(PhotometricType::C, &[90.0, 180.0, 270.0], &[0.0, 90.0], |h, _| h);
+        let half = photometry_of(PhotometricType::C, &[90.0, 180.0, 270.0], &[0.0, 90.0], |h, _| h);
         let whole = half.expanded();
         assert_eq!(whole.horizontal_deg, [0.0, 90.0, 180.0, 270.0, 360.0]);
         assert_eq!(
             whole.candela.iter().step_by(2).copied().collect::<Vec<_>>(),
             [180.0, 90.0, 180.0, 270.0, 180.0]
         );
-        let beam = of(PhotometricType::A, &[0.0, 10.0], &[0.0, 5.0], |h, v| h + v).expanded();
+        let beam = photometry_of(PhotometricType::A, &[0.0, 10.0], &[0.0, 5.0], |h, v| h + v).expanded();
         assert_eq!((beam.horizontal_deg.as_slice(), beam.candela[1]), ([-10.0, 0.0, 10.0].as_slice(), 15.0));
-        let open = of(PhotometricType::C, &steps(0.0, 345.0, 23), &[0.0, 90.0], |_, _| 1.0);
+        let open = photometry_of(PhotometricType::C, &steps(0.0, 345.0, 23), &[0.0, 90.0], |_, _| 1.0);
         assert_eq!(open.expanded().horizontal_deg.last(), Some(&360.0));
     }
 }

@@ -5,6 +5,7 @@ use super::facets::Facets;
 use super::{Error, printable_line, write_atomic};
 use std::path::Path;
 
+/// Writes all vertices and facets as the head of the file says; sags only where there is one for each facet.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
     let sag = mesh.sag.len() == mesh.facets.len();

@@ -15,7 +15,7 @@ pub enum ColourMap {
 }
 
 impl ColourMap {
-    /// The colour at `x` in `[0, 1]`; values outside are clamped, NaN is grey.
+    /// The sRGB colour at `x` in `[0, 1]`; values outside are clamped, NaN is grey.
     pub fn colour(self, x: f64) -> [u8; 3] {
         // NaN passes through `clamp`.
         if x.is_nan() {
@@ -41,8 +41,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A grid as a picture, one cell `zoom` pixels wide, the second axis upward, colours from 0 (or the smallest value when
-    /// negative) to the largest; `exponent` below 1 lifts the dark parts.
+    /// Draws a grid as a picture, one cell `zoom` pixels wide and high, the second axis upward, colours from 0 (or the smallest value when
+    /// negative) to the largest, NaN in grey; `exponent` below 1 lifts the dark parts. `values` must fill the grid.
     pub fn of_grid(grid: &Grid, map: ColourMap, zoom: u32, exponent: f64) -> Self {
         let (nx, ny) = (grid.axes[0].cells, grid.axes[1].cells);
         // From zero, so that darkness is dark; a grid of negative values needs its own floor.
@@ -64,7 +64,7 @@ impl Picture {
         Self { width: (nx * zoom) as u32, height: (ny * zoom) as u32, rgb }
     }
 
-    /// The picture as the bytes of a PNG file.
+    /// Encodes the picture as the bytes of a PNG file.
     ///
     /// # Errors
     /// When the picture has no pixels or its bytes do not fit its size.

@@ -23,13 +23,13 @@ pub struct Polylines {
 }
 
 impl Polylines {
-    /// Adds a line; its values are the caller's to keep in step.
+    /// Adds a line, which may have no points; `values` is not touched, and the caller's to keep in step.
     pub fn push(&mut self, points: impl IntoIterator<Item = Point>) {
         self.points.extend(points);
         self.ends.push(self.points.len());
     }
 
-    /// The points of each line.
+    /// The points of each line, mm, in order.
     pub fn lines(&self) -> impl Iterator<Item = &[Point]> {
         (0..self.ends.len()).map(|k| {
             let start = if k == 0 { 0 } else { self.ends[k - 1] };
@@ -37,8 +37,8 @@ impl Polylines {
         })
     }
 
-    /// The lines cut off where they first leave a box, so that rays to infinity do not decide what a viewer shows; values stay with
-    /// their lines, lines that start outside become single points. A box around nothing cuts nothing.
+    /// Cuts lines off where they first leave a box, so that rays to infinity do not decide what a viewer shows. Values stay with their
+    /// lines; lines that start outside become their first point. An empty box cuts nothing.
     pub fn inside(&self, bounds: &Aabb) -> Self {
         if bounds.is_empty() {
             return self.clone();

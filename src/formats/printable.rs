@@ -17,7 +17,7 @@ pub fn is_unprintable(c: char) -> bool {
     }
 }
 
-/// Text of any number of lines with its unprintable characters written as `\u{1b}`.
+/// Writes the unprintable characters of a text of any number of lines as `\u{1b}`; one without any is borrowed.
 ///
 /// ```
 /// use lampyris::formats::printable;
@@ -35,7 +35,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// The same on one line: line ends and tabulators become blanks.
+/// As [`printable`], on one line: line ends and tabulators become blanks.
 pub fn printable_line(text: &str) -> Cow<'_, str> {
     if text.contains(['\n', '\t']) {
         let line = text.replace(['\n', '\t'], " ");
@@ -44,7 +44,7 @@ pub fn printable_line(text: &str) -> Cow<'_, str> {
     printable(text)
 }
 
-/// Text with every unprintable character replaced by one of as many bytes, so that places in it stay where they are.
+/// Replaces every unprintable character by one of as many bytes, so that places in the text stay where they are.
 pub fn printable_in_place(text: &str) -> Cow<'_, str> {
     if !text.contains(is_unprintable) {
         return Cow::Borrowed(text);
@@ -60,7 +60,7 @@ pub fn printable_in_place(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(replaced).collect())
 }
 
-/// A JSON text whose strings hold unprintable characters as escapes; it reads back the same.
+/// Writes the unprintable characters of a JSON text, which stand in its strings, as escapes; it reads back the same.
 pub fn printable_json(text: String) -> String {
     if !text.contains(is_unprintable) {
         return text;
@@ -78,8 +78,8 @@ pub fn printable_json(text: String) -> String {
     shown
 }
 
-/// A cell of CSV that holds text: quoted where it must be, and never taken for a formula by a spreadsheet, which an
-/// apostrophe in front prevents.
+/// Writes text as a cell of CSV: unprintable characters as by [`printable`], quoted where it must be, and never taken for a formula by a
+/// spreadsheet, which an apostrophe in front prevents.
 ///
 /// ```
 /// use lampyris::formats::csv_text;
@@ -95,12 +95,13 @@ pub fn csv_text(text: &str) -> String {
     if safe.contains([',', ';', '"', '\n', '\t']) { quoted(&safe) } else { safe }
 }
 
-/// The same always in quotes.
+/// As [`csv_text`], always in quotes.
 pub fn csv_quoted_text(text: &str) -> String {
     let cell = csv_text(text);
     if cell.starts_with('"') { cell } else { quoted(&cell) }
 }
 
+/// Puts text into quotes and doubles those inside.
 fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }

@@ -36,7 +36,8 @@ const LEAST_BUDGET: u64 = 1 << 26;
 const COLUMNS: [&str; 8] = ["x", "y", "z", "dx", "dy", "dz", "power", "wavelength_nm"];
 
 impl LightRay {
-    /// From origin, direction, power and wavelength; the direction is brought to unit length.
+    /// Makes a ray of seven or eight numbers: origin (mm), direction, power and, if given, wavelength (nm); the direction is brought to
+    /// unit length. An error, for people, where one is not finite, the direction zero, the power negative or the wavelength not positive.
     pub(super) fn from_numbers(numbers: &[f64]) -> Result<Self, String> {
         let triple = |k: usize| Vector::new(numbers[k], numbers[k + 1], numbers[k + 2]);
         if let Some(bad) = numbers.iter().find(|x| !x.is_finite()) {
@@ -69,7 +70,7 @@ impl LightRay {
 
 /// Reads a list of rays; `.npz` by arrays `origin` (n × 3), `direction` (n × 3), `power` (n) and, if wanted,
 /// `wavelength_nm` (n), of f64 or f32; anything else as CSV with columns `x, y, z, dx, dy, dz, power` and, if wanted,
-/// `wavelength_nm`. A CSV header may name the columns in any order; lines that start with `#` are comments.
+/// `wavelength_nm`. Positions are mm. A CSV header may name the columns in any order; lines that start with `#` are comments.
 ///
 /// # Errors
 /// When the file cannot be read or its content makes no rays; the message names the line.
@@ -81,7 +82,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
     parse_csv(path, &text)
 }
 
-/// Writes a list of rays as NPZ or CSV, by the extension; wavelengths when the first ray has one.
+/// Writes a list of rays as NPZ (`.npz`) or CSV (`.csv`, `.txt`); wavelengths when the first ray has one, then NaN for rays without.
 ///
 /// # Errors
 /// When the extension is another, or the file cannot be written.
@@ -126,7 +127,7 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
     }
 }
 
-/// Rays from lines of numbers, with a header that tells the order of columns or without one.
+/// Reads rays from lines of numbers, with a header that tells the order of columns or without one; none from a text without lines.
 fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     let mut rays = Vec::new();
     // Position of each of `COLUMNS` in a line.
@@ -182,7 +183,8 @@ fn parse_csv(path: &Path, text: &str) -> Result<Vec<LightRay>, Error> {
     Ok(rays)
 }
 
-/// Where the seven or eight columns stand in a line.
+/// Where each of [`COLUMNS`] stands in a line: by the names of a header, or in that order without one. An error, for people, where a
+/// needed one is missing or one stands twice.
 fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
     if !header {
         return match cells.len() {
@@ -208,7 +210,7 @@ fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
     Ok(order)
 }
 
-/// Rays from the arrays origin, direction, power and, where there is one, wavelength_nm.
+/// Reads rays from an NPZ file's arrays origin, direction, power and, where there is one, wavelength_nm.
 fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
     let file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
@@ -246,7 +248,8 @@ fn read_npz(path: &Path) -> Result<Vec<LightRay>, Error> {
         .collect()
 }
 
-/// The values of an NPY array of shape `(n, width)`, or `(n,)` for a width of 1; their bytes are taken from the budget.
+/// Reads the values of an NPY array of f64 or f32 of shape `(n, width)`, or `(n,)` for a width of 1; their bytes are taken off `budget`,
+/// and more than that is an error.
 fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Vec<f64>, String> {
     let cut = |e: std::io::Error| e.to_string();
     let mut start = [0u8; 10];
@@ -302,7 +305,7 @@ fn read_array(mut entry: impl Read, width: usize, budget: &mut u64) -> Result<Ve
 pub(super) mod tests {
     use super::*;
 
-    pub(in crate::formats) fn some(n: usize, spectral: bool) -> Vec<LightRay> {
+    pub(in crate::formats) fn some_rays(n: usize, spectral: bool) -> Vec<LightRay> {
         (0..n)
             .map(|i| {
                 let t = i as f64;
@@ -321,7 +324,7 @@ pub(super) mod tests {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.csv", "a.npz"] {
             for spectral in [false, true] {
-                let (path, rays) = (folder.path().join(name), some(100, spectral));
+                let (path, rays) = (folder.path().join(name), some_rays(100, spectral));
                 write_rays(&path, &rays).unwrap();
                 let back = read_rays(&path).unwrap();
                 assert_eq!(back.len(), rays.len());

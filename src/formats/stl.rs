@@ -5,6 +5,7 @@ use super::{Error, write_atomic};
 use crate::math::{Point, Vector};
 use std::path::Path;
 
+/// Writes the triangles of all facets, mm; groups and vertex normals have no place in the format.
 pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
     let mut triangles: Vec<[Point; 3]> = Vec::with_capacity(2 * mesh.facets.len());

@@ -30,13 +30,15 @@ pub struct Column {
 #[derive(Debug)]
 pub struct NpzStream {
     path: PathBuf,
+    /// Each with the part that it is written to.
     columns: Vec<(Column, PathBuf, BufWriter<File>)>,
     rows: u64,
     unfinished: Vec<Unfinished>,
 }
 
 impl NpzStream {
-    /// Begins a file with these columns.
+    /// Begins a file with these columns, each in a part of its own beside `path`. One process may have one stream of a path at a time, and
+    /// names of columns must differ.
     ///
     /// # Errors
     /// When the folder cannot be written.
@@ -57,7 +59,7 @@ impl NpzStream {
     /// Adds rows: the bytes of each column, little-endian, in the columns' order.
     ///
     /// # Errors
-    /// When the disk is full, or the columns do not hold so many rows.
+    /// When the disk is full, after which the stream is of no use, or the columns do not hold so many rows, which adds none.
     pub fn write(&mut self, rows: u64, bytes: &[&[u8]]) -> Result<(), Error> {
         // A column that is short would shift all later rows against the others.
         let fits = |(c, b): (&(Column, PathBuf, BufWriter<File>), &&[u8])| {
@@ -74,7 +76,7 @@ impl NpzStream {
         Ok(())
     }
 
-    /// Packs the columns into the file and gives the number of rows.
+    /// Packs the columns into the file, which replaces an older one, and returns the number of rows; there may be none.
     ///
     /// # Errors
     /// When the disk is full.

@@ -15,8 +15,8 @@ enum Array<'a> {
     U8(&'a [u8]),
 }
 
-/// Writes one DataArray, its numbers in base64 behind their length.
-fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::Result<()> {
+/// Writes a `DataArray` element, its numbers, `components` to a point or cell, in base64 behind their length in bytes.
+fn write_data_array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::Result<()> {
     let (kind, body): (&str, Vec<u8>) = match data {
         Array::F64(v) => ("Float64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
         Array::U32(v) => ("UInt32", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
@@ -32,18 +32,20 @@ fn array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::R
     writeln!(w, "</DataArray>")
 }
 
+/// Text on one line as it may stand in an attribute of XML.
 fn escape(text: &str) -> String {
     // Attributes of XML: the quote would end them.
     printable_line(text).replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
-/// Writes the head of a file.
-fn open(w: &mut dyn Write, kind: &str) -> io::Result<()> {
+/// Writes the head of a VTK file of this kind, such as `PolyData`; the caller closes it.
+fn write_head(w: &mut dyn Write, kind: &str) -> io::Result<()> {
     writeln!(w, r#"<?xml version="1.0"?>"#)?;
     writeln!(w, r#"<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)
 }
 
-/// Facets with normals, and cell data: sag (mm), normal error (degrees), curvature (1/mm), face id, part.
+/// Writes facets with normals and surface parameters of vertices, and cell data: sag (mm), normal error (degrees) and curvature (1/mm)
+/// where there is one for each facet, face id, part.
 pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
     let mesh = facets.mesh;
     let count = mesh.facets.len();
@@ -62,12 +64,12 @@ pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
     let faces: Vec<u32> = mesh.facets.iter().map(|f| f.face.0).collect();
     let parts: Vec<u32> = mesh.facets.iter().map(|f| facets.group_of(f.face) as u32).collect();
     write_atomic(path, |w| {
-        open(w, "UnstructuredGrid")?;
+        write_head(w, "UnstructuredGrid")?;
         let vertices = mesh.vertices.len();
         writeln!(w, r#"<UnstructuredGrid><Piece NumberOfPoints="{vertices}" NumberOfCells="{count}">"#)?;
         writeln!(w, r#"<PointData Normals="normal">"#)?;
-        array(w, "normal", 3, Array::F64(&normals))?;
-        array(w, "uv", 2, Array::F64(&uv))?;
+        write_data_array(w, "normal", 3, Array::F64(&normals))?;
+        write_data_array(w, "uv", 2, Array::F64(&uv))?;
         writeln!(w, r#"</PointData><CellData Scalars="sag_mm">"#)?;
         for (name, data) in [
             ("sag_mm", &mesh.sag),
@@ -76,22 +78,22 @@ pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
         ] {
             // What was not measured is empty and left out.
             if data.len() == count {
-                array(w, name, 1, Array::F64(data))?;
+                write_data_array(w, name, 1, Array::F64(data))?;
             }
         }
-        array(w, "face_id", 1, Array::U32(&faces))?;
-        array(w, "part", 1, Array::U32(&parts))?;
+        write_data_array(w, "face_id", 1, Array::U32(&faces))?;
+        write_data_array(w, "part", 1, Array::U32(&parts))?;
         writeln!(w, "</CellData><Points>")?;
-        array(w, "Points", 3, Array::F64(&points))?;
+        write_data_array(w, "Points", 3, Array::F64(&points))?;
         writeln!(w, "</Points><Cells>")?;
-        array(w, "connectivity", 1, Array::I64(&corners))?;
-        array(w, "offsets", 1, Array::I64(&offsets))?;
-        array(w, "types", 1, Array::U8(&types))?;
+        write_data_array(w, "connectivity", 1, Array::I64(&corners))?;
+        write_data_array(w, "offsets", 1, Array::I64(&offsets))?;
+        write_data_array(w, "types", 1, Array::U8(&types))?;
         writeln!(w, "</Cells></Piece></UnstructuredGrid></VTKFile>")
     })
 }
 
-/// Writes polylines as VTP, their values as cell data.
+/// Writes polylines as VTP, their values as cell data, of which there must be one a line.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -100,7 +102,7 @@ pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
     let connectivity: Vec<i64> = (0..lines.points.len() as i64).collect();
     let offsets: Vec<i64> = lines.ends.iter().map(|&e| e as i64).collect();
     write_atomic(path, |w| {
-        open(w, "PolyData")?;
+        write_head(w, "PolyData")?;
         writeln!(
             w,
             r#"<PolyData><Piece NumberOfPoints="{}" NumberOfVerts="0" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="0">"#,
@@ -109,13 +111,13 @@ pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
         )?;
         writeln!(w, "<PointData></PointData><CellData>")?;
         for (name, values) in &lines.values {
-            array(w, name, 1, Array::F64(values))?;
+            write_data_array(w, name, 1, Array::F64(values))?;
         }
         writeln!(w, "</CellData><Points>")?;
-        array(w, "Points", 3, Array::F64(&points))?;
+        write_data_array(w, "Points", 3, Array::F64(&points))?;
         writeln!(w, "</Points><Lines>")?;
-        array(w, "connectivity", 1, Array::I64(&connectivity))?;
-        array(w, "offsets", 1, Array::I64(&offsets))?;
+        write_data_array(w, "connectivity", 1, Array::I64(&connectivity))?;
+        write_data_array(w, "offsets", 1, Array::I64(&offsets))?;
         writeln!(w, "</Lines></Piece></PolyData></VTKFile>")
     })
 }
@@ -128,7 +130,7 @@ pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
 pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
     let [a, b] = &grid.axes;
     write_atomic(path, |w| {
-        open(w, "ImageData")?;
+        write_head(w, "ImageData")?;
         // One cell thick in z, for the readers that the doc names.
         let extent = format!("0 {} 0 {} 0 1", a.cells, b.cells);
         writeln!(
@@ -141,16 +143,16 @@ pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
         )?;
         let name = grid.column();
         writeln!(w, r#"<PointData></PointData><CellData Scalars="{}">"#, escape(&name))?;
-        array(w, &name, 1, Array::F64(&grid.values))?;
+        write_data_array(w, &name, 1, Array::F64(&grid.values))?;
         if let Some(error) = &grid.error {
-            array(w, "standard_error", 1, Array::F64(error))?;
+            write_data_array(w, "standard_error", 1, Array::F64(error))?;
         }
         for layer in &grid.layers {
-            array(w, &layer.column(), 1, Array::F64(&layer.values))?;
-            array(w, &format!("{}_standard_error", layer.column()), 1, Array::F64(&layer.error))?;
+            write_data_array(w, &layer.column(), 1, Array::F64(&layer.values))?;
+            write_data_array(w, &format!("{}_standard_error", layer.column()), 1, Array::F64(&layer.error))?;
         }
         for (name, values) in grid.error_layers() {
-            array(w, &name, 1, Array::F64(values))?;
+            write_data_array(w, &name, 1, Array::F64(values))?;
         }
         writeln!(w, "</CellData></Piece></ImageData></VTKFile>")
     })

@@ -112,7 +112,9 @@ pub struct Bvh<'m> {
     leaves: Leaves,
     /// The triangle of each leaf primitive.
     codes: Vec<TriangleCode>,
+    /// Middle of the mesh, mm, about which a cured tree is built.
     center: Point,
+    /// Around the mesh, grown by the room around boxes, mm.
     bounds: Aabb,
     /// Units of the tree in a millimetre: a power of two, so that scaling does not round; 1 as shipped.
     scale: f64,
@@ -142,7 +144,7 @@ impl Boundable for Bounded {
 }
 
 impl<'m> Bvh<'m> {
-    /// Builds the hierarchy; facets with corners that are no finite numbers are left out.
+    /// Builds the hierarchy; facets with corners that are not finite or beyond 1e12 mm are left out.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
         let surroundings = Surroundings::new(mesh).with_starts_as_far_as(settings.farthest_start);
@@ -189,7 +191,7 @@ impl<'m> Bvh<'m> {
         Self { surroundings, normals: settings.normals, tree, leaves, codes, center, bounds, scale, build_seconds }
     }
 
-    /// The hit without its normal.
+    /// Finds the nearest hit, without its normal, and counts the ray; `None` for a miss.
     fn nearest(&self, ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         cost.rays += 1;
         match &self.leaves {
@@ -198,7 +200,8 @@ impl<'m> Bvh<'m> {
         }
     }
 
-    /// The nearest hit as obvhs finds it: single precision throughout and its own test of triangles.
+    /// Finds the nearest hit as obvhs does, in single precision and with its own test of triangles. The whole facet that the ray leaves is
+    /// passed over. `None` for a miss, and where the ray is not finite in f32.
     fn nearest_shipped(&self, triangles: &[RtTriangle], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         let own = ray.departure.map(|d| d.primitive);
         // Beyond what `f32` holds a range is as good as endless.
@@ -219,7 +222,7 @@ impl<'m> Bvh<'m> {
         Some(self.codes[found].hit(f64::from(t), [weights.x, weights.y].map(f64::from)))
     }
 
-    /// The nearest hit with the tree of obvhs and the facet test of the octree.
+    /// Finds the nearest hit with the tree of obvhs and the facet test of the octree; `None` for a miss, and where the ray is not finite.
     fn nearest_cured(&self, corners: &[[Point; 4]], ray: &Ray, cost: &mut Cost) -> Option<FacetHit> {
         // Lifted as for the octree: grazing rays would else be told differently.
         let ray = &self.surroundings.lifted(ray);
@@ -261,7 +264,8 @@ impl<'m> Bvh<'m> {
         best.hit()
     }
 
-    /// Walks the tree; the closure gives the f32 distance at which a leaf primitive is hit.
+    /// Walks the tree with a ray in its units. `leaf` gives the f32 distance at which a leaf primitive is hit, infinity where it is not.
+    /// Returns the primitive of the nearest hit and its distance. Counts tests, and nodes of the wide tree alone: obvhs shows no others.
     fn walk(
         &self,
         ray: Ray32,
@@ -327,8 +331,8 @@ impl Intersector for Bvh<'_> {
     }
 }
 
-/// The steps of `obvhs::cwbvh::builder::build_cwbvh`, but where the tree is too deep for the 32 places of its stack, as over
-/// many coincident facets, the binary tree it comes from.
+/// Builds a wide tree over boxes, at least one, by the steps of `obvhs::cwbvh::builder::build_cwbvh`; where it is too deep for the 32
+/// places of its stack, as over many coincident facets, returns the binary tree it comes from.
 fn wide_or_binary(boxes: &[Bounded], params: &BvhBuildParams) -> Tree {
     let all = (0..boxes.len() as u32).collect();
     let (distance, threshold) = (params.ploc_search_distance, params.search_depth_threshold);
@@ -339,7 +343,7 @@ fn wide_or_binary(boxes: &[Bounded], params: &BvhBuildParams) -> Tree {
     if depth(&wide) < 32 { Tree::Wide(wide) } else { Tree::Binary(binary) }
 }
 
-/// Levels of nodes below each other, the root's included.
+/// Levels of nodes below each other, the root's included: 1 for a root alone.
 fn depth(tree: &CwBvh) -> u32 {
     let mut deepest = 0;
     let mut open = vec![(0, 1)];
@@ -351,6 +355,7 @@ fn depth(tree: &CwBvh) -> u32 {
     deepest
 }
 
+/// The triangle in f32, in the mesh's own coordinates.
 fn triangle32(mesh: &FacetMesh, code: TriangleCode) -> Triangle {
     let [v0, v1, v2] = code.corners(mesh).map(|p| p.as_vec3a());
     Triangle { v0, v1, v2 }

@@ -32,37 +32,37 @@ const REACH: f64 = 1.0 / (1u64 << 40) as f64;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surroundings<'m> {
     pub(crate) mesh: &'m FacetMesh,
-    /// A start is taken to lie on a border when it is nearer than this, mm.
+    /// A start is taken to lie on a border or plane when it is no farther from it than this, mm.
     pub(crate) reach: f64,
-    /// Around all positions that count.
+    /// Around all usable positions, mm; empty where there are none.
     pub(crate) bounds: Aabb,
 }
 
 /// The largest coordinate that is traced, mm: its cube overflows no `f32` box, and a million kilometres hold any lamp.
 const LARGEST: f64 = 1e12;
 
-/// Whether a corner can be traced: a number of at most [`LARGEST`].
+/// Whether a corner can be traced: each coordinate a number of at most [`LARGEST`] in size.
 pub(crate) fn is_usable(p: Point) -> bool {
     p.abs().cmple(Point::splat(LARGEST)).all()
 }
 
 impl<'m> Surroundings<'m> {
-    /// A start is a rounded `origin + t·direction`; 2⁻⁴⁰ of the largest coordinate covers rays a thousand times
-    /// longer than the scene and is a picometre for a lamp.
+    /// Takes the bounds of all usable positions, and 2⁻⁴⁰ of the largest coordinate as the reach, 0 without positions: a start is a
+    /// rounded `origin + t·direction`, and this covers rays a thousand times longer than the scene. For a lamp it is a picometre.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
         let bounds = Aabb::from_points(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
         Self { mesh, reach: largest * REACH, bounds }
     }
 
-    /// The same for starts whose coordinates are as large as this, mm: they are rounded by a share of it, wherever the mesh is.
+    /// Widens the reach for starts whose coordinates are up to `farthest` mm, by a share of which they are rounded; never narrows it.
     pub(crate) fn with_starts_as_far_as(self, farthest: f64) -> Self {
         Self { reach: self.reach.max(farthest * REACH), ..self }
     }
 
-    /// A ray that leaves a facet at a grazing angle, started over that facet and not under it: what rounding put on the wrong side would
-    /// pass under the next facet where it starts nearer to their common edge than it rises. Other rays rise out of the rounding
-    /// within [`Self::reach`] of an edge, where neighbours are asked from a point inside the facet.
+    /// Returns a ray that grazes the facet it leaves with its origin lifted over that facet, and any other ray as it is: what rounding put
+    /// on the wrong side would pass under the next facet where it starts nearer to their common edge than it rises. Other rays rise out of
+    /// the rounding within [`Self::reach`] of an edge. Direction and range are kept: a hit's `t` counts from the lifted origin.
     pub(crate) fn lifted(&self, ray: &Ray) -> Ray {
         let Some(own) = ray.departure.map(|d| d.primitive as usize).filter(|&f| f < self.mesh.facets.len()) else {
             return *ray;
@@ -83,7 +83,7 @@ impl<'m> Surroundings<'m> {
         Ray { origin: ray.origin + up * (wanted - height), ..*ray }
     }
 
-    /// Room that a box test must leave around a start so that a moved start stays inside, mm.
+    /// Room that a box test must leave around a start so that a moved start stays inside, mm; 0 for a ray that leaves no facet.
     pub(crate) fn slack(&self, ray: &Ray) -> f64 {
         if ray.departure.is_some() { 2.0 * (1.0 + LONGEST_NUDGE) * self.reach } else { 0.0 }
     }
@@ -105,6 +105,7 @@ pub(crate) struct FacetRay {
 }
 
 impl FacetRay {
+    /// Prepares a ray: chooses its axes and shear. It need not be finite; one without a direction then hits nothing.
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
@@ -137,7 +138,7 @@ impl FacetRay {
         self.axes.map(|a| (a % 3) as usize)
     }
 
-    /// The ray in the order of its axes.
+    /// The ray with its coordinates in the order of its axes, without its departure.
     #[inline(always)]
     pub(crate) fn line(&self) -> Line {
         let [kx, ky, kz] = self.axes();
@@ -145,7 +146,8 @@ impl FacetRay {
         Line { origin: [o[kx], o[ky], o[kz]], shear: self.shear, t_min: self.t_min }
     }
 
-    /// Tests the triangles of a facet (bit 0: the first, bit 1: the second) and keeps the nearest hit.
+    /// Tests the chosen triangles of a facet (bit 0: the first, bit 1: the second) and offers hits to `best`. Where the ray leaves this
+    /// facet or a neighbour, the rules for departures at the head of the file hold. `corners` are those of `facet`, mm.
     #[inline(always)]
     pub(crate) fn test(
         &self,
@@ -156,12 +158,12 @@ impl FacetRay {
         best: &mut Nearest,
     ) {
         // A ray that leaves nothing needs none of the care below.
-        let Some(own) = self.from else { return self.quad(facet, triangles, corners, self.origin, best) };
+        let Some(own) = self.from else { return self.test_plainly(facet, triangles, corners, self.origin, best) };
         let [first, second] = if own == facet {
             self.tests_of_own(&corners.map(|p| *p), around)
         } else {
             match self.tests_of_other(own, facet, corners, around) {
-                None => return self.quad(facet, triangles, corners, self.origin, best),
+                None => return self.test_plainly(facet, triangles, corners, self.origin, best),
                 Some(tests) => tests,
             }
         };
@@ -171,13 +173,13 @@ impl FacetRay {
                 TriangleTest::From(moved) => moved.to_array(),
                 TriangleTest::Never => continue,
             };
-            self.quad(facet, triangles & bit, corners, origin, best);
+            self.test_plainly(facet, triangles & bit, corners, origin, best);
         }
     }
 
-    /// Both triangles from one origin.
+    /// Tests the chosen triangles of a facet from `origin`, whatever the ray leaves, and offers hits to `best`.
     #[inline(always)]
-    fn quad(&self, facet: u32, triangles: u32, corners: [&Point; 4], origin: [f64; 3], best: &mut Nearest) {
+    fn test_plainly(&self, facet: u32, triangles: u32, corners: [&Point; 4], origin: [f64; 3], best: &mut Nearest) {
         let [kx, ky, kz] = self.axes();
         // As arrays, since the index of a glam vector is a match.
         let corners: [&[f64; 3]; 4] = corners.map(|p| p.as_ref());
@@ -188,11 +190,11 @@ impl FacetRay {
             along[2][k] = corners[k][kz];
         }
         let line = Line { origin: [origin[kx], origin[ky], origin[kz]], ..self.line() };
-        line.quad((facet, triangles), &along, best);
+        line.test_quad((facet, triangles), &along, best);
     }
 
-    /// The facet that the ray leaves: only its other triangle may be met, and only where the fold between them closes
-    /// on the ray.
+    /// How to ask the two triangles of the facet that the ray leaves: of these only the one it does not start on may be met, and only
+    /// where the fold between them closes on the ray.
     #[cold]
     fn tests_of_own(&self, corners: &[Point; 4], around: &Surroundings) -> [TriangleTest; 2] {
         let [a, b, c, d] = *corners;
@@ -220,14 +222,14 @@ impl FacetRay {
         let other = if !closes || off_plane * off_plane > thick {
             TriangleTest::Never
         } else if own.is_at_diagonal(corners, start, around.reach) {
-            TriangleTest::From(own.moved(start, around.reach))
+            TriangleTest::From(own.nudge(start, around.reach))
         } else {
             TriangleTest::Plain
         };
         if own.second { [other, TriangleTest::Never] } else { [TriangleTest::Never, other] }
     }
 
-    /// How to ask a facet near the start; `None` for all others.
+    /// How to ask a facet whose box holds the start within reach; `None` for all others, which are tested plainly.
     #[inline(always)]
     fn tests_of_other(
         &self,
@@ -282,7 +284,7 @@ impl FacetRay {
             if rise <= least_rise {
                 TriangleTest::Never
             } else {
-                TriangleTest::From(own.moved(start, around.reach))
+                TriangleTest::From(own.nudge(start, around.reach))
             }
         };
         let [a, b, c, d] = *corners;
@@ -290,7 +292,7 @@ impl FacetRay {
     }
 }
 
-/// A ray in the order of its axes, the main one last.
+/// A ray with its coordinates in the order of its axes, the main one last.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     pub(crate) origin: [f64; 3],
@@ -300,10 +302,10 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// Both triangles of a facet, its corners axis by axis in the order of the ray's: they share the shear of their corners and the
-    /// edge function of the diagonal. The steps are loops over four, so that compilers make one instruction of each.
+    /// Tests the chosen triangles of a facet (bits as in [`FacetRay::test`]) and offers hits to `best`; corners are axis by axis in the
+    /// order of the ray's axes. Departures play no part. The steps are loops over four, so that compilers make one instruction of each.
     #[inline(always)]
-    pub(crate) fn quad(&self, (facet, triangles): (u32, u32), corners: &[[f64; 4]; 3], best: &mut Nearest) {
+    pub(crate) fn test_quad(&self, (facet, triangles): (u32, u32), corners: &[[f64; 4]; 3], best: &mut Nearest) {
         let ([ox, oy, oz], [sx, sy, _]) = (self.origin, self.shear);
         let (mut x, mut y, mut z, mut outline) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
         for k in 0..4 {
@@ -322,7 +324,7 @@ impl Line {
         // facets at an edge one is hit.
         let zero = |e: [f64; 3]| (e[0] == 0.0) | (e[1] == 0.0) | (e[2] == 0.0);
         if triangles & (u32::from(zero(first)) | u32::from(zero(second)) << 1) != 0 {
-            return self.on_an_edge((facet, triangles), [first, second], [x, y, z], best);
+            return self.test_with_exact_signs((facet, triangles), [first, second], [x, y, z], best);
         }
         let met = triangles & (u32::from(one_sided(first)) | u32::from(one_sided(second)) << 1);
         if met == 3 {
@@ -336,10 +338,10 @@ impl Line {
         }
     }
 
-    /// Tests a facet again of which an edge function is zero, with signs that are exact.
+    /// Tests the chosen triangles again where an edge function is zero, with exact signs; `x`, `y` are sheared, `z` the heights.
     #[cold]
     #[inline(never)]
-    fn on_an_edge(
+    fn test_with_exact_signs(
         &self,
         (facet, triangles): (u32, u32),
         edges: [[f64; 3]; 2],
@@ -357,7 +359,7 @@ impl Line {
         }
     }
 
-    /// A hit with these edge functions, if it lies within the range of the ray.
+    /// Offers `best` the hit with these edge functions and corner heights if its `t` lies between `t_min` and the nearest hit so far.
     #[inline(always)]
     pub(crate) fn keep(&self, facet: u32, second: bool, edges: [f64; 3], heights: [f64; 3], best: &mut Nearest) {
         let [u, v, w] = edges;
@@ -370,7 +372,7 @@ impl Line {
     }
 }
 
-/// How a triangle is asked.
+/// How a triangle is asked: from the ray's start, from a moved one, or not at all.
 #[derive(Clone, Copy, Debug)]
 enum TriangleTest {
     Plain,
@@ -378,7 +380,7 @@ enum TriangleTest {
     Never,
 }
 
-/// Whether no two edge functions have opposite signs.
+/// Whether no two edge functions have opposite signs; zero has none, so that all zero is one-sided.
 #[inline(always)]
 fn one_sided(e: [f64; 3]) -> bool {
     let below = (e[0] < 0.0) | (e[1] < 0.0) | (e[2] < 0.0);
@@ -386,7 +388,7 @@ fn one_sided(e: [f64; 3]) -> bool {
     !(below & above)
 }
 
-/// The edge functions c × b, a × c and b × a of sheared corners (of x and y alone), in the order and with the sign that `quad` uses.
+/// The edge functions c × b, a × c and b × a of sheared corners (of x and y alone), in the order and with the sign that `test_quad` uses.
 /// Their signs are exact, zero means on the line; their sizes are rounded.
 #[cold]
 fn edges_with_exact_signs(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> [f64; 3] {

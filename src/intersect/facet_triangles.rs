@@ -10,7 +10,7 @@ use crate::mesh::FacetMesh;
 pub(crate) struct TriangleCode(u32);
 
 impl TriangleCode {
-    /// The triangles of all facets, in their order, but of those with a corner that is no finite number.
+    /// Lists the triangles of all facets in their order; leaves out facets with a corner that is not finite or beyond 1e12 mm.
     pub(crate) fn enumerate(mesh: &FacetMesh) -> Vec<Self> {
         (0..mesh.facets.len())
             .filter(|&f| mesh.corners(f).iter().all(|&p| is_usable(p)))
@@ -36,12 +36,13 @@ impl TriangleCode {
         self.0 & 1 == 1
     }
 
+    /// Positions of its corners, mm; `mesh` is the one it was enumerated from.
     pub(crate) fn corners(self, mesh: &FacetMesh) -> [Point; 3] {
         let [a, b, c, d] = mesh.corners(self.facet() as usize);
         if self.is_second() { [a, c, d] } else { [a, b, c] }
     }
 
-    /// A hit on it, with the weights of its second and third corner.
+    /// Makes a hit on it at the distance `t`, mm, from the weights of its second and third corner.
     pub(crate) fn hit(self, t: f64, [b1, b2]: [f64; 2]) -> FacetHit {
         FacetHit { t, facet: self.facet(), second: self.is_second(), b: [1.0 - b1 - b2, b1, b2] }
     }

@@ -46,7 +46,9 @@ const BATCH: usize = 32;
 /// ```
 pub struct Instanced<'a> {
     instancing: &'a Instancing,
+    /// Structures in the order of its groups.
     groups: Vec<Box<dyn Intersector + 'a>>,
+    /// Over the boxes of placements, by their index.
     tree: BoxTree,
     /// Of each placement, whether its box meets no other's.
     stands_alone: Vec<bool>,
@@ -65,7 +67,7 @@ struct Walk<'t> {
     boxes: Option<BoxWalk<'t>>,
     /// Of the first group, or of a placement.
     best: Option<(Option<u32>, Hit)>,
-    /// Where the ray is asked next.
+    /// The placement where the ray is asked next; `None` once it has passed all boxes.
     next: Option<u32>,
 }
 
@@ -87,7 +89,7 @@ struct Question {
 }
 
 impl<'a> Instanced<'a> {
-    /// Of a structure for each group, in the group's own coordinates.
+    /// Wraps one structure for each of `instancing.groups`, in that order, each built in its group's own coordinates.
     pub fn new(instancing: &'a Instancing, groups: Vec<Box<dyn Intersector + 'a>>) -> Self {
         let started = Instant::now();
         let boxes: Vec<Aabb> = instancing.placements.iter().map(|p| p.bounds).collect();
@@ -99,7 +101,7 @@ impl<'a> Instanced<'a> {
         Self { instancing, groups, tree, stands_alone, has_single, build_seconds }
     }
 
-    /// At most [`BATCH`] rays.
+    /// Answers at most [`BATCH`] rays in the scene's coordinates: overwrites `hits` and counts each ray once.
     fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let rays_before = cost.rays;
         let mut walks: SmallVec<[Walk; BATCH]> = rays.iter().map(|ray| self.departing(ray)).collect();

@@ -22,17 +22,19 @@ pub(crate) use prefetch::prefetch;
 
 /// Finds the nearest hit of a ray.
 pub trait Intersector: Sync {
-    /// Nearest hit with `t` in `[ray.t_min, ray.t_max]`, `None` for a miss.
+    /// Returns the nearest hit with `t` in `[ray.t_min, ray.t_max]`, `None` for a miss, and adds the work to `cost`.
+    ///
+    /// Rays and hits are in the coordinates of the model or mesh that it was built on, mm.
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit>;
 
-    /// The same for many rays; an implementation may reorder them inside. `hits` is as long as `rays`.
+    /// Answers many rays: overwrites every entry of `hits`, which is as long as `rays`. An implementation may reorder them inside.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = self.intersect(ray, cost);
         }
     }
 
-    /// Tells which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
+    /// Says which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
     fn prepare_for(&self, _expected: &ExpectedRays<'_>) {}
 
     /// Whether it is known, without looking for a hit, that a ray which leaves a surface meets nothing, however far it goes;
@@ -41,11 +43,11 @@ pub trait Intersector: Sync {
         false
     }
 
-    /// What the structure holds and what it took to build.
+    /// Returns what the structure holds and what it took to build.
     fn footprint(&self) -> Footprint;
 }
 
-/// Whoever borrows an intersector asks as it does.
+/// A borrowed intersector passes every call on.
 impl<T: Intersector + ?Sized> Intersector for &T {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         (**self).intersect(ray, cost)
@@ -82,13 +84,13 @@ pub struct ExpectedRays<'a> {
 /// What rays of a source have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Beam {
-    /// They start at one point.
+    /// They start at one point, mm.
     Point(Point),
     /// They start in one plane, in the direction across it.
     Collimated {
         /// A point of the plane; starts may stray from it by rounding.
         origin: Point,
-        /// Where the rays run, and the normal of the plane.
+        /// Unit vector along which the rays run, and the normal of the plane.
         direction: Vector,
     },
 }
@@ -115,7 +117,7 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// The point as one that a ray leaves.
+    /// Returns the departure of a ray that leaves from this hit.
     #[inline(always)]
     pub fn departure(&self) -> Departure {
         Departure { face: self.face, primitive: self.primitive, uv: self.uv, triangle: self.triangle }
@@ -197,12 +199,12 @@ impl NormalMode {
     /// Every mode, the coarsest first.
     pub const ALL: [Self; 5] = [Self::Flat, Self::Nearest, Self::Bilinear, Self::Cubic, Self::Exact];
 
-    /// The mode that facets themselves can answer: polishing starts from a facet hit whose own normal does not matter.
+    /// Returns the mode to ask facets with: `Bilinear` for `Exact`, as polishing replaces the facet's normal; any other mode itself.
     pub fn on_facets(self) -> Self {
         if self == Self::Exact { Self::Bilinear } else { self }
     }
 
-    /// The name that people read and write.
+    /// Returns the name used in files and on the command line, in lower case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flat => "flat",

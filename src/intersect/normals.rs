@@ -15,14 +15,15 @@ use crate::math::{Point, Ray, Triangle, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use std::hint::select_unpredictable;
 
-/// The hit of a ray that is asked alone as the trait reports it.
+/// Turns a facet hit into what the trait reports: parameters, flat normal and the normal of `mode`; `Exact` is treated as `Bilinear`.
+/// A normal that cancels to zero is replaced: the bilinear or nearest one by the flat one, the cubic one by the bilinear one.
 #[inline(never)]
 pub(crate) fn describe(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mode: NormalMode) -> Hit {
     describe_in_batch(mesh, ray, hit, mode)
 }
 
-/// The hit as the trait reports it, inlined where batches are answered and without branches on which triangle was hit: of a ray
-/// that is answered in 100 ns this took 30.
+/// The same as [`describe`], inlined where batches are answered and without branches on which triangle was hit: of a ray that is
+/// answered in 100 ns this took 30.
 #[inline(always)]
 pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mode: NormalMode) -> Hit {
     let facet = &mesh.facets[hit.facet as usize];
@@ -58,14 +59,14 @@ pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mod
     }
 }
 
-/// Of four things at the corners of a facet, those of the triangle that was hit.
+/// Of four values at the corners of a facet, picks the three of the triangle (0, 1, 2), or of (0, 2, 3) where `second`.
 #[inline(always)]
 fn triangle<T: Copy>(second: bool, corners: [T; 4]) -> [T; 3] {
     let [a, b, c, d] = corners;
     [a, select_unpredictable(second, c, b), select_unpredictable(second, d, c)]
 }
 
-/// Where the ray meets the cubic patch: its normal there, not of unit length.
+/// Returns the normal of the cubic patch where the ray meets it, not of unit length; zero where the patch degenerates there.
 #[inline(never)]
 fn cubic(mesh: &FacetMesh, facet: &Facet, ray: &Ray, hit: &FacetHit, flat: Vector) -> Vector {
     let vertices = facet.vertices.map(|v| mesh.vertices[v as usize]);
@@ -79,7 +80,7 @@ fn cubic(mesh: &FacetMesh, facet: &Facet, ray: &Ray, hit: &FacetHit, flat: Vecto
     }
 }
 
-/// Facet parameters of a hit.
+/// Facet parameters of a hit, in the unit square.
 #[inline(always)]
 fn parameters(hit: &FacetHit) -> Uv {
     let [_, b1, b2] = hit.b;
@@ -87,14 +88,14 @@ fn parameters(hit: &FacetHit) -> Uv {
     Uv::new(select_unpredictable(hit.second, b1, sum), select_unpredictable(hit.second, sum, b2))
 }
 
-/// Weights of the corners at a place of the unit square.
+/// Weights of the four corners at facet parameters `p`; their sum is one.
 #[inline(always)]
 fn bilinear_weights(p: Uv) -> [f64; 4] {
     let q = 1.0 - p;
     [q.x * q.y, p.x * q.y, p.x * p.y, q.x * p.y]
 }
 
-/// The normal of the corner nearest to the hit.
+/// Returns the vertex normal of the corner nearest to the hit; of equally near ones the first.
 #[inline(never)]
 fn nearest(hit: &FacetHit, mesh: &FacetMesh, facet: &Facet) -> Vector {
     let vertices = facet.vertices.map(|v| &mesh.vertices[v as usize]);
@@ -128,8 +129,8 @@ const STEPS: usize = 2;
 /// The farthest that steps may lead from the facet hit, as a share of the facet.
 const FARTHEST: f64 = 0.5;
 
-/// Normal, not of unit length, of a patch where a ray meets it near `start`: two Newton steps, which are not taken where they lead
-/// away, as for rays that graze it.
+/// Returns the normal, not of unit length, of a patch where a ray meets it near the parameters `start`, found by two Newton steps.
+/// Where these lead away, as for rays that graze it, or to a normal against `flat`, that of `start` itself.
 fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: Vector) -> Vector {
     let mut p = start;
     let mut local = patch(p);
@@ -161,6 +162,7 @@ fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: V
 struct QuadNet([[Point; 4]; 4]);
 
 impl QuadNet {
+    /// A patch with these corners, mm, and the vertices' normals there.
     fn new(corners: &[Point; 4], vertices: &[MeshVertex; 4]) -> Self {
         // net[i][j]: i along u, j along v; corners 0..3 at (0,0), (3,0), (3,3), (0,3).
         let mut net = [[Point::ZERO; 4]; 4];
@@ -185,6 +187,7 @@ impl QuadNet {
         Self(net)
     }
 
+    /// Point and derivatives at facet parameters; beyond the unit square the polynomial goes on.
     fn evaluate(&self, p: Uv) -> PatchPoint {
         let ((bu, du), (bv, dv)) = (bernstein(p.x), bernstein(p.y));
         let mut local = PatchPoint { point: Point::ZERO, du: Vector::ZERO, dv: Vector::ZERO };
@@ -199,7 +202,7 @@ impl QuadNet {
     }
 }
 
-/// Cubic Bernstein polynomials and their derivatives.
+/// Returns the four cubic Bernstein polynomials at `t`, and their derivatives.
 fn bernstein(t: f64) -> ([f64; 4], [f64; 4]) {
     let s = 1.0 - t;
     let values = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];
@@ -215,6 +218,7 @@ struct TriangleNet {
 }
 
 impl TriangleNet {
+    /// A triangle of the first three corners, mm, with the vertices' normals there.
     fn new(corners: &[Point; 4], vertices: &[MeshVertex; 4]) -> Self {
         let point = |i: usize, j: usize| tangent_point(corners[i], vertices[i].normal, corners[j]);
         let sides = [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2)].map(|(i, j)| point(i, j));
@@ -226,6 +230,7 @@ impl TriangleNet {
         Self { corners, sides, middle }
     }
 
+    /// Point and derivatives at the weights of the second and third corner; beyond the triangle the polynomial goes on.
     fn evaluate(&self, p: Uv) -> PatchPoint {
         let [p300, p030, p003] = self.corners;
         let [p210, p120, p021, p012, p102, p201] = self.sides;

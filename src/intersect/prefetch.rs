@@ -7,13 +7,13 @@
 /// Bytes of a cache line on every x86-64.
 const LINE: usize = 64;
 
-/// Asks for the cache lines of one element; does nothing where the processor is not known.
+/// Asks for the cache lines of one element, without waiting; does nothing but on x86-64. An index out of bounds is harmless.
 #[inline(always)]
 pub(crate) fn prefetch<T>(slice: &[T], index: usize) {
     prefetch_range(slice, index, 1);
 }
 
-/// Asks for the cache lines of `count` elements.
+/// Asks for the cache lines of `count` elements from `first` on. A range out of bounds is harmless.
 #[inline(always)]
 pub(crate) fn prefetch_range<T>(slice: &[T], first: usize, count: usize) {
     #[cfg(target_arch = "x86_64")]

@@ -12,15 +12,16 @@ const ROOM_OF_F32: f64 = 1e-3;
 /// Facets folded by more than 120° have no slope over which both triangles are left, nor has one without area.
 const LEAST_COSINE: f64 = 0.5;
 
-/// Above which slope a ray that leaves a facet is known not to meet it again.
+/// The slope above which a ray that leaves a facet is known not to meet it again, on either side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slopes {
-    /// Mean normal of both triangles, and the sine over the plane across it that is enough.
+    /// Mean unit normal of both triangles, and the sine over the plane across it that is enough: infinite where none is.
     axis: [f32; 3],
     sine: f32,
 }
 
 impl Slopes {
+    /// Takes the corners of a facet, the last two equal for a triangle. No ray passes the slope of one without area or folded sharply.
     pub(crate) fn new([a, b, c, d]: [Point; 4]) -> Self {
         let first = (b - a).cross(c - a).normalize_or_zero();
         let second = if c == d { first } else { (c - a).cross(d - a).normalize_or_zero() };
@@ -32,7 +33,7 @@ impl Slopes {
         Self { axis: axis.as_vec3().to_array(), sine }
     }
 
-    /// Whether the ray is one that [`super::facet::FacetRay::test`] never finds to meet the facet it leaves.
+    /// Whether a ray of this unit direction that leaves the facet is known not to meet it again; `false` says nothing.
     #[inline(always)]
     pub(crate) fn leaves(&self, direction: Vector) -> bool {
         let ([x, y, z], d) = (self.axis, direction.as_vec3());

@@ -22,7 +22,8 @@ pub(super) struct StartTriangle {
 }
 
 impl StartTriangle {
-    /// The triangle that the departure names; where it names none, the one over which the start lies.
+    /// Takes the triangle that the departure names; where it names none, the one on whose side of the diagonal the start lies. Of a facet
+    /// whose last two corners coincide that is always the first.
     ///
     /// On the diagonal rounding puts a start over either: of rays that left a folded quad there at a sine below 1e-3, one in sixteen was
     /// taken to leave the other triangle, under whose plane it passed.
@@ -34,7 +35,7 @@ impl StartTriangle {
         Self { second, normal: (q - p).cross(r - p), corner: p, middle: (p + q + r) / 3.0 }
     }
 
-    /// Whether the start lies so near to the diagonal, or beyond, that its place does not tell which triangle is ahead.
+    /// Whether the start lies within `reach` mm of the diagonal, or beyond it, so that its place does not tell which triangle is ahead.
     pub(super) fn is_at_diagonal(&self, corners: &[Point; 4], start: Point, reach: f64) -> bool {
         distance_to_segment(start, corners[0], corners[2]) <= reach || is_over_second(corners, start) != self.second
     }
@@ -57,12 +58,13 @@ impl StartTriangle {
     }
 }
 
-/// Whether a start lies on the second triangle's side of the diagonal.
+/// Whether a start lies on the second triangle's side of the diagonal; on the diagonal itself it does not.
 fn is_over_second([a, b, c, d]: &[Point; 4], start: Point) -> bool {
     let diagonal = c - a;
     diagonal.cross(start - a).dot(diagonal.cross(d - b)) > 0.0
 }
 
+/// Distance of `p` from the segment between `a` and `b`, mm; from `a` where they coincide.
 pub(super) fn distance_to_segment(p: Point, a: Point, b: Point) -> f64 {
     let (ab, ap) = (b - a, p - a);
     let along = ap.dot(ab) / ab.length_squared();

@@ -36,7 +36,7 @@ impl Aabb {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// The common part; empty when they do not meet.
+    /// The common part; empty when they do not meet, of no thickness when they touch.
     pub fn intersection(self, other: Self) -> Self {
         Self { min: self.min.max(other.min), max: self.max.min(other.max) }
     }
@@ -51,12 +51,12 @@ impl Aabb {
         self.min.cmple(p).all() && p.cmple(self.max).all()
     }
 
-    /// Centre of the box.
+    /// Centre of the box; NaN for [`Aabb::EMPTY`].
     pub fn center(&self) -> Point {
         0.5 * (self.min + self.max)
     }
 
-    /// Edge lengths; negative for an empty box.
+    /// Edge lengths, mm; some are negative for an empty box.
     pub fn size(&self) -> Vector {
         self.max - self.min
     }
@@ -75,18 +75,19 @@ impl Aabb {
         s.x * s.y + s.y * s.z + s.z * s.x
     }
 
-    /// The box grown by `margin` mm on every side.
+    /// The box grown by `margin` mm on every side; [`Aabb::EMPTY`] stays empty.
     pub fn grown(self, margin: f64) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
-    /// The box with room on every side for what is far above the rounding of a crossing.
+    /// The box grown on every side by far more than the rounding of a crossing: 1e-6 of its diagonal and 1e-9 of its largest coordinate.
+    /// Not for an empty box, which becomes NaN.
     pub fn with_room(self) -> Self {
         let largest = self.min.abs().max(self.max.abs()).max_element();
         self.grown(ROOM[0] * self.diagonal() + ROOM[1] * largest)
     }
 
-    /// The eight corners.
+    /// The eight corners; bit 0, 1 or 2 of the index is set where x, y or z is the upper one.
     pub fn corners(&self) -> [Point; 8] {
         std::array::from_fn(|i| {
             let pick = |bit: usize, lo: f64, hi: f64| if i >> bit & 1 == 0 { lo } else { hi };

@@ -40,7 +40,7 @@ impl Default for BoxTree {
 }
 
 impl BoxTree {
-    /// A tree of these boxes, halved and halved again at the middle one along the longest side of their centres.
+    /// Builds a tree of these boxes, halved and halved again at the middle one along the longest side of their centres; there may be none.
     ///
     /// ```
     /// use lampyris::math::{Aabb, BoxTree, Point, Ray, Vector};
@@ -62,7 +62,7 @@ impl BoxTree {
         tree
     }
 
-    /// Adds the node of these boxes and all below it; its index.
+    /// Adds the node of these boxes, at least one, and all below it; returns its index. `leaves` is sorted on the way.
     fn add_node(&mut self, leaves: &mut [u32], boxes: &[Aabb]) -> u32 {
         let index = self.nodes.len();
         let (zeros, none) = ([[0.0; WIDTH]; 3], [0; WIDTH]);
@@ -82,7 +82,7 @@ impl BoxTree {
         index as u32
     }
 
-    /// Around all boxes.
+    /// The box around all boxes; empty without any.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
@@ -92,7 +92,7 @@ impl BoxTree {
         size_of_val(&*self.nodes)
     }
 
-    /// Whether one of the boxes that meet this one is wanted.
+    /// Whether one of the boxes that meet `bounds`, or touch it, is wanted: `is_wanted` is asked by index, in no order, up to the first.
     pub fn any_meeting(&self, bounds: &Aabb, mut is_wanted: impl FnMut(u32) -> bool) -> bool {
         let mut open: SmallVec<[u32; STACK]> = self.nodes.first().map(|_| 0).into_iter().collect();
         while let Some(node) = open.pop() {
@@ -112,7 +112,8 @@ impl BoxTree {
         false
     }
 
-    /// Goes through the boxes that a ray crosses.
+    /// Starts a walk through the boxes that a ray crosses from its `t_min` on. Where it ends is told to [`BoxWalk::next`]; its `t_max` does
+    /// not count.
     #[inline]
     pub fn walk(&self, ray: &Ray) -> BoxWalk<'_> {
         let mut open = SmallVec::new();
@@ -123,11 +124,13 @@ impl BoxTree {
     }
 }
 
+/// The box around the boxes with these indices; empty without any.
 fn union(leaves: impl Iterator<Item = u32>, boxes: &[Aabb]) -> Aabb {
     leaves.fold(Aabb::EMPTY, |sum, k| sum.union(boxes[k as usize]))
 }
 
-/// Parts boxes at the middle one along the longest side of their centres; the first half of a single box is empty.
+/// Parts the indices of boxes at the middle one along the longest side of their centres, reordering them in place; the first half of a
+/// single box is empty.
 fn halves<'l>(leaves: &'l mut [u32], boxes: &[Aabb]) -> (&'l mut [u32], &'l mut [u32]) {
     let middle = leaves.len() / 2;
     if middle > 0 {
@@ -141,6 +144,7 @@ fn halves<'l>(leaves: &'l mut [u32], boxes: &[Aabb]) -> (&'l mut [u32], &'l mut 
 }
 
 impl Node {
+    /// Adds a child with its box; a node takes up to [`WIDTH`].
     fn add_child(&mut self, bounds: Aabb, link: u32) {
         let child = self.children as usize;
         for axis in 0..3 {
@@ -151,6 +155,7 @@ impl Node {
         self.children += 1;
     }
 
+    /// The box of a child.
     fn bounds(&self, child: usize) -> Aabb {
         Aabb {
             min: Vector::from_array(self.low.map(|side| side[child])),
@@ -165,13 +170,15 @@ pub struct BoxWalk<'t> {
     tree: &'t BoxTree,
     origin: Vector,
     inverse: Vector,
+    /// The ray's `t_min`.
     least: f64,
     /// Links with where the ray enters them, the nearest last.
     open: SmallVec<[(f64, u32); STACK]>,
 }
 
 impl BoxWalk<'_> {
-    /// The next box that is entered at `end` or before.
+    /// The index of the next box that is entered at `end` or before; `None` when there is none left. `end` must not grow from call to call:
+    /// what lay beyond it is forgotten.
     #[inline]
     pub fn next(&mut self, end: f64) -> Option<u32> {
         while let Some((near, link)) = self.open.pop() {
@@ -186,7 +193,7 @@ impl BoxWalk<'_> {
         None
     }
 
-    /// Puts the children of a node that the ray enters before `end` where they are asked, the nearest first.
+    /// Puts the children of a node that the ray enters at `end` or before on `open`, the nearest last, which is taken first.
     #[inline(always)]
     fn open_node(&mut self, link: u32, end: f64) {
         let node = &self.tree.nodes[link as usize];

@@ -33,12 +33,12 @@ impl Frame {
     /// Leaves everything where it is.
     pub const IDENTITY: Self = Self { origin: Point::ZERO, x: Vector::X, y: Vector::Y, z: Vector::Z, scale: 1.0 };
 
-    /// A shift.
+    /// A shift by a vector, mm, that turns and scales nothing.
     pub fn translation(by: Vector) -> Self {
         Self { origin: by, ..Self::IDENTITY }
     }
 
-    /// A right-handed frame from its axis and an approximate x direction, as in STEP's AXIS2_PLACEMENT_3D.
+    /// Makes a right-handed frame of scale 1 from its axis and an approximate x direction, of any length, as in STEP's AXIS2_PLACEMENT_3D.
     ///
     /// Missing or parallel `x_hint` falls back to a perpendicular of the axis; a zero axis falls back to `Z`.
     pub fn from_axis(origin: Point, axis: Vector, x_hint: Option<Vector>) -> Self {
@@ -56,7 +56,7 @@ impl Frame {
         Self { origin, x, y: z.cross(x), z, scale: 1.0 }
     }
 
-    /// The image of a point.
+    /// The image of a point: from the frame's coordinates to those that the frame is in.
     pub fn point(&self, p: Point) -> Point {
         self.origin + self.vector(p)
     }
@@ -86,7 +86,7 @@ impl Frame {
         Vector::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
-    /// `self ∘ inner`: first `inner`, then `self`.
+    /// Joins two placements, `self ∘ inner`: what comes of placing by `inner` first, then by `self`.
     pub fn compose(&self, inner: &Self) -> Self {
         Self {
             origin: self.point(inner.origin),
@@ -116,7 +116,7 @@ impl Frame {
         self.x.cross(self.y).dot(self.z) < 0.0
     }
 
-    /// Whether the placement moves nothing.
+    /// Whether the placement is [`Frame::IDENTITY`] to the last bit.
     pub fn is_identity(&self) -> bool {
         *self == Self::IDENTITY
     }

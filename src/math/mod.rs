@@ -37,7 +37,7 @@ impl FaceId {
     }
 }
 
-/// Two unit vectors that complete the unit vector `n` to a right-handed frame `(a, b, n)`.
+/// Returns two unit vectors `a`, `b` that complete the unit vector `n` to a right-handed frame `(a, b, n)`.
 ///
 /// Branch-free and continuous except at `n.z = 0⁻`: Duff et al., *Building an Orthonormal Basis, Revisited*, JCGT 2017.
 pub fn orthonormal_pair(n: Vector) -> (Vector, Vector) {

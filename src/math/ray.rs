@@ -47,12 +47,12 @@ pub enum Triangle {
 }
 
 impl Ray {
-    /// A ray in free space with `t` in `[0, ∞)`. `direction` must be of unit length.
+    /// A ray that leaves no surface, with `t` in `[0, ∞)`. `direction` must be of unit length; it is not normalised.
     pub fn new(origin: Point, direction: Vector) -> Self {
         Self { origin, direction, t_min: 0.0, t_max: f64::INFINITY, departure: None }
     }
 
-    /// A ray through two points, with `t` in `[0, ∞)`; `None` when they coincide.
+    /// A ray from `origin` through `target`, with `t` in `[0, ∞)`, so that it goes on behind `target`; `None` when they coincide.
     pub fn from_points(origin: Point, target: Point) -> Option<Self> {
         (target - origin).try_normalize().map(|direction| Self::new(origin, direction))
     }

@@ -1,6 +1,7 @@
 //! Roots of quadratics and of monotonic functions, without cancellation.
 
-/// Real roots of `a·x² + b·x + c`, ascending, without cancellation; one root when `a = 0`, none when all vanish.
+/// Real roots of `a·x² + b·x + c`, ascending, without cancellation; a double one twice. With `a = 0` the first alone, with `b = 0` too
+/// none, whatever `c` is.
 ///
 /// Source: Press et al., *Numerical Recipes*, 5.6, with the discriminant by fused multiply-add (Kahan).
 ///
@@ -27,8 +28,8 @@ pub fn quadratic_roots(a: f64, b: f64, c: f64) -> (Option<f64>, Option<f64>) {
 
 /// A root of `f` in `[lo, hi]` by Newton steps that fall back to bisection, so that it always ends.
 ///
-/// `f` returns the value and the derivative. `None` when the values at the ends have the same sign. The result is
-/// accurate to `tolerance` in `x` (or to the last bit when that is smaller).
+/// `f` returns the value and the derivative. `None` when the values at the ends have the same sign or are NaN. It ends at a step of at
+/// most `tolerance` in `x` (or of the last bit of `x` where that is more), or after 200 steps.
 ///
 /// ```
 /// let root = lampyris::math::safe_newton(|x| (x * x - 2.0, 2.0 * x), 0.0, 2.0, 1e-15);

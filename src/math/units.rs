@@ -9,7 +9,7 @@ pub const INCH: f64 = 25.4;
 /// Radians in a degree.
 pub const DEGREE: f64 = PI / 180.0;
 
-/// Factor of an SI prefix by its STEP name (`MILLI`, `MICRO`, …); `None` for a name that is no prefix.
+/// Factor of an SI prefix by its STEP name (`MILLI`, `MICRO`, …), in capitals; `None` for a name that is no prefix.
 pub fn si_prefix(name: &str) -> Option<f64> {
     Some(match name {
         "EXA" => 1e18,

@@ -5,7 +5,7 @@
 use bytemuck::{AnyBitPattern, NoUninit};
 use std::io::{self, Read, Write};
 
-/// Writes the length of an array and its elements.
+/// Writes the number of elements as eight bytes, then the elements as this machine has them.
 pub(crate) fn write_array<T: NoUninit>(to: &mut dyn Write, array: &[T]) -> io::Result<()> {
     to.write_all(&(array.len() as u64).to_le_bytes())?;
     to.write_all(bytemuck::cast_slice(array))
@@ -14,16 +14,17 @@ pub(crate) fn write_array<T: NoUninit>(to: &mut dyn Write, array: &[T]) -> io::R
 /// Reads arrays from what holds so many bytes: a length beyond them asks for no memory.
 pub(crate) struct ArrayReader<'a> {
     from: &'a mut dyn Read,
+    /// Bytes that may still be read.
     left: u64,
 }
 
 impl<'a> ArrayReader<'a> {
-    /// Of at most so many bytes.
+    /// Reads from `from`, which holds at most `left` bytes.
     pub(crate) fn new(from: &'a mut dyn Read, left: u64) -> Self {
         Self { from, left }
     }
 
-    /// Reads an array into a new vector of `make`, which gets the number of elements.
+    /// Reads an array into the empty vector that `make` returns for its number of elements, which it may give room.
     ///
     /// # Errors
     /// When it is longer than what is left, or cannot be read.
@@ -52,7 +53,7 @@ impl<'a> ArrayReader<'a> {
     }
 }
 
-/// What is wrong with bytes that are no arrays of ours.
+/// An error of kind `InvalidData` with this message, for bytes that are no arrays of ours.
 pub(crate) fn invalid(message: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, message)
 }

@@ -58,14 +58,14 @@ pub struct Facet {
 }
 
 impl Facet {
-    /// Whether the last two corners coincide.
+    /// Whether the last two corners are one vertex; two vertices at one position are told apart.
     pub fn is_triangle(&self) -> bool {
         self.vertices[2] == self.vertices[3]
     }
 }
 
 impl FacetMesh {
-    /// The four corner positions of a facet.
+    /// The four corner positions of a facet, mm; the last two are equal for a triangle.
     #[inline]
     pub fn corners(&self, facet: usize) -> [Point; 4] {
         // Spelled out: a `map` over the array is not unrolled and took a tenth of building an octree.
@@ -74,7 +74,7 @@ impl FacetMesh {
         [position(a), position(b), position(c), position(d)]
     }
 
-    /// Indices of the four corner positions of a facet.
+    /// Indices into [`FacetMesh::positions`] of the four corners of a facet.
     #[inline]
     pub fn corner_positions(&self, facet: usize) -> [u32; 4] {
         let [a, b, c, d] = self.facets[facet].vertices;
@@ -82,7 +82,7 @@ impl FacetMesh {
         [position(a), position(b), position(c), position(d)]
     }
 
-    /// A box around all positions.
+    /// A box around all positions, also those that no facet uses; empty without any.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.positions.iter().copied())
     }
@@ -98,7 +98,8 @@ impl FacetMesh {
         0.5 * ((b - a).cross(c - a).length() + (c - a).cross(d - a).length())
     }
 
-    /// Volume enclosed by the facets as traced, mm³, positive when normals point outward; meaningful only for a closed mesh.
+    /// Volume enclosed by the facets as traced, mm³, positive when they run counter-clockwise seen from outside; meaningful only for a
+    /// closed mesh.
     pub fn volume(&self) -> f64 {
         // About the middle of the mesh: far from the origin the terms would cancel to nothing.
         let origin = self.bounds().center();
@@ -111,12 +112,12 @@ impl FacetMesh {
             .sum()
     }
 
-    /// Number of facets with four distinct corners.
+    /// Number of facets that are no triangles.
     pub fn quad_count(&self) -> usize {
         self.facets.iter().filter(|f| !f.is_triangle()).count()
     }
 
-    /// Bytes held by the mesh.
+    /// Bytes of the mesh's arrays, without spare room.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.positions)
             + size_of_val(&*self.vertices)

@@ -6,7 +6,7 @@ use crate::math::{FaceId, Point, Uv, Vector};
 use std::io::{self, Write};
 
 impl FacetMesh {
-    /// Writes the mesh.
+    /// Writes the mesh as arrays of this machine's numbers, for [`Self::read_arrays`].
     ///
     /// # Errors
     /// When `to` cannot be written.
@@ -21,7 +21,8 @@ impl FacetMesh {
         write_array(to, &self.sag)
     }
 
-    /// Reads a mesh whose faces are fewer than `faces`.
+    /// Reads a mesh written by [`Self::write_arrays`] whose face ids lie below `faces`. Numbers themselves are not checked: positions may
+    /// be anything.
     ///
     /// # Errors
     /// When it cannot be read, or an index lies outside its array.

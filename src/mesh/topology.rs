@@ -16,14 +16,15 @@ pub struct Topology {
 }
 
 impl Topology {
-    /// Whether the facets bound a volume and agree which side is outside.
+    /// Whether every edge has two facets that agree which side is outside; true without facets too.
     pub fn is_closed(&self) -> bool {
         *self == Self::default()
     }
 }
 
 impl FacetMesh {
-    /// Topology of a range of facets (those of a shell stand together), by identity of positions.
+    /// Counts the edges of a range of facets (those of a shell stand together) by kind. Edges are the same where their position indices
+    /// are: equal points under two indices stay apart.
     pub fn topology(&self, facets: Range<usize>) -> Topology {
         // Uses along and against the edge's order of positions.
         let mut edges: FxHashMap<[u32; 2], [u32; 2]> = FxHashMap::default();

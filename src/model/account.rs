@@ -31,7 +31,7 @@ pub struct SolidAccount {
 }
 
 impl SolidAccount {
-    /// Lower and upper corner of the box around its faces, mm; `None` without faces.
+    /// Lower and upper corner of the box around its faces, mm, where the first instance stands; `None` without faces.
     pub fn bbox_mm(&self) -> Option<[[f64; 3]; 2]> {
         self.faces.iter().map(|f| f.bbox_mm).reduce(|a, b| {
             let lower = std::array::from_fn(|k| a[0][k].min(b[0][k]));
@@ -40,7 +40,7 @@ impl SolidAccount {
         })
     }
 
-    /// Sides of that box, mm; 0 where rounding alone makes a flat one thick.
+    /// Sides of that box, mm; 0 without faces and where rounding alone makes a flat one thick.
     pub fn size_mm(&self) -> [f64; 3] {
         /// The rounding of places up to 100 m.
         const ROUNDING_MM: f64 = 1e-9;
@@ -60,7 +60,7 @@ impl SolidAccount {
 /// A face. Lengths are mm, and places are where the part's first instance stands (the part's own coordinates without one).
 #[derive(Clone, Debug, Serialize)]
 pub struct FaceAccount {
-    /// The `#id` in its file.
+    /// The `#id` in its file; `None` when it came from none.
     pub id: Option<u64>,
     /// Name, empty when it had none.
     pub name: String,
@@ -75,12 +75,13 @@ pub struct FaceAccount {
     pub radius_mm: Option<f64>,
     /// Area inside the trims, mm².
     pub area_mm2: f64,
-    /// Lower and upper corner.
+    /// Lower and upper corner of a box around it, mm.
     pub bbox_mm: [[f64; 3]; 2],
-    /// A point on the face, away from its edges.
+    /// A point on the face, away from its edges, mm.
     pub at: [f64; 3],
 }
 
+/// Writes a colour as `#rrggbb`, none as null.
 fn hex_colour<S: Serializer>(colour: &Option<Colour>, serializer: S) -> Result<S::Ok, S::Error> {
     colour.map(|c| c.to_string()).serialize(serializer)
 }
@@ -98,7 +99,7 @@ const GAUSS: [(f64, f64); 5] = [
 const PIECES: usize = 2;
 
 impl Model {
-    /// Every part with its solids and faces; parts without faces are left out.
+    /// Tells of every part its solids and faces, in order; parts without faces are left out, those without an instance are not.
     pub fn account(&self) -> Vec<PartAccount> {
         // The first instance stands for all: one place to look at is enough to know a face.
         let mut first: Vec<Option<&Instance>> = vec![None; self.parts.len()];
@@ -120,7 +121,7 @@ impl Model {
 }
 
 impl Part {
-    /// Its solids and sheets where an instance stands.
+    /// Tells of its solids and sheets where an instance stands, or in its own coordinates without one.
     fn account(&self, instance: Option<&Instance>) -> Vec<SolidAccount> {
         let placement = instance.map_or(Frame::IDENTITY, |i| i.placement);
         let inherited = instance.and_then(|i| i.colour).or(self.colour);
@@ -149,7 +150,7 @@ impl Part {
 }
 
 impl Face {
-    /// Its figures in a place; `inherited` is the colour that shows where it has none of its own.
+    /// Tells its figures where `placement` puts it; `inherited` is the colour that shows where it has none of its own.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         FaceAccount {
             id: self.entity,
@@ -164,7 +165,8 @@ impl Face {
         }
     }
 
-    /// Parameters of a point inside the trims, well away from them where the face is wide.
+    /// Surface parameters of a point inside the trims, well away from them where the face is wide; of trims without extent, a point of
+    /// them.
     pub fn inner_parameters(&self) -> Uv {
         let outline = Outline::new(self);
         // A loop that crosses none of the rows has no extent that could hold a point: its corner is on it then.
@@ -206,7 +208,7 @@ struct Sweep<'f> {
 }
 
 impl Sweep<'_> {
-    /// Signed area to the left of a curve: the integral of the row areas over dv.
+    /// Signed area, mm², between a curve and the lower end of u, positive where v rises: the integral of the row areas over dv.
     fn area_left_of(&self, curve: &UvCurve) -> f64 {
         let mut sum = 0.0;
         for span in curve.breakpoints().windows(2) {
@@ -216,7 +218,7 @@ impl Sweep<'_> {
                     let d = curve.derivatives(piece[0] + x * width);
                     // A piece along a row adds nothing to an integral over dv, and its row need not be computed.
                     if d.first.y != 0.0 {
-                        sum += weight * width * d.first.y * self.row(d.point);
+                        sum += weight * width * d.first.y * self.row_area(d.point);
                     }
                 }
             }
@@ -224,8 +226,8 @@ impl Sweep<'_> {
         sum
     }
 
-    /// Parameters at which a span of a curve is divided: at the rows of knots that a straight one crosses, at as many even steps of a
-    /// bent one.
+    /// Parameters at which a span of a curve is divided, both ends included: at the rows of knots that a straight one crosses, at as many
+    /// even steps of a bent one, and in [`PIECES`] between.
     fn smooth_pieces(&self, curve: &UvCurve, [t0, t1]: [f64; 2]) -> Vec<f64> {
         let v0 = curve.evaluate(t0).y;
         let v1 = curve.evaluate(t1).y;
@@ -248,8 +250,8 @@ impl Sweep<'_> {
         pieces
     }
 
-    /// Integral of the surface's density of area from the lower end of u to a point.
-    fn row(&self, end: Uv) -> f64 {
+    /// Integral over u of the surface's density of area, at the height v of a point, from the lower end of u up to it.
+    fn row_area(&self, end: Uv) -> f64 {
         let mut sum = 0.0;
         for span in self.breaks[0].windows(2).filter(|s| s[0] < end.x) {
             let width = (span[1].min(end.x) - span[0]) / PIECES as f64;
@@ -267,7 +269,7 @@ impl Sweep<'_> {
 }
 
 impl TessellatedFace {
-    /// What is told of a ready mesh, at its place and in its parent's colour where it has none.
+    /// Tells its figures where `placement` puts it, in the inherited colour where it has none; `at` is that frame's origin without facets.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         let corner = |k: usize| self.mesh.positions[self.mesh.vertices[k].position as usize];
         // The middle of the first facet.

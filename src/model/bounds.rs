@@ -34,12 +34,12 @@ const SIDES: [Side; 6] = [
 ];
 
 impl Side {
-    /// How far a point lies towards this side.
+    /// How far a point lies towards this side, mm from the origin.
     fn height(self, p: Point) -> f64 {
         self.sign * p[self.axis]
     }
 
-    /// How far a box reaches towards this side.
+    /// How far a box reaches towards this side, mm from the origin; minus infinity for an empty one.
     fn reach(self, b: &Aabb) -> f64 {
         if self.sign > 0.0 { b.max[self.axis] } else { -b.min[self.axis] }
     }
@@ -55,6 +55,7 @@ enum Shape<'m> {
 /// The shapes of a part, each with a box around its control points in the part's coordinates.
 struct PartHulls<'m> {
     shapes: Vec<(Shape<'m>, Aabb)>,
+    /// Around all of them; empty without any.
     whole: Aabb,
 }
 
@@ -94,6 +95,7 @@ impl Face {
 }
 
 impl<'m> PartHulls<'m> {
+    /// Takes the boxes of all faces and meshes of a part; `whole` is empty without any.
     fn new(part: &'m super::Part) -> Self {
         let faces = part.shells.iter().flat_map(|s| &s.faces).map(|f| (Shape::Face(f), f.surface.bounds()));
         let meshes =
@@ -103,7 +105,7 @@ impl<'m> PartHulls<'m> {
         Self { shapes, whole }
     }
 
-    /// Grows a box by all shapes that reach beyond it towards one side, the farthest first.
+    /// Returns `bounds`, in the model's coordinates, grown by all shapes that may reach beyond it towards one side, the farthest first.
     fn grow(&self, mut bounds: Aabb, side: Side, placement: &Frame) -> Aabb {
         let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.shapes.len());
         for (k, (_, hull)) in self.shapes.iter().enumerate() {
@@ -127,16 +129,18 @@ impl<'m> PartHulls<'m> {
     }
 }
 
-/// A box around a box in its place.
+/// A box around a box where a placement puts it.
 fn placed(local: &Aabb, placement: &Frame) -> Aabb {
     Aabb::from_points(local.corners().map(|p| placement.point(p)))
 }
 
+/// Whether a box holds another wholly.
 fn covers(bounds: &Aabb, hull: &Aabb) -> bool {
     bounds.contains(hull.min) && bounds.contains(hull.max)
 }
 
-/// Grows a box by a face.
+/// Returns `bounds`, in the model's coordinates, grown by a placed face: its trims, and its extremes inside them where its control points
+/// reach beyond the box.
 fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     let position = |uv: Uv| placement.point(face.surface.evaluate(uv));
     let hull = Aabb::from_points(face.surface.points.iter().map(|p| placement.point(p.position())));
@@ -179,7 +183,7 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     bounds
 }
 
-/// Follows a height uphill inside the trims, first in strides of half a cell.
+/// Follows a height uphill inside the trims from `start`, first in strides of half a cell, and returns the parameters of the summit.
 fn climb(start: Uv, cell: Uv, height: impl Fn(Uv) -> f64, outline: &Outline) -> Uv {
     let mut uv = start;
     let mut best = height(uv);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colour(pub [f64; 3]);
 
-/// As `#rrggbb`, 255 steps a channel.
+/// As `#rrggbb`, 255 steps a channel; values beyond `[0, 1]` are clamped.
 impl fmt::Display for Colour {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [r, g, b] = self.0.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8);
@@ -114,7 +114,7 @@ impl SurfaceKind {
         Self::Other,
     ];
 
-    /// The word for it in reports and selectors.
+    /// The word for it in reports and selectors, in lower case.
     pub fn word(self) -> &'static str {
         match self {
             Self::Plane => "plane",
@@ -140,7 +140,7 @@ impl fmt::Display for SurfaceKind {
 }
 
 impl Analytic {
-    /// Its kind without its figures.
+    /// Its kind, without frames and lengths.
     pub fn kind(&self) -> SurfaceKind {
         match self {
             Self::Plane { .. } => SurfaceKind::Plane,
@@ -157,7 +157,8 @@ impl Analytic {
         }
     }
 
-    /// Radius of a cylinder or sphere, or of a torus' tube, mm; a cone has many.
+    /// Radius of a cylinder or sphere, or of a torus' tube, mm in the part's coordinates; `None` for all others, also for a cone, which has
+    /// many.
     pub fn radius(&self) -> Option<f64> {
         match *self {
             Self::Cylinder { radius, .. } | Self::Sphere { radius, .. } => Some(radius),
@@ -186,7 +187,7 @@ pub struct Face {
     pub reversed: bool,
     /// Trimming loops; without any, the face is the whole domain of its surface.
     pub loops: Vec<TrimLoop>,
-    /// Largest measured distance between an edge in space and its uv curve on the surface, mm.
+    /// Largest measured distance between an edge in space and its uv curve on the surface, mm in the part's coordinates.
     pub gap: f64,
 }
 
@@ -226,13 +227,13 @@ pub struct EdgeUse {
 }
 
 impl EdgeUse {
-    /// Where the loop enters this use.
+    /// Surface parameters where the loop enters this use.
     pub fn start(&self) -> Uv {
         let [t0, t1] = self.uv.domain();
         self.uv.evaluate(if self.reversed { t1 } else { t0 })
     }
 
-    /// Where the loop leaves this use.
+    /// Surface parameters where the loop leaves this use.
     pub fn end(&self) -> Uv {
         let [t0, t1] = self.uv.domain();
         self.uv.evaluate(if self.reversed { t0 } else { t1 })

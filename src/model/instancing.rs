@@ -40,8 +40,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// A ray of the scene in the group's coordinates. It is not normalised anew, so that a point at t is the same point; what it leaves
-    /// stays as it is.
+    /// Moves a ray of the scene into the group's coordinates. It is not normalised anew, so that a point at t is the same point. Its
+    /// departure keeps the scene's face id.
     #[inline]
     pub fn local_ray(&self, ray: &Ray) -> Ray {
         Ray {
@@ -67,7 +67,8 @@ struct FaceRun {
 const SINGLE: u32 = u32::MAX;
 
 impl Instancing {
-    /// The groups of a model whose faces are glued where they come this near, mm; `None` where no part is placed often.
+    /// Divides a model into groups; `None` where no part is placed 64 times and more in one scale. Instances whose curved faces come within
+    /// `glue_mm` of another's stay in the first group; at 0 or less none is kept for that.
     pub fn new(model: &Model, glue_mm: f64) -> Option<Self> {
         let kind = |i: &Instance| (i.part, i.placement.scale.to_bits());
         let mut counts: FxHashMap<(PartId, u64), usize> = FxHashMap::default();
@@ -103,7 +104,7 @@ impl Instancing {
                 (local, SINGLE)
             } else {
                 let group = *group_of.entry(kind(instance)).or_insert_with(|| {
-                    let (alone, bounds) = group(part, instance.placement.scale);
+                    let (alone, bounds) = lone_part(part, instance.placement.scale);
                     instancing.groups.push(alone);
                     boxes.push(bounds);
                     boxes.len() as u32 - 1
@@ -123,14 +124,15 @@ impl Instancing {
         (!instancing.placements.is_empty()).then_some(instancing)
     }
 
-    /// Placements alone, in the order of their faces: nothing stands once.
+    /// Joins groups and placements that were made elsewhere; placements are in the order of their first faces. Nothing stands once: the
+    /// first group is empty, and placements name the others, from 1 on.
     pub fn from_placements(groups: Vec<Model>, placements: Vec<Placement>) -> Self {
         let run = |(k, p): (usize, &Placement)| FaceRun { first: p.first_face.0, local: 0, placement: k as u32 };
         let runs = placements.iter().enumerate().map(run).collect();
         Self { groups, placements, runs, single: Vec::new() }
     }
 
-    /// Index into the placements, where the face is of one, and the face in its group.
+    /// Finds where a face of the model is: the index into the placements, `None` for what stands once, and the face in its group.
     #[inline]
     pub fn locate(&self, face: FaceId) -> (Option<usize>, FaceId) {
         let Some(&run) = self.run(face) else { return (None, face) };
@@ -167,13 +169,13 @@ impl Instancing {
         }
     }
 
-    /// The largest coordinate of what is placed from a group, mm.
+    /// The largest coordinate, in size, of what is placed from a group, mm in the model's coordinates; 0 for the first group.
     pub fn reach(&self, group: usize) -> f64 {
         let placed = self.placements.iter().filter(|p| p.group as usize == group);
         placed.map(|p| p.bounds.min.abs().max(p.bounds.max.abs()).max_element()).fold(0.0, f64::max)
     }
 
-    /// How often each group stands.
+    /// How often each group stands; the first one once, even if it has no faces. There must be a first.
     pub fn counts(&self) -> Vec<usize> {
         let mut counts = vec![0; self.groups.len()];
         counts[0] = 1;
@@ -182,8 +184,8 @@ impl Instancing {
     }
 }
 
-/// A part alone, at the origin, and the box around it with room for its facets.
-fn group(part: &Part, scale: f64) -> (Model, Aabb) {
+/// A model of a part alone, at the origin in this scale, and the box around it, which holds its edges and vertices too.
+fn lone_part(part: &Part, scale: f64) -> (Model, Aabb) {
     let placement = Frame { scale, ..Frame::IDENTITY };
     let instance = Instance { name: part.name.clone(), part: PartId(0), placement, colour: None };
     let model = Model { name: part.name.clone(), parts: vec![part.clone()], instances: vec![instance] };

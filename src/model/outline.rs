@@ -10,14 +10,15 @@ const POINTS_PER_SPAN: usize = 4;
 /// Rows, as shares of the height of the outline, on which a point inside is looked for; the first that holds one serves.
 const ROWS: [f64; 7] = [0.5, 0.37, 0.63, 0.21, 0.79, 0.09, 0.91];
 
-/// A face in its parameter plane. Without polygons it is the whole domain of its surface.
+/// A face in the parameter plane of its surface, as polygons. Without any it is the whole domain.
 pub(super) struct Outline {
+    /// One for each loop, which closes by itself.
     pub(super) polygons: Vec<Vec<Uv>>,
     domain: [[f64; 2]; 2],
 }
 
 impl Outline {
-    /// Polygons along the trims, fine enough to tell inside from outside.
+    /// Follows every loop by a polygon, fine enough to tell inside from outside but near the trims.
     pub(super) fn new(face: &Face) -> Self {
         let polygon = |l: &super::TrimLoop| {
             let mut points = Vec::new();
@@ -45,7 +46,7 @@ impl Outline {
         Self { polygons: face.loops.iter().map(polygon).collect(), domain: face.surface.domain() }
     }
 
-    /// Lower and upper corner.
+    /// Lower and upper corner of the polygons, or of the domain without any, in surface parameters.
     pub(super) fn corners(&self) -> [Uv; 2] {
         if self.polygons.is_empty() {
             let [[u0, u1], [v0, v1]] = self.domain;
@@ -55,12 +56,12 @@ impl Outline {
         points.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
     }
 
-    /// Whether a point is on the face, by the number of polygons around it.
+    /// Whether surface parameters lie inside the trims, by the number of polygons around them; without polygons all do.
     pub(super) fn contains(&self, p: Uv) -> bool {
         self.polygons.is_empty() || self.polygons.iter().filter(|q| surrounds(q, p)).count() % 2 == 1
     }
 
-    /// A point well inside: the middle of the longest stretch of one of a few rows; `None` when none is crossed.
+    /// Surface parameters well inside: the middle of the longest stretch of one of a few rows; `None` when no row is crossed.
     pub(super) fn inner_point(&self) -> Option<Uv> {
         let [lo, hi] = self.corners();
         if self.polygons.is_empty() {
@@ -86,7 +87,7 @@ fn sides(polygon: &[Uv]) -> impl Iterator<Item = (Uv, Uv)> {
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
 }
 
-/// Where a side crosses the row `v`.
+/// The u at which a side crosses the row `v`, which must lie between its ends.
 fn abscissa((a, b): (Uv, Uv), v: f64) -> f64 {
     a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)
 }

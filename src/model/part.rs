@@ -61,8 +61,8 @@ pub struct Shell {
 }
 
 impl Part {
-    /// Ranges of [`Part::shells`], one a solid (its shell and those of its voids) or sheet. Ready meshes are one more solid behind
-    /// these.
+    /// Ranges of [`Part::shells`], one a solid (its shell and those of its voids) or sheet; empty without shells. Ready meshes count as one
+    /// more solid behind these, which is not in the list.
     pub fn solids(&self) -> Vec<Range<usize>> {
         let mut solids: Vec<Range<usize>> = Vec::new();
         for (i, shell) in self.shells.iter().enumerate() {

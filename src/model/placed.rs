@@ -49,20 +49,23 @@ pub struct PlacedFace<'a> {
 }
 
 impl Model {
-    /// A model of one part that stands where it is.
+    /// A model of one part that stands where it is, with the part's name for both model and instance.
     pub fn from_part(part: Part) -> Self {
         let name = part.name.clone();
         let instance = Instance { name: name.clone(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
         Self { name, parts: vec![part], instances: vec![instance] }
     }
 
-    /// The part of an instance.
+    /// The part with this id.
+    ///
+    /// # Panics
+    /// When the model has no such part.
     pub fn part(&self, id: PartId) -> &Part {
         &self.parts[id.0 as usize]
     }
 
-    /// What to call an instance: its own name, or its part's where some program made one up (`=>[0:1:1:2]`) or gave none, or its
-    /// number.
+    /// What to call an instance, by its index: its own name, its part's where some program made one up (`=>[0:1:1:2]`) or gave none, or
+    /// `part` and its number from 1.
     pub fn label(&self, instance: usize) -> String {
         let own = &self.instances[instance].name;
         let part = &self.part(self.instances[instance].part).name;
@@ -112,7 +115,7 @@ impl Model {
         self.instances.iter().map(|i| self.part(i.part).face_count()).sum()
     }
 
-    /// The id of the first face of every instance.
+    /// The id of the first face of every instance; of an instance without faces that of the next one's.
     pub fn first_faces(&self) -> Vec<FaceId> {
         // Counted once a part: a thousand lenses are one.
         let counts: Vec<u32> = self.parts.iter().map(|p| p.face_count() as u32).collect();
@@ -137,7 +140,7 @@ impl PlacedFace<'_> {
         self.face.map(|f| f.name.as_str()).or(self.tessellated.map(|t| t.name.as_str())).unwrap_or("")
     }
 
-    /// The `#id` of the face in its file.
+    /// The `#id` of the face in its file; `None` when it came from none.
     pub fn entity(&self) -> Option<u64> {
         self.face.and_then(|f| f.entity).or(self.tessellated.and_then(|t| t.entity))
     }
@@ -152,12 +155,13 @@ impl PlacedFace<'_> {
         self.face.map_or(SurfaceKind::Tessellated, |f| f.analytic.kind())
     }
 
-    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm.
+    /// Radius of a cylinder or sphere, or of a torus' tube, where it stands, mm; `None` for all others.
     pub fn radius(&self) -> Option<f64> {
         Some(self.face?.analytic.radius()? * self.placement.scale)
     }
 
-    /// The colour that shows: of the face, the shell, the instance or the part, the first that is given.
+    /// The colour that shows: of the face, the shell, the instance or the part, the first that is given; `None` where none is. `model` must
+    /// be the one that it is a face of.
     pub fn colour(&self, model: &Model) -> Option<Colour> {
         let part = model.part(self.part);
         let own = self.face.and_then(|f| f.colour).or(self.tessellated.and_then(|t| t.colour));

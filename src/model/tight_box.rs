@@ -11,7 +11,8 @@ const HALVINGS: usize = 3;
 const ROOM: f64 = 1e-6;
 
 impl Part {
-    /// A box around everything of the part, with edges that stray from their faces and vertices that stray from their edges.
+    /// A box around everything of the part in its coordinates times `scale`, mm, with edges that stray from their faces and vertices that
+    /// stray from their edges.
     pub(super) fn tight_box(&self, scale: f64) -> Aabb {
         let frame = Frame { scale, ..Frame::IDENTITY };
         let faces = self.shells.iter().flat_map(|s| &s.faces).map(Face::tight_box);
@@ -34,7 +35,8 @@ impl Face {
         if bounds.is_empty() { self.surface.bounds() } else { bounds.grown(self.gap) }
     }
 
-    /// The range of the parameters that the loops go through.
+    /// Ranges of u and v that the loops go through, by their control points; the whole domain of a parameter where there are no loops or
+    /// they reach beyond it.
     fn trim_range(&self) -> [[f64; 2]; 2] {
         let domain = self.surface.domain();
         let uses = self.loops.iter().flat_map(|l| &l.uses);
@@ -50,7 +52,7 @@ impl Face {
     }
 }
 
-/// Around what of a patch lies over a range of parameters, halved so often in turn.
+/// A box around the part of a patch over ranges of the surface's parameters, halved `halvings` times in turn; empty where it has none.
 fn tight_box(patch: &BezierPatch, range: &[[f64; 2]; 2], halvings: usize) -> Aabb {
     if (0..2).any(|d| patch.domain[d][1] < range[d][0] || patch.domain[d][0] > range[d][1]) {
         return Aabb::EMPTY;

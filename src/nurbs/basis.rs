@@ -20,7 +20,8 @@ pub(super) const BROAD: usize = 14;
 /// See [`NARROW`].
 pub(super) const WIDE: usize = MAX_DEGREE + 1;
 
-/// Index `k` of the knot span `[knots[k], knots[k + 1])` that holds `t`, never an empty one.
+/// Finds the index `k` of the knot span `[knots[k], knots[k + 1])` that holds `t`, never an empty one. Knots must not decrease, and leave
+/// a domain.
 ///
 /// `t` outside the domain gives the first or last span; the end of the domain belongs to the last span.
 pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
@@ -37,7 +38,8 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
     k
 }
 
-/// The basis functions alone, in place of a table: the same bits as [`basis`] gives for them. Meshing asks for little else.
+/// Values at `t` of the `degree + 1` basis functions that are not zero in a span, 0 beyond: the same bits as [`basis`] gives for them.
+/// Meshing asks for little else.
 #[inline]
 pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> [f64; W] {
     assert!(degree < W && span >= degree && span + degree < knots.len());
@@ -60,7 +62,8 @@ pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span
     value
 }
 
-/// Basis functions and derivatives up to `order` (at most 2) in a span: *The NURBS Book*, A2.3.
+/// Values at `t` of the basis functions that are not zero in a span, and derivatives up to `order` (at most 2), 0 beyond: *The NURBS
+/// Book*, A2.3.
 #[inline]
 pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64, order: usize) -> Basis<W> {
     let p = degree;

@@ -5,7 +5,7 @@ use super::curve::{ControlPoint, Curve, Spline};
 use smallvec::SmallVec;
 
 impl<P: ControlPoint> Spline<P> {
-    /// The blossom (polar form) of the polynomial piece over knot span `span` at `degree` arguments.
+    /// The blossom (polar form), homogeneous, of the polynomial piece over knot span `span`, not empty, at `degree` arguments.
     pub(super) fn blossom(&self, span: usize, arguments: &[f64]) -> P {
         match self.degree {
             0..NARROW => self.blossom_in::<NARROW>(span, arguments),
@@ -32,7 +32,7 @@ impl<P: ControlPoint> Spline<P> {
         d[0]
     }
 
-    /// The same curve over another knot vector that refines this one on `[knots[degree], knots[n]]`.
+    /// Returns the same curve over another knot vector, one that refines this one on its domain `[knots[degree], knots[n]]`.
     ///
     /// New knots may start and end inside the domain (the curve is then cut there) and must hold every old knot
     /// between, at least as often. This is knot insertion, clamping and cutting in one (Oslo algorithm by blossoms).
@@ -49,7 +49,7 @@ impl<P: ControlPoint> Spline<P> {
         Self { degree: p, knots, points }
     }
 
-    /// The part over `[a, b]`, which must lie in the domain with `a < b`; its domain is `[a, b]`.
+    /// The part over `[a, b]`, which must lie in the domain with `a < b`, clamped; its domain is `[a, b]`.
     pub fn restricted(&self, a: f64, b: f64) -> Self {
         if [a, b] == self.domain() && self.is_clamped() {
             return self.clone();
@@ -60,7 +60,8 @@ impl<P: ControlPoint> Spline<P> {
         self.refined(knots)
     }
 
-    /// Control points of [`Spline::restricted`], which hull the curve over `[a, b]`; within one knot span, without the rest of it.
+    /// Returns the control points of [`Spline::restricted`], whose hull holds the curve over `[a, b]`, without cutting the whole curve. The
+    /// same conditions hold for `a` and `b`.
     pub fn restricted_points(&self, a: f64, b: f64) -> SmallVec<[P; 8]> {
         let p = self.degree;
         // The common case by itself: cutting the whole curve would make points of every span.
@@ -78,7 +79,8 @@ impl<P: ControlPoint> Spline<P> {
         out
     }
 
-    /// [`Spline::restricted_points`] over several spans, of which `span` is the first: points whose knots all lie inside are the curve's own.
+    /// [`Spline::restricted_points`] over several spans, of which `span` is the first: points whose knots all lie inside are the curve's
+    /// own.
     fn restricted_across(&self, span: usize, a: f64, b: f64) -> SmallVec<[P; 8]> {
         let (p, end) = (self.degree, self.knots.partition_point(|&k| k < b));
         if end <= span || self.knots[span] > a || a >= b || b > self.domain()[1] {
@@ -106,7 +108,8 @@ impl<P: ControlPoint> Spline<P> {
 }
 
 impl Curve {
-    /// This curve and behind it another of its degree that starts where it ends; the parameter follows on at the joint.
+    /// Joins this curve and another of its degree that starts where it ends, both clamped; the parameter runs on at the joint, from where
+    /// `tail` keeps its speed. Where the two do not meet, the end of this one is kept.
     pub fn joined_with(&self, tail: &Self) -> Self {
         let p = self.degree;
         let (end, start) = (self.domain()[1], tail.domain()[0]);

@@ -7,13 +7,13 @@ use std::f64::consts::FRAC_PI_2;
 /// An arc longer than a multiple of 90° by this share of 90° still has that many pieces: a full turn in rounded radians has four.
 const PIECE_SLACK: f64 = 1e-9;
 
-/// Breakpoints of an arc: pieces of at most 90°.
+/// Angles at which an arc from `a` to `b`, radians, is divided, both ends included: equal pieces of at most 90°.
 fn breakpoints([a, b]: [f64; 2]) -> Vec<f64> {
     let pieces = ((b - a) / FRAC_PI_2 - PIECE_SLACK).ceil().max(1.0) as usize;
     (0..=pieces).map(|i| if i == pieces { b } else { a + (b - a) * i as f64 / pieces as f64 }).collect()
 }
 
-/// The arc `radius·(cos φ, sin φ, 0)` in a frame, `φ` in `[a, b]` with `a < b ≤ a + 2π`; its domain is `[a, b]`.
+/// Makes the arc `radius·(cos φ, sin φ, 0)` in a frame, mm, `φ` in `[a, b]` radians with `a < b ≤ a + 2π`; its domain is `[a, b]`.
 ///
 /// At every breakpoint the parameter is the angle; between them see [`parameter_of_angle`].
 ///
@@ -33,7 +33,7 @@ pub fn arc(frame: &Frame, radius: f64, range: [f64; 2]) -> Curve {
     Curve { degree: 2, knots, points }
 }
 
-/// Knots, and control points `(x, y, weight)` of the unit arc in the plane.
+/// Knots, and control points `(x, y, weight)` of the unit arc in the plane over a range of angles, radians; x and y are not weighted.
 pub(super) fn unit_arc(range: [f64; 2]) -> (Vec<f64>, Vec<(f64, f64, f64)>) {
     let breaks = breakpoints(range);
     let mut knots = vec![breaks[0]; 3];
@@ -50,17 +50,18 @@ pub(super) fn unit_arc(range: [f64; 2]) -> (Vec<f64>, Vec<(f64, f64, f64)>) {
     (knots, points)
 }
 
-/// Spline parameter of an angle on the arc over `range`: `τ = tan(φ/2)/tan(h/2)` in each piece of half-angle `h`.
+/// Spline parameter of an angle, radians, on the arc over `range`: `τ = tan(φ/2)/tan(h/2)` in each piece of half-angle `h`. Nothing is
+/// clamped: beyond the ends the outer pieces go on.
 pub fn parameter_of_angle(range: [f64; 2], angle: f64) -> f64 {
     in_piece(range, angle, |phi, half| half * (0.5 * phi).tan() / (0.5 * half).tan())
 }
 
-/// Angle of a spline parameter: the inverse of [`parameter_of_angle`].
+/// Angle, radians, of a spline parameter on the arc over `range`: the inverse of [`parameter_of_angle`].
 pub fn angle_of_parameter(range: [f64; 2], parameter: f64) -> f64 {
     in_piece(range, parameter, |tau, half| 2.0 * (tau / half * (0.5 * half).tan()).atan())
 }
 
-/// Applies a map of the offset from the middle of the piece that holds `x`.
+/// Maps the offset of `x` from the middle of the piece that holds it, given with the piece's half-angle, and adds the middle again.
 fn in_piece(range: [f64; 2], x: f64, map: impl Fn(f64, f64) -> f64) -> f64 {
     let breaks = breakpoints(range);
     // Inner breakpoints alone: angles beyond the ends belong to the first and last piece.

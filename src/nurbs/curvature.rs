@@ -26,7 +26,7 @@ pub struct FundamentalForms {
 }
 
 impl FundamentalForms {
-    /// From derivatives; `None` where they span no plane.
+    /// Computes the forms from derivatives; `None` where the first ones span no plane: one is zero beside the other, or both are parallel.
     pub fn new(d: &SecondDerivatives) -> Option<Self> {
         let n = d.du.cross(d.dv);
         let (lu, lv) = (d.du.length(), d.dv.length());
@@ -56,7 +56,7 @@ impl FundamentalForms {
         a.abs().max(b.abs())
     }
 
-    /// Normal curvature in a direction of the parameter plane, 1/mm; 0 for a zero direction.
+    /// Normal curvature in a direction of the parameter plane, of any length, 1/mm; 0 for a zero direction.
     pub fn normal_curvature(&self, d: Uv) -> f64 {
         let form = |q: [f64; 3]| q[0] * d.x * d.x + 2.0 * q[1] * d.x * d.y + q[2] * d.y * d.y;
         let length = form(self.first);
@@ -65,7 +65,7 @@ impl FundamentalForms {
 }
 
 impl Surface {
-    /// The fundamental forms at `uv`; `None` at poles and cusps.
+    /// The fundamental forms at `uv`, which is clamped to the domain; `None` at poles and cusps.
     pub fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
         FundamentalForms::new(&self.second_derivatives(uv))
     }

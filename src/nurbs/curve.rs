@@ -15,7 +15,7 @@ pub trait ControlPoint:
         + Add<Output = Self::Position>
         + Sub<Output = Self::Position>
         + Mul<f64, Output = Self::Position>;
-    /// The neutral element of addition.
+    /// All components zero, the weight too.
     const ZERO: Self;
     /// The control point at a position with a weight.
     fn weighted(position: Self::Position, weight: f64) -> Self;
@@ -23,7 +23,7 @@ pub trait ControlPoint:
     fn numerator(self) -> Self::Position;
     /// The weight.
     fn weight(self) -> f64;
-    /// Numerator over weight.
+    /// Numerator over weight, which must not be zero.
     fn position(self) -> Self::Position {
         self.numerator() * (1.0 / self.weight())
     }
@@ -90,7 +90,7 @@ impl<P: ControlPoint> Spline<P> {
         Self { degree: 1, knots: vec![t0, t0, t1, t1], points: vec![P::weighted(a, 1.0), P::weighted(b, 1.0)] }
     }
 
-    /// The polyline through positions at strictly increasing parameters; at least two.
+    /// The polyline through positions at strictly increasing parameters, as many of both; at least two.
     pub fn polyline(parameters: &[f64], positions: &[P::Position]) -> Self {
         let mut knots = Vec::with_capacity(parameters.len() + 2);
         knots.push(parameters[0]);
@@ -99,7 +99,7 @@ impl<P: ControlPoint> Spline<P> {
         Self { degree: 1, knots, points: positions.iter().map(|&p| P::weighted(p, 1.0)).collect() }
     }
 
-    /// The cubic Hermite spline (C¹) through positions with derivatives at strictly increasing parameters.
+    /// The cubic Hermite spline (C¹) through positions with derivatives at strictly increasing parameters, as many of each; at least two.
     pub fn hermite(parameters: &[f64], positions: &[P::Position], derivatives: &[P::Position]) -> Self {
         let n = parameters.len();
         let (mut knots, mut points) = (vec![parameters[0]; 4], vec![P::weighted(positions[0], 1.0)]);
@@ -126,7 +126,7 @@ impl<P: ControlPoint> Spline<P> {
         self.homogeneous_at(t).position()
     }
 
-    /// Position and derivatives at `t`, which is clamped to the domain.
+    /// Position and first two derivatives at `t`, which is clamped to the domain.
     pub fn derivatives(&self, t: f64) -> CurveDerivatives<P::Position> {
         // The quotient rule for S = A/w: S′ = (A′ − S·w′)/w and S″ = (A″ − 2·S′·w′ − S·w″)/w.
         let [a, a1, a2] = self.homogeneous(t, 2);
@@ -137,7 +137,7 @@ impl<P: ControlPoint> Spline<P> {
         CurveDerivatives { point, first, second }
     }
 
-    /// Homogeneous point at `t` inside the domain.
+    /// Homogeneous point at `t`, which is clamped to the domain.
     pub(super) fn homogeneous_at(&self, t: f64) -> P {
         match self.degree {
             0..NARROW => self.point_in::<NARROW>(t),
@@ -147,6 +147,7 @@ impl<P: ControlPoint> Spline<P> {
         }
     }
 
+    /// As [`Spline::homogeneous_at`], with tables of width `W`.
     fn point_in<const W: usize>(&self, t: f64) -> P {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
@@ -156,6 +157,7 @@ impl<P: ControlPoint> Spline<P> {
         active.iter().zip(&b).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
     }
 
+    /// Homogeneous point and derivatives up to `order` (at most 2) at `t`, which is clamped to the domain; zero beyond the order.
     fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {
         match self.degree {
             0..NARROW => self.homogeneous_in::<NARROW>(t, order),
@@ -180,7 +182,7 @@ impl<P: ControlPoint> Spline<P> {
         })
     }
 
-    /// Whether the first and last `degree + 1` knots coincide.
+    /// Whether the first `degree + 1` knots coincide, and the last: the curve then ends at its outer control points.
     pub fn is_clamped(&self) -> bool {
         let (p, n) = (self.degree, self.points.len());
         self.knots[0] == self.knots[p] && self.knots[n] == self.knots[n + p]
@@ -215,14 +217,15 @@ impl<P: ControlPoint> Spline<P> {
             .collect()
     }
 
-    /// The same curve run backwards, with `t` mapped to `t0 + t1 − t`.
+    /// The same curve run backwards over the same domain, with `t` mapped to `t0 + t1 − t`.
     pub fn reversed(&self) -> Self {
         let [t0, t1] = self.domain();
         let knots = self.knots.iter().rev().map(|k| t0 + (t1 - k)).collect();
         Self { degree: self.degree, knots, points: self.points.iter().rev().copied().collect() }
     }
 
-    /// The same curve with its parameter mapped affinely onto `[a, b]`, `a < b`.
+    /// The same curve with its parameter mapped affinely onto `[a, b]`, `a < b`. The curve must be clamped: knots beyond the domain are
+    /// moved to its ends.
     pub fn reparametrised(&self, [a, b]: [f64; 2]) -> Self {
         let [t0, t1] = self.domain();
         let map = |k: f64| {

@@ -6,8 +6,8 @@ use crate::math::{Point, Vector};
 /// Most pieces of a fitted curve.
 const MAX_PIECES: u32 = 4096;
 
-/// The C¹ cubic through a curve given by position and derivative, its pieces doubled until the middles agree to
-/// `tolerance` mm; the error left.
+/// Fits a C¹ cubic to a curve over `[a, b]` that `at` gives by position, mm, and derivative: its pieces are doubled until their middles
+/// agree to `tolerance` mm or there are [`MAX_PIECES`]. Returns it with the largest error of these middles, mm.
 pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), tolerance: f64) -> (Curve, f64) {
     let mut n = 8u32;
     loop {

@@ -37,7 +37,7 @@ macro_rules! as_wide_as_needed {
 }
 
 impl BezierPatch {
-    /// All patches of a surface, those along v in a row, by knot insertion.
+    /// All patches of a surface over its knot rectangles that are not empty, those along v in a row, by knot insertion.
     pub(super) fn extract(surface: &Surface) -> Vec<Self> {
         let [p, q] = surface.degree;
         let [nu, nv] = surface.counts();
@@ -73,11 +73,12 @@ impl BezierPatch {
         patches
     }
 
-    /// Homogeneous point and first derivatives with respect to the local parameters in `[0, 1]²`.
+    /// Homogeneous point and first derivatives by the local parameters, u first. These are in `[0, 1]²`; beyond it the polynomial goes on.
     pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
         as_wide_as_needed!(self.homogeneous_in(local))
     }
 
+    /// As [`BezierPatch::homogeneous`], with tables of width `W`.
     fn homogeneous_in<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
         let [p, q] = self.degree;
         let (bu, du) = bernstein_to_first::<W>(p, local.x);
@@ -103,6 +104,7 @@ impl BezierPatch {
         as_wide_as_needed!(self.point_in(local))
     }
 
+    /// As [`BezierPatch::homogeneous_point`], with tables of width `W`.
     fn point_in<const W: usize>(&self, local: Uv) -> Homogeneous {
         let [p, q] = self.degree;
         let bu = bernstein::<W>(p, local.x);
@@ -114,11 +116,13 @@ impl BezierPatch {
         sum
     }
 
-    /// Homogeneous points at three local parameters of each direction, u first; the same bits as one by one.
+    /// Homogeneous points at three local parameters of each direction, `[i][j]` at `(u[i], v[j])`; the same bits as
+    /// [`BezierPatch::homogeneous_point`].
     pub fn homogeneous_lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
         as_wide_as_needed!(self.lattice_in(u, v))
     }
 
+    /// As [`BezierPatch::homogeneous_lattice`], with tables of width `W`.
     fn lattice_in<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
         let [p, q] = self.degree;
         let (bu, bv) = (u.map(|x| bernstein::<W>(p, x)), v.map(|x| bernstein::<W>(q, x)));
@@ -139,6 +143,7 @@ impl BezierPatch {
         as_wide_as_needed!(self.second_in(local))
     }
 
+    /// As [`BezierPatch::second_derivatives`], with tables of width `W`.
     fn second_in<const W: usize>(&self, local: Uv) -> SecondDerivatives {
         let [p, q] = self.degree;
         let (bu, bv) = (bernstein_to_second::<W>(p, local.x), bernstein_to_second::<W>(q, local.y));
@@ -171,7 +176,7 @@ impl BezierPatch {
         Aabb::from_points(self.points.iter().map(|p| p.project()))
     }
 
-    /// The two halves in `direction` (0: u, 1: v), by de Casteljau.
+    /// Halves the patch in `direction` (0: u, 1: v) by de Casteljau; the lower half first.
     pub fn halves(&self, direction: usize) -> [Self; 2] {
         let q = self.degree[1];
         let n = self.degree[direction];
@@ -200,7 +205,7 @@ impl BezierPatch {
     }
 }
 
-/// Bernstein polynomials of degree `n < W` at `t`.
+/// Bernstein polynomials of degree `n < W` at `t`, 0 beyond the degree.
 fn bernstein<const W: usize>(n: usize, t: f64) -> [f64; W] {
     let s = 1.0 - t;
     let mut b = [0.0; W];

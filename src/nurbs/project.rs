@@ -14,7 +14,7 @@ const SEEDS: usize = 8;
 /// Steps below this share of the domain end: a few units in the last place.
 const CONVERGED_SHARE: f64 = 1e-15;
 
-/// The parameter of the point of the curve that is nearest to `p`, and the distance.
+/// Finds the parameter of the point of the curve that is nearest to `p`, and the distance, mm.
 ///
 /// ```
 /// use lampyris::math::Point;
@@ -27,12 +27,13 @@ pub fn nearest(curve: &Curve, p: Point) -> (f64, f64) {
     nearest_by(curve, |q| q - p, None)
 }
 
-/// Like [`nearest`], starting at a parameter and searching elsewhere only when the distance stays above `expected`.
+/// As [`nearest`], from the parameter `start`; searches the whole curve only when the distance found from there is above `expected`, mm.
 pub fn nearest_from(curve: &Curve, p: Point, start: f64, expected: f64) -> (f64, f64) {
     nearest_by(curve, |q| q - p, Some((start, expected)))
 }
 
-/// The parameter that minimises the length of `offset(curve(t))`, and that length. `offset` must be affine.
+/// Finds the parameter that minimises the length of `offset(curve(t))`, and that length. `offset` must be affine; `start` is a parameter
+/// with the length at which its local minimum is taken, as for [`nearest_from`].
 pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<(f64, f64)>) -> (f64, f64) {
     // Followed along a curve, the nearest point is mostly near the last one; only where it is not are all pieces
     // sampled.
@@ -75,7 +76,8 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
     best
 }
 
-/// Newton steps on the derivative of the squared length, halved while they do not descend.
+/// Descends from `start`, clamped to the domain, by Newton steps on the derivative of the squared length, halved while they do not
+/// descend; returns the parameter and the length there.
 fn descend_from(curve: &Curve, offset: &impl Fn(Point) -> Point, start: f64) -> (f64, f64) {
     let [t0, t1] = curve.domain();
     let zero = offset(Point::ZERO);

@@ -65,7 +65,7 @@ impl Repairs {
         *self != Self::default()
     }
 
-    /// What was mended in either.
+    /// All that was changed in either.
     fn union(self, o: Self) -> Self {
         Self {
             clamped: self.clamped || o.clamped,
@@ -75,7 +75,8 @@ impl Repairs {
     }
 }
 
-/// Distinct knots with multiplicities as one knot vector; `None` when the sum is beyond reason or the lists differ.
+/// Repeats distinct knots by their multiplicities in one knot vector; `None` when these add up to more than some four
+/// million or the lists differ in length.
 pub fn expand_knots(distinct: &[f64], multiplicities: &[usize]) -> Option<Vec<f64>> {
     if distinct.len() != multiplicities.len() {
         return None;
@@ -88,7 +89,10 @@ pub fn expand_knots(distinct: &[f64], multiplicities: &[usize]) -> Option<Vec<f6
     Some(distinct.iter().zip(multiplicities).flat_map(|(&k, &m)| std::iter::repeat_n(k, m)).collect())
 }
 
-/// A curve from its parts.
+/// Makes a clamped curve of a file's parts, mm, and tells what had to be repaired; without weights all are 1.
+///
+/// # Errors
+/// What cannot be repaired: see [`Defect`].
 pub fn curve(
     degree: usize,
     knots: Vec<f64>,
@@ -102,7 +106,11 @@ pub fn curve(
     Ok((Curve { degree, knots, points }, repairs))
 }
 
-/// A surface from its parts; `points[i * count_v + j]`.
+/// Makes a clamped surface of a file's parts, mm, and tells what had to be repaired; `points[i * count_v + j]`, as are weights, which are
+/// 1 where there are none.
+///
+/// # Errors
+/// What cannot be repaired: see [`Defect`].
 pub fn surface(
     degree: [usize; 2],
     knots: [Vec<f64>; 2],
@@ -128,7 +136,8 @@ pub fn surface(
     Ok((Surface { degree, knots: [ku, kv], points }, repairs_u.union(repairs_v)))
 }
 
-/// Control points with their weights, or what is wrong with either.
+/// Homogeneous control points of positions and weights, 1 where there are none; weights beyond 10⁶ or below 10⁻⁶ at their largest are
+/// scaled to a largest of 1. An error where one is not positive beside the largest, or a coordinate is not finite or beyond 1e15 mm.
 fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogeneous>, Defect> {
     if points.len() > MAX_POINTS || weights.is_some_and(|w| w.len() != points.len()) {
         return Err(Defect::Counts);
@@ -157,7 +166,7 @@ fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogene
         .collect()
 }
 
-/// Checks order and count, and merges near-equal knots.
+/// Checks degree, count, order and domain of knots for so many points, and merges near-equal ones.
 fn check_knots(degree: usize, mut knots: Vec<f64>, points: usize) -> Result<(Vec<f64>, Repairs), Defect> {
     if degree == 0 || degree > MAX_DEGREE {
         return Err(Defect::Degree);
@@ -193,7 +202,7 @@ fn check_knots(degree: usize, mut knots: Vec<f64>, points: usize) -> Result<(Vec
     Ok((knots, repairs))
 }
 
-/// Cuts excess multiplicities and clamps, for several lines over the same knots.
+/// Cuts excess multiplicities and clamps, for several lines, at least one, over the same knots; adds what it did to `repairs`.
 fn conform(
     degree: usize,
     mut knots: Vec<f64>,

@@ -63,7 +63,7 @@ pub struct SecondDerivatives {
 }
 
 impl SecondDerivatives {
-    /// Those of the projection of a homogeneous surface with these values of S, Su, Sv, Suu, Suv, Svv.
+    /// Divides by the weight: from homogeneous S, Su, Sv, Suu, Suv and Svv to those of the surface in space.
     pub(super) fn projected([a, au, av, auu, auv, avv]: [Homogeneous; 6]) -> Self {
         let inv = 1.0 / a.w;
         let point = a.truncate() * inv;
@@ -108,6 +108,7 @@ impl Surface {
         }
     }
 
+    /// As [`Surface::evaluate`], with tables of width `W`.
     fn point_in<const W: usize>(&self, uv: Uv) -> Point {
         let uv = self.clamp(uv);
         let [p, q] = self.degree;
@@ -137,7 +138,7 @@ impl Surface {
         SecondDerivatives::projected(self.sums::<6>(uv, 2))
     }
 
-    /// Sums for (S, Su, Sv) or (S, Su, Sv, Suu, Suv, Svv), homogeneous.
+    /// Homogeneous (S, Su, Sv) for `order` 1, or (S, Su, Sv, Suu, Suv, Svv) for 2, at `uv`, which is clamped to the domain.
     fn sums<const N: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
         match self.degree[0].max(self.degree[1]) {
             0..NARROW => self.sums_in::<N, NARROW>(uv, order),
@@ -174,7 +175,8 @@ impl Surface {
         sums
     }
 
-    /// Unit normal along `Su × Sv`; at a pole or collapsed edge the limit from inside; `None` where there is none.
+    /// Unit normal along `Su × Sv` at `uv`, which is clamped to the domain; at a pole or collapsed edge the limit from inside; `None` where
+    /// there is none.
     pub fn normal(&self, uv: Uv) -> Option<Vector> {
         let d = self.derivatives(uv);
         let n = d.du.cross(d.dv);
@@ -190,7 +192,7 @@ impl Surface {
     }
 
     /// The unit normal just inside the domain, seen from a singular point: along the mixed derivative where one partial
-    /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre.
+    /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre. `None` where that has none either.
     pub(crate) fn limit_normal(&self, uv: Uv) -> Option<Vector> {
         let [[u0, u1], [v0, v1]] = self.domain();
         let d = self.second_derivatives(uv);
@@ -216,7 +218,8 @@ impl Surface {
         Aabb::from_points(self.points.iter().map(|p| p.project()))
     }
 
-    /// The line of constant `u` (a curve in v) or of constant `v` (a curve in u).
+    /// The line of constant u for `direction` 0 (a curve in v), or of constant v for 1 (a curve in u); `at` is that parameter, clamped to
+    /// the domain.
     pub fn isoline(&self, direction: usize, at: f64) -> Curve {
         // `direction` is the one held constant.
         let lines = self.lines(direction);
@@ -233,7 +236,7 @@ impl Surface {
         Curve { degree: self.degree[other], knots: self.knots[other].clone(), points }
     }
 
-    /// Control polygons that run along `direction`.
+    /// Control polygons that run along `direction`, 0 for u and 1 for v.
     fn lines(&self, direction: usize) -> Vec<Vec<Homogeneous>> {
         let [nu, nv] = self.counts();
         if direction == 0 {
@@ -243,7 +246,8 @@ impl Surface {
         }
     }
 
-    /// Applies a change of one direction's curves (cutting, refining, reversing) to the whole surface.
+    /// Applies a change of the curves along one direction, 0 for u and 1 for v (cutting, refining, reversing), to the whole surface. It
+    /// must give all curves the same degree and knots, and as many points.
     pub fn map_direction(&self, direction: usize, change: impl Fn(Curve) -> Curve) -> Self {
         let (degree, knots) = (self.degree[direction], &self.knots[direction]);
         let lines: Vec<Curve> = self
@@ -265,7 +269,7 @@ impl Surface {
         s
     }
 
-    /// The part over a rectangle of the domain; an unclamped surface comes out clamped.
+    /// The part over a rectangle inside the domain, of positive width both ways; an unclamped surface comes out clamped.
     pub fn restricted(&self, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Self {
         self.map_direction(0, |c| c.restricted(u0, u1)).map_direction(1, |c| c.restricted(v0, v1))
     }
@@ -279,7 +283,7 @@ impl Surface {
         }
     }
 
-    /// The surface with every control point's position changed (by a placement, say).
+    /// The surface with every control point's position changed by `place` and weights kept: exact for affine maps.
     pub fn transformed(&self, place: impl Fn(Point) -> Point) -> Self {
         let points = self.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
         Self { points, ..self.clone() }

@@ -6,7 +6,7 @@
 use super::{ControlPoint, Curve, Surface, conic};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 
-/// The plane rectangle `origin + u·x + v·y`.
+/// Makes the plane rectangle `origin + u·x + v·y` over ranges of u and v.
 pub fn plane(frame: &Frame, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Surface {
     let at = |u: f64, v: f64| Homogeneous::weighted(frame.point(Point::new(u, v, 0.0)), 1.0);
     Surface {
@@ -16,7 +16,7 @@ pub fn plane(frame: &Frame, [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> Surface {
     }
 }
 
-/// `curve(u) + v·direction`, v in `range`.
+/// Makes the surface `curve(u) + v·direction`, v in the given range; `direction` need not be of unit length.
 pub fn extrusion(curve: &Curve, direction: Vector, [v0, v1]: [f64; 2]) -> Surface {
     let at = |p: &Homogeneous, v: f64| Homogeneous::weighted(p.project() + v * direction, p.w);
     Surface {
@@ -26,7 +26,7 @@ pub fn extrusion(curve: &Curve, direction: Vector, [v0, v1]: [f64; 2]) -> Surfac
     }
 }
 
-/// `curve(v)` turned about the z axis of `axis` by the angle u in `angles`.
+/// Turns `curve(v)`, in the coordinates that `axis` is in, about the z axis of `axis` by the angle u in `angles`, radians.
 pub fn revolution(curve: &Curve, axis: &Frame, angles: [f64; 2]) -> Surface {
     let (knots, arc) = conic::unit_arc(angles);
     let meridian: Vec<(Point, f64)> = curve.points.iter().map(|p| (axis.local_point(p.project()), p.w)).collect();
@@ -44,23 +44,24 @@ pub fn revolution(curve: &Curve, axis: &Frame, angles: [f64; 2]) -> Surface {
     Surface { degree: [2, curve.degree], knots: [knots, curve.knots.clone()], points }
 }
 
-/// A cylinder about the z axis of `frame`: u the angle, v the height.
+/// Makes a cylinder about the z axis of `frame`: u the angle, radians, v the height; lengths are in units of the frame.
 pub fn cylinder(frame: &Frame, radius: f64, angles: [f64; 2], heights: [f64; 2]) -> Surface {
     cone(frame, radius, 0.0, angles, heights)
 }
 
-/// A cone about the z axis: `radius` at height 0, growing by `tan(half_angle)` per unit of v along the axis.
+/// Makes a cone about the z axis: `radius` at height 0, growing by `tan(half_angle)` per unit of v along the axis; angles in radians,
+/// lengths in units of the frame. Beyond the apex, where it would be negative, the surface goes on turned over.
 pub fn cone(frame: &Frame, radius: f64, half_angle: f64, angles: [f64; 2], heights: [f64; 2]) -> Surface {
     let at = |v: f64| frame.point(Point::new(radius + v * half_angle.tan(), 0.0, v));
     revolution(&Curve::line(at(heights[0]), at(heights[1]), heights), frame, angles)
 }
 
-/// A sphere: u the longitude about z, v the latitude in `[-π/2, π/2]`.
+/// Makes a sphere about the frame's origin: u the longitude about z, v the latitude in `[-π/2, π/2]`, radians.
 pub fn sphere(frame: &Frame, radius: f64, longitudes: [f64; 2], latitudes: [f64; 2]) -> Surface {
     torus(frame, 0.0, radius, longitudes, latitudes)
 }
 
-/// A torus: u the angle about z, v the angle about the tube, 0 on the outer equator.
+/// Makes a torus: u the angle about z, v the angle about the tube, 0 on the outer equator, radians; lengths in units of the frame.
 pub fn torus(frame: &Frame, major: f64, minor: f64, angles: [f64; 2], minor_angles: [f64; 2]) -> Surface {
     // The meridian lies in the x–z plane.
     let meridian =

@@ -31,7 +31,10 @@ const FIRST_RING: f64 = 1e-3;
 const SHARPEST_RING: f64 = 1e-9;
 
 impl Abg {
-    /// `a` and `b` positive, `g` from 0; refused when the whole disk of radius 2 would scatter more than there is.
+    /// A model of these coefficients: `a` zero or more (0 scatters nothing), `b` positive, `g` from 0 to 10.
+    ///
+    /// # Errors
+    /// When one is out of range, or the disk of radius 2 would scatter more than there is.
     pub fn new(a: f64, b: f64, g: f64) -> Result<Self, Error> {
         require("A of the ABg model", a, a >= 0.0, "zero or more")?;
         require("B of the ABg model", b, b > 0.0, "positive")?;
@@ -53,12 +56,12 @@ impl Abg {
         [self.a, self.b, self.g]
     }
 
-    /// Total integrated scatter at normal incidence.
+    /// Share of the light that is scattered at normal incidence.
     pub fn total_scatter(&self) -> f64 {
         self.share_within(1.0)
     }
 
-    /// A direction by the lobe, from two numbers in [0, 1); `None` for the share that stays specular.
+    /// Draws a unit direction on the side of the unit normal `n` from two numbers in [0, 1); `None` for the share that stays specular.
     pub(super) fn sample(&self, specular: Vector, n: Vector, u: [f64; 2]) -> Option<Vector> {
         let r = self.radius_of_share(u[0])?;
         let (s, c) = (2.0 * PI * u[1]).sin_cos();
@@ -69,14 +72,14 @@ impl Abg {
         (up2 > 0.0).then(|| (beta + n * up2.sqrt()).normalize())
     }
 
-    /// The BSDF times the cosine of the outgoing direction, 1/sr.
+    /// The BSDF times the cosine of the outgoing direction, 1/sr; 0 below the surface.
     pub(super) fn density(&self, specular: Vector, n: Vector, out: Vector) -> f64 {
         let step = out - specular;
         let r = (step - n * step.dot(n)).length();
         self.a / (self.b + r.powf(self.g)) * out.dot(n).max(0.0)
     }
 
-    /// Share that the unbounded plane of β would scatter within radius `r`.
+    /// Share that the unbounded plane of β would scatter within radius `r`, at most [`REACH`].
     fn share_within(&self, r: f64) -> f64 {
         if self.radii.is_empty() {
             return PI * self.a * (r * r / self.b).ln_1p();
@@ -85,7 +88,7 @@ impl Abg {
         self.shares[i] + self.ring(self.radii[i], r)
     }
 
-    /// The radius that encloses a share; `None` when even the largest does not.
+    /// The radius, a difference of direction cosines, within which `share` is scattered; `None` when even [`REACH`] does not hold it.
     fn radius_of_share(&self, share: f64) -> Option<f64> {
         if share >= self.share_within(REACH) {
             return None;
@@ -101,11 +104,13 @@ impl Abg {
         crate::math::safe_newton(missing, low, high, RADIUS_TOLERANCE).or(Some(low))
     }
 
+    /// Share scattered per unit of radius, at radius `r`.
     fn weight(&self, r: f64) -> f64 {
         2.0 * PI * r * self.a / (self.b + r.powf(self.g))
     }
 
-    /// Integral of the weight over a ring by Gauss–Legendre with five points: 1e-13 of the whole on these rings.
+    /// Share scattered between two radii, the integral of the weight, by Gauss–Legendre with five points: 1e-13 of the whole on these
+    /// rings.
     fn ring(&self, from: f64, to: f64) -> f64 {
         const NODES: [(f64, f64); 3] = [
             (0.0, 128.0 / 225.0),
@@ -117,7 +122,7 @@ impl Abg {
         half * (NODES[0].1 * self.weight(middle) + NODES[1].1 * pair(NODES[1].0) + NODES[2].1 * pair(NODES[2].0))
     }
 
-    /// Adds up the weight ring by ring, in rings that grow by one factor.
+    /// Fills `radii` and `shares` by adding up the weight ring by ring, in rings that grow by one factor.
     fn tabulate(&mut self) {
         // The bend of the weight lies at r = b^(1/g), and nothing changes far below it: rings start there.
         let start = (self.b.powf(1.0 / self.g.max(0.1)) * FIRST_RING).clamp(SHARPEST_RING, 0.1);

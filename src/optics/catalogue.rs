@@ -69,13 +69,13 @@ const ENTRIES: &[Entry] = &[
     },
 ];
 
-/// By any of its names, in any case.
+/// The entry with this name or alias, in any case, blanks around it passed over.
 fn entry(name: &str) -> Option<&'static Entry> {
     let wanted = name.trim().to_lowercase();
     ENTRIES.iter().find(|e| e.name.to_lowercase() == wanted || e.aliases.contains(&wanted.as_str()))
 }
 
-/// The clear medium of that name, in any case.
+/// The clear medium of that name or alias, in any case; `None` where the catalogue has none.
 ///
 /// ```
 /// use lampyris::optics::{catalogue, line};
@@ -85,17 +85,17 @@ pub fn medium(name: &str) -> Option<Medium> {
     entry(name).map(|e| Medium::clear(e.name, Index::Sellmeier(e.sellmeier.to_vec())))
 }
 
-/// Names of all media.
+/// Names of all media, without aliases.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|e| e.name)
 }
 
-/// Where a medium's index comes from.
+/// Where a medium's index comes from, for people; `None` where the catalogue has no such medium.
 pub fn source(name: &str) -> Option<&'static str> {
     entry(name).map(|e| e.source)
 }
 
-/// Wavelengths the source vouches for, nm.
+/// First and last vacuum wavelength that the source vouches for, nm; `None` where the catalogue has no such medium.
 pub fn range_nm(name: &str) -> Option<[f64; 2]> {
     entry(name).map(|e| e.range_nm)
 }

@@ -51,7 +51,7 @@ pub(super) fn observer_range() -> [f64; 2] {
     [OBSERVER_START, OBSERVER_START + STEP * (OBSERVER.len() - 1) as f64]
 }
 
-/// The colour-matching functions at a wavelength in nm, linear between the points, zero beyond them.
+/// The colour-matching functions x̄, ȳ, z̄ at a wavelength in nm, linear between the points, zero beyond them.
 pub(super) fn observer(wavelength_nm: f64) -> [f64; 3] {
     let x = (wavelength_nm - OBSERVER_START) / STEP;
     let last = (OBSERVER.len() - 1) as f64;

@@ -61,7 +61,10 @@ impl Split {
 }
 
 impl Coating {
-    /// Constant shares, each from 0 to 1 and no more than 1 together.
+    /// Constant shares; a rounding by which both are more than 1 together is taken off the transmittance.
+    ///
+    /// # Errors
+    /// When one is not from 0 to 1, or both are more than 1 together.
     pub fn ideal(reflectance: f64, transmittance: f64) -> Result<Self, Error> {
         let share = |x: f64| (0.0..=1.0).contains(&x);
         require("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
@@ -72,7 +75,7 @@ impl Coating {
         Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
     }
 
-    /// Shares at `cos_i = |d·n|`, with the index `n1` on the side of arrival and `n2` on the other.
+    /// Shares at `cos_i = |d·n|`, with the index `n1` on the side of arrival and `n2` on the other, which a metal does not ask for.
     ///
     /// Where Snell's law has no refracted ray, what would have been transmitted is reflected.
     pub fn split(&self, cos_i: f64, n1: f64, n2: f64, wavelength_nm: f64) -> Split {
@@ -105,7 +108,7 @@ impl Coating {
         matches!(self, Self::Table(t) if t.wavelengths_nm.len() > 1)
     }
 
-    /// Whether nothing is ever transmitted.
+    /// Whether nothing is ever transmitted, at any angle and wavelength.
     pub fn is_opaque(&self) -> bool {
         match self {
             Self::Bare => false,
@@ -138,7 +141,11 @@ pub struct CoatingTable {
 }
 
 impl CoatingTable {
-    /// From cells angle by angle, in each wavelength by wavelength. Angles from 0 to 90; both axes strictly increasing.
+    /// A table from cells angle by angle, in each wavelength by wavelength (nm).
+    ///
+    /// # Errors
+    /// When an axis is empty or not strictly increasing, angles leave 0 to 90°, there are more or fewer cells, or a share is not from 0 to
+    /// 1 or two are more than 1 together.
     pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, cells: Vec<Split>) -> Result<Self, Error> {
         let what = "coating";
         if angles_deg.is_empty() || wavelengths_nm.is_empty() {
@@ -168,7 +175,7 @@ impl CoatingTable {
         Ok(Self { angles_deg, wavelengths_nm, cells })
     }
 
-    /// The shares at an angle of the table and a wavelength.
+    /// The shares at an angle of the table, which is measured in the rarer medium, and a wavelength; constant beyond the ends.
     pub fn shares(&self, angle_deg: f64, wavelength_nm: f64) -> Split {
         let (i, s) = bracket(&self.angles_deg, angle_deg);
         let (j, t) = bracket(&self.wavelengths_nm, wavelength_nm);
@@ -188,11 +195,12 @@ impl CoatingTable {
         sum
     }
 
+    /// Whether no cell transmits anything.
     fn is_opaque(&self) -> bool {
         self.cells.iter().all(|c| c.transmitted == Power::NONE)
     }
 
-    /// The angle that the table is read at.
+    /// The angle that the table is read at, degrees: in the rarer medium, 90 beyond the critical angle, that of incidence if it is opaque.
     fn angle_deg(&self, cos_i: f64, eta: f64) -> f64 {
         // Beyond the critical angle no ray is refracted: the table is read at its end, grazing in the rarer medium.
         let cos = if eta <= 1.0 || self.is_opaque() { cos_i } else { cos_transmitted(cos_i, eta).unwrap_or(0.0) };

@@ -42,7 +42,7 @@ impl Effect {
         Self::BulkScatter,
     ];
 
-    /// The name in reports and scene files.
+    /// The name in reports and scene files, lower case with underscores.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reflection => "reflection",
@@ -57,7 +57,7 @@ impl Effect {
         }
     }
 
-    /// The effect of that name.
+    /// The effect of exactly that [`Effect::name`]; `None` where there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|e| e.name() == name)
     }

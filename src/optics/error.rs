@@ -70,7 +70,7 @@ impl From<ErrorKind> for Error {
     }
 }
 
-/// `value` when `good`, else the refusal that names it.
+/// Returns `value` when it is `good` and finite, else the refusal that names it and what is `allowed`.
 pub(super) fn require(what: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
     if good && value.is_finite() { Ok(value) } else { Err(ErrorKind::OutOfRange { what, value, allowed }.into()) }
 }

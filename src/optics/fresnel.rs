@@ -26,14 +26,14 @@ impl Power {
         0.5 * (self.rs + self.rp)
     }
 
-    /// Adds a weighted share.
+    /// Adds `weight` times another pair of shares.
     pub(super) fn add(&mut self, other: Self, weight: f64) {
         self.rs += other.rs * weight;
         self.rp += other.rp * weight;
     }
 }
 
-/// Reflection at an interface of two transparent media; what is not reflected is transmitted.
+/// Reflected shares at an interface of two transparent media; what is not reflected is transmitted.
 ///
 /// `cos_i` in `[0, 1]`, `eta = n1/n2` as for [`super::refract`]. [`Power::TOTAL`] at and beyond the critical angle.
 ///
@@ -46,7 +46,7 @@ pub fn dielectric(cos_i: f64, eta: f64) -> Power {
     cos_transmitted(cos_i, eta).map_or(Power::TOTAL, |cos_t| of_cosines(cos_i, cos_t, eta))
 }
 
-/// The same where the cosine of the angle of refraction is known.
+/// As [`dielectric`] where the cosine of the angle of refraction is known; NaN where both cosines are zero.
 #[inline]
 pub fn of_cosines(cos_i: f64, cos_t: f64, eta: f64) -> Power {
     let rs = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
@@ -54,7 +54,7 @@ pub fn of_cosines(cos_i: f64, cos_t: f64, eta: f64) -> Power {
     Power { rs: rs * rs, rp: rp * rp }
 }
 
-/// Reflection at a metal of complex index `n + i·k` seen from a medium of index `outside`; the rest is absorbed.
+/// Reflected shares at a metal of complex index `n + i·k` seen from a medium of index `outside`; the rest is absorbed.
 ///
 /// `cos_i` in `[0, 1]`. With `k = 0` it agrees with [`dielectric`].
 pub fn conductor(cos_i: f64, outside: f64, n: f64, k: f64) -> Power {

@@ -26,7 +26,11 @@ pub struct IntensitySampler {
 }
 
 impl IntensitySampler {
-    /// Refuses angles that do not ascend or leave the sphere, and a distribution without light. Symmetry is expanded.
+    /// Prepares a distribution for sampling; symmetry is expanded.
+    ///
+    /// # Errors
+    /// When intensities do not fill at least two planes of two angles or are negative, angles do not ascend or leave the sphere, or there
+    /// is no light.
     pub fn new(photometry: &Photometry) -> Result<Self, Error> {
         let p = photometry.expanded();
         let (columns, rows) = (p.horizontal_deg.len(), p.vertical_deg.len());
@@ -86,7 +90,7 @@ impl IntensitySampler {
         self.sums[self.sums.len() - 1]
     }
 
-    /// A direction; `u` uniform in `[0, 1)²`.
+    /// Draws a unit direction; `u` uniform in `[0, 1)²`.
     pub fn sample(&self, u: [f64; 2]) -> Vector {
         // Below the whole, so that rounding never ends in a cell without light.
         let wanted = (u[0] * self.flux()).min(self.flux().next_down());
@@ -117,7 +121,7 @@ impl IntensitySampler {
         self.direction(x, turned)
     }
 
-    /// Share of the flux per steradian in a direction; zero outside the measured angles.
+    /// Share of the flux per steradian in a direction of any length; zero outside the measured angles.
     pub fn density(&self, d: Vector) -> f64 {
         let [h, v] = self.kind.angles_deg(d).map(f64::to_radians);
         let quarter = std::f64::consts::FRAC_PI_2;
@@ -126,13 +130,15 @@ impl IntensitySampler {
             PhotometricType::A => (v + quarter, h),
             PhotometricType::B => (h + quarter, v),
         };
-        let (Some((i, s)), Some((t, r))) = (cell(&self.polar, x), cell(&self.turning, turned)) else {
+        let (Some((i, s)), Some((t, r))) = (find_interval(&self.polar, x), find_interval(&self.turning, turned))
+        else {
             return 0.0;
         };
         let along = |t: usize| self.node(t, i) + s * (self.node(t, i + 1) - self.node(t, i));
         (along(t) + r * (along(t + 1) - along(t))) / self.flux()
     }
 
+    /// Intensity at the `t`-th turning and the `i`-th polar angle.
     fn node(&self, t: usize, i: usize) -> f64 {
         self.intensity[t * self.polar.len() + i]
     }
@@ -142,7 +148,8 @@ impl IntensitySampler {
         [0.5 * (self.node(t, i) + self.node(t + 1, i)), 0.5 * (self.node(t, i + 1) + self.node(t + 1, i + 1))]
     }
 
-    /// Integral of an intensity, linear from `low` to `high` over the polar interval `i`, times the sine, up to `x`.
+    /// Integral, cd rad, of an intensity, linear from `low` to `high` over the polar interval `i`, times the sine, from its start up to
+    /// `x`, radians.
     fn ring(&self, i: usize, low: f64, high: f64, x: f64) -> f64 {
         let (a, b) = (self.polar[i], self.polar[i + 1]);
         let slope = (high - low) / (b - a);
@@ -151,7 +158,7 @@ impl IntensitySampler {
         low * fall + slope * (x.sin() - a.sin() - (x - a) * x.cos())
     }
 
-    /// The direction at an angle from the pole and one about it, by the type's own axes.
+    /// The unit direction at an angle from the pole and one about it, radians, by the type's own axes.
     fn direction(&self, x: f64, turned: f64) -> Vector {
         let (h, v) = match self.kind {
             PhotometricType::C => (turned.to_degrees(), x.to_degrees()),
@@ -162,14 +169,15 @@ impl IntensitySampler {
     }
 }
 
-/// The interval that holds `x` and the fraction in it; `None` outside.
-fn cell(nodes: &[f64], x: f64) -> Option<(usize, f64)> {
+/// The interval of ascending nodes, at least two, that holds `x` and the fraction in it; `None` outside by more than rounding.
+fn find_interval(nodes: &[f64], x: f64) -> Option<(usize, f64)> {
     let i = nodes.partition_point(|&a| a <= x).clamp(1, nodes.len() - 1) - 1;
     let s = (x - nodes[i]) / (nodes[i + 1] - nodes[i]);
     (-ROUNDING..=1.0 + ROUNDING).contains(&s).then_some((i, s))
 }
 
-/// The fraction of an interval below which lies the share `u` of a density that runs linearly from `y0` to `y1`.
+/// The fraction of an interval below which lies the share `u` of a density that runs linearly from `y0` to `y1`, both zero or more; `u`
+/// itself where both are zero.
 pub(super) fn linear_quantile(y0: f64, y1: f64, u: f64) -> f64 {
     // The root of the quadratic cumulative, in the form that does not cancel when both ends are equal.
     let root = (y0 * y0 + (y1 * y1 - y0 * y0) * u).max(0.0).sqrt();

@@ -78,7 +78,7 @@ impl Index {
         }
     }
 
-    /// Whether the index depends on the wavelength.
+    /// Whether the index depends on the wavelength, by its coefficients or points.
     pub fn is_dispersive(&self) -> bool {
         match self {
             Self::Constant(_) => false,
@@ -89,7 +89,10 @@ impl Index {
         }
     }
 
-    /// The same index, refused when it is not a number of at least 0.1 at any of the wavelengths.
+    /// Returns the same index.
+    ///
+    /// # Errors
+    /// When it is not between 0.1 and 10 at one of the vacuum wavelengths, NaN included; without wavelengths it is never refused.
     pub fn checked(self, wavelengths_nm: &[f64]) -> Result<Self, Error> {
         for &nm in wavelengths_nm {
             let n = self.value(nm);
@@ -145,12 +148,12 @@ pub enum Absorption {
 }
 
 impl Absorption {
-    /// A constant coefficient, per mm.
+    /// A constant Napierian coefficient, per mm; refused when it is negative or not finite.
     pub fn per_mm(coefficient: f64) -> Result<Self, Error> {
         Ok(Self::Constant(require("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
     }
 
-    /// Coefficients per mm at wavelengths in nm.
+    /// Napierian coefficients per mm at wavelengths in nm, which must ascend; refused when there are none or one is negative.
     pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
         let table = Table::new("absorption", points)?;
         let [low, _] = table.extremes();
@@ -158,7 +161,10 @@ impl Absorption {
         Ok(Self::Table(table))
     }
 
-    /// From internal transmittances over a sample of `thickness_mm`, as glass sheets give them.
+    /// Coefficients from internal transmittances at wavelengths in nm over a sample of `thickness_mm`, as glass sheets give them.
+    ///
+    /// # Errors
+    /// When the thickness is not positive, a transmittance not above 0 and at most 1, or wavelengths do not ascend.
     pub fn from_transmittance(
         thickness_mm: f64,
         points: impl IntoIterator<Item = (f64, f64)>,
@@ -172,7 +178,7 @@ impl Absorption {
         Self::table(rows.collect::<Result<Vec<_>, Error>>()?)
     }
 
-    /// The coefficient at a wavelength, per mm.
+    /// The Napierian coefficient at a vacuum wavelength, per mm; beyond a table that of its nearer end.
     pub fn coefficient(&self, wavelength_nm: f64) -> f64 {
         match self {
             Self::None => 0.0,
@@ -181,7 +187,7 @@ impl Absorption {
         }
     }
 
-    /// Share of power left after a way of `length` mm.
+    /// Share of power left after a way of `length` mm at a vacuum wavelength.
     pub fn transmittance(&self, length: f64, wavelength_nm: f64) -> f64 {
         match self {
             Self::None => 1.0,

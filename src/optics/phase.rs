@@ -26,26 +26,29 @@ pub struct BulkScatter {
 const ISOTROPIC: f64 = 1e-6;
 
 impl BulkScatter {
-    /// Refuses a negative coefficient and a `g` outside (−1, 1).
+    /// Scattering with this coefficient, events per mm, and mean cosine `g`.
+    ///
+    /// # Errors
+    /// When the coefficient is negative or `g` outside (−1, 1).
     pub fn new(coefficient: f64, g: f64) -> Result<Self, Error> {
         require("a scattering coefficient", coefficient, coefficient >= 0.0, "zero or more per mm")?;
         require("the mean cosine g", g, g.abs() < 1.0, "above -1 and below 1")?;
         Ok(Self { coefficient, g })
     }
 
-    /// Way to the next event, mm, exponentially distributed; infinite without scattering. `u` in `[0, 1)`.
+    /// Draws the way to the next event, mm, exponentially distributed; infinite without scattering. `u` uniform in `[0, 1)`.
     pub fn free_path(&self, u: f64) -> f64 {
         if self.coefficient > 0.0 { -(-u).ln_1p() / self.coefficient } else { f64::INFINITY }
     }
 
-    /// Share of directions per steradian at the cosine of the scattering angle.
+    /// Share of the scattered light per steradian at this cosine of the scattering angle; it integrates to 1.
     pub fn density(&self, cos: f64) -> f64 {
         let g = self.g;
         let d = 1.0 + g * g - 2.0 * g * cos;
         (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
     }
 
-    /// The direction after an event; `u` uniform in `[0, 1)²`.
+    /// Draws the unit direction after an event from the unit direction `d` before it; `u` uniform in `[0, 1)²`.
     pub fn sample(&self, d: Vector, u: [f64; 2]) -> Vector {
         let g = self.g;
         let cos = if g.abs() < ISOTROPIC {

@@ -32,17 +32,18 @@ pub struct Stokes {
     pub u: f64,
     /// Counter-clockwise circular, seen against the light, less clockwise.
     pub v: f64,
-    /// Unit vector across the direction.
+    /// Unit vector across the direction of the ray, to which `q` and `u` refer.
     pub axis: Vector,
 }
 
 impl Stokes {
-    /// Unpolarised light of some power along `d`.
+    /// Unpolarised light of some power along the unit direction `d`.
     pub fn unpolarised(power: f64, d: Vector) -> Self {
         Self { i: power, q: 0.0, u: 0.0, v: 0.0, axis: orthonormal_pair(d).0 }
     }
 
-    /// Light of some power along `d`, linearly polarised along the part of `field` across `d`; unpolarised when there is none.
+    /// Light of some power along the unit direction `d`, linearly polarised along the part of `field`, of any length, across `d`;
+    /// unpolarised when there is none.
     pub fn linear(power: f64, d: Vector, field: Vector) -> Self {
         match (field - d * field.dot(d)).try_normalize() {
             Some(axis) => Self { i: power, q: power, u: 0.0, v: 0.0, axis },
@@ -50,12 +51,12 @@ impl Stokes {
         }
     }
 
-    /// Share of the power that is polarised.
+    /// Share of the power that is polarised; NaN for light of no power.
     pub fn degree(&self) -> f64 {
         (self.q * self.q + self.u * self.u + self.v * self.v).sqrt() / self.i
     }
 
-    /// The same light along `d` with respect to another axis across `d`.
+    /// Describes the same light along `d` with respect to another unit vector across `d`.
     pub fn turned_to(&self, axis: Vector, d: Vector) -> Self {
         let (c, s) = (self.axis.dot(axis), d.cross(self.axis).dot(axis));
         // cos 2φ and sin 2φ, normalised so that a slightly skew axis creates no power.
@@ -64,7 +65,7 @@ impl Stokes {
         Self { q: c2 * self.q + s2 * self.u, u: c2 * self.u - s2 * self.q, axis, ..*self }
     }
 
-    /// The light after an interface: turned to the plane of incidence, then changed.
+    /// The light after an interface: turned to the plane of incidence, then changed; its axis is then that plane's normal.
     ///
     /// `d` is the direction of arrival, `n` the normal on either side. At normal incidence any plane will do.
     pub fn through(&self, interface: &Mueller, d: Vector, n: Vector) -> Self {
@@ -107,7 +108,8 @@ pub struct Mueller {
 }
 
 impl Mueller {
-    /// The matrix of complex amplitudes of s and p, its powers times `factor`.
+    /// The matrix of an interface with these complex amplitudes of s and p, in units of the field that arrives; powers are their squares
+    /// times `factor`.
     fn from_amplitudes(s: Complex, p: Complex, factor: f64) -> Self {
         let (ps, pp, cross) = (s.square(), p.square(), s.conjugate() * p);
         Self {
@@ -118,19 +120,20 @@ impl Mueller {
         }
     }
 
-    /// From the power shares of s and p alone, without a phase between them: a tabulated coating.
+    /// The matrix of the power shares of s and p alone, without a phase between them: a tabulated coating.
     pub fn without_phase(power: super::fresnel::Power) -> Self {
         Self::from_amplitudes(Complex::real(power.rs.sqrt()), Complex::real(power.rp.sqrt()), 1.0)
     }
 }
 
-/// Reflection at an interface of two transparent media, total reflection with its phases included; `eta = n1/n2`.
+/// The matrix of reflection at an interface of two transparent media, total reflection with its phases included; `cos_i = |d·n|`,
+/// `eta = n1/n2`.
 pub fn reflected(cos_i: f64, eta: f64) -> Mueller {
     let [s, p] = amplitudes(cos_i, eta);
     Mueller::from_amplitudes(s, p, 1.0)
 }
 
-/// Transmission through such an interface; zero at total reflection.
+/// The matrix of transmission of power through such an interface; zero at total reflection and at grazing incidence.
 pub fn transmitted(cos_i: f64, eta: f64) -> Mueller {
     let Some(cos_t) = cos_transmitted(cos_i, eta) else {
         return Mueller { a: 0.0, b: 0.0, c: 0.0, e: 0.0 };
@@ -142,7 +145,7 @@ pub fn transmitted(cos_i: f64, eta: f64) -> Mueller {
     Mueller::from_amplitudes(s, p, factor)
 }
 
-/// Reflection at a metal of index `n + i·k` seen from a medium of index `outside`.
+/// The matrix of reflection at a metal of index `n + i·k` seen from a medium of index `outside`; `cos_i = |d·n|`.
 pub fn metal(cos_i: f64, outside: f64, n: f64, k: f64) -> Mueller {
     let index = Complex { re: n / outside, im: k / outside };
     let sin2 = (1.0 - cos_i) * (1.0 + cos_i);
@@ -155,7 +158,7 @@ pub fn metal(cos_i: f64, outside: f64, n: f64, k: f64) -> Mueller {
     Mueller::from_amplitudes(s, p, 1.0)
 }
 
-/// Amplitudes of reflection of s and p.
+/// Amplitudes of reflection of s and p at an interface of two transparent media, of length 1 beyond the critical angle.
 fn amplitudes(cos_i: f64, eta: f64) -> [Complex; 2] {
     let cos_t = match cos_transmitted(cos_i, eta) {
         Some(c) => Complex::real(c),
@@ -185,6 +188,7 @@ impl Complex {
         Self { re: self.re, im: -self.im }
     }
 
+    /// The square of its length.
     fn square(self) -> f64 {
         self.re * self.re + self.im * self.im
     }

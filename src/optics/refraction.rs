@@ -27,7 +27,7 @@ pub fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
     Some(refract_with_cosine(d, n, eta)?.0)
 }
 
-/// The same with the cosine of the angle of refraction, which Fresnel's equations want too.
+/// As [`refract`], with the cosine of the angle of refraction, which Fresnel's equations want too.
 #[inline]
 pub fn refract_with_cosine(d: Vector, n: Vector, eta: f64) -> Option<(Vector, f64)> {
     let along = d.dot(n);
@@ -36,7 +36,7 @@ pub fn refract_with_cosine(d: Vector, n: Vector, eta: f64) -> Option<(Vector, f6
     Some((unit((d - n * along) * eta + n * cos_t.copysign(along)), cos_t))
 }
 
-/// Cosine of the angle of refraction, `None` at and beyond the critical angle.
+/// Cosine of the angle of refraction for `cos_i = |d·n|` and `eta = n1/n2`; `None` at and beyond the critical angle.
 #[inline]
 pub(super) fn cos_transmitted(cos_i: f64, eta: f64) -> Option<f64> {
     // (1 - cos)(1 + cos) keeps the sine exact near normal incidence, where 1 - cos² would cancel.
@@ -44,7 +44,7 @@ pub(super) fn cos_transmitted(cos_i: f64, eta: f64) -> Option<f64> {
     (sin2_t < 1.0).then(|| (1.0 - sin2_t).sqrt())
 }
 
-/// One Newton step of the normalisation: exact to the last bits for lengths within 1e-8 of 1.
+/// Brings a vector of nearly unit length to unit length by one Newton step: exact to the last bits for lengths within 1e-8 of 1.
 #[inline]
 fn unit(v: Vector) -> Vector {
     v * (1.5 - 0.5 * v.length_squared())

@@ -33,7 +33,7 @@ pub fn sin_cos_turns(turns: f64) -> (f64, f64) {
 const SINE: [f64; 8] = inverse_factorials(3);
 const COSINE: [f64; 8] = inverse_factorials(2);
 
-/// Coefficients of the series of the sine (from 3!) or cosine (from 2!), with their signs.
+/// Coefficients of the series of the sine (`first` 3, from 1/3!) or cosine (2, from 1/2!), with their signs.
 const fn inverse_factorials(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut factorial) = (0, if first == 3 { 6.0 } else { 2.0 });
@@ -46,7 +46,7 @@ const fn inverse_factorials(first: u32) -> [f64; 8] {
     terms
 }
 
-/// A uniform point of the unit disk; neighbouring pairs stay neighbours.
+/// Maps a pair in `[0, 1]²` to a uniform point of the unit disk; neighbouring pairs stay neighbours.
 pub fn disk([u, v]: [f64; 2]) -> Uv {
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     // The centre has no azimuth, and the formula below would divide by zero.
@@ -57,7 +57,7 @@ pub fn disk([u, v]: [f64; 2]) -> Uv {
     Uv::new(r * angle.cos(), r * angle.sin())
 }
 
-/// A uniform direction of the whole sphere.
+/// Maps a pair in `[0, 1)²` to a uniform unit direction of the whole sphere.
 pub fn sphere([u, v]: [f64; 2]) -> Vector {
     let z = 1.0 - 2.0 * u;
     let r = ((1.0 - z) * (1.0 + z)).sqrt();
@@ -65,14 +65,14 @@ pub fn sphere([u, v]: [f64; 2]) -> Vector {
     Vector::new(r * c, r * s, z)
 }
 
-/// A uniform direction of the cone of half-angle `acos(cos_max)` about the unit vector `axis`.
+/// Maps a pair in `[0, 1)²` to a uniform unit direction of the cone of half-angle `acos(cos_max)` about the unit vector `axis`.
 pub fn cone(axis: Vector, cos_max: f64, [u, v]: [f64; 2]) -> Vector {
     // 1 - cos is kept, so that narrow cones lose no digits.
     let one_minus = u * (1.0 - cos_max);
     direction_about(axis, 1.0 - one_minus, (one_minus * (2.0 - one_minus)).sqrt(), v)
 }
 
-/// A direction with density `cos θ/π` per steradian about `n`: Lambert's law.
+/// Maps a pair in `[0, 1)²` to a unit direction with density `cos θ/π` per steradian about the unit vector `n`: Lambert's law.
 pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
     let p = disk(u);
     let (a, b) = orthonormal_pair(n);
@@ -80,7 +80,8 @@ pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
     (a * p.x + b * p.y + n * z).normalize()
 }
 
-/// A direction with density `(m + 1)/2π · cosᵐ θ` per steradian about `axis`.
+/// Maps a pair in `[0, 1)²` to a unit direction with density `(m + 1)/2π · cosᵐ θ` per steradian about the unit vector `axis`; `exponent`
+/// is m, zero or more.
 pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
     // The inverse of the cumulative 1 − cosᵐ⁺¹; 1 − u is never zero, so that no direction grazes by the number
     // drawn.
@@ -88,7 +89,7 @@ pub fn cosine_power(axis: Vector, exponent: f64, [u, v]: [f64; 2]) -> Vector {
     direction_about(axis, cos, ((1.0 - cos) * (1.0 + cos)).sqrt(), v)
 }
 
-/// The direction at an angle from `axis`, at azimuth `2π·turn`.
+/// The unit direction at an angle of this cosine and sine from the unit vector `axis`, at azimuth `2π·turn`.
 pub(super) fn direction_about(axis: Vector, cos: f64, sin: f64, turn: f64) -> Vector {
     let (a, b) = orthonormal_pair(axis);
     let (s, c) = sin_cos_turns(turn);

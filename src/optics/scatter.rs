@@ -48,7 +48,10 @@ pub enum Lobe {
 }
 
 impl Scatter {
-    /// Refuses a share outside `[0, 1]` and a lobe without meaning.
+    /// Makes a scatter of `share` by `lobe`.
+    ///
+    /// # Errors
+    /// When the share is outside `[0, 1]`, a `sigma` is not positive or an exponent negative.
     pub fn new(share: f64, lobe: Lobe) -> Result<Self, Error> {
         require("the scattered share", share, (0.0..=1.0).contains(&share), "from 0 to 1")?;
         match lobe {
@@ -64,19 +67,19 @@ impl Scatter {
         self.share > 0.0 && !matches!(&self.lobe, Lobe::Abg(abg) if abg.coefficients()[0] == 0.0)
     }
 
-    /// A direction to leave in, `None` when this light stays specular. `u` uniform in `[0, 1)³`.
+    /// Draws a unit direction to leave in, on the side of `n`; `None` when this light stays specular. `u` uniform in `[0, 1)³`.
     pub fn sample(&self, specular: Vector, n: Vector, u: [f64; 3]) -> Option<Vector> {
         if u[0] < self.share { self.lobe.sample(specular, n, [u[1], u[2]]) } else { None }
     }
 
-    /// Share of the light per steradian around `out`, without the specular part.
+    /// Share of the light per steradian around `out`, a unit direction, without the specular part; 0 below the surface.
     pub fn density(&self, specular: Vector, n: Vector, out: Vector) -> f64 {
         self.share * self.lobe.density(specular, n, out)
     }
 }
 
 impl Lobe {
-    /// A direction on the side of `n`; `None` for the share that stays specular (ABg alone).
+    /// Draws a unit direction on the side of `n`; `None` for the share that stays specular (ABg alone). `u` uniform in `[0, 1)²`.
     ///
     /// What a lobe about the specular direction would send through the surface is mirrored in it, so that no power is lost
     /// at grazing incidence; [`Lobe::density`] accounts for it.
@@ -93,7 +96,8 @@ impl Lobe {
         }
     }
 
-    /// Probability per steradian of [`Lobe::sample`]; it integrates to 1, for ABg to the share it scatters.
+    /// Probability per steradian of [`Lobe::sample`] around `out`, a unit direction; it integrates to 1, for ABg to the share it scatters,
+    /// and is 0 below the surface.
     pub fn density(&self, specular: Vector, n: Vector, out: Vector) -> f64 {
         let cos = out.dot(n);
         if cos <= 0.0 {
@@ -120,7 +124,8 @@ fn share_below_pi(sigma: f64) -> f64 {
 /// Angle, radians, below which it stands for its sine: they differ by a sixth of its square, 2e-9 of the density.
 const SMALL_ANGLE: f64 = 1e-4;
 
-/// Density per steradian of the Gaussian laid out flat: the flat density times θ/sin θ.
+/// Density per steradian of the Gaussian of deviation `sigma`, radians, at the cosine of the angle from its axis: the flat density times
+/// θ/sin θ.
 fn gaussian(cos: f64, sigma: f64) -> f64 {
     let angle = cos.clamp(-1.0, 1.0).acos();
     let stretch = if angle < SMALL_ANGLE { 1.0 } else { angle / angle.sin().max(f64::MIN_POSITIVE) };
@@ -128,10 +133,12 @@ fn gaussian(cos: f64, sigma: f64) -> f64 {
     flat * stretch / share_below_pi(sigma)
 }
 
+/// `d` mirrored in the plane across the unit vector `n`.
 fn mirror_image(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
+/// `d`, mirrored in the surface if it points below it.
 fn fold_to_side(d: Vector, n: Vector) -> Vector {
     if d.dot(n) < 0.0 { mirror_image(d, n) } else { d }
 }

@@ -59,12 +59,12 @@ impl Default for WhiteLed {
 }
 
 impl Spectrum {
-    /// A single line.
+    /// A single line at a vacuum wavelength.
     pub fn line(wavelength_nm: f64) -> Self {
         Self::Lines(vec![[wavelength_nm, 1.0]])
     }
 
-    /// The only wavelength, if there is just one.
+    /// The wavelength, nm, of a spectrum of one line; `None` for every other.
     pub fn single_line(&self) -> Option<f64> {
         match self {
             Self::Lines(lines) => match lines[..] {
@@ -75,7 +75,10 @@ impl Spectrum {
         }
     }
 
-    /// The spectrum ready to draw wavelengths from.
+    /// Makes the spectrum ready to draw wavelengths from.
+    ///
+    /// # Errors
+    /// When a number is out of range or the spectrum carries no power, as a table of one point.
     pub fn sampler(&self) -> Result<Wavelengths, Error> {
         match self {
             Self::Lines(lines) => Wavelengths::lines(lines),
@@ -108,17 +111,17 @@ impl Spectrum {
     }
 }
 
-/// Steps of at most 1 nm, no more than 4000.
+/// Number of steps over a range of wavelengths: of at most 1 nm, but from 64 to 4000.
 fn steps(range_nm: f64) -> usize {
     (range_nm.ceil() as usize).clamp(64, 4000)
 }
 
-/// Spectral exitance by Planck's law, up to a factor; c₂ of the SI since 2019.
+/// Spectral exitance per wavelength at a wavelength by Planck's law, up to a factor; c₂ of the SI since 2019.
 fn planck(nm: f64, kelvin: f64) -> f64 {
     (nm * 1e-3).powi(-5) / (1.438_776_877e7 / (nm * kelvin)).exp_m1()
 }
 
-/// A peak of area 1 with a full width at half height.
+/// A Gaussian of area 1 about 0 with this full width at half height, at `x`.
 fn gaussian(x: f64, width: f64) -> f64 {
     // The full width at half height is √(8 ln 2) deviations.
     let sigma = width / (8.0 * 2f64.ln()).sqrt();
@@ -141,7 +144,8 @@ enum Kind {
 }
 
 impl Wavelengths {
-    /// The spectrum of lines, each a wavelength in nm and a relative power.
+    /// The spectrum of lines, each a wavelength in nm and a relative power; refused without power, or with a wavelength that is not
+    /// positive or a negative power.
     fn lines(lines: &[[f64; 2]]) -> Result<Self, Error> {
         let mut sum = 0.0;
         let mut sums = Vec::with_capacity(lines.len());
@@ -153,7 +157,8 @@ impl Wavelengths {
         Self::with_power(Kind::Lines(lines.iter().map(|l| l[0]).collect()), sums)
     }
 
-    /// The spectrum of a table of wavelength, nm, and relative power, linear between its points.
+    /// The spectrum of a table of wavelength, nm, and relative power, linear between its points; refused without power, as with one point,
+    /// or with a wavelength that is not positive or a negative power.
     fn continuous(table: Table) -> Result<Self, Error> {
         let points: Vec<[f64; 2]> = table.points().map(|(x, y)| [x, y]).collect();
         let [low, _] = table.extremes();
@@ -167,7 +172,7 @@ impl Wavelengths {
         Self::with_power(Kind::Continuous(points), sums)
     }
 
-    /// Refuses sums that end in no power.
+    /// Joins both; refuses sums that are none, or end in no power or not in a finite one.
     fn with_power(kind: Kind, sums: Vec<f64>) -> Result<Self, Error> {
         match sums.last() {
             Some(&total) if total > 0.0 && total.is_finite() => Ok(Self { kind, sums }),
@@ -175,11 +180,12 @@ impl Wavelengths {
         }
     }
 
+    /// Power of the whole, before normalisation.
     fn total(&self) -> f64 {
         self.sums[self.sums.len() - 1]
     }
 
-    /// A wavelength in nm, drawn in proportion to power; `u` in `[0, 1)`, monotonic in `u` where lines ascend.
+    /// Draws a wavelength in nm in proportion to power; `u` uniform in `[0, 1)`. It rises with `u`, for lines where these ascend.
     pub fn sample(&self, u: f64) -> f64 {
         // Below the whole, so that rounding never ends in a piece without power.
         let wanted = (u * self.total()).min(self.total().next_down());
@@ -195,7 +201,7 @@ impl Wavelengths {
         }
     }
 
-    /// Share of power per nm at a wavelength; zero for lines, whose density is not a function.
+    /// Share of power per nm at a wavelength; zero beyond the table, and for lines, whose density is not a function.
     pub fn density(&self, wavelength_nm: f64) -> f64 {
         match &self.kind {
             Kind::Lines(_) => 0.0,
@@ -211,7 +217,7 @@ impl Wavelengths {
         }
     }
 
-    /// First and last wavelength, nm.
+    /// Least and greatest wavelength of its lines or points, nm, also where these carry no power.
     pub fn range_nm(&self) -> [f64; 2] {
         match &self.kind {
             Kind::Lines(nm) => nm.iter().fold([f64::INFINITY, 0.0], |[a, b], &x| [a.min(x), b.max(x)]),
@@ -219,7 +225,7 @@ impl Wavelengths {
         }
     }
 
-    /// CIE XYZ of one watt, Y in lumens.
+    /// CIE XYZ of one watt of this light, Y in lumens; zero where the eye sees nothing of it.
     pub fn xyz(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
         let mut add = |nm: f64, weight: f64| {
@@ -252,6 +258,9 @@ impl Wavelengths {
 
     /// The same light by its lumens in place of its watts: what wavelengths are drawn from where power is counted in lumens. The product
     /// with V(λ) is taken every nanometre and at every point of the spectrum.
+    ///
+    /// # Errors
+    /// When the eye sees nothing of it.
     pub fn photometric(&self) -> Result<Self, Error> {
         match &self.kind {
             Kind::Lines(nm) => {

@@ -17,7 +17,10 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table of `what` from points `(x, y)`, x strictly increasing; at least one.
+    /// A table from points `(x, y)`; `what` it holds is for messages.
+    ///
+    /// # Errors
+    /// When there is no point, x does not increase strictly, or a number is not finite.
     pub fn new(what: &'static str, points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
         if x.is_empty() {
@@ -30,14 +33,15 @@ impl Table {
         Ok(Self { x, y })
     }
 
-    /// Samples of a smooth function at `intervals + 1` even steps; the caller vouches for finite values.
+    /// Samples a smooth function over `[a, b]` at `intervals + 1` even steps; the caller vouches for `a < b`, an interval and finite
+    /// values.
     pub(super) fn sampled([a, b]: [f64; 2], intervals: usize, f: impl Fn(f64) -> f64) -> Self {
         let x: Vec<f64> = (0..=intervals).map(|i| a + (b - a) * i as f64 / intervals as f64).collect();
         let y = x.iter().map(|&x| f(x)).collect();
         Self { x, y }
     }
 
-    /// The value at `x`.
+    /// The value at `x`, that of the nearer end beyond the points.
     pub fn value(&self, x: f64) -> f64 {
         let (i, s) = bracket(&self.x, x);
         if s == 0.0 { self.y[i] } else { self.y[i] + s * (self.y[i + 1] - self.y[i]) }
@@ -65,7 +69,7 @@ impl Table {
     }
 }
 
-/// Refuses what is not finite or does not increase, by its row.
+/// Refuses values that are not finite or do not increase strictly, by their row; there may be none.
 pub(super) fn check_increasing(what: &'static str, x: &[f64]) -> Result<(), Error> {
     for (i, &value) in x.iter().enumerate() {
         require(what, value, true, "a finite number")?;
@@ -76,7 +80,7 @@ pub(super) fn check_increasing(what: &'static str, x: &[f64]) -> Result<(), Erro
     Ok(())
 }
 
-/// Index and fraction of `x` among increasing values, clamped to the ends; a fraction of 0 needs no next value.
+/// Index and fraction in `[0, 1)` of `x` among increasing values, at least one, clamped to the ends; a fraction of 0 needs no next value.
 pub(super) fn bracket(values: &[f64], x: f64) -> (usize, f64) {
     let i = values.partition_point(|&v| v <= x);
     if i == 0 {

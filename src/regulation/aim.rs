@@ -38,15 +38,16 @@ const SCAN_H_DEG: f64 = 5.0;
 const DARK_SHARE: f64 = 0.01;
 
 impl Aim {
-    /// The beam as it was placed.
+    /// Turns nothing; `how` says why, for people.
     pub(super) fn unchanged(how: &str) -> Self {
         Self { h_deg: 0.0, v_deg: 0.0, gradient: None, how: how.to_owned() }
     }
 
-    /// Brings the cut-off of a passing beam to its line, then its elbow to line A.
+    /// Finds the aim that brings the cut-off of a passing beam to its line, then its elbow to line A. The lamp stays as placed where the
+    /// map does not hold the scan or has no cut-off on it, and sideways where it has no elbow.
     pub(super) fn by_cut_off(map: &IntensityMap, rule: CutOff) -> Self {
         // First up and down, then sideways: the scan for the elbow lies below the cut-off that was found.
-        let Some(edge) = steepest(map, |b| [rule.scan_h_deg, b], [-SCAN_V_DEG, SCAN_V_DEG], 1.0) else {
+        let Some(edge) = steepest_edge(map, |b| [rule.scan_h_deg, b], [-SCAN_V_DEG, SCAN_V_DEG], 1.0) else {
             return Self::unchanged("as placed: the far field does not hold the scan for the cut-off");
         };
         // What has no edge cannot be aimed by it; to turn the lamp by noise would be worse.
@@ -65,7 +66,7 @@ impl Aim {
         );
         // To the right of the elbow the light reaches higher: the scan goes from light to dark towards the left.
         let scan = |h: f64| [h, ELBOW_V_DEG + v_deg];
-        match steepest(map, scan, [-SCAN_H_DEG, SCAN_H_DEG], -1.0) {
+        match steepest_edge(map, scan, [-SCAN_H_DEG, SCAN_H_DEG], -1.0) {
             Some(elbow) if elbow.gradient >= LEAST_ELBOW_GRADIENT => {
                 let how =
                     format!("{vertical}; elbow found at {:.2}° and read as {}°", elbow.position, rule.elbow_h_deg);
@@ -78,21 +79,27 @@ impl Aim {
         }
     }
 
-    /// The same aim turned a little more, as a regulation allows where a row fails.
+    /// The same aim with every direction read `h_deg` farther right and `v_deg` farther up, as a regulation allows where a row fails.
     pub(super) fn realigned(&self, h_deg: f64, v_deg: f64) -> Self {
         let how = format!("{}; realigned by {h_deg}° and {v_deg}°", self.how);
         Self { h_deg: self.h_deg + h_deg, v_deg: self.v_deg + v_deg, gradient: self.gradient, how }
     }
 }
 
-/// The steepest place of a scan.
+/// The steepest place of a scan: its angle, degrees, and the gradient G there.
 struct Edge {
     position: f64,
     gradient: f64,
 }
 
-/// The steepest fall of log₁₀ E along a scan in the direction of `sign`; `None` where the map does not hold two steps of it.
-fn steepest(map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2], range: [f64; 2], sign: f64) -> Option<Edge> {
+/// Finds the steepest fall of log₁₀ E along a scan over `range`, degrees, towards larger angles for a `sign` of 1, smaller ones for −1.
+/// `direction` gives H and V of an angle. `None` where the map does not hold two steps of the scan.
+fn steepest_edge(
+    map: &IntensityMap,
+    direction: impl Fn(f64) -> [f64; 2],
+    range: [f64; 2],
+    sign: f64,
+) -> Option<Edge> {
     // Half an opening to each side of the scanned point, as fine as the map allows: a wider one would blunt the edge.
     let sensor = Sensor { half_deg: 0.5 * map.coarsest_deg().max(STEP_DEG), round: false };
     let steps = ((range[1] - range[0]) / STEP_DEG).round() as usize;

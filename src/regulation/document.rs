@@ -4,7 +4,8 @@ use super::verdict::Assessment;
 use serde_json::{Value, json};
 
 impl Assessment {
-    /// The assessment as JSON: regulation, aim, photometer, and every row with both errors and its verdict.
+    /// The assessment as JSON: regulation, aim, photometer, and every row with both errors and its verdict; angles in degrees, intensities
+    /// in cd, null for what is `None`.
     pub fn document(&self) -> Value {
         let rows = self.rows.iter().map(|r| {
             let settles = r.settles.map(|s| json!({"rays": s.rays, "tolerance_mm": s.tolerance_mm}));

@@ -15,7 +15,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Of requirements that must all be met.
+    /// The verdict of requirements that must all be met: fail if one fails, else unsure if one is; pass without any.
     pub(super) fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
         // One failure decides; doubt counts only where nothing fails.
         verdicts.into_iter().fold(Self::Pass, |sum, v| match (sum, v) {
@@ -63,14 +63,14 @@ pub(super) struct Judgement {
 pub(super) struct Decisive {
     pub(super) reading: Reading,
     pub(super) direction: [f64; 2],
-    /// How far the reading is on the good side of its limit.
+    /// How far the reading is on the good side of its limit, cd.
     margin: f64,
     /// Standard errors that the margin must have.
     sigmas: f64,
 }
 
 impl Decisive {
-    /// Rays and tolerance with which the same margin would be enough.
+    /// Rays and tolerance with which the same margin would be enough, from the rays that were `traced`; `None` where that is beyond reason.
     pub(super) fn settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
@@ -90,7 +90,8 @@ impl Decisive {
 }
 
 impl Judgement {
-    /// Reads all comparisons of a requirement; passes or fails only beyond the errors of the readings.
+    /// Reads all comparisons of a requirement and judges it: pass or fail only beyond the errors of the readings, else unsure, also where
+    /// there are no comparisons.
     pub(super) fn of_requirement(photometer: &Photometer, requirement: &Requirement) -> Self {
         // Of many comparisons one may be lucky: what one alone may decide is asked for at a confidence divided by their number. For a
         // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
@@ -103,7 +104,7 @@ impl Judgement {
         let mut failing = 0;
         let mut decisive: Option<Decisive> = None;
         for comparison in &requirement.comparisons {
-            let (reading, margin) = read(photometer, comparison);
+            let (reading, margin) = read_margin(photometer, comparison);
             let error = reading.error();
             // A limit that is just reached is met, where there is no error.
             passing += usize::from(margin >= to_pass * error && margin >= 0.0);
@@ -128,8 +129,8 @@ impl Judgement {
     }
 }
 
-/// The reading of a comparison, and by how much it keeps its limit; negative where it does not.
-fn read(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
+/// The reading of a comparison, and by how much it keeps its limit, cd; negative where it does not.
+fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
     let reading = photometer.map.read(&comparison.measurement);
     let margin =
         if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };

@@ -43,12 +43,13 @@ impl Reading {
 /// What a photometer in one or several directions adds up: cells with weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measurement {
+    /// By index of the cell.
     // Ordered: sums over cells come in one order, and two runs agree to the last bit.
     weights: BTreeMap<usize, f64>,
 }
 
 impl Measurement {
-    /// This measurement plus `factor` times another; cells that both hold are then counted with their correlation.
+    /// Adds `factor` times another measurement of the same map; cells that both hold are then counted with their correlation.
     pub(super) fn plus(mut self, factor: f64, other: &Self) -> Self {
         for (cell, weight) in &other.weights {
             *self.weights.entry(*cell).or_insert(0.0) += factor * weight;
@@ -69,7 +70,8 @@ pub(super) struct Sensor {
 const DISC_BANDS: usize = 32;
 
 impl IntensityMap {
-    /// From the edges of the cells (rising, degrees) and one value with two errors a cell, V slow.
+    /// Makes a map of the edges of its cells (rising, degrees) and of each cell candela, its statistical and its geometric standard error,
+    /// V slow.
     ///
     /// # Errors
     /// When the edges do not rise, the number of cells is another, or a value is no number.
@@ -89,7 +91,8 @@ impl IntensityMap {
         Ok(Self { h_edges, v_edges, cells })
     }
 
-    /// The same map whose cells hold at least the error of one ray of this flux, lm: a cell that no ray met may hold as much.
+    /// Raises the statistical error of each cell to at least what one ray of this flux, lm, makes there: a cell that no ray met may hold as
+    /// much.
     pub fn with_ray_flux(mut self, flux: f64) -> Self {
         let width: Vec<f64> = self.h_edges.windows(2).map(|e| (e[1] - e[0]).to_radians()).collect();
         let height = |row: usize| self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin();
@@ -107,7 +110,7 @@ impl IntensityMap {
         sides(&self.h_edges).max(sides(&self.v_edges))
     }
 
-    /// Azimuths and elevations from and to, degrees.
+    /// Outer edges of the map, degrees: azimuths from and to, then elevations.
     pub(super) fn extent(&self) -> [[f64; 2]; 2] {
         [&self.h_edges, &self.v_edges].map(|e| [e[0], e[e.len() - 1]])
     }
@@ -120,7 +123,8 @@ impl IntensityMap {
         Self { h_edges: self.h_edges.iter().rev().map(|h| -h).collect(), v_edges: self.v_edges.clone(), cells }
     }
 
-    /// A photometer aimed at `(h, v)`: the mean over its opening, weighed by solid angle. `None` where the opening leaves the map.
+    /// What a photometer aimed at `(h, v)`, degrees of the map, adds up: the mean over its opening, weighed by solid angle. `None` where
+    /// the opening leaves the map.
     pub(super) fn measure(&self, sensor: Sensor, h: f64, v: f64) -> Option<Measurement> {
         let bands = if sensor.round { DISC_BANDS } else { 1 };
         let mut measurement = Measurement::default();
@@ -151,8 +155,8 @@ impl IntensityMap {
         Some(measurement)
     }
 
-    /// The value of a measurement. Statistical errors of cells are independent; those of the geometry push neighbours the same way, so
-    /// that they add without sign.
+    /// Reads a measurement, made on a map of these cells: its value and errors, cd. Statistical errors of cells are independent; those of
+    /// the geometry push neighbours the same way, so that they add without sign.
     pub(super) fn read(&self, measurement: &Measurement) -> Reading {
         let mut value = 0.0;
         let mut variance = 0.0;
@@ -167,7 +171,8 @@ impl IntensityMap {
     }
 }
 
-/// Cells that an interval touches with the measure of the common part; `None` where the interval leaves the edges.
+/// Lists the cells that an interval touches, each with the common part by `measure`, an integral up to an angle in degrees; `None` where
+/// the interval leaves the edges.
 fn overlaps(edges: &[f64], from: f64, to: f64, measure: impl Fn(f64) -> f64) -> Option<Vec<(usize, f64)>> {
     /// Degrees by which an interval may end outside, for edges are rounded in their files.
     const EDGE_ROUNDING: f64 = 1e-9;

@@ -11,7 +11,8 @@ const GEOMETRIC: &str = "geometric";
 const SAME_CENTRE_DEG: f64 = 1e-7;
 
 impl IntensityMap {
-    /// From the CSV file of a far-field receiver: columns `H_deg`, `V_deg`, an intensity in cd and its errors, a cell a line.
+    /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
+    /// if there is one, its geometric error, else 0; a cell a line, in any order.
     ///
     /// `ray_flux` is the flux of one ray in lm, where it is known: a cell that no ray met may hold as much, so that no error is smaller.
     ///
@@ -61,7 +62,7 @@ impl IntensityMap {
     }
 }
 
-/// The edges of cells of equal width, from their centres.
+/// The edges of cells of equal width from their rising centres, degrees; an error for fewer than two or unequal steps.
 fn edges_between(centres: &[f64]) -> Result<Vec<f64>, String> {
     let [first, .., last] = centres else { return Err("a far field of one cell is no map".into()) };
     // The mean step: single differences carry the rounding of two decimals.

@@ -8,6 +8,7 @@ use super::table::{Row, Rules};
 #[derive(Clone, Debug)]
 pub(super) struct Comparison {
     pub(super) measurement: Measurement,
+    /// Candela.
     pub(super) limit: f64,
     /// Whether the limit is a least value.
     pub(super) at_least: bool,
@@ -30,6 +31,7 @@ pub(super) struct Photometer<'a> {
     pub(super) map: &'a IntensityMap,
     pub(super) aim: &'a Aim,
     pub(super) sensor: Sensor,
+    /// Angle within which a point may be met; 0 where it must be met in its very direction.
     pub(super) tolerance_deg: f64,
 }
 
@@ -40,12 +42,13 @@ const MOST_DEG: f64 = 88.0;
 const TOLERANCE_RING: usize = 8;
 
 impl Photometer<'_> {
+    /// What the photometer adds up in a direction of the table, degrees; `None` where its opening leaves the far field.
     fn measure(&self, direction: [f64; 2]) -> Option<Measurement> {
         self.map.measure(self.sensor, direction[0] + self.aim.h_deg, direction[1] + self.aim.v_deg)
     }
 
-    /// The rows' own directions: of a point with the directions around it where the regulation lets it be met nearby.
-    fn near(&self, direction: [f64; 2]) -> Vec<[f64; 2]> {
+    /// A point's own direction, then those around it within the tolerance where the regulation lets it be met nearby; degrees of the table.
+    fn near_directions(&self, direction: [f64; 2]) -> Vec<[f64; 2]> {
         let mut directions = vec![direction];
         if self.tolerance_deg > 0.0 {
             // Two rings: a smooth beam is met between them if at all.
@@ -60,8 +63,8 @@ impl Photometer<'_> {
         directions
     }
 
-    /// Directions along a line, one opening beside the other.
-    fn line(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
+    /// Directions along a line, both ends included, at most half an opening apart; degrees of the table.
+    fn line_directions(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
         // Half an opening apart, so that nothing bright lies between two of them unseen.
         let steps = (length / self.sensor.half_deg).ceil().max(1.0);
@@ -69,8 +72,9 @@ impl Photometer<'_> {
         (0..=steps as usize).map(|k| at(k as f64)).collect()
     }
 
-    /// Directions in a polygon, rim included, one opening beside the other, that the far field holds; and whether it holds all of it.
-    fn zone(&self, polygon: &[[f64; 2]]) -> (Vec<[f64; 2]>, bool) {
+    /// Directions in a polygon, rim included, half an opening apart, that the far field holds, degrees of the table; and whether it holds
+    /// all of the polygon.
+    fn zone_directions(&self, polygon: &[[f64; 2]]) -> (Vec<[f64; 2]>, bool) {
         let step = self.sensor.half_deg;
         let shift = [self.aim.h_deg, self.aim.v_deg];
         let mut bounds = [[0.0; 2]; 2];
@@ -103,42 +107,47 @@ impl Photometer<'_> {
         (directions, complete)
     }
 
-    /// Directions over all of the far field.
-    fn everywhere(&self) -> Vec<[f64; 2]> {
+    /// Directions over all of the far field, half an opening apart, degrees of the table.
+    fn all_directions(&self) -> Vec<[f64; 2]> {
         let [h, v] = self.map.extent();
         let (h, v) = (h.map(|x| x - self.aim.h_deg), v.map(|x| x - self.aim.v_deg));
-        self.zone(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
+        self.zone_directions(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
     }
 
-    /// The direction in which the photometer reads most.
-    fn brightest(&self) -> Option<[f64; 2]> {
+    /// The direction of the table in which the photometer reads most; `None` where the far field holds no opening.
+    fn brightest_direction(&self) -> Option<[f64; 2]> {
         let read = |d: &[f64; 2]| self.measure(*d).map_or(0.0, |m| self.map.read(&m).value);
-        self.everywhere().into_iter().max_by(|a, b| read(a).total_cmp(&read(b)))
+        self.all_directions().into_iter().max_by(|a, b| read(a).total_cmp(&read(b)))
     }
 }
 
-/// What a row asks, as requirements that must all be met; empty where it asks nothing that can be measured.
+/// Turns what a row asks into requirements that must all be met; empty where it asks nothing that can be measured. `rows` are those of its
+/// function, to which a relative row refers.
 pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
     let point = row.h.zip(row.v).map(|(h, v)| [h, v]);
     let ends = (row.h0.zip(row.v0)).zip(row.h1.zip(row.v1));
     let lenient = rules.tolerance_deg > 0.0;
     match (row.kind.as_str(), point) {
-        ("point" | "distribution_point", Some(p)) => bounds(photometer, row, &photometer.near(p), [lenient; 2]),
-        ("line", _) => {
-            let directions = ends.map(|((h0, v0), (h1, v1))| (photometer.line([h0, v0], [h1, v1]), true));
-            bounds_over(photometer, row, directions)
+        ("point" | "distribution_point", Some(p)) => {
+            limits_at(photometer, row, &photometer.near_directions(p), [lenient; 2])
         }
-        ("zone", _) => bounds_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone(p))),
+        ("line", _) => {
+            let directions =
+                ends.map(|((h0, v0), (h1, v1))| (photometer.line_directions([h0, v0], [h1, v1]), true));
+            limits_over(photometer, row, directions)
+        }
+        ("zone", _) => limits_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone_directions(p))),
         // Some direction must reach the least maximum, and none may pass the greatest.
-        ("imax", _) => bounds(photometer, row, &photometer.everywhere(), [true, false]),
-        ("sum" | "group_sum", _) => sum(photometer, row).into_iter().collect(),
-        ("relative", _) => relative(photometer, row, rows).into_iter().collect(),
+        ("imax", _) => limits_at(photometer, row, &photometer.all_directions(), [true, false]),
+        ("sum" | "group_sum", _) => sum_requirement(photometer, row).into_iter().collect(),
+        ("relative", _) => relative_requirement(photometer, row, rows).into_iter().collect(),
         _ => Vec::new(),
     }
 }
 
-/// A row's least and greatest value at directions; `any` says for each whether one direction is enough.
-fn bounds(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [bool; 2]) -> Vec<Requirement> {
+/// A requirement each for a row's least and its greatest value at directions, none for a limit that it has not; `any` says for each
+/// whether one direction is enough.
+fn limits_at(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [bool; 2]) -> Vec<Requirement> {
     let limits = [(row.min, true, any[0]), (row.max, false, any[1])];
     let requirement = |(limit, at_least, any): (Option<f64>, bool, bool)| {
         let limit = limit?;
@@ -162,17 +171,17 @@ fn bounds(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [boo
     limits.into_iter().filter_map(requirement).collect()
 }
 
-/// A row's least and greatest value over all directions of a line or zone, given with whether the far field holds them all. A row
-/// that does not say where counts as not seen: nothing that was read can meet it.
-fn bounds_over(photometer: &Photometer, row: &Row, place: Option<(Vec<[f64; 2]>, bool)>) -> Vec<Requirement> {
+/// The requirements of a row's least and greatest value over all directions of a line or zone, given with whether the far field holds them
+/// all. A row that does not say where counts as not seen: nothing that was read can meet it.
+fn limits_over(photometer: &Photometer, row: &Row, place: Option<(Vec<[f64; 2]>, bool)>) -> Vec<Requirement> {
     let (directions, complete) = place.unwrap_or((Vec::new(), false));
-    let mut requirements = bounds(photometer, row, &directions, [false; 2]);
+    let mut requirements = limits_at(photometer, row, &directions, [false; 2]);
     requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
     requirements
 }
 
-/// The sum of readings at several points.
-fn sum(photometer: &Photometer, row: &Row) -> Option<Requirement> {
+/// The requirement of a sum of readings at several points; `None` where the row has no points or no minimum.
+fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
     let points = row.points.as_deref()?;
     let limit = row.min?;
     let mut total = Measurement::default();
@@ -187,17 +196,18 @@ fn sum(photometer: &Photometer, row: &Row) -> Option<Requirement> {
     Some(Requirement { comparisons: vec![comparison], any: false, unseen: 0 })
 }
 
-/// A reading compared with a multiple of another: the difference is one measurement, so that what both have in common cancels.
-fn relative(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
+/// The requirement of a reading compared with a multiple of another: the difference is one measurement, so that what both have in common
+/// cancels. `None` where the row names no factor, place or reference that is found.
+fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
     // Without a factor the row is text.
     let factor = row.factor?;
     let reference = match row.of.as_deref()? {
-        "imax" => photometer.brightest()?,
+        "imax" => photometer.brightest_direction()?,
         name => rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?,
     };
     let (directions, complete) = match (&row.polygon, row.h.zip(row.v)) {
-        (Some(polygon), _) => photometer.zone(polygon),
-        (None, Some((h, v))) => (photometer.near([h, v]), true),
+        (Some(polygon), _) => photometer.zone_directions(polygon),
+        (None, Some((h, v))) => (photometer.near_directions([h, v]), true),
         (None, None) => return None,
     };
     let reference = photometer.measure(reference);
@@ -219,7 +229,7 @@ fn relative(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirem
     Some(requirement)
 }
 
-/// Whether a point lies in a polygon or on its rim.
+/// Whether a point lies in a polygon, by even and odd crossings, or within 1e-4° of its rim.
 fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
     /// Degrees by which a direction may lie outside: a thousandth of the finest sensor.
     const RIM_DEG: f64 = 1e-4;

@@ -56,8 +56,8 @@ pub struct Function {
 }
 
 impl Function {
-    /// Where the points of a group are judged by their sum: the share of its own minimum that each must reach all the same. `None`
-    /// where each point stands for itself.
+    /// The share of its own minimum that each point of a group must reach although the group is judged by its sum, 0 for none; `None` where
+    /// each point stands for itself.
     pub(super) fn point_floor(&self) -> Option<f64> {
         // FMVSS 108 has two ways: each point at least 60 % of its figure, or any share of it when its group's sum
         // is met.
@@ -139,12 +139,12 @@ const SIGNAL_SENSOR_DEG: f64 = 10.0 / 60.0 / 2.0;
 const SENSOR_65MM_DEG: f64 = 0.0745;
 
 impl Regulation {
-    /// All functions there are tables of.
+    /// All functions there are tables of, file by file.
     pub fn all() -> Vec<Self> {
-        FILES.iter().flat_map(|(prefix, text)| read(prefix, text)).collect()
+        FILES.iter().flat_map(|(prefix, text)| read_table(prefix, text)).collect()
     }
 
-    /// A function by its name; upper and lower case, spaces and dashes do not matter, and a name that fits the beginning of others
+    /// Finds a function by its name; upper and lower case, spaces and dashes do not matter, and a name that fits the beginning of others
     /// means the first of them (`FMVSS 108 stop` is one lighted section).
     ///
     /// # Errors
@@ -170,7 +170,7 @@ impl Regulation {
         Err(format!("no regulation is called '{id}'; there are {} … (`assess --list` shows all)", near.join(", ")))
     }
 
-    /// How far the rows were compared with a second source.
+    /// Says, in a sentence for people, how far the rows were compared with a second source.
     pub fn checked(&self) -> String {
         let two = self.function.rows.iter().filter(|r| r.evidence == "two").count();
         format!(
@@ -193,8 +193,11 @@ struct File {
     functions: Vec<Function>,
 }
 
-/// The regulations of a table, one a lamp function.
-fn read(prefix: &str, text: &str) -> Vec<Regulation> {
+/// Reads the regulations of a table of the program, one a lamp function, each called by `prefix` and the function's name.
+///
+/// # Panics
+/// When the text is no table.
+fn read_table(prefix: &str, text: &str) -> Vec<Regulation> {
     // The tables are part of the program: a test reads each of them.
     let file: File = serde_json::from_str(text).unwrap_or_else(|e| panic!("table of {prefix}: {e}"));
     let number = |v: &Value, path: &str| v.pointer(path).and_then(Value::as_f64);

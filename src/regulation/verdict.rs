@@ -32,7 +32,7 @@ pub struct Assessment {
     pub sensor_deg: f64,
     /// Row by row.
     pub rows: Vec<RowVerdict>,
-    /// All of them.
+    /// Of all rows together; pass where no row has a verdict.
     pub verdict: Verdict,
 }
 
@@ -60,7 +60,8 @@ const ROUNDED_EDGES: f64 = 1e-9;
 /// Half the widest opening that UN R148 allows, degrees.
 const WIDEST_SIGNAL_SENSOR_DEG: f64 = 0.5;
 
-/// Measures a far field by a regulation.
+/// Measures a far field by a regulation: aims it, judges every row, and where one fails looks for a realignment that the regulation allows
+/// and with which none does.
 ///
 /// # Errors
 /// When the cells of the map are coarser than the regulation's photometer; the message says how fine they must be.
@@ -101,7 +102,8 @@ pub fn assess(
     Ok(realign(map, regulation, assumptions, sensor, &first).unwrap_or(first))
 }
 
-/// Another aim within what the regulation allows, with which no row fails; the nearest one.
+/// The assessment with another aim, the nearest to that of `first` within what the regulation allows, with which no row fails; `None`
+/// where there is none.
 fn realign(
     map: &IntensityMap,
     regulation: &Regulation,
@@ -135,7 +137,7 @@ fn realign(
     })
 }
 
-/// Judges every row for the map as it is aimed.
+/// Judges every row for the map as it is aimed, without realigning; `map` is mirrored already for left-hand traffic.
 fn assess_aimed(
     map: &IntensityMap,
     regulation: &Regulation,
@@ -167,7 +169,8 @@ fn assess_aimed(
     Assessment { regulation: regulation.clone(), sensor_deg: 2.0 * sensor.half_deg, aim, rows, verdict }
 }
 
-/// Judges a row by its worst requirement; rows with conditions on use stay without a verdict.
+/// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
+/// verdict.
 fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Assumptions, row: &Row) -> RowVerdict {
     let mut verdict = RowVerdict { row: row.clone(), reading: None, direction: None, verdict: None, settles: None };
     // Conditions are about the lamp's use, which the simulation does not know.

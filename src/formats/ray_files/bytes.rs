@@ -21,6 +21,7 @@ pub(super) struct ByteReader {
 }
 
 impl ByteReader {
+    /// Opens an ordinary file and stands at its first byte.
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let unreadable = |e| Error::new(path, ErrorKind::Read(e));
         let file = open_file(path).map_err(unreadable)?;
@@ -28,6 +29,7 @@ impl ByteReader {
         Ok(Self { path: path.to_owned(), file: BufReader::with_capacity(BUFFER, file), position: 0, length })
     }
 
+    /// Bytes read so far.
     pub(super) fn position(&self) -> u64 {
         self.position
     }
@@ -42,7 +44,7 @@ impl ByteReader {
         Error::new(&self.path, ErrorKind::Malformed(message.into()))
     }
 
-    /// Fills `bytes` from the file; `field` is what they are, for the message when it ends too soon.
+    /// Reads as many bytes as `bytes` has; `field` is what they are, for the message when the file ends too soon.
     pub(super) fn fill(&mut self, bytes: &mut [u8], field: &str) -> Result<(), Error> {
         // Kept for the message: it must name where the field began.
         let start = self.position;
@@ -57,14 +59,15 @@ impl ByteReader {
         Ok(())
     }
 
-    pub(super) fn array<const N: usize>(&mut self, field: &str) -> Result<[u8; N], Error> {
+    /// Reads `N` bytes.
+    pub(super) fn read_array<const N: usize>(&mut self, field: &str) -> Result<[u8; N], Error> {
         let mut bytes = [0; N];
         self.fill(&mut bytes, field)?;
         Ok(bytes)
     }
 
-    /// So many bytes, which the file is known to hold.
-    pub(super) fn block(&mut self, bytes: u64, field: &str) -> Result<Vec<u8>, Error> {
+    /// Reads a number of bytes that the file itself states; an error, before memory is taken, where fewer are left.
+    pub(super) fn read_block(&mut self, bytes: u64, field: &str) -> Result<Vec<u8>, Error> {
         // Before memory is taken: a damaged length may ask for all there is.
         if bytes > self.length.saturating_sub(self.position) {
             return Err(self.malformed(format!(
@@ -77,32 +80,33 @@ impl ByteReader {
         Ok(block)
     }
 
-    pub(super) fn i32(&mut self, field: &str) -> Result<i32, Error> {
-        Ok(i32::from_le_bytes(self.array(field)?))
+    pub(super) fn read_i32(&mut self, field: &str) -> Result<i32, Error> {
+        Ok(i32::from_le_bytes(self.read_array(field)?))
     }
 
-    pub(super) fn u32(&mut self, field: &str) -> Result<u32, Error> {
-        Ok(u32::from_le_bytes(self.array(field)?))
+    pub(super) fn read_u32(&mut self, field: &str) -> Result<u32, Error> {
+        Ok(u32::from_le_bytes(self.read_array(field)?))
     }
 
-    pub(super) fn u64(&mut self, field: &str) -> Result<u64, Error> {
-        Ok(u64::from_le_bytes(self.array(field)?))
+    pub(super) fn read_u64(&mut self, field: &str) -> Result<u64, Error> {
+        Ok(u64::from_le_bytes(self.read_array(field)?))
     }
 
-    pub(super) fn f32(&mut self, field: &str) -> Result<f32, Error> {
-        Ok(f32::from_le_bytes(self.array(field)?))
+    pub(super) fn read_f32(&mut self, field: &str) -> Result<f32, Error> {
+        Ok(f32::from_le_bytes(self.read_array(field)?))
     }
 
-    /// One row of numbers; a file that ends within it is an error.
-    pub(super) fn row(&mut self, row: &mut [f32], field: &str) -> Result<(), Error> {
+    /// Reads as many numbers as `row` has; a file that ends within them is an error.
+    pub(super) fn read_row(&mut self, row: &mut [f32], field: &str) -> Result<(), Error> {
         for number in row {
-            *number = self.f32(field)?;
+            *number = self.read_f32(field)?;
         }
         Ok(())
     }
 
-    /// Rows of f32, each made a ray by `ray`, which may refuse it; the message then names the ray, counted from 1.
-    pub(super) fn rays(
+    /// Reads `count` rows of f32, each made a ray by `ray`, which gets its index from 0 and may refuse it; the error then names the ray,
+    /// counted from 1.
+    pub(super) fn read_rays(
         &mut self,
         count: u64,
         columns: usize,
@@ -111,14 +115,15 @@ impl ByteReader {
         let mut rays = Vec::with_capacity(count.min(RESERVED_RAYS) as usize);
         let mut row = vec![0.0; columns];
         for index in 0..count {
-            self.row(&mut row, "the rays")?;
+            self.read_row(&mut row, "the rays")?;
             rays.push(ray(index, &row).map_err(|m| self.malformed(format!("ray {}: {m}", index + 1)))?);
         }
         Ok(rays)
     }
 }
 
-/// A ray from the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm.
+/// Makes a ray of the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm; an error as
+/// [`LightRay::from_numbers`].
 pub(super) fn light_ray(row: &[f32], scale: f64, wavelength_nm: Option<f64>) -> Result<LightRay, String> {
     let mut numbers = [0.0; 8];
     for (number, value) in numbers.iter_mut().zip(&row[..7]) {

@@ -15,31 +15,31 @@ const POLARISED_VERSION: u32 = 3;
 /// What stands behind the last ray.
 const END: &[u8; 7] = b"LTRFEND";
 
-/// Reads the rays of a binary ray data file.
+/// Reads the rays of a binary ray data file; an error for far-field, tristimulus and polarised data.
 pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     let mut file = ByteReader::open(path)?;
-    file.array::<4>("the signature")?;
-    let major = file.u32("the major version")?;
-    file.u32("the minor version")?;
+    file.read_array::<4>("the signature")?;
+    let major = file.read_u32("the major version")?;
+    file.read_u32("the minor version")?;
     if !(2..=POLARISED_VERSION).contains(&major) {
         return Err(file.malformed(format!("version {major} of LightTools' ray files; 2 and 3 are known")));
     }
-    let flux = match file.u32("the type of data")? {
+    let flux = match file.read_u32("the type of data")? {
         0 => Flux::Radiant,
         1 => Flux::Luminous,
         other => return Err(file.malformed(format!("type of data {other} at byte 12; 0 (W) and 1 (lm) are known"))),
     };
-    if file.u32("the far-field mark")? != 0 {
+    if file.read_u32("the far-field mark")? != 0 {
         return Err(file.malformed("its rays have directions only (far-field data); positions are needed"));
     }
-    let columns = match file.u32("the colour information")? {
+    let columns = match file.read_u32("the colour information")? {
         0 => 7,
         2 => 8,
         1 => return Err(file.malformed("tristimulus values instead of wavelengths; write it with wavelengths")),
         other => return Err(file.malformed(format!("colour information {other} at byte 20; 0 and 2 are known"))),
     };
     let mut notes = Vec::new();
-    let unit = file.u32("the unit of length")?;
+    let unit = file.read_u32("the unit of length")?;
     let scale = match UNITS_MM.get(unit as usize) {
         Some(Some(scale)) => *scale,
         Some(None) => {
@@ -49,13 +49,13 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
         None => return Err(file.malformed(format!("unit of length {unit} at byte 24; 0 to 7 are known"))),
     };
     let mut origin = [0.0; 3];
-    file.row(&mut origin, "the origin")?;
+    file.read_row(&mut origin, "the origin")?;
     // Whether rays are listed about it or from it, the format does not say.
     if origin != [0.0; 3] {
         notes.push(format!("the origin of the data, {origin:?}, is not applied: rays stand as they are listed"));
     }
-    let stated = file.f32("the flux")?;
-    if major == POLARISED_VERSION && file.u32("the polarisation mark")? != 0 {
+    let stated = file.read_f32("the flux")?;
+    if major == POLARISED_VERSION && file.read_u32("the polarisation mark")? != 0 {
         return Err(file.malformed("polarised rays (Stokes vectors) are not read; write it without polarisation"));
     }
 
@@ -67,9 +67,9 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
         return Err(file.malformed(message));
     }
     let rays =
-        file.rays(bytes / row, columns, |_, row| light_ray(row, scale, row.get(7).map(|w| f64::from(*w))))?;
+        file.read_rays(bytes / row, columns, |_, row| light_ray(row, scale, row.get(7).map(|w| f64::from(*w))))?;
     // A file cut between two rows would else pass.
-    if file.array::<7>("the end mark")? != *END {
+    if file.read_array::<7>("the end mark")? != *END {
         return Err(file.malformed("LTRFEND is missing behind the rays; it was cut short"));
     }
     let mut set = RaySet { rays, flux: Some(flux), spectrum: None, notes };

@@ -4,7 +4,8 @@
 //! that the caller counts in where the file holds both. Where the header's total disagrees with the sum of the rays, as it does in files
 //! whose rays carry relative weights, the rays are scaled to the header's total and a note says so.
 //!
-//! Guarantee: a TM-25 file that is read and written again has the same bytes, unknown header values included.
+//! Guarantee: a TM-25 file that is read and written again has the same bytes, unknown header values included, but for what a note names
+//! and what stands behind the end of a text.
 //! Known weakness: Stokes columns and tristimulus columns are kept by [`Tm25`] but not traced.
 
 mod bytes;
@@ -53,7 +54,8 @@ pub struct RaySet {
 const TOTAL_ROUNDING: f64 = 1e-4;
 
 impl RaySet {
-    /// Scales the rays to the total flux that a header states; `None` where it states none.
+    /// Scales the rays to the total flux that a header states, and adds a note, where they differ by more than rounding; does nothing where
+    /// it states none, no positive one, or the rays are dark.
     fn scale_to(&mut self, stated: Option<f64>) {
         let sum: f64 = self.rays.iter().map(|r| r.power).sum();
         let Some(stated) = stated.filter(|s| *s > 0.0) else { return };

@@ -16,7 +16,8 @@ pub struct Tm25 {
 }
 
 impl Tm25 {
-    /// A file of traced rays, with wavelengths when every ray has one and the flux is radiant.
+    /// Makes a file of traced rays whose powers are `flux`, rounded to f32, with wavelengths when every ray has one and the flux is
+    /// radiant.
     pub fn from_rays(rays: &[LightRay], flux: Flux) -> Self {
         // The standard allows a wavelength per ray with the radiant flux alone.
         let spectral = flux == Flux::Radiant && !rays.is_empty() && rays.iter().all(|r| r.wavelength_nm.is_some());
@@ -50,11 +51,11 @@ pub fn read_tm25(path: &Path) -> Result<Tm25, Error> {
     let Tm25Reader { mut file, header, places, .. } = Tm25Reader::open(path)?;
     // The header was checked against the length of the file, so that this is no more than the file itself.
     let mut rows = vec![0.0; header.rays as usize * places.count];
-    file.row(&mut rows, "the rays")?;
+    file.read_row(&mut rows, "the rays")?;
     Ok(Tm25 { header, rows })
 }
 
-/// Writes a TM-25 file.
+/// Writes a TM-25 file; that rows and header agree is up to the caller.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -83,7 +84,7 @@ pub struct Tm25Reader {
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 impl Tm25Reader {
-    /// Reads the header.
+    /// Opens a file and reads its header.
     ///
     /// # Errors
     /// When the file cannot be read or its header is not of the standard's form.
@@ -95,7 +96,7 @@ impl Tm25Reader {
         Ok(Self { file, header, notes, places })
     }
 
-    /// The rays, their powers in the preferred flux where the file has both.
+    /// Reads the rays, their powers in the preferred flux where the file has both, and scales them to the header's total.
     ///
     /// A file with a spectral table per ray gives each ray one wavelength of its table, spread so that the rays of a table together
     /// have its spectrum.
@@ -117,7 +118,7 @@ impl Tm25Reader {
 
         let places = self.places;
         let spectral = self.header.spectral;
-        let rays = self.file.rays(self.header.rays, places.count, |_, row| {
+        let rays = self.file.read_rays(self.header.rays, places.count, |_, row| {
             let wavelength = match spectral {
                 SpectralData::None | SpectralData::Table => None,
                 SpectralData::Single => single,
@@ -164,7 +165,7 @@ struct Spectrum {
 }
 
 impl Spectrum {
-    /// `None` for an empty table.
+    /// Sorts and integrates a table; `None` for an empty one.
     fn new(table: &[[f32; 2]]) -> Option<Self> {
         let mut pairs: Vec<[f64; 2]> = table.iter().map(|pair| pair.map(f64::from)).collect();
         // Sorted: nothing in the standard promises that the pairs rise.
@@ -179,7 +180,7 @@ impl Spectrum {
         (!pairs.is_empty()).then_some(Self { pairs, sums, total })
     }
 
-    /// The wavelength below which this share of the power lies, nm; a table of no power gives its first wavelength.
+    /// The wavelength below which `share`, in `[0, 1)`, of the power lies, nm; a table of no power gives its least wavelength.
     fn wavelength(&self, share: f64) -> f64 {
         let wanted = share * self.total;
         // The first node beyond the wanted power: it is reached in the interval before.
@@ -263,7 +264,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.tm25ray");
         for (flux, spectral) in [(Flux::Radiant, true), (Flux::Radiant, false), (Flux::Luminous, true)] {
-            let rays = crate::formats::rays::tests::some(50, spectral);
+            let rays = crate::formats::rays::tests::some_rays(50, spectral);
             write_tm25(&path, &Tm25::from_rays(&rays, flux)).unwrap();
             let set = read_ray_set(&path, flux).unwrap();
             assert_eq!(set.flux, Some(flux));

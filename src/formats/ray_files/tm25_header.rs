@@ -62,11 +62,13 @@ pub(super) struct ColumnPlaces {
     pub(super) wavelength: Option<usize>,
     pub(super) luminous: Option<usize>,
     pub(super) spectrum_index: Option<usize>,
+    /// Columns of a row, position and direction counted.
     pub(super) count: usize,
 }
 
 impl Tm25Columns {
-    /// The places of the columns, in the order of the file, with so many additional ones at the end.
+    /// Where the columns stand in a row, in the order of the file, with so many additional ones at the end; `None` for those that are
+    /// absent.
     pub(super) fn places(self, additional: usize) -> ColumnPlaces {
         let mut count = 6;
         let mut place = |present: bool, width: usize| {
@@ -139,6 +141,7 @@ impl Tm25Header {
         }
     }
 
+    /// Where the columns of a row stand, additional ones counted.
     pub(super) fn places(&self) -> ColumnPlaces {
         self.columns.places(self.column_names.len())
     }
@@ -146,21 +149,21 @@ impl Tm25Header {
     /// Reads the header and leaves the reader at the first ray; what was supposed goes to `notes`.
     pub(super) fn read(file: &mut ByteReader, notes: &mut Vec<String>) -> Result<Self, Error> {
         // The mark was read by whoever chose this reader; a caller who did not ask is told here.
-        if &file.array::<4>("the mark TM25")? != b"TM25" {
+        if &file.read_array::<4>("the mark TM25")? != b"TM25" {
             return Err(file.malformed("not a TM-25 file"));
         }
-        let version = file.i32("the version")?;
+        let version = file.read_i32("the version")?;
         if version != VERSION {
             let message = format!("version {version} of TM-25; the layout of {VERSION} alone is public and read");
             return Err(file.malformed(message));
         }
-        let creation = file.i32("the method of creation")?;
-        let luminous_flux = file.f32("the luminous flux")?;
-        let radiant_flux = file.f32("the radiant flux")?;
-        let rays = file.u64("the number of rays")?;
-        let date = file.array("the date")?;
-        let start_position = file.i32("the start position")?;
-        let spectral = match file.i32("the spectral identifier")? {
+        let creation = file.read_i32("the method of creation")?;
+        let luminous_flux = file.read_f32("the luminous flux")?;
+        let radiant_flux = file.read_f32("the radiant flux")?;
+        let rays = file.read_u64("the number of rays")?;
+        let date = file.read_array("the date")?;
+        let start_position = file.read_i32("the start position")?;
+        let spectral = match file.read_i32("the spectral identifier")? {
             0 => SpectralData::None,
             1 => SpectralData::Single,
             2 => SpectralData::PerRay,
@@ -171,20 +174,20 @@ impl Tm25Header {
             }
         };
         let mut wavelengths = [0.0; 3];
-        file.row(&mut wavelengths, "the wavelengths")?;
+        file.read_row(&mut wavelengths, "the wavelengths")?;
         let tables = bounded(file, "spectral tables")?;
         let additional = bounded(file, "additional columns")?;
-        let text_bytes = file.i32("the size of the additional text")?;
+        let text_bytes = file.read_i32("the size of the additional text")?;
         let text_bytes = u64::try_from(text_bytes)
             .map_err(|_| file.malformed(format!("an additional text of {text_bytes} bytes at byte 84")))?;
         // Room for later versions: what stands there is not understood, and would be lost in silence.
-        if file.array::<168>("the reserved bytes")?.iter().any(|b| *b != 0) {
+        if file.read_array::<168>("the reserved bytes")?.iter().any(|b| *b != 0) {
             notes.push("reserved bytes of the header are not zero; they are not kept".to_owned());
         }
         let columns = read_columns(file)?;
         let mut descriptions: [String; DESCRIPTIONS] = Default::default();
         for text in &mut descriptions {
-            *text = utf32(&file.block(4 * DESCRIPTION_CHARACTERS as u64, "the description")?);
+            *text = utf32(&file.read_block(4 * DESCRIPTION_CHARACTERS as u64, "the description")?);
         }
         let spectra = read_spectra(file, tables)?;
         let mut header = Self {
@@ -206,11 +209,12 @@ impl Tm25Header {
         // Before the names: their place follows from the columns, which must make sense by then.
         header.check().map_err(|m| file.malformed(m))?;
         header.read_names(file, additional, notes)?;
-        header.text = utf32(&file.block(text_bytes, "the additional text")?);
+        header.text = utf32(&file.read_block(text_bytes, "the additional text")?);
         Ok(header)
     }
 
-    /// Names of the additional columns. Some vendors leave them out: then the rays start 512 bytes a column earlier.
+    /// Reads the names of the additional columns. Some vendors leave them out: then the rays start 512 bytes a column earlier, the names
+    /// are empty and a note says so. An error where the rays do not end with the file.
     fn read_names(
         &mut self,
         file: &mut ByteReader,
@@ -243,12 +247,12 @@ impl Tm25Header {
             )));
         }
         for _ in 0..additional {
-            self.column_names.push(utf32(&file.block(COLUMN_NAME_BYTES, "the name of a column")?));
+            self.column_names.push(utf32(&file.read_block(COLUMN_NAME_BYTES, "the name of a column")?));
         }
         Ok(())
     }
 
-    /// What the standard demands of identifiers and columns.
+    /// Checks what the standard demands of identifiers, columns and tables; the error is for people.
     fn check(&self) -> Result<(), String> {
         let c = self.columns;
         let per_ray = matches!(self.spectral, SpectralData::PerRay | SpectralData::TablePerRay);
@@ -279,7 +283,7 @@ impl Tm25Header {
         Ok(())
     }
 
-    /// The bytes of the header, up to the first ray.
+    /// Encodes the header up to the first ray; texts longer than their fields are cut, reserved bytes are zero.
     pub(super) fn bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
         out.extend(b"TM25");
@@ -320,21 +324,21 @@ impl Tm25Header {
     }
 }
 
-/// A count of the header that memory depends on.
+/// Reads a count of the header that memory depends on, of what `of` says; an error beyond [`MAX_ADDITIONAL`].
 fn bounded(file: &mut ByteReader, of: &str) -> Result<usize, Error> {
     let byte = file.position();
-    let count = file.i32(of)?;
+    let count = file.read_i32(of)?;
     if !(0..=MAX_ADDITIONAL).contains(&count) {
         return Err(file.malformed(format!("{count} {of} at byte {byte}; 0 to {MAX_ADDITIONAL} are read")));
     }
     Ok(count as usize)
 }
 
-/// Reads which columns the rays have; position and direction they must have.
+/// Reads the eight flags of the columns that the rays have; an error for a flag beside 0 and 1, or without position and direction.
 fn read_columns(file: &mut ByteReader) -> Result<Tm25Columns, Error> {
     let mut flags = [false; 8];
     for (number, flag) in flags.iter_mut().enumerate() {
-        *flag = match file.i32("the flags of the columns")? {
+        *flag = match file.read_i32("the flags of the columns")? {
             0 => false,
             1 => true,
             other => {
@@ -349,31 +353,31 @@ fn read_columns(file: &mut ByteReader) -> Result<Tm25Columns, Error> {
     Ok(Tm25Columns { radiant, wavelength, luminous, stokes, tristimulus, spectrum_index })
 }
 
-/// Reads the tables of wavelength and weight, and the padding behind them.
+/// Reads so many tables of wavelength, nm, and weight, and the padding behind them; an error where one is longer than the file.
 fn read_spectra(file: &mut ByteReader, tables: usize) -> Result<Vec<Vec<[f32; 2]>>, Error> {
     let start = file.position();
     let mut spectra = Vec::with_capacity(tables);
     for _ in 0..tables {
-        let pairs = file.i32("the length of a spectral table")?;
+        let pairs = file.read_i32("the length of a spectral table")?;
         let pairs =
             u64::try_from(pairs).map_err(|_| file.malformed(format!("a spectral table of {pairs} pairs")))?;
-        let block = file.block(8 * pairs, "a spectral table")?;
+        let block = file.read_block(8 * pairs, "a spectral table")?;
         let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
         spectra.push(block.chunks_exact(8).map(|pair| [number(&pair[..4]), number(&pair[4..])]).collect());
     }
     // The padding counts from where the tables begin.
     let padding = (file.position() - start).next_multiple_of(PADDING) - (file.position() - start);
-    file.block(padding, "the padding of the spectral tables")?;
+    file.read_block(padding, "the padding of the spectral tables")?;
     Ok(spectra)
 }
 
-/// UTF-32 text up to the first NUL; what is no character becomes U+FFFD.
+/// Decodes little-endian UTF-32 up to the first NUL; what is no character becomes U+FFFD.
 fn utf32(bytes: &[u8]) -> String {
     let codes = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     codes.take_while(|c| *c != 0).map(|c| char::from_u32(c).unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
 }
 
-/// A text in so many bytes, cut or padded with NUL.
+/// Adds a text in UTF-32 to `out` in exactly so many bytes, cut or padded with NUL.
 fn push_utf32(out: &mut Vec<u8>, text: &str, bytes: usize) {
     let end = out.len() + bytes;
     out.extend(text.chars().take(bytes / 4).flat_map(|c| u32::from(c).to_le_bytes()));

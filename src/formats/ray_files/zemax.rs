@@ -18,19 +18,19 @@ const MICROMETRE: f64 = 1000.0;
 /// the number of rays, the unit, the ray format and the flux type.
 pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     let mut file = ByteReader::open(path)?;
-    file.i32("the identifier")?;
-    let count = file.u32("the number of rays")?;
-    file.array::<100>("the description")?;
+    file.read_i32("the identifier")?;
+    let count = file.read_u32("the number of rays")?;
+    file.read_array::<100>("the description")?;
     // Read over: of the two fluxes that of the ray set is what its rays add up to.
-    file.f32("the flux of the source")?;
-    let stated = file.f32("the flux of the ray set")?;
-    let composite = file.f32("the wavelength")?;
-    file.array::<16>("the angular range")?;
-    let unit = file.u32("the unit of length")?;
-    file.array::<52>("the placement")?;
-    let format = file.i32("the ray format")?;
-    let flux = file.i32("the flux type")?;
-    file.array::<8>("the reserved numbers")?;
+    file.read_f32("the flux of the source")?;
+    let stated = file.read_f32("the flux of the ray set")?;
+    let composite = file.read_f32("the wavelength")?;
+    file.read_array::<16>("the angular range")?;
+    let unit = file.read_u32("the unit of length")?;
+    file.read_array::<52>("the placement")?;
+    let format = file.read_i32("the ray format")?;
+    let flux = file.read_i32("the flux type")?;
+    file.read_array::<8>("the reserved numbers")?;
 
     let scale = UNITS_MM.get(unit as usize).copied();
     let scale = scale.ok_or_else(|| {
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     };
     // Without a wavelength per ray, the header may give one for all; 0 stands for a composite.
     let common = (composite > 0.0).then(|| f64::from(composite) * MICROMETRE);
-    let rays = file.rays(u64::from(count), columns, |_, row| {
+    let rays = file.read_rays(u64::from(count), columns, |_, row| {
         // Each ray's own wavelength goes before that of the header.
         let own = row.get(7).map(|w| f64::from(*w) * MICROMETRE);
         light_ray(row, scale, own.or(common))

@@ -15,6 +15,7 @@ use crate::math::{Uv, Vector};
 pub(super) struct Candidate {
     /// Local parameters of the leaf.
     pub(super) local: [f64; 2],
+    /// mm along the ray.
     pub(super) t: f64,
     pub(super) certainty: Certainty,
     /// Surface parameters, where the surface as given settled it.
@@ -22,7 +23,8 @@ pub(super) struct Candidate {
 }
 
 impl Exact {
-    /// Takes a root when it lies in range, inside the trims, and is not the point that the ray leaves.
+    /// Keeps a root on the leaf `index` in `query` when it lies in range, inside the trims, and is not the point that the ray leaves. One
+    /// that a trim in its band turns away is remembered as rejected.
     pub(super) fn offer(&self, query: &mut Query, index: u32, candidate: Candidate) {
         let Candidate { local, t, certainty, settled } = candidate;
         if !query.is_in_range(t) {
@@ -50,7 +52,8 @@ impl Exact {
         query.accept(Root { t, leaf: index, local, certainty, near_trim, settled });
     }
 
-    /// Whether a root lies inside the trims, and whether a trim is within the band.
+    /// Whether a root, in parameters of the leaf, lies inside the trims, and whether it is flagged as near one. Within the band of a shared
+    /// edge the side on which the ray passes that edge decides.
     fn trim_side(&self, query: &Query, leaf: &Leaf, local: [f64; 2]) -> (bool, bool) {
         let face = &self.geometry.faces[leaf.face as usize];
         let trim = &self.geometry.trims[face.trim as usize];

@@ -12,9 +12,9 @@ use crate::math::{Ray, Uv, Vector};
 /// The first hit with everything that is known about it; also a miss has a certainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The first hit.
+    /// The first hit; `None` for a miss.
     pub hit: Option<Hit>,
-    /// Of the hit or of the miss.
+    /// Of the hit or of the miss: a miss is `Certified` or `Uncertified`.
     pub certainty: Certainty,
     /// Whether a trim lies within the band of the hit, or of a nearer root that the trim turned away.
     pub near_trim: bool,
@@ -48,7 +48,8 @@ const UNBIASED: f64 = 2e-15;
 const CORRECTIONS: usize = 4;
 
 impl Exact {
-    /// The first hit, with its certificate, also for a miss.
+    /// Finds the first hit with `t` in the range of the ray, in the model's coordinates, and proves it or the miss. A ray that is not
+    /// finite or has no direction misses, uncertified. The point that the ray leaves does not count.
     pub fn first(&self, ray: &Ray, cost: &mut Cost) -> Answer {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget);
@@ -56,12 +57,13 @@ impl Exact {
         self.answer(&query, cost)
     }
 
-    /// Every crossing in order of t, each once. A crossing found from both sides of a patch border counts once.
+    /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
         self.passage(ray, cost).crossings
     }
 
-    /// Every crossing in order of t, and where trims were near.
+    /// Finds every crossing in the range of the ray, in order of t, and where trims were near. Crossings from where on the budget ended or
+    /// a place stayed undecided are [`Certainty::Uncertified`], and others may be missing there: of an empty list that cannot be seen.
     pub fn passage(&self, ray: &Ray, cost: &mut Cost) -> Passage {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget.saturating_mul(BUDGET_OF_ALL));
@@ -93,7 +95,7 @@ impl Exact {
         Passage { crossings: hits, near_trims }
     }
 
-    /// Takes up a ray.
+    /// Takes up a ray with this budget of clipping steps; one that is not finite or has no direction will miss, undecided.
     #[inline(always)]
     pub(super) fn restart(&self, query: &mut Query, ray: &Ray, budget: u32) {
         query.restart(ray, &self.geometry, &self.tree, budget);
@@ -104,7 +106,7 @@ impl Exact {
         }
     }
 
-    /// What a search has found.
+    /// Turns what a search for the first has found into an answer, and adds its work to `cost`.
     #[inline(always)]
     pub(super) fn answer(&self, query: &Query, cost: &mut Cost) -> Answer {
         cost.rays += 1;
@@ -125,7 +127,7 @@ impl Exact {
         Answer { hit, certainty, near_trim }
     }
 
-    /// Names a root, after the steps of Newton's method that the search left to do.
+    /// Turns a root into a hit: refines a certified one by Newton's method, and finds parameters, normal, face and patch.
     #[inline(always)]
     fn hit(&self, query: &Query, root: &Root) -> Hit {
         let (leaf, label) = (&self.linearizations[root.leaf as usize], &self.labels[root.leaf as usize]);
@@ -167,8 +169,8 @@ impl Exact {
         Hit { t, normal, geometric_normal: normal, face, primitive, triangle: None, uv, certainty }
     }
 
-    /// The unit normal along `Su × Sv` where `f64` leaves too little of it: of the surface as given, and its limit at singular
-    /// points of that.
+    /// The unit normal along `Su × Sv` on a leaf where `f64` leaves too little of it: of the surface as given, and its limit at singular
+    /// points of that. `uv` and `local` are the same place, on the surface and in the leaf.
     #[cold]
     fn delicate_normal(&self, index: u32, uv: Uv, local: [f64; 2]) -> Vector {
         let leaf = &self.leaves[index as usize];
@@ -182,7 +184,7 @@ impl Exact {
     }
 }
 
-/// Whether a crossing is one of those before it: the same face at the same place with the same side towards the ray.
+/// Whether a crossing repeats one of `hits`, in order of t: the same face at the same place with the same side towards the ray.
 fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> bool {
     let close = SAME_CROSSING + SAME_CROSSING_FAR * hit.t.abs();
     // At a pole clipping ends on boxes TANGENT wide across the ray, as often as patches meet there: along the ray they differ by

@@ -91,14 +91,14 @@ impl Kernel for LeafClipping<'_> {
     }
 }
 
-/// Looks for every root of the query on a leaf by clipping.
+/// Looks for every root of the query on a leaf by clipping, and offers them; what its budget leaves undecided is noted in `query`.
 #[cold]
 pub(super) fn clip(exact: &Exact, query: &mut Query, leaf: u32) {
     simd::dispatch(LeafClipping { exact, query, leaf });
 }
 
 impl Exact {
-    /// Looks for every root of the query on a leaf.
+    /// Looks for every root of the query on a leaf: in `f64`, and where that cannot tell once more in 32 digits.
     #[inline(always)]
     fn clip_leaf(&self, query: &mut Query, index: u32) {
         query.clips += 1;
@@ -137,7 +137,7 @@ impl Exact {
         self.clip_seen(query, &Clipping { index, leaf, seen, departure, at_pole });
     }
 
-    /// Looks for every root in what is seen of a leaf; whether its precision was enough.
+    /// Looks for every root in what is seen of a leaf. Returns `false` where `f64` cannot tell: what it offered must then be found again.
     #[inline(always)]
     fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> bool {
         let leaf = clipping.leaf;
@@ -179,7 +179,7 @@ impl Exact {
         true
     }
 
-    /// One step: drops a box, takes its root, or puts what is left of it on the stack; false where `f64` cannot tell.
+    /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; `false` where `f64` cannot tell.
     #[inline(always)]
     fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: Node, stack: &mut Vec<Node>) -> bool {
         let (degree, seen) = (clipping.leaf.degree, &clipping.seen);
@@ -229,7 +229,7 @@ impl Exact {
         true
     }
 
-    /// Takes the root of a box with one at most, when Newton's method finds it there; whether it did.
+    /// Offers or settles the root of a box with one at most, unless the ray leaves it; `false` when Newton's method finds none in the box.
     #[inline(always)]
     fn take_single_root(
         &self,
@@ -283,7 +283,7 @@ impl Exact {
         true
     }
 
-    /// Takes the roots of a box where the ray touches a surface that bends, none or both; whether it could tell.
+    /// Offers the roots of a box where the ray touches a surface that bends, none or both; `false` where it cannot tell.
     #[cold]
     fn take_tangency(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
         // The square around the box, and somewhat more, is what is looked at.
@@ -303,7 +303,7 @@ impl Exact {
         true
     }
 
-    /// Reports a box that touches the ray within rounding, unless it is the point that the ray leaves; false where 32 digits may tell more.
+    /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; `false` where 32 digits may tell more.
     #[inline(always)]
     fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
         let s = net::evaluate_inlined(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
@@ -324,7 +324,7 @@ impl Exact {
         true
     }
 
-    /// Tangent where the surface is regular and the ray grazes it; uncertified at singular points.
+    /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
     fn contact(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
         let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
         let (_, du, dv) = project(&jet);
@@ -341,7 +341,7 @@ fn size(rect: &[[f64; 2]; 2]) -> [f64; 2] {
     rect.map(|[lo, hi]| hi - lo)
 }
 
-/// The part of a node that the hull leaves.
+/// The part of a node over `keep`, a rectangle in shares of its sides; `near` is its least t.
 #[inline(always)]
 fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
     let Node { mut net, mut rect, .. } = node;
@@ -358,7 +358,7 @@ fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
     Node { net, rect, near }
 }
 
-/// Puts the halves of a node on the stack, across its longer side, the nearer one on top.
+/// Halves a node across the side along which it is longer, or moves across the ray alone, and puts the nearer half on top of the stack.
 #[inline(always)]
 fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     // The first derivative is as long as its middle and its radius allow: a side is at most that.

@@ -48,7 +48,7 @@ pub(super) struct Preconditioner {
     pub(super) slack: [f64; 2],
 }
 
-/// Range of t over a net; everything when a weight is not positive.
+/// Range of t, mm, over a net in a ray's frame; everything when a weight is not positive.
 #[inline(always)]
 pub(super) fn range_along(net: &[V4]) -> (f64, f64) {
     let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -62,7 +62,7 @@ pub(super) fn range_along(net: &[V4]) -> (f64, f64) {
     (lo, hi)
 }
 
-/// What a net's hull says of the ray; `None` when it misses it.
+/// What the hull of a net in a ray's frame says of the ray; `None` when it misses it by more than `margin`, in homogeneous units.
 #[inline(always)]
 pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
     let (mut lo, mut hi, mut least_weight) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], f64::INFINITY);
@@ -83,7 +83,8 @@ pub(super) fn hull(net: &[V4], margin: [f64; 2]) -> Option<Hull> {
     Some(Hull { near, far, across: largest / least_weight.max(f64::MIN_POSITIVE) })
 }
 
-/// A net in the ray's frame (across, across, along, weight), and the largest coordinates across.
+/// Turns control points about a leaf's centre into a net in the ray's frame (across, across, along, weight), and returns the largest
+/// coordinates across too. `oc` is the ray's origin less that centre.
 #[inline(always)]
 pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net, [f64; 2]) {
     // The origin is taken off in homogeneous form, A − o·W, which stays linear in the control points: no division,
@@ -109,8 +110,8 @@ pub(super) fn halving_rounding(leaf: &Leaf) -> f64 {
     (SHIFT_ROUNDING + 2.0 * (f64::from(leaf.degree[0]) + f64::from(leaf.degree[1]))) * ROUND
 }
 
-/// Two directions across a ray: one along the longer tangent as it is seen, the other across it. That coordinate is small all over a leaf
-/// that the ray runs along, and what is small is rounded by little.
+/// Two unit vectors across a ray: one along the longer tangent of the leaf's middle as it is seen, the other across it. That coordinate is
+/// small all over a leaf that the ray runs along, and what is small is rounded by little.
 pub(super) fn tangent_frame(seen: &SeenLeaf, degree: [u8; 2], direction: Vector) -> [Vector; 2] {
     let slopes = net::slopes(&seen.net, degree);
     let [[a, b], [c, d]] = [[slopes.u[0], slopes.u[1]], [slopes.v[0], slopes.v[1]]];
@@ -119,7 +120,7 @@ pub(super) fn tangent_frame(seen: &SeenLeaf, degree: [u8; 2], direction: Vector)
     [along, direction.cross(along)]
 }
 
-/// The inverse of the middle Jacobian; `None` where its rounding is not bounded.
+/// Inverts the middle Jacobian; `None` where its determinant is zero. A nearly singular one has a deviation that counts its rounding.
 #[inline(always)]
 pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Option<Preconditioner> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
@@ -135,12 +136,14 @@ pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Opt
     Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING + blur, slack })
 }
 
-/// Ranges of u and v that can hold a root: where `u = u − g(u, v)` for the preconditioned net g.
+/// Ranges of u and v, as shares of the box, that can hold a root: where `u = u − g(u, v)` for the preconditioned net g. They may reach
+/// beyond the box or miss it; rounding is not counted.
 #[inline(always)]
 pub(super) fn linear_hull(net: &[V4], degree: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
     by_degree!(degree, linear_hull_of_degree(net, y))
 }
 
+/// As [`linear_hull`] of a net of degrees `p` and `q`.
 #[inline(always)]
 fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [[f64; 2]; 2] {
     let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
@@ -159,7 +162,8 @@ fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [
     range
 }
 
-/// The root near `start`, as a share of the box; `None` when it is not found near the box.
+/// Finds the root of a net in the ray's frame by Newton's method from `start`, both in shares of the box; `None` when it does not converge
+/// or leaves the box by half of it.
 #[inline(always)]
 pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
     let mut last = f64::INFINITY;

@@ -11,7 +11,7 @@ pub(super) struct DoubleDouble {
     low: f64,
 }
 
-/// The sum of two numbers, and what it rounds away.
+/// The sum of two numbers without any rounding: the rounded one, and what it rounds away.
 #[inline(always)]
 fn two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;
@@ -19,7 +19,7 @@ fn two_sum(a: f64, b: f64) -> DoubleDouble {
     DoubleDouble { high, low: (a - (high - of_b)) + (b - of_b) }
 }
 
-/// As [`two_sum`] for `|a| ≥ |b|`.
+/// As [`two_sum`], right only for `|a| ≥ |b|`.
 #[inline(always)]
 fn quick_two_sum(a: f64, b: f64) -> DoubleDouble {
     let high = a + b;

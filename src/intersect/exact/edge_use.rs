@@ -19,13 +19,14 @@ pub(super) struct EdgeUse {
     pub(super) gap: f64,
     /// Whether the loop runs against the edge.
     pub(super) reversed: bool,
+    /// Indices of the uses that follow and go before it in its loop.
     next: u32,
     previous: u32,
     /// The other use of the same seam.
     twin: Option<u32>,
 }
 
-/// How far the faces that share each of a part's edges lie off it.
+/// How far the faces that share each of a part's edges lie off it at most, by edge, in the units of the part; 0 for unused edges.
 pub(super) fn edge_gaps(part: &Part) -> Vec<f64> {
     let mut gaps = vec![0f64; part.edges.len()];
     for face in part.shells.iter().flat_map(|s| &s.faces) {
@@ -38,8 +39,8 @@ pub(super) fn edge_gaps(part: &Part) -> Vec<f64> {
     gaps
 }
 
-/// All uses of a face in the order of its loops; `closed` says in which parameters its surface closes on itself, `gaps` how far
-/// faces lie off the part's edges.
+/// Lists all uses of a face in the order of its loops, seams paired; `closed` says in which parameters its surface closes on itself,
+/// `gaps` how far faces lie off the part's edges.
 pub(super) fn edge_uses(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<EdgeUse> {
     let mut by_edge: FxHashMap<EdgeId, Vec<u32>> = FxHashMap::default();
     for (k, u) in face.loops.iter().flat_map(|l| &l.uses).enumerate() {
@@ -72,7 +73,7 @@ pub(super) fn edge_uses(face: &Face, closed: [bool; 2], gaps: &[f64]) -> Vec<Edg
 }
 
 /// The use that bounds the face on the other side of the vertex where `from` ends in the loop's direction, or begins
-/// when not `forward`; across seams and poles, which bound nothing.
+/// when not `forward`; across seams and poles, which bound nothing. `None` where [`MOST_AROUND`] uses in a row bound nothing.
 pub(super) fn next_bounding_use(uses: &[EdgeUse], from: u32, forward: bool) -> Option<u32> {
     let step = |k: u32| if forward { uses[k as usize].next } else { uses[k as usize].previous };
     let mut at = from;

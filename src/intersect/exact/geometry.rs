@@ -67,7 +67,8 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
-    /// The faces of a model as the tracer wants them: surfaces and trims once a part, patches once a place.
+    /// Prepares all placed faces of a model: surfaces and trims once a part, patches once a place. `band` is the least distance from a trim
+    /// that is flagged, mm.
     pub(super) fn new(model: &Model, band: f64) -> Self {
         let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
         let mut geometry = Self {
@@ -93,7 +94,7 @@ impl Geometry {
                     });
                     let closed = |s: &usize| model.part(placed.part).shells[*s].closed;
                     let solid = placed.shell.filter(closed).map(|s| [placed.instance as u32, s as u32]);
-                    geometry.place(&placed, face, (trim, grid), solid);
+                    geometry.add_face(&placed, face, (trim, grid), solid);
                 }
                 _ => geometry.skipped.push(placed.id),
             }
@@ -101,13 +102,19 @@ impl Geometry {
         geometry
     }
 
-    /// Distance from a trim within which a root is flagged, mm, where the faces along it lie so far off the edge.
+    /// Distance from a trim, mm, within which a root is flagged where the faces along it lie `gap`, in the units of the part, off the edge.
     pub(super) fn flagged(&self, gap: f64, placement: &Frame) -> f64 {
         self.band.max(FLAGGED_OF_GAP * gap * placement.scale)
     }
 
-    /// Adds a face at its place, with patches that are placed there.
-    fn place(&mut self, placed: &PlacedFace<'_>, face: &Face, (trim, grid): (u32, u32), solid: Option<[u32; 2]>) {
+    /// Adds a face at its place, with patches that are placed there; `trim` and `grid` are those of its part.
+    fn add_face(
+        &mut self,
+        placed: &PlacedFace<'_>,
+        face: &Face,
+        (trim, grid): (u32, u32),
+        solid: Option<[u32; 2]>,
+    ) {
         let record = self.faces.len() as u32;
         // Mirroring turns a normal over once more.
         let sign = if face.reversed != placed.placement.is_mirrored() { -1.0 } else { 1.0 };
@@ -138,7 +145,7 @@ impl Geometry {
         }
     }
 
-    /// A patch as it was given.
+    /// A patch as it was given, for computing in 32 digits.
     pub(super) fn reference(&self, patch: &Patch) -> ReferencePatch<'_> {
         let face = &self.faces[patch.face as usize];
         let surface = &self.surfaces[face.grid as usize];
@@ -171,7 +178,7 @@ impl Geometry {
         })
     }
 
-    /// Which sides of a patch are a pole of its surface.
+    /// Which sides of a patch, low and high in u and in v, are a pole of its surface.
     fn pole_sides(&self, patch: &Patch) -> [[bool; 2]; 2] {
         let grid = &self.grids[self.faces[patch.face as usize].grid as usize];
         [0, 1].map(|d: usize| {
@@ -185,7 +192,7 @@ impl Geometry {
         &self.trims[self.faces[patch.face as usize].trim as usize]
     }
 
-    /// The patch of a face that holds the parameters.
+    /// The patch of a face that holds the parameters; the outermost one where they lie beyond the domain.
     pub(super) fn patch_at(&self, face: &FaceRecord, uv: Uv) -> u32 {
         // Inner breaks alone: parameters on an end, or beyond it by rounding, belong to the outermost patch.
         let grid = &self.grids[face.grid as usize];
@@ -197,7 +204,8 @@ impl Geometry {
     }
 }
 
-/// The vertices at the ends of a part's edges, with the radii within which their sectors decide.
+/// The vertices at start and end of each of a part's edges, with the radii, mm, within which their sectors decide; where the part has no
+/// such vertex, the end of the curve.
 fn edge_ends(part: &Part) -> Vec<[(Point, f64); 2]> {
     let end = |e: &Edge, k: usize| e.curve.evaluate(e.curve.domain()[k]);
     // One radius a vertex, not one an edge: the faces around it must agree on when its sectors decide, or two would
@@ -216,7 +224,7 @@ fn edge_ends(part: &Part) -> Vec<[(Point, f64); 2]> {
     part.edges.iter().map(|e| [place(e, 0), place(e, 1)]).collect()
 }
 
-/// Whether a surface can be traced at all.
+/// Whether a face's surface can be traced: whole arrays, degrees in bounds, finite rising knots, finite points of positive weight.
 fn is_usable(face: &Face) -> bool {
     let s = &face.surface;
     let [nu, nv] = s.counts();

@@ -52,12 +52,13 @@ pub(super) struct Leaf {
 }
 
 impl Leaf {
+    /// Its control points in the pool of all leaves, about its centre.
     pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
         let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
         &pool[self.net as usize..self.net as usize + n]
     }
 
-    /// Local parameters of the patch at local parameters of the leaf.
+    /// Turns local parameters of the leaf into those of its patch.
     #[inline]
     pub(super) fn patch_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
@@ -68,7 +69,7 @@ impl Leaf {
         Aabb { min: self.lo, max: self.hi }
     }
 
-    /// Local parameters of the leaf at local parameters of the patch.
+    /// Turns local parameters of the patch into those of the leaf, outside the unit square where they lie beside it.
     pub(super) fn leaf_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [(u - u0) / (u1 - u0), (v - v0) / (v1 - v0)]
@@ -86,7 +87,8 @@ pub(super) struct Described {
     pub(super) net: Net,
 }
 
-/// The leaf that `piece` of a patch's net is, over `rect` of the patch's parameters; who builds the tree fills in its numbers.
+/// Describes `piece`, the part of a patch's net over `rect` of its local parameters, as a leaf in the world; `depth` counts the
+/// roundings behind it. The caller fills in `net`, `patch`, `face` and `whole`.
 pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
     let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
@@ -151,8 +153,8 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
     Described { leaf, slopes, net: centred }
 }
 
-/// Which sides of a leaf lie on the border of its surface. The two ends of a surface that closes on itself are no border, nor
-/// is a pole, beyond which the surface comes back.
+/// Which sides, low and high in u and in v, of the leaf over `rect` lie on the border of its surface. The two ends of a surface that closes
+/// on itself are no border, nor is a pole, beyond which the surface comes back.
 pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2]) -> [[bool; 2]; 2] {
     [0, 1].map(|d: usize| {
         let ends = [grid.breaks[d][0], grid.breaks[d][grid.breaks[d].len() - 1]];
@@ -163,8 +165,8 @@ pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2])
     })
 }
 
-/// Lets roots up to the trimming band beyond the surface's border count, where a trim runs along the border: the
-/// side of the shared edge decides there, not the end of the surface. Beyond any other side another leaf begins.
+/// Widens the reach and boxes of a leaf on sides where `border` says that the surface ends, so that roots up to [`BANDS_BEYOND`] times
+/// `band` mm beyond count: the side of the shared edge decides there, not the end of the surface. Elsewhere another leaf begins.
 pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
     // No farther than half of the extension: beyond the extension the derivative boxes prove nothing.
     let far = BANDS_BEYOND * band;
@@ -186,7 +188,7 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
     }
 }
 
-/// Axes of an oriented box: along the longer derivative, across it, and the normal last.
+/// Unit axes of an oriented box: along the longer derivative, across it, and the normal last; any frame that fits where there is none.
 fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
     let longer = if sv.length() > su.length() { sv } else { su };
     let x = longer.try_normalize().unwrap_or(Vector::X);
@@ -198,7 +200,7 @@ fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
     [x, z.cross(x), z]
 }
 
-/// The Jacobian in the tangent plane, and the rule that measures four-vectors along a tangent.
+/// The middle Jacobian in the tangent plane: ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v.
 fn tangent_jacobian(leaf: &Leaf, slopes: &Slopes) -> [f64; 4] {
     let p = |a: &V4, e: Vector| xyz(a).dot(e);
     let [x, y, _] = leaf.axes;
@@ -210,7 +212,7 @@ fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
     a[0] * e.x.abs() + a[1] * e.y.abs() + a[2] * e.z.abs() + a[3] * radius
 }
 
-/// Largest row sum of `|J⁻¹| R` for a ray along the normal.
+/// Largest row sum of `|J⁻¹| R` for a ray along the normal; infinite where the Jacobian is singular.
 pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
     let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
@@ -223,7 +225,8 @@ pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
     ((d.abs() * rx + b.abs() * ry) / det.abs()).max((c.abs() * rx + a.abs() * ry) / det.abs())
 }
 
-/// The direction whose halving leaves the smaller deviation, predicted from second differences.
+/// The direction, 0 for u and 1 for v, whose halving leaves the smaller deviation, predicted from second differences; ties go by the
+/// parity of `depth`.
 pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;

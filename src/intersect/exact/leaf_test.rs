@@ -22,8 +22,8 @@ const UNIQUE: f64 = 0.95;
 /// Leaves that are nearly singular go to clipping where rounding moves a root by more, as a share of the leaf.
 ///
 /// A derivative is off by twice the degree, 25 at most, of what control points are off, and the inverse magnifies both alike: row sums are
-/// off by a hundred times the margin, the 5 % that [`UNIQUE`] leaves. What the inverse is off by itself, eight half ulps of the product of row
-/// sums over the determinant, is less: the margin has 32 of the leaf's radius, a seventh of a row sum, over the same.
+/// off by a hundred times the margin, the 5 % that [`UNIQUE`] leaves. What the inverse is off by itself, eight half ulps of the product of
+/// row sums over the determinant, is less: the margin has 32 of the leaf's radius, a seventh of a row sum, over the same.
 const LARGEST_MARGIN: f64 = 5e-4;
 /// Rounding of parameters of a unit square: fifty ulps of its middle.
 const PARAMETER_ROUNDING: f64 = 1e-14;
@@ -43,7 +43,7 @@ impl Exact {
         COORDINATE_ROUNDING * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs() + leaf.radius) + leaf.slop
     }
 
-    /// Meets a leaf: excludes it, takes its only root, or hands it to clipping.
+    /// Tests a leaf: excludes it, offers its only root, or hands it to clipping; what comes of it is left in `query`.
     #[inline(always)]
     pub(super) fn test_leaf(&self, query: &mut Query, index: u32) {
         let leaf = &self.linearizations[index as usize];
@@ -88,8 +88,8 @@ impl Exact {
         self.offer_only_root(query, index, (local, s), oc, (margin, margins));
     }
 
-    /// The only root of a leaf's enlarged domain, in parameters, with the homogeneous point there; `None` where Newton's method
-    /// has left that domain, so that the root may be any.
+    /// Finds the only root of a leaf's enlarged domain, in its parameters, with the homogeneous point there about its centre; `None` where
+    /// Newton's method does not converge or has left that domain, so that the root may be any.
     #[inline(always)]
     fn newton_on_leaf(
         &self,
@@ -128,7 +128,7 @@ impl Exact {
         None
     }
 
-    /// Offers the only root of the enlarged domain: outside of the leaf it is another leaf's.
+    /// Offers or settles the only root of the enlarged domain, unless the ray leaves it; outside of the leaf it is another leaf's.
     #[inline(always)]
     fn offer_only_root(
         &self,
@@ -169,7 +169,7 @@ impl Exact {
         }
     }
 
-    /// Clips a leaf whose oriented box the ray touches.
+    /// Clips a leaf if the ray touches its oriented box.
     #[inline(always)]
     fn clip_touched(&self, query: &mut Query, index: u32) {
         let leaf = &self.leaves[index as usize];
@@ -187,7 +187,8 @@ fn within(x: f64, e: f64) -> bool {
     x >= -e && x <= 1.0 + e
 }
 
-/// A step of Newton's method, to be taken off, and t after it.
+/// A step of Newton's method across the ray from the jet of a leaf's net: what is to be subtracted from the parameters, and t after it,
+/// mm. `oc` is the ray's origin less the leaf's centre; where the Jacobian is singular the step is not finite.
 #[inline(always)]
 pub(super) fn newton_step(query: &Query, oc: Vector, jet: &Jet) -> ([f64; 2], f64) {
     let (k1, k2) = (query.n1.dot(oc), query.n2.dot(oc));
@@ -200,7 +201,7 @@ pub(super) fn newton_step(query: &Query, oc: Vector, jet: &Jet) -> ([f64; 2], f6
     ([xu, xv], query.d.dot(Vector::new(s[0], s[1], s[2]) / s[3] - oc))
 }
 
-/// The oriented box, with the rounding of the rotated origin as margin.
+/// Whether a ray meets a leaf's oriented box, grown by `noise` mm, in what is left of its range.
 #[inline(always)]
 fn touches_oriented_box(query: &Query, leaf: &Leaf, oc: Vector, noise: f64) -> bool {
     let (mut near, mut far) = (query.t_min, query.t_max);

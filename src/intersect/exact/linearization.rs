@@ -48,6 +48,7 @@ pub(super) struct HitLabel {
 }
 
 impl Linearization {
+    /// Packs a leaf, the boxes around its derivatives and the homogeneous point in its middle, all about its centre.
     pub(super) fn new(leaf: &Leaf, slopes: &Slopes, middle: &V4, ill_scaled: bool) -> Self {
         // Rounded up: in single precision it must not end before the leaf does.
         let half = leaf.reach.map(|[lo, hi]| ((0.5 - lo).max(hi - 0.5) as f32).next_up());
@@ -64,7 +65,7 @@ impl Linearization {
         }
     }
 
-    /// The same with its net further on in the pool.
+    /// The same with its net `by` control points further on in the pool.
     pub(super) fn moved_in_pool(self, by: u32) -> Self {
         Self { net: self.net + by, ..self }
     }
@@ -75,7 +76,7 @@ impl Linearization {
         &pool[self.net as usize..self.net as usize + n]
     }
 
-    /// The Jacobian's row and the value in the middle, seen by `n·A − k·W`.
+    /// Derivatives by u and v and the value in the middle of the leaf, seen by `n·A − k·W`.
     #[inline(always)]
     pub(super) fn projected(&self, n: Vector, k: f64) -> [f64; 3] {
         let [x, y, z, w] = &self.rows;
@@ -83,7 +84,7 @@ impl Linearization {
         [all[0], all[1], all[2]]
     }
 
-    /// How far the Jacobian's row may stray, summed over both parameters.
+    /// How far these derivatives may stray over the leaf's enlarged domain, summed over both parameters.
     #[inline(always)]
     pub(super) fn radius(&self, n: Vector, k: f64) -> f64 {
         let [x, y, z, w] = &self.rows;
@@ -99,6 +100,7 @@ pub(super) fn projected_jet(jet: &Jet, n: Vector, k: f64) -> [f64; 3] {
 }
 
 impl HitLabel {
+    /// Takes from a leaf's patch and face what names a hit on it.
     pub(super) fn new(leaf: &Leaf, geometry: &Geometry) -> Self {
         let patch = &geometry.patches[leaf.patch as usize];
         let face = &geometry.faces[leaf.face as usize];
@@ -115,7 +117,7 @@ impl HitLabel {
         }
     }
 
-    /// Surface parameters of local ones.
+    /// Turns local parameters of the leaf into surface parameters.
     #[inline(always)]
     pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
         self.from + self.extent * Uv::new(u, v)

@@ -62,7 +62,7 @@ impl Kernel for Evaluation<'_> {
     }
 }
 
-/// Value and derivatives of a net at `(u, v)`, which may lie outside `[0, 1]²`.
+/// Homogeneous value and first derivatives of a net at `(u, v)`, which may lie outside `[0, 1]²`.
 #[inline]
 pub(super) fn evaluate(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
     simd::dispatch(Evaluation { net, degree, u, v })
@@ -85,7 +85,7 @@ pub(super) fn evaluate_inlined(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> J
     }
 }
 
-/// Bernstein values and derivatives of degree `N - 1`.
+/// Bernstein values and derivatives at `t` of degree `N - 1`, one to three.
 #[inline(always)]
 fn bernstein_fixed<const N: usize>(t: f64) -> ([f64; N], [f64; N]) {
     let s = 1.0 - t;
@@ -143,7 +143,7 @@ fn tensor_product<const N: usize, const M: usize>(
     jet
 }
 
-/// Bernstein values and derivatives of any degree.
+/// Bernstein values and derivatives of degree `n` at `t`, up to [`MAX_DEGREE`]; 0 beyond the degree.
 fn bernstein(n: usize, t: f64) -> ([f64; MAX_DEGREE + 1], [f64; MAX_DEGREE + 1]) {
     let s = 1.0 - t;
     let (mut b, mut d) = ([0.0; MAX_DEGREE + 1], [0.0; MAX_DEGREE + 1]);
@@ -173,7 +173,7 @@ fn point_index(direction: usize, q: usize, k: usize, line: usize) -> usize {
     if direction == 0 { k * (q + 1) + line } else { line * (q + 1) + k }
 }
 
-/// The two halves of a net in `direction`, by de Casteljau.
+/// Halves a net in `direction`, 0 for u and 1 for v, by de Casteljau; the lower half first.
 #[inline]
 pub(super) fn halves(net: &[V4], degree: [u8; 2], direction: usize) -> [Net; 2] {
     let (mut low, mut high): (Net, Net) = (net.into(), net.into());
@@ -195,7 +195,7 @@ fn halve_v(low: &mut [V4], high: &mut [V4], p: usize, q: usize) {
     halve(low, high, [q, p, 1]);
 }
 
-/// Halves along `n` on `lines` lines; both nets hold the whole on entry.
+/// Halves the `lines + 1` lines of degree `n` that run in `direction`; both nets hold the whole on entry, and their half afterwards.
 #[inline(always)]
 fn halve(low: &mut [V4], high: &mut [V4], [n, lines, direction]: [usize; 3]) {
     let q = if direction == 0 { lines } else { n };
@@ -213,7 +213,7 @@ fn halve(low: &mut [V4], high: &mut [V4], [n, lines, direction]: [usize; 3]) {
     }
 }
 
-/// The net over `[a, b]` of `direction`, which may reach outside `[0, 1]`; `b` must not be 0.
+/// Replaces a net by its part over the range `[a, b]` of `direction`, which may reach outside `[0, 1]`; `b` must not be 0.
 #[inline]
 pub(super) fn restrict(net: &mut [V4], degree: [u8; 2], direction: usize, range: [f64; 2]) {
     if direction == 0 {
@@ -233,7 +233,8 @@ fn restrict_v(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
     restrict_lines(net, [q, p, 1], range);
 }
 
-/// Restricts all lines of degree `n` along a direction to the part [a, b] of [0, 1], which may reach beyond it.
+/// Restricts the `lines + 1` lines of degree `n` that run in `direction` to the part from `a` to `b` of `[0, 1]`, which may reach beyond
+/// it; `b` must not be 0.
 #[inline(always)]
 fn restrict_lines(net: &mut [V4], [n, lines, direction]: [usize; 3], [a, b]: [f64; 2]) {
     let q = if direction == 0 { lines } else { n };
@@ -273,12 +274,13 @@ pub(super) struct Slopes {
     pub(super) rv: V4,
 }
 
-/// Boxes around the derivatives, from the hulls of the difference nets.
+/// Bounds the homogeneous derivatives over `[0, 1]²` by boxes, from the hulls of the difference nets.
 #[inline]
 pub(super) fn slopes(net: &[V4], degree: [u8; 2]) -> Slopes {
     by_degree!(degree, slopes_in(net))
 }
 
+/// As [`slopes`] of a net of degrees `p` and `q`.
 #[inline(always)]
 fn slopes_in(net: &[V4], p: usize, q: usize) -> Slopes {
     let m = q + 1;

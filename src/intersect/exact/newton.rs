@@ -31,7 +31,7 @@ pub struct SurfacePoint {
     pub residual: f64,
     /// Whether it lies inside the face's trims.
     pub inside: bool,
-    /// The patch.
+    /// Index of the patch, as [`Hit::primitive`](crate::intersect::Hit::primitive).
     pub patch: u32,
 }
 
@@ -39,7 +39,8 @@ impl Exact {
     /// Follows Newton's method on a face from surface parameters to the ray, from patch to patch; `None` when it has not
     /// come within 1e-11 of its patch and 1e-9 mm (or the rounding of the origin) after `steps`.
     ///
-    /// Nothing is proved: the point found is on the spline and on the ray, and may be any of their common points.
+    /// Nothing is proved: the point found is on the spline and on the ray, and may be any of their common points, before the range of the
+    /// ray or outside the trims too. `None` also where the face is not traced, `uv` is not finite or the Jacobian becomes singular.
     pub fn converge(&self, ray: &Ray, face: FaceId, uv: Uv, steps: u32) -> Option<SurfacePoint> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let grid = &self.geometry.grids[record.grid as usize];
@@ -120,7 +121,7 @@ impl Exact {
         None
     }
 
-    /// Distance from a world point to a face's surface at given parameters, mm.
+    /// Distance from a point of the world to the point of a face's surface at given parameters, mm; `None` where the face is not traced.
     pub fn distance_at(&self, face: FaceId, uv: Uv, point: crate::math::Point) -> Option<f64> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
@@ -128,14 +129,15 @@ impl Exact {
         Some((point - patch.center - project(&jet).0).length())
     }
 
-    /// The patch of a face that holds the parameters; `None` where the face has no surface that is traced.
+    /// The patch of a face that holds the parameters, the outermost one where they lie beyond the domain; `None` where the face has no
+    /// surface that is traced, or they are not finite.
     pub(in crate::intersect) fn patch_at(&self, face: FaceId, uv: Uv) -> Option<u32> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         uv.is_finite().then(|| self.geometry.patch_at(record, uv))
     }
 
-    /// The patch of a face that holds all the corners of a facet, which is `None` where several do; `None` where the face has no surface
-    /// that is traced.
+    /// Finds the patch of a face that holds all the corners of a facet, in surface parameters: `None` where the face has no surface that is
+    /// traced, `Some(None)` where they lie on several patches.
     pub(in crate::intersect) fn patch_around(&self, face: FaceId, corners: &[Uv; 4]) -> Option<Option<u32>> {
         let middle = 0.25 * corners.iter().sum::<Uv>();
         let patch = self.patch_at(face, middle)?;
@@ -154,7 +156,7 @@ impl Exact {
         self.geometry.faces[*self.geometry.by_id.get(&face)? as usize].solid
     }
 
-    /// Outward unit normal of a face at surface parameters.
+    /// Outward unit normal of a face in the world at surface parameters, its limit at poles; `None` where the face is not traced.
     pub fn normal_at(&self, face: FaceId, uv: Uv) -> Option<Vector> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];

@@ -47,7 +47,8 @@ pub(in crate::intersect) struct Seed {
 }
 
 impl Exact {
-    /// Follows Newton's method from each seed on its patch; `None` where that tells nothing, be it that the root lies beyond.
+    /// Follows Newton's method from each seed on its patch and overwrites `points`, which is as long as `seeds`; `None` where that tells
+    /// nothing, be it that the root lies beyond the patch. The range of a ray does not count.
     pub(in crate::intersect) fn converge_batch(
         &self,
         rays: &[Ray],
@@ -90,7 +91,7 @@ struct Group {
 }
 
 impl Convergence<'_> {
-    /// Newton's method for all seeds, as many of one degree at a time as a register has lanes.
+    /// Works off all seeds, as many of one degree at a time as a register has lanes.
     #[inline(always)]
     fn converge<V: F64x8>(self) {
         let mut net = [[V::splat(0.0); 4]; LARGEST_NET];
@@ -228,7 +229,7 @@ fn settle<V: F64x8>(
     }
 }
 
-/// The point that a lane found.
+/// The point that a lane found on the patch `index`; `None` where it found none, or one beyond the patch.
 #[inline(always)]
 fn point(ends: &Ends, lane: usize, geometry: &Geometry, index: u32) -> Option<SurfacePoint> {
     let [u, v] = [ends.local[0][lane], ends.local[1][lane]];
@@ -250,7 +251,7 @@ fn point(ends: &Ends, lane: usize, geometry: &Geometry, index: u32) -> Option<Su
     Some(SurfacePoint { t: ends.t[lane], uv, normal, residual: ends.residual[lane], inside, patch: index })
 }
 
-/// Whether a point near a trim is inside of it.
+/// Whether a point in a border cell, given in parameters of its patch and of the surface, lies inside the trims.
 #[inline(never)]
 fn is_inside(geometry: &Geometry, patch: &Patch, local: [f64; 2], uv: Uv) -> bool {
     let (_, du, dv) = project(&patch.jet(local));

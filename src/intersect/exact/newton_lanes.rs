@@ -29,7 +29,7 @@ pub(super) struct Ends {
     /// Along `Su × Sv`, of unit length.
     pub(super) normal: [[f64; LANES]; 3],
     pub(super) residual: [f64; LANES],
-    /// Lanes that ended at a root with a normal.
+    /// One bit for each lane that ended at a root with a normal; what the others hold is of no meaning.
     pub(super) regular: u8,
 }
 
@@ -46,7 +46,7 @@ fn dot<V: F64x8>(a: &Vectors<V>, b: &Vectors<V>) -> V {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
 }
 
-/// `a × b`.
+/// `a × b` in every lane.
 #[inline(always)]
 fn cross<V: F64x8>(a: &Vectors<V>, b: &Vectors<V>) -> Vectors<V> {
     [
@@ -66,13 +66,14 @@ fn select<V: F64x8>(mask: u8, new: &Vectors<V>, old: &Vectors<V>) -> Vectors<V> 
     [new[0].select(mask, old[0]), new[1].select(mask, old[1]), new[2].select(mask, old[2])]
 }
 
-/// The steps on nets of degrees `N − 1` and `M − 1`.
+/// [`step`] on nets of degrees `N − 1` and `M − 1`.
 #[inline(always)]
 pub(super) fn step_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V; 4]], starts: &Starts) -> Ends {
     step::<V, N, M>(&net[..N * M], [N as u8 - 1, M as u8 - 1], starts)
 }
 
-/// Steps until every lane has ended or been given up. `N` and `M` have room for the degrees.
+/// Takes Newton steps from `starts` until every lane has ended or been given up, and returns where they did. `net` holds the control
+/// points of eight patches side by side, and `N` and `M` have room for their degrees.
 ///
 /// With `e` from the point to the ray's origin, `g = e × d` and `n = Su × Sv` a step is `(−g·Sv, g·Su) / n·d`: the two equations
 /// across the ray without a frame around it, and `|g|` is the distance from the ray.
@@ -156,7 +157,7 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
     out
 }
 
-/// Points about the centres, and derivatives.
+/// Points about the centres of eight patches, mm, and derivatives by local parameters.
 #[inline(always)]
 fn evaluate<V: F64x8, const N: usize, const M: usize>(
     net: &[[V; 4]],
@@ -194,7 +195,7 @@ fn evaluate<V: F64x8, const N: usize, const M: usize>(
     (point, along_u, along_v)
 }
 
-/// Bernstein values of degree `n < N`, and derivatives.
+/// Bernstein values of degree `n < N` at `t` of each lane, and derivatives; 0 beyond the degree.
 #[inline(always)]
 fn bernstein<V: F64x8, const N: usize>(n: usize, t: V) -> ([V; N], [V; N]) {
     let (zero, s) = (V::splat(0.0), V::splat(1.0).sub(t));

@@ -39,7 +39,7 @@ pub(super) struct Patch {
 }
 
 impl PatchGrid {
-    /// The breaks of a face's surface, and where sides of it coincide or come to one point.
+    /// Finds the breaks of a face's surface, and by five points of each side where sides coincide or come to one point.
     pub(super) fn new(face: &Face) -> Self {
         let s = &face.surface;
         let counts = s.counts();
@@ -68,7 +68,8 @@ impl PatchGrid {
 }
 
 impl Patch {
-    /// The patch at its place: its net about its own centre, of weight 1 in the middle.
+    /// Places a patch of the part in the world: its net about its own centre, of weight 1 in the middle. `face` indexes
+    /// [`Geometry::faces`].
     pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
         let middle = patch.homogeneous(Uv::splat(0.5))[0];
         // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
@@ -105,19 +106,19 @@ impl Patch {
         self.rounding / (NET_ROUNDING * f64::EPSILON)
     }
 
-    /// Local parameters of surface parameters.
+    /// Turns surface parameters into local ones, in the unit square over the patch and beyond it elsewhere.
     pub(super) fn local(&self, uv: Uv) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.domain;
         [(uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0)]
     }
 
-    /// Surface parameters of local parameters.
+    /// Turns local parameters into surface parameters.
     pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
         let [[u0, u1], [v0, v1]] = self.domain;
         Uv::new(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v)
     }
 
-    /// Homogeneous point about the centre, and derivatives.
+    /// Homogeneous point about the centre at local parameters, and derivatives by these.
     pub(super) fn jet(&self, [u, v]: [f64; 2]) -> Jet {
         net::evaluate(&self.net, self.degree, u, v)
     }
@@ -131,7 +132,7 @@ pub(super) fn is_ill_scaled(patch: &BezierPatch) -> bool {
     short || weights[1] > LARGEST_WEIGHT_RATIO * weights[0]
 }
 
-/// Position about the centre and first derivatives of a homogeneous jet.
+/// Divides a homogeneous jet: the position about the centre, mm, and the first derivatives by u and v.
 #[inline(always)]
 pub(super) fn project(jet: &Jet) -> (Vector, Vector, Vector) {
     let inv = 1.0 / jet.s[3];
@@ -169,7 +170,7 @@ pub(super) fn regular_normal(jet: &Jet, rounding: f64) -> Option<Vector> {
     cross_normal(du, dv, TRUSTED * rounding)
 }
 
-/// The direction of `du × dv`; `None` where one of them is shorter than `shortest`, or both are parallel.
+/// The unit vector along `du × dv`; `None` where one of them is not longer than `shortest`, mm per parameter, or both are parallel.
 #[inline(always)]
 pub(super) fn cross_normal(du: Vector, dv: Vector, shortest: f64) -> Option<Vector> {
     let n = du.cross(dv);
@@ -178,7 +179,8 @@ pub(super) fn cross_normal(du: Vector, dv: Vector, shortest: f64) -> Option<Vect
     (trusted && clear).then(|| n.normalize())
 }
 
-/// The limit of the unit normal at a singular point, from the middle of the net.
+/// The limit of the unit normal at a singular point, taken towards the middle of the net; z for a net that has no normal. `rounding` is
+/// the error of the net's points, mm.
 pub(super) fn limit_normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], rounding: f64) -> Vector {
     let shortest = TRUSTED * rounding;
     let trusted = |du: Vector, dv: Vector| du.length_squared().min(dv.length_squared()) > shortest * shortest;

@@ -24,6 +24,7 @@ const BORDER: f64 = 1e-6;
 pub(super) struct Root {
     /// mm along the ray.
     pub(super) t: f64,
+    /// Index into the leaves of the model.
     pub(super) leaf: u32,
     /// Local parameters of the leaf.
     pub(super) local: [f64; 2],
@@ -41,9 +42,9 @@ pub(super) struct DeparturePoint {
     pub(super) face: u32,
     patch: u32,
     uv: Uv,
-    /// Distance from the ray's origin to the stated surface point.
+    /// Distance from the ray's origin to the stated surface point, mm.
     pub(super) off: f64,
-    /// Below this the origin is taken to be that point.
+    /// Below this, mm, the origin is taken to be that point.
     tolerance: f64,
 }
 
@@ -72,9 +73,9 @@ pub(super) struct Query {
     pub(super) collects_all: bool,
     /// Every root, in a search for all.
     pub(super) all: Vec<Root>,
-    /// From here on a region of the ray stayed undecided.
+    /// The least t from which on a region of the ray stayed undecided; infinite where all is decided.
     pub(super) undecided_from: f64,
-    /// The nearest root that a trim within its band turned away.
+    /// The t of the nearest root that a trim within its band turned away; infinite without one.
     pub(super) nearest_rejected: f64,
     /// Every such root, in a search for all.
     pub(super) all_rejected: Vec<f64>,
@@ -110,7 +111,8 @@ impl Query {
         clips: 0,
     };
 
-    /// Takes up a ray; field by field, since building it elsewhere and moving it here cost 8 % of a ray.
+    /// Takes up a ray and forgets the one before, but for what a search for all has collected. Field by field, since building it elsewhere
+    /// and moving it here cost 8 % of a ray.
     #[inline(always)]
     pub(super) fn restart(&mut self, ray: &Ray, geometry: &Geometry, tree: &Tree, budget: u32) {
         self.o = ray.origin;
@@ -133,13 +135,13 @@ impl Query {
         self.clips = 0;
     }
 
-    /// Whether a root at `t` would be of use.
+    /// Whether a root at `t` lies in the ray's range and before the nearest root so far.
     #[inline(always)]
     pub(super) fn is_in_range(&self, t: f64) -> bool {
         t >= self.t_min && (t < self.t_max || (t == self.t_max && self.best.is_none()))
     }
 
-    /// Remembers a root that a trim has cut away.
+    /// Remembers the `t` of a root that a trim within its band has turned away.
     pub(super) fn reject_at_trim(&mut self, t: f64) {
         self.nearest_rejected = self.nearest_rejected.min(t);
         if self.collects_all {
@@ -147,7 +149,7 @@ impl Query {
         }
     }
 
-    /// Keeps a root; where the nearest alone is asked for, the ray ends there.
+    /// Keeps a root: in a search for all beside the others, else in place of the one before, and the ray then ends there.
     pub(super) fn accept(&mut self, root: Root) {
         if self.collects_all {
             self.all.push(root);
@@ -160,6 +162,7 @@ impl Query {
 }
 
 impl DeparturePoint {
+    /// The point at parameters `uv` of a face; `None` where that face is not traced or `uv` is not finite.
     fn new(ray: &Ray, face: crate::math::FaceId, uv: Uv, geometry: &Geometry) -> Option<Self> {
         let face = *geometry.by_id.get(&face)?;
         if !uv.is_finite() {
@@ -173,7 +176,8 @@ impl DeparturePoint {
         Some(Self { face, patch, uv, off, tolerance })
     }
 
-    /// The departure in the leaf's parameters; on a neighbouring patch only when it lies on the common border.
+    /// The departure in the leaf's parameters, which may lie far outside of it; `None` on another face, and on another patch unless it lies
+    /// on the common border.
     pub(super) fn local_to(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
         // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
         if leaf.face != self.face {
@@ -195,7 +199,7 @@ impl DeparturePoint {
         self.off <= self.tolerance || t.abs() <= NEAR_DEPARTURE * self.off
     }
 
-    /// Whether a root elsewhere in the parameters is the same point: across a seam, or at a pole.
+    /// Whether a root of a leaf, `t` mm along the ray, is the departure under other parameters: across a seam, or at a pole.
     pub(super) fn is_same_point(&self, leaf: &Leaf, local: [f64; 2], t: f64, geometry: &Geometry) -> bool {
         if leaf.face != self.face || t.abs() > NEAR_DEPARTURE * (self.tolerance + self.off) {
             return false;

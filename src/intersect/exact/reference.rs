@@ -26,7 +26,7 @@ type Point3 = [Number; 3];
 /// A root of 32 digits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SettledRoot {
-    /// Distance along the ray.
+    /// Distance along the ray, mm.
     pub(super) t: f64,
     /// As shares of the patch's rectangle.
     pub(super) local: [f64; 2],
@@ -68,7 +68,7 @@ impl Kernel for Settling<'_> {
     }
 }
 
-/// The largest coordinate of a direction, and the two others.
+/// The axis of the largest coordinate of a direction, and the two others.
 #[inline(always)]
 fn main_axis(direction: Vector) -> (usize, [usize; 2]) {
     let main = direction.abs().max_position();
@@ -93,7 +93,7 @@ impl Kernel for NetAlong<'_> {
         let (main, axes) = main_axis(d);
         let origin: Point3 = patch.placement.origin.to_array().map(Number::from);
         let seen = |point: Point4| -> V4 {
-            let placed = patch.place(&[point[0], point[1], point[2]]);
+            let placed = patch.place_vector(&[point[0], point[1], point[2]]);
             let r: Point3 = std::array::from_fn(|k| placed[k] + (origin[k] - o[k].into()) * point[3]);
             let across = axes.map(|k| r[k] - r[main] * d[k].into() / d[main].into());
             let component = |n: Vector| (across[0] * n[axes[0]].into() + across[1] * n[axes[1]].into()).to_f64();
@@ -122,7 +122,8 @@ impl Kernel for TangentsAt<'_> {
 }
 
 impl ReferencePatch<'_> {
-    /// The root of a ray (origin, direction) near the patch's parameters `start`; `None` when Newton's method finds none.
+    /// Finds the root of a ray (origin, direction; in the world) from the patch's local parameters `start`; `None` when Newton's method
+    /// does not converge. The root may be another one, or lie beyond the patch, on the continued polynomial.
     pub(super) fn settle(self, ray: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
         simd::dispatch(Settling { patch: self, ray, start })
     }
@@ -132,7 +133,7 @@ impl ReferencePatch<'_> {
         simd::dispatch(TangentsAt { patch: self, uv })
     }
 
-    /// The surface seen along a ray (origin, direction), at local parameters.
+    /// Sees the surface along a ray (origin, direction; in the world), at local parameters of the patch.
     ///
     /// For a direction n across the ray, `n·(S − o)` is the sum of n's components at the axes times these.
     #[inline(always)]
@@ -158,6 +159,7 @@ impl ReferencePatch<'_> {
         Number::from(self.domain[d][1]) - self.domain[d][0].into()
     }
 
+    /// What [`Self::settle`] does, inlined into its kernel.
     #[inline(always)]
     fn newton(&self, [o, d]: [Vector; 2], start: [f64; 2]) -> Option<SettledRoot> {
         // Two planes that hold the ray, each from the largest component of the direction and one of the others: with a small
@@ -192,7 +194,7 @@ impl ReferencePatch<'_> {
         None
     }
 
-    /// The point and the derivatives in the world.
+    /// The point in the world at surface parameters, and the derivatives by these, in the patch's own span also beyond it.
     #[inline(always)]
     fn derivatives(&self, [u, v]: [Number; 2]) -> (Point3, Point3, Point3) {
         let s = self.surface;
@@ -217,13 +219,17 @@ impl ReferencePatch<'_> {
         let point: Point3 = std::array::from_fn(|k| s0[k] / s0[3]);
         let slope = |x: &Point4| -> Point3 { std::array::from_fn(|k| (x[k] - point[k] * x[3]) / s0[3]) };
         let origin: Point3 = self.placement.origin.to_array().map(Number::from);
-        let placed = self.place(&point);
-        (std::array::from_fn(|k| placed[k] + origin[k]), self.place(&slope(&su)), self.place(&slope(&sv)))
+        let placed = self.place_vector(&point);
+        (
+            std::array::from_fn(|k| placed[k] + origin[k]),
+            self.place_vector(&slope(&su)),
+            self.place_vector(&slope(&sv)),
+        )
     }
 
-    /// The image of a difference of points.
+    /// Turns and scales a difference of points of the part into the world.
     #[inline(always)]
-    fn place(&self, x: &Point3) -> Point3 {
+    fn place_vector(&self, x: &Point3) -> Point3 {
         let f = self.placement;
         std::array::from_fn(|k| {
             let sum = x[0] * f.x[k].into() + x[1] * f.y[k].into() + x[2] * f.z[k].into();
@@ -232,7 +238,7 @@ impl ReferencePatch<'_> {
     }
 }
 
-/// Value and derivative of a spline in one span.
+/// Homogeneous value and derivative at `t` of the polynomial that a spline is in one span; `points` are its `degree + 1` control points.
 #[inline(always)]
 fn de_boor(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Point4; 8]>, t: Number) -> [Point4; 2] {
     let mut slope = [Number::ZERO; 4];
@@ -260,8 +266,8 @@ fn rounded(x: Point3) -> Vector {
     Vector::from_array(x.map(Number::to_f64))
 }
 
-/// The control points of a Bézier patch, each coordinate rounded once: knot spans of 1e-9 beside weights of 1e6 leave no digit of
-/// what `f64` extracts.
+/// Overwrites the control points of a Bézier patch of `surface`, over the same domain, with those from 32 digits, each coordinate
+/// rounded once: knot spans of 1e-9 beside weights of 1e6 leave no digit of what `f64` extracts.
 pub(super) fn extract(surface: &Surface, patch: &mut BezierPatch) {
     let ends = patch.domain.map(|ends| ends.map(Number::from));
     let points = bezier_points(surface, patch.domain, ends);
@@ -270,7 +276,8 @@ pub(super) fn extract(surface: &Surface, patch: &mut BezierPatch) {
     }
 }
 
-/// Control points over a rectangle of the surface's domain, in the knot rectangle `domain`.
+/// Bézier control points, row by row in u, over the rectangle `ends` of the surface's domain, of the polynomial in the knot rectangle
+/// `domain`.
 #[inline(always)]
 fn bezier_points(surface: &Surface, domain: [[f64; 2]; 2], ends: [[Number; 2]; 2]) -> Vec<Point4> {
     let [p, q] = surface.degree;
@@ -294,7 +301,8 @@ fn bezier_points(surface: &Surface, domain: [[f64; 2]; 2], ends: [[Number; 2]; 2
     points
 }
 
-/// The blossom of a span at the first of two parameters, and `seconds` times at the other: a Bézier point over the range between them.
+/// The blossom of a span's control points, `seconds` times at the second of two parameters and else at the first: a Bézier point over the
+/// range between them.
 #[inline(always)]
 fn blossom(
     knots: &[f64],

@@ -24,7 +24,7 @@ const STRAYED: f64 = 4.0;
 /// Clipping steps that settling a root counts as: twenty microseconds.
 const WORK: u32 = 40;
 
-/// Whether the place of a root with this margin must be settled.
+/// Whether the place of a root with this margin, both in parameters of its leaf, must be settled in 32 digits.
 #[inline(always)]
 pub(super) fn is_open(local: [f64; 2], margin: [f64; 2]) -> bool {
     let open = |x: f64, margin: f64| margin > LOOSE || margin > AMBIGUOUS && !(x > margin && x < 1.0 - margin);
@@ -41,7 +41,8 @@ enum Place {
 }
 
 impl Exact {
-    /// Offers a root at its place in 32 digits, if that lies on the leaf; flags what stays open.
+    /// Finds a root on the leaf `index` again in 32 digits, and offers it if it lies on the leaf; where they find none near, offers it as
+    /// uncertified. Takes [`WORK`] off the ray's budget. `margin` is in parameters of the leaf.
     #[cold]
     pub(super) fn settle(&self, query: &mut Query, index: u32, found: Candidate, margin: [f64; 2]) {
         // Charged to the ray's budget and given up with it, so that a ray along a border, of which every root is open, ends as others do.
@@ -64,7 +65,7 @@ impl Exact {
         self.offer_settled(query, index, &root, margin);
     }
 
-    /// Offers a root in 32 digits that a leaf's search has found, if it lies on the leaf.
+    /// Offers a root in 32 digits as certified if it lies on the leaf, as uncertified in the crack of a seam or at a pole, else not at all.
     pub(super) fn offer_settled(&self, query: &mut Query, index: u32, root: &SettledRoot, margin: [f64; 2]) {
         let leaf = &self.leaves[index as usize];
         let patch = &self.geometry.patches[leaf.patch as usize];
@@ -81,7 +82,7 @@ impl Exact {
         }
     }
 
-    /// Whether a root in 32 digits lies on the leaf that found it.
+    /// Tells whether a root in 32 digits lies on the leaf that found it.
     ///
     /// Over an inner border the surface goes on, and in its own numbers without a gap: de Boor's points of two spans agree on their knot to
     /// 30 digits. So a ray that meets the face meets it on a leaf by that leaf's own polynomial, and that leaf's test in `f64`, which
@@ -124,7 +125,7 @@ impl Exact {
         }
     }
 
-    /// Flags a root that nothing tells, from where on it may lie along the ray: anywhere in the leaf's extent.
+    /// Offers a root that nothing tells as uncertified, and leaves the ray undecided from two radii of the leaf before it on.
     fn leave_open(&self, query: &mut Query, index: u32, found: Candidate) {
         let leaf = &self.leaves[index as usize];
         // Two radii before the root: no point of the leaf lies nearer.

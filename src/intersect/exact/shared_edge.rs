@@ -41,12 +41,12 @@ struct EdgePassage {
     distance: f64,
     /// The direction of the edge there, across the ray.
     along: [f64; 2],
-    /// Whether it is nearest at its start or at its end.
+    /// Whether it is nearest at its end, `true`, or at its start; `None` in between.
     end: Option<bool>,
 }
 
-/// How a ray, the frame's origin and the two directions across it, passes an edge near a parameter; `None` when it runs
-/// along the edge.
+/// How a ray, given by its origin and the two directions across it in the part's coordinates, passes an edge near a parameter of it;
+/// `None` when it runs along the edge.
 fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option<EdgePassage> {
     let [t0, t1] = curve.domain();
     let seed = ((near - t0) / (t1 - t0) * SEEDS).round().clamp(0.0, SEEDS);
@@ -84,8 +84,8 @@ fn nearest_passage(curve: &Curve, near: f64, [o, n1, n2]: [Vector; 3]) -> Option
 impl Geometry {
     /// Whether a root of a face near its trims counts, by the sides of the shared edges; `None` where no edge can tell.
     ///
-    /// The ray comes as its origin and the two directions across it. `facing` is the sign of `(Su × Sv) · d` at the root, `near` what
-    /// trims there are about it.
+    /// The ray comes as its origin and the two directions across it, in the world. `facing` has the sign of `(Su × Sv) · d` at the root,
+    /// `near` are the uses about it.
     pub(super) fn side_of_edges(
         &self,
         face: &FaceRecord,
@@ -105,7 +105,7 @@ impl Geometry {
         // The side on which the face lies, and the edge's direction in the loop, with the face to its left.
         let mirrored = facing < 0.0;
         // Vertices first: there several edges are equally near, and rounding would choose among them.
-        if let Some(inside) = self.in_sector(face, trim, near, mirrored, frame) {
+        if let Some(inside) = self.is_in_sector(face, trim, near, mirrored, frame) {
             return Some(inside);
         }
         let mut best: Option<(u32, EdgePassage)> = None;
@@ -141,11 +141,12 @@ impl Geometry {
         Some(if convex { by_nearest && by_other } else { by_nearest || by_other })
     }
 
-    /// Whether a ray through a vertex falls into one of the face's sectors there; `None` when it passes no vertex.
+    /// Whether a ray, in the part's coordinates, through a vertex falls into one of the face's sectors there; `None` when it passes no
+    /// vertex, or runs along an edge of one.
     ///
     /// Directions are compared, never subtracted: whatever their rounding, each falls into exactly one of the sectors about a
     /// vertex.
-    fn in_sector(
+    fn is_in_sector(
         &self,
         face: &FaceRecord,
         trim: &Trim,

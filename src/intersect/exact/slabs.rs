@@ -26,6 +26,7 @@ const WIDENED_ULPS: f64 = 64.0;
 /// A ray as the hierarchy sees it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RaySlabs {
+    /// Of the direction.
     inverse: [f32; 3],
     /// 1 where the ray runs against the axis.
     back: [usize; 3],
@@ -42,7 +43,7 @@ pub(super) struct RaySlabs {
 }
 
 impl RaySlabs {
-    /// Meets nothing.
+    /// A ray that meets nothing.
     pub(super) const IDLE: Self = Self {
         inverse: [1.0; 3],
         back: [0; 3],
@@ -53,7 +54,7 @@ impl RaySlabs {
         misses: true,
     };
 
-    /// Takes up a ray.
+    /// Takes up a ray, in the world, for the boxes of `tree`.
     #[inline(always)]
     pub(super) fn restart(&mut self, ray: &Ray, tree: &Tree) {
         let (o, d) = (ray.origin, ray.direction);
@@ -83,13 +84,13 @@ impl RaySlabs {
         self.end_at(ray.t_max);
     }
 
-    /// Boxes entered beyond `t` are of no interest any more.
+    /// Ends the ray at `t`, mm: boxes entered beyond are not met any more.
     #[inline(always)]
     pub(super) fn end_at(&mut self, t: f64) {
         self.end = ((t - self.start).max(0.0) as f32 * SLACK).next_up();
     }
 
-    /// Where each of a node's boxes is entered, counted from the start and not too far, and a bit for each that is met.
+    /// What [`intersect_boxes`] returns, in plain Rust.
     #[inline(always)]
     fn intersect_boxes_portable(&self, node: &Node) -> ([f32; WIDTH], u32) {
         let (mut near, mut far) = ([0f32; WIDTH], [self.end; WIDTH]);
@@ -118,7 +119,7 @@ impl RaySlabs {
         use std::arch::x86_64::*;
         let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(self.end));
         for k in 0..3 {
-            let [first, last] = [self.back[k], 1 - self.back[k]].map(|side| row(&node.planes[side & 1][k]));
+            let [first, last] = [self.back[k], 1 - self.back[k]].map(|side| load_planes(&node.planes[side & 1][k]));
             let inverse = _mm256_set1_ps(self.inverse[k]);
             let a = _mm256_mul_ps(_mm256_sub_ps(first, _mm256_set1_ps(self.enter[k])), inverse);
             let b = _mm256_mul_ps(_mm256_sub_ps(last, _mm256_set1_ps(self.leave[k])), inverse);
@@ -134,7 +135,8 @@ impl RaySlabs {
     }
 }
 
-/// Where a ray enters each of a node's boxes, counted from its start and not too far, and a bit for each that is met.
+/// A lower bound of where a ray enters each of a node's boxes, counted from where it enters the scene, and a bit for each box that it may
+/// meet.
 #[inline(always)]
 pub(super) fn intersect_boxes<I: Instructions>(slabs: &RaySlabs, node: &Node) -> ([f32; WIDTH], u32) {
     #[cfg(target_arch = "x86_64")]
@@ -148,7 +150,7 @@ pub(super) fn intersect_boxes<I: Instructions>(slabs: &RaySlabs, node: &Node) ->
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn row(row: &[f32; WIDTH]) -> std::arch::x86_64::__m256 {
+fn load_planes(row: &[f32; WIDTH]) -> std::arch::x86_64::__m256 {
     // SAFETY: the array holds eight.
     unsafe { std::arch::x86_64::_mm256_loadu_ps(row.as_ptr()) }
 }

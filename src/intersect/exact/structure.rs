@@ -20,7 +20,7 @@ pub struct Settings {
     /// Models with fewer leaves are cut finer, down to a fifth of `flatness`: as long as all leaves stay in the first caches
     /// more of them cost nothing. One bicubic patch in 264 leaves instead of 11 answers twice as many rays.
     pub leaves: usize,
-    /// How often a patch may be halved at most.
+    /// How often a patch may be halved for flatness; large loose leaves are halved up to eight times more for their boxes.
     pub depth: u32,
     /// Clipping steps on a bicubic net that a ray may take before its answer is left uncertified: half a microsecond each. Nets of
     /// higher degree count as many as they take longer.
@@ -42,7 +42,8 @@ impl Settings {
         Self { flatness: 1.0, ..Self::default() }
     }
 
-    /// For so many rays: the default where its leaves are not many more than they, else as [`Settings::for_few_rays`], and less deep. On a file of 4,300 patches that is 65 MB for 775.
+    /// Chooses by the number of rays to come: the default where it makes no more leaves than that, by a hundred to a patch, else
+    /// [`Settings::for_few_rays`] with at most eight halvings. On a file of 4,300 patches that is 65 MB instead of 775.
     pub fn for_rays(model: &Model, rays: u64) -> Self {
         let faces = model.placed_faces().filter_map(|f| f.face);
         let patches: u64 = faces.map(|f| patch_count(&f.surface)).sum();
@@ -58,7 +59,7 @@ const SHALLOW: u32 = 8;
 /// Leaves of a patch by default settings: 51 to 200 on the models of four CAD systems.
 const LEAVES_OF_PATCH: u64 = 100;
 
-/// Bézier patches of a surface.
+/// Number of Bézier patches of a surface: its knot spans that are not empty.
 fn patch_count(surface: &Surface) -> u64 {
     let intervals = |d: usize| {
         let knots = &surface.knots[d][surface.degree[d]..=surface.counts()[d]];
@@ -105,7 +106,8 @@ pub struct Exact {
 }
 
 impl Exact {
-    /// Cuts every placed face that has a surface; a hit's [`Hit::primitive`](crate::intersect::Hit::primitive) is the patch.
+    /// Cuts every placed face that has a surface, in the current rayon pool; a hit's [`Hit::primitive`](crate::intersect::Hit::primitive)
+    /// is the patch.
     ///
     /// Ready meshes and surfaces that are not finite or not positive in weight are left out: [`Exact::skipped`].
     pub fn build(model: &Model, settings: &Settings) -> Self {
@@ -147,7 +149,7 @@ impl Exact {
         self.leaves.len()
     }
 
-    /// Bytes held without the model itself.
+    /// Bytes of patches, leaves and hierarchy, without copies of the model's surfaces and trims.
     pub(super) fn bytes(&self) -> usize {
         let nets: usize = self.geometry.patches.iter().map(|p| size_of_val(p) + size_of_val(&*p.net)).sum();
         let tested = size_of_val(&*self.linearizations) + size_of_val(&*self.labels);
@@ -156,7 +158,7 @@ impl Exact {
     }
 }
 
-/// Leaves of all patches, flatter than asked for where there are few.
+/// Cuts all patches into leaves, flatter than `settings.flatness` where they are fewer than `settings.leaves`.
 fn subdivide(geometry: &Geometry, settings: &Settings) -> Vec<PatchLeaves> {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
     let mut patches = subdivision::subdivide_all(geometry, flatness);

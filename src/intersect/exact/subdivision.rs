@@ -30,8 +30,8 @@ const LARGE: f64 = 1e-3;
 const TIGHTER: f64 = 0.75;
 /// How often a flat leaf may be halved for the sake of its box.
 const BOX_HALVINGS: u32 = 8;
-/// Deviation from which a part has no tangent plane to speak of, and how often in a row it is halved in spite of it. Beside a pole the deviation is a
-/// few units however small the part is; a patch that is a line or a point stays without one, and was cut into a million leaves.
+/// Deviation from which a part has no tangent plane to speak of, and how often in a row it is halved in spite of it. Beside a pole the
+/// deviation is a few units however small the part is; a patch that is a line or a point has none, and was cut into a million leaves.
 const NO_TANGENT_PLANE: f64 = 1e6;
 const VAIN_HALVINGS: u32 = 4;
 /// Largest ratio of two weights of a flat leaf.
@@ -78,7 +78,7 @@ struct Subdivision<'a> {
     scene_area: f64,
 }
 
-/// Cuts every patch into leaves.
+/// Cuts every patch into leaves, in parallel, and returns those of each in the order of the patches; none where all is outside the trims.
 pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> Vec<PatchLeaves> {
     let whole =
         |p: &Patch| SubPatch { net: p.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0, vain: 0 };
@@ -103,7 +103,7 @@ pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> Vec<Patc
         .collect()
 }
 
-/// A part without what lies outside the trims on its sides; `None` when nothing is left.
+/// Cuts off from a part's sides what lies outside the trims, where that is worth it; `None` when nothing is left.
 fn crop(trim: &Trim, patch: &Patch, mut part: SubPatch) -> Option<SubPatch> {
     let kept = trim.bounds_within(in_surface(patch, part.rect))?;
     let from = patch.local(Uv::new(kept[0][0], kept[1][0]));
@@ -127,7 +127,7 @@ fn crop(trim: &Trim, patch: &Patch, mut part: SubPatch) -> Option<SubPatch> {
 }
 
 impl Subdivision<'_> {
-    /// Cuts the patch into leaves; parts that lie outside the trims are dropped.
+    /// Cuts `whole`, the patch or what a crop left of it, into leaves; parts that lie outside the trims are dropped.
     fn leaves(&self, whole: SubPatch) -> PatchLeaves {
         let degree = self.patch.degree;
         let mut out = PatchLeaves::default();
@@ -152,7 +152,7 @@ impl Subdivision<'_> {
             let tighter = if large { tightening_direction(&piece, degree, TIGHTER * area) } else { None };
             let direction = match tighter {
                 None if flat || deepest => {
-                    self.keep(described, region, rect, &mut out);
+                    self.add_leaf(described, region, rect, &mut out);
                     continue;
                 }
                 // Flatness asks for nothing more: it is halved for its box alone, in the direction that tightens
@@ -174,7 +174,8 @@ impl Subdivision<'_> {
         out
     }
 
-    /// Whether the one-step test decides on a part most of the time.
+    /// Whether a part is so flat that the one-step test decides on it most of the time; large parts, by the half area of their box, must be
+    /// flatter unless they are the deepest.
     fn is_flat(&self, part: &Described, area: f64, deepest: bool) -> bool {
         let (least, most) =
             part.net.iter().fold((f64::INFINITY, 0f64), |(least, most), p| (least.min(p[3]), most.max(p[3])));
@@ -182,8 +183,8 @@ impl Subdivision<'_> {
         deviation(&part.leaf, &part.slopes) < flatter * self.flatness.deviation && most < WEIGHT_RATIO * least
     }
 
-    /// Makes a part a leaf.
-    fn keep(&self, part: Described, region: Region, rect: [[f64; 2]; 2], out: &mut PatchLeaves) {
+    /// Makes a part a leaf and adds it to `out`, with its net and linearization.
+    fn add_leaf(&self, part: Described, region: Region, rect: [[f64; 2]; 2], out: &mut PatchLeaves) {
         let Described { mut leaf, slopes, net: control } = part;
         leaf.whole = region == Region::Inside;
         leaf.patch = self.index;
@@ -202,7 +203,7 @@ impl Subdivision<'_> {
     }
 }
 
-/// The direction whose halves have the smaller boxes, when these together are smaller than `area`.
+/// The direction whose halves have the smaller boxes; `None` unless half areas of these add up to less than `area`.
 fn tightening_direction(piece: &[V4], degree: [u8; 2], area: f64) -> Option<usize> {
     let halves = |d: usize| -> f64 {
         let boxes = net::halves(piece, degree, d).map(|half| extent(&half));
@@ -213,14 +214,14 @@ fn tightening_direction(piece: &[V4], degree: [u8; 2], area: f64) -> Option<usiz
     (areas[best] < area).then_some(best)
 }
 
-/// Corners of the box around a net's points.
+/// Lower and upper corner, mm, of the box around a net's points.
 fn extent(net: &[V4]) -> (Vector, Vector) {
     net.iter()
         .map(|p| xyz(p) / p[3])
         .fold((Vector::INFINITY, Vector::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)))
 }
 
-/// The rectangle of the surface's domain for one of a patch's local domain.
+/// Turns a rectangle of a patch's local domain into one of the surface's.
 fn in_surface(patch: &Patch, [u, v]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     let (from, to) = (patch.uv([u[0], v[0]]), patch.uv([u[1], v[1]]));
     [[from.x, to.x], [from.y, to.y]]

@@ -109,7 +109,8 @@ pub(super) fn roots(
 }
 
 impl Bend {
-    /// `None` where the curve or the sign of φ″ is not certain.
+    /// Bounds the curve and φ″ over a net in the ray's frame with this rounding, in homogeneous units; `None` where the curve or the sign
+    /// of φ″ is not certain.
     fn new(net: &[V4], degree: [u8; 2], margin: [f64; 2]) -> Option<Self> {
         let slopes = net::slopes(net, degree);
         let Slopes { u, v, ru, rv } = &slopes;
@@ -162,8 +163,8 @@ impl Bend {
         (range[0] > LEAST_BEND * range[1]).then_some(Self { p, q, along, across, range })
     }
 
-    /// Newton's step along p and q towards the lowest point of φ on the curve, ended at the border of what is looked at: of φ that is lowest
-    /// beyond, the nearest point says enough.
+    /// Newton's step along p and q towards the lowest point of φ on the curve, ended at the border of what is looked at: of φ that is
+    /// lowest beyond, the nearest point says enough.
     #[inline(always)]
     fn step(&self, x: [f64; 2], slope: f64, h: f64, [h_p, h_q]: [f64; 2]) -> [f64; 2] {
         let Self { p, q, range: [least, most], .. } = *self;
@@ -179,7 +180,7 @@ impl Bend {
         [step, (x[q] - (h + h_p * step) / h_q).clamp(0.0, 1.0) - x[q]]
     }
 
-    /// Height of the ray over the lowest point of φ, to `f64`.
+    /// Value of φ at its lowest point over the net, in `f64` and homogeneous units: how far the ray passes the surface.
     fn lowest(&self, net: &[V4], degree: [u8; 2]) -> f64 {
         let Self { p, q, along, across, .. } = *self;
         let part = |e: [f64; 2], x: &V4| e[0] * x[0] + e[1] * x[1];
@@ -203,21 +204,24 @@ impl Bend {
     }
 }
 
+/// The range that holds `x` too.
 fn grown([low, high]: Range, x: f64) -> Range {
     [low.min(x), high.max(x)]
 }
 
+/// The range of products of two ranges.
 fn product(a: Range, b: Range) -> Range {
     [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]].into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], grown)
 }
 
+/// The range of squares of a range.
 fn squared([low, high]: Range) -> Range {
     let most = low.abs().max(high.abs());
     let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
     [least * least, most * most]
 }
 
-/// Ranges of the second derivatives (pp, pq, qq) of a component of the net.
+/// Ranges over the net of the second derivatives (pp, pq, qq) of a component of it, widened by `noise`; zero for those of degree one.
 fn second_derivatives(
     net: &[V4],
     degree: [u8; 2],
@@ -273,6 +277,7 @@ impl Kernel for Search<'_> {
 }
 
 impl Search<'_> {
+    /// What [`roots`] returns, once the bend is known.
     #[inline(always)]
     fn search(&self) -> Option<SmallVec<[SettledRoot; 2]>> {
         let Bend { p, q, range: [least, most], .. } = *self.bend;
@@ -300,7 +305,7 @@ impl Search<'_> {
                     return Some(SmallVec::new());
                 }
                 if height < -rounding && slope * slope < -0.5 * least * height {
-                    return self.both(x, height, dh);
+                    return self.both_roots(x, height, dh);
                 }
             }
             let [step, other] = self.bend.step(x, slope, h, dh);
@@ -310,9 +315,10 @@ impl Search<'_> {
         None
     }
 
-    /// Both roots beside the lowest point of φ.
+    /// Finds both roots beside the lowest point of φ at `x`, and returns those in the box; `None` where Newton's method does not find both
+    /// well inside what is looked at.
     #[inline(always)]
-    fn both(&self, x: [f64; 2], height: f64, dh: [f64; 2]) -> Option<SmallVec<[SettledRoot; 2]>> {
+    fn both_roots(&self, x: [f64; 2], height: f64, dh: [f64; 2]) -> Option<SmallVec<[SettledRoot; 2]>> {
         let Bend { p, q, range: [least, most], .. } = *self.bend;
         let way = (-4.0 * height / (least + most)).sqrt();
         let mut found = SmallVec::new();
@@ -334,12 +340,14 @@ impl Search<'_> {
         Some(found)
     }
 
-    /// Where a place lies in what is looked at.
+    /// Turns local parameters of the patch into shares of what is looked at.
     #[inline(always)]
     fn share(&self, local: &[Number; 2]) -> [f64; 2] {
         [0, 1].map(|k| (local[k] - self.from[k].into()).to_f64() / self.extent[k])
     }
 
+    /// g and h from 32 digits, in homogeneous units, and their derivatives by shares, at local parameters of the patch and the same as
+    /// shares `x`.
     #[inline(always)]
     fn heights(&self, local: &[Number; 2], x: [f64; 2]) -> Heights {
         let Bend { p, q, along, across, .. } = *self.bend;

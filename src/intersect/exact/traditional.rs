@@ -57,13 +57,16 @@ pub struct Traditional<'a> {
 #[derive(Debug)]
 struct SampledSurface {
     face: FaceId,
+    /// Around its control points, in the world.
     bounds: Aabb,
+    /// Samples in u and in v.
     counts: [usize; 2],
+    /// Parameters and the place in the world, v fastest.
     samples: Vec<(Uv, Point)>,
 }
 
 impl<'a> Traditional<'a> {
-    /// Samples the surfaces of the model that `exact` was built from.
+    /// Samples the surfaces of `model`, which must be the one that `exact` was built from; faces that this skips are left out.
     pub fn new(model: &Model, exact: &'a Exact, seeds: Seeds) -> Self {
         let start = Instant::now();
         let surfaces = model
@@ -97,7 +100,8 @@ impl<'a> Traditional<'a> {
         Self { exact, surfaces, build_seconds: start.elapsed().as_secs_f64() }
     }
 
-    /// Adds the roots of a surface that Newton's method reaches from the samples nearest to the ray.
+    /// Adds the roots of a surface inside its trims that Newton's method reaches from samples that are nearer to the ray than their
+    /// neighbours, whatever the range of the ray; one may be added twice.
     fn candidates(&self, ray: &Ray, surface: &SampledSurface, found: &mut Vec<(FaceId, SurfacePoint)>) {
         let distances: Vec<f64> =
             // Squared distances suffice to find the minima.

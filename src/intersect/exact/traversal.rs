@@ -62,20 +62,20 @@ impl Kernel for BatchSearch<'_> {
     }
 }
 
-/// Meets every leaf that the ray may touch.
+/// Tests every leaf that the ray may touch; what is found is left in `query`, which has taken up a ray.
 #[inline]
 pub(super) fn search(exact: &Exact, query: &mut Query) {
     simd::dispatch(Search { exact, query });
 }
 
-/// Finds the first hits of many rays.
+/// Finds the first hits of many rays, with the bits that each has alone; overwrites `hits`, which is as long as `rays`.
 #[inline]
 pub(super) fn search_batch(exact: &Exact, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
     simd::dispatch(BatchSearch { exact, rays, hits, cost });
 }
 
 impl Exact {
-    /// Meets every leaf that the ray may touch, nearest boxes first.
+    /// Tests every leaf that the ray may touch, nearest boxes first.
     #[inline(always)]
     fn walk<I: Instructions>(&self, query: &mut Query) {
         let mut stack = Stack::new();
@@ -85,7 +85,7 @@ impl Exact {
         }
     }
 
-    /// Where every search begins: at the root of the hierarchy.
+    /// Empties the stack and puts the root of the hierarchy on it, unless the ray misses everything.
     #[inline(always)]
     fn push_root(&self, query: &Query, stack: &mut Stack) {
         stack.clear();
@@ -94,7 +94,7 @@ impl Exact {
         }
     }
 
-    /// The next leaf that the ray may touch, nearest boxes first; `None` when there is none left.
+    /// Takes the next leaf that the ray may touch off the stack, nearest boxes first, and counts nodes; `None` when there is none left.
     #[inline(always)]
     fn next_leaf<I: Instructions>(&self, query: &mut Query, stack: &mut Stack) -> Option<u32> {
         while let Some((index, near)) = stack.pop() {
@@ -127,7 +127,7 @@ impl Exact {
         None
     }
 
-    /// Finds the first hits of many rays, [`LANES`] of them side by side.
+    /// Finds the first hits of many rays, [`LANES`] of them side by side, and writes each into `hits` at its ray's index.
     #[inline(always)]
     fn walk_batch<I: Instructions>(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let mut waiting = rays.iter().enumerate();
@@ -166,7 +166,7 @@ impl Exact {
         self.push_root(&lane.query, &mut lane.stack);
     }
 
-    /// Walks to the next leaf and asks for its memory.
+    /// Walks to the next leaf, sets `lane.leaf` and asks for its memory; where none is left, for that of what names the hit.
     #[inline(always)]
     fn walk_to_leaf<I: Instructions>(&self, lane: &mut Lane) {
         lane.leaf = self.next_leaf::<I>(&mut lane.query, &mut lane.stack);

@@ -47,7 +47,7 @@ struct Binary {
 }
 
 impl Tree {
-    /// The hierarchy over the boxes of leaves, which keep their indices.
+    /// Builds the hierarchy over the boxes of leaves, in the world, which keep their indices; without boxes it has no nodes.
     pub(super) fn build(boxes: &[Aabb]) -> Self {
         if boxes.is_empty() {
             return Self { nodes: Vec::new(), center: Vector::ZERO, bounds: Aabb::EMPTY };
@@ -71,7 +71,7 @@ impl Tree {
             }
             for (k, &child) in children.iter().enumerate() {
                 let c = binary[child];
-                tree.nodes[wide].set(k, c.bounds, center);
+                tree.nodes[wide].set_child_box(k, c.bounds, center);
                 if c.is_leaf {
                     tree.nodes[wide].child[k] = c.first | LEAF;
                 } else {
@@ -91,8 +91,8 @@ impl Node {
         // An empty box, with its planes turned inside out: every slab test fails on it.
         Self { planes: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]], child: [LEAF; WIDTH] };
 
-    /// Sets the box of child `k`, rounded outward about `center`.
-    fn set(&mut self, k: usize, bounds: Aabb, center: Vector) {
+    /// Sets the box, in the world, of child `k`, rounded outward to f32 about `center`; its link stays.
+    fn set_child_box(&mut self, k: usize, bounds: Aabb, center: Vector) {
         for axis in 0..3 {
             // One rounding in the shift, one to f32: two steps outward cover both.
             let (lo, hi) = (bounds.min[axis] - center[axis], bounds.max[axis] - center[axis]);
@@ -102,7 +102,7 @@ impl Node {
     }
 }
 
-/// A binary tree over boxes, from which the wide one is collapsed.
+/// Builds the binary tree over at least one box, root first, from which the wide one is collapsed.
 fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let centres: Vec<Vector> = boxes.iter().map(Aabb::center).collect();
@@ -127,7 +127,8 @@ fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
     nodes
 }
 
-/// Sorts the slice into two parts by the cheapest of the binned planes; the length of the first part.
+/// Sorts a slice of at least two into two parts by the cheapest of the binned planes; returns the length of the first part, half of it
+/// where no plane parts them.
 fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
     let centre = |i: u32| centres[i as usize];
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);

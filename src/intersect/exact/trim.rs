@@ -24,7 +24,7 @@ const LEAST_REACH: f64 = 1e-9;
 /// The largest share of the domain that cells keep off a trim: with more, none would be decided.
 const LARGEST_REACH: f64 = 1e-2;
 
-/// What a cell or rectangle of the domain is.
+/// What a cell or rectangle of the domain is; `Border` where it is not decided as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Region {
     Inside,
@@ -77,7 +77,8 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    /// The trim of a face: `band` in mm, `closed` directions of its surface, and the gap of each edge of its part.
+    /// Prepares the trims of a face: `band` in mm, in which directions its surface is `closed`, and the gap of each edge of its part, in
+    /// the units of the part. Without loops the face is whole.
     pub(super) fn new(face: &Face, closed: [bool; 2], band: f64, gaps: &[f64]) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
@@ -124,12 +125,12 @@ impl Trim {
         trim
     }
 
-    /// The widest of the gaps along its edges, in the units of the part.
+    /// The widest of the gaps along its edges, in the units of the part; 0 without edges.
     pub(super) fn widest_gap(&self) -> f64 {
         self.uses.iter().map(|u| u.gap).fold(0.0, f64::max)
     }
 
-    /// Area within the loops in parameters, negative where they run clockwise.
+    /// Signed area within the loops in parameters, by chords: only its sign is sure, negative where they run clockwise.
     fn signed_area(&self) -> f64 {
         // Chords will do: pieces are so short beside their loop that the sign is that of the curves.
         let from_origin = |q: &glam::DVec3| q.truncate() / q.z - self.origin;
@@ -149,7 +150,7 @@ impl Trim {
         at(lo)..=at(hi)
     }
 
-    /// Decides the cells that no piece of a trim comes within `reach` of, and lists the pieces of the others.
+    /// Decides the cells that no piece of a trim comes within `reach` of, in u and v, and lists the pieces of the others and of rows.
     fn fill_cells(&mut self, reach: Uv) {
         for (k, piece) in self.pieces.iter().enumerate() {
             let (lo, hi) = (piece.min - reach, piece.max + reach);
@@ -191,7 +192,7 @@ impl Trim {
         (crossings % 2 == 1) != self.outside_is_inside
     }
 
-    /// Whether a point lies beyond the grid, where nothing counts.
+    /// Whether a point lies beyond a side of the grid where the domain goes on, so that it is outside.
     fn is_beyond(&self, q: Uv) -> bool {
         (0..2).any(|d| {
             let x = (q[d] - self.origin[d]) * self.density[d];
@@ -199,7 +200,7 @@ impl Trim {
         })
     }
 
-    /// The part of a rectangle of the domain that holds all of it that is not outside; `None` when all is.
+    /// Shrinks a rectangle of the domain to a part that holds all of it that is not outside; `None` when all is.
     pub(super) fn bounds_within(&self, rect: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
         if self.whole {
             return Some(rect);
@@ -232,7 +233,7 @@ impl Trim {
         kept.iter().all(|[a, b]| a < b).then_some(kept)
     }
 
-    /// What a rectangle of the domain is: inside or outside only when all its cells are.
+    /// What a rectangle of the domain is: inside or outside only when all its cells are, else `Border`.
     pub(super) fn region(&self, [u, v]: [[f64; 2]; 2]) -> Region {
         if self.whole {
             return Region::Inside;
@@ -252,7 +253,7 @@ impl Trim {
         found.unwrap_or(Region::Border)
     }
 
-    /// What the cell that holds a point is.
+    /// What the cell that holds a point of the domain is; outside where that lies beyond the grid and the domain goes on.
     #[inline]
     pub(super) fn cell_at(&self, q: Uv) -> Region {
         if self.is_beyond(q) {
@@ -269,7 +270,7 @@ impl Trim {
         prefetch(&self.cells, j * self.count[0] + i);
     }
 
-    /// Whether `q`, which lies in a border cell, is inside, and what uses pass within `band` mm; `metric` as for
+    /// Whether `q`, which lies in a border cell, is inside, and what uses pass within `band` mm, each at its nearest point; `metric` as for
     /// [`TrimPiece::nearest`].
     pub(super) fn locate(&self, q: Uv, metric: [f64; 3], band: f64) -> Place {
         let [i, j] = [0, 1].map(|d| *self.cell_range(q[d], q[d], d).start());

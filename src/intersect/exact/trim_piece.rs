@@ -48,7 +48,7 @@ struct LoopSide {
 }
 
 impl TrimPiece {
-    /// The piece of these homogeneous control points, `(w·u, w·v, w)`, over the parameters `range` of the edge of `side`.
+    /// Makes a piece of homogeneous control points, `(w·u, w·v, w)`, over the parameters `range` of the edge of `side`.
     fn new(points: SmallVec<[DVec3; 4]>, range: [f64; 2], side: LoopSide) -> Self {
         let LoopSide { owner, reversed } = side;
         let at = |p: &DVec3| p.truncate() / p.z;
@@ -59,6 +59,7 @@ impl TrimPiece {
         piece
     }
 
+    /// Sets the hull anew from the control points and the heights of the ends.
     fn update_hull(&mut self) {
         self.min = Uv::new(f64::INFINITY, self.v[0].min(self.v[1]));
         self.max = Uv::new(f64::NEG_INFINITY, self.v[0].max(self.v[1]));
@@ -69,7 +70,7 @@ impl TrimPiece {
         }
     }
 
-    /// Point and derivative at `t` in `[0, 1]`.
+    /// Surface parameters and their derivative at `t` in `[0, 1]`.
     pub(super) fn evaluate(&self, t: f64) -> (Uv, Uv) {
         let n = self.points.len() - 1;
         let mut w: SmallVec<[DVec3; 8]> = self.points.as_slice().into();
@@ -84,7 +85,7 @@ impl TrimPiece {
         (p, (d.truncate() - p * d.z) / a.z)
     }
 
-    /// u where the piece crosses height `v`, which must lie in its range.
+    /// The u at which the piece crosses the height `v`, which must lie in its range and the piece not be level.
     pub(super) fn u_at(&self, v: f64) -> f64 {
         // Newton's method inside of a bracket, which a monotone piece allows: it ends whatever the slope.
         let (mut lo, mut hi) = (0.0, 1.0);
@@ -113,7 +114,7 @@ impl TrimPiece {
         u
     }
 
-    /// Whether the piece crosses the height `v`; half-open, so that a joint counts once.
+    /// Whether the height `v` lies between the ends of the piece, the upper end excluded, so that a joint counts once.
     #[inline]
     pub(super) fn spans(&self, v: f64) -> bool {
         let (low, high) = if self.v[0] < self.v[1] { (self.v[0], self.v[1]) } else { (self.v[1], self.v[0]) };
@@ -129,8 +130,9 @@ impl TrimPiece {
         q.x < self.min.x || q.x < self.u_at(q.y)
     }
 
-    /// Nearest parameter to `q` and the distance there, in the metric of `u`, `v` ↦ `u·du + v·dv` given by its products
-    /// `[du·du, du·dv, dv·dv]`.
+    /// The parameter, in `[0, 1]`, of the piece's point nearest to `q` and the distance there, mm, in the metric of `u`, `v` ↦ `u·du +
+    /// v·dv` given by its products `[du·du, du·dv, dv·dv]`. The nearest from the foot on the chord, which on a short piece is the nearest
+    /// of all.
     pub(super) fn nearest(&self, q: Uv, metric: [f64; 3]) -> (f64, f64) {
         let [e, f, g] = metric;
         let inner = |a: Uv, b: Uv| e * a.x * b.x + f * (a.x * b.y + a.y * b.x) + g * a.y * b.y;
@@ -155,7 +157,8 @@ impl TrimPiece {
     }
 }
 
-/// All loops of a face as pieces monotone in v and no longer than `longest` in u and v, joints closed.
+/// Cuts all loops of a face into pieces monotone in v and no longer than `longest` in u and v, with bit-equal heights at joints. Pieces
+/// that are not finite or not positive in weight are left out; absurdly long or wild ones stay as they are.
 pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
     let mut all = Vec::new();
     let mut owner = 0;
@@ -204,7 +207,8 @@ struct CurvePart {
     depth: u32,
 }
 
-/// Halves a Bézier piece until its parts are monotone in v and no longer than `longest` in u and v.
+/// Halves a Bézier piece until its parts are monotone in v and no longer than `longest` in u and v, or limits are reached, and adds them
+/// to `out` in the order of the curve.
 fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, side: LoopSide) {
     let first = out.len();
     let mut stack = vec![whole];

@@ -13,8 +13,9 @@ use std::arch::x86_64::*;
 /// Eight lanes of f32.
 pub(super) struct Avx2;
 
+/// A row of a node's bounds as numbers.
 #[inline(always)]
-unsafe fn row(node: &Node, row: usize) -> __m256 {
+unsafe fn load_bounds(node: &Node, row: usize) -> __m256 {
     unsafe {
         let bytes = node.bounds.get_unchecked(row).as_ptr().cast();
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes)))
@@ -26,13 +27,13 @@ unsafe fn broadcast_axis(v: &[f32; 3], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
 }
 
-/// The numbers of a corner in the order whose halves are given.
+/// The numbers of a corner in another order, which is given by halves as in [`QuadRay::order`].
 #[inline(always)]
 unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
     unsafe { _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(corner), order)) }
 }
 
-/// Half a row of corners against the ray's origin.
+/// Eight corners of a block along an axis from the lane `first` on, relative to the ray's origin, mm.
 #[inline(always)]
 unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: __m256) -> __m256 {
     unsafe {
@@ -41,7 +42,7 @@ unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: 
     }
 }
 
-/// By octant: the places of children, the farthest first.
+/// By octant: slots of children.
 #[repr(align(64))]
 pub(super) struct Orders(pub(super) [[u32; 8]; 8]);
 
@@ -106,12 +107,12 @@ impl Lanes for Avx2 {
             let [nx, ny, nz] = [ray.entry_row(0), ray.entry_row(1), ray.entry_row(2)];
             // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
             // but never missed.
-            let enter_x = _mm256_fmadd_ps(row(node, nx), sx, _mm256_sub_ps(base_x, slack_x));
-            let enter_y = _mm256_fmadd_ps(row(node, ny), sy, _mm256_sub_ps(base_y, slack_y));
-            let enter_z = _mm256_fmadd_ps(row(node, nz), sz, _mm256_sub_ps(base_z, slack_z));
-            let leave_x = _mm256_fmadd_ps(row(node, nx ^ 1), sx, _mm256_add_ps(base_x, slack_x));
-            let leave_y = _mm256_fmadd_ps(row(node, ny ^ 1), sy, _mm256_add_ps(base_y, slack_y));
-            let leave_z = _mm256_fmadd_ps(row(node, nz ^ 1), sz, _mm256_add_ps(base_z, slack_z));
+            let enter_x = _mm256_fmadd_ps(load_bounds(node, nx), sx, _mm256_sub_ps(base_x, slack_x));
+            let enter_y = _mm256_fmadd_ps(load_bounds(node, ny), sy, _mm256_sub_ps(base_y, slack_y));
+            let enter_z = _mm256_fmadd_ps(load_bounds(node, nz), sz, _mm256_sub_ps(base_z, slack_z));
+            let leave_x = _mm256_fmadd_ps(load_bounds(node, nx ^ 1), sx, _mm256_add_ps(base_x, slack_x));
+            let leave_y = _mm256_fmadd_ps(load_bounds(node, ny ^ 1), sy, _mm256_add_ps(base_y, slack_y));
+            let leave_z = _mm256_fmadd_ps(load_bounds(node, nz ^ 1), sz, _mm256_add_ps(base_z, slack_z));
             let enter =
                 _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
             let leave =
@@ -183,7 +184,7 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
         // SAFETY: see the head of the file; a masked load reads three numbers, those of a corner.
         unsafe {
             let three = _mm256_setr_epi64x(-1, -1, -1, 0);

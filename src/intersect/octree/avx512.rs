@@ -47,7 +47,7 @@ unsafe fn widen_bytes(bytes: __m128i) -> __m512 {
     unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes)) }
 }
 
-/// Where a ray crosses bounds along an axis: into the children, and out of them, which is negated.
+/// Distances at which a ray crosses eight bounds into the children along an axis, then eight out of them, which are negated.
 #[inline(always)]
 unsafe fn crossings(bytes: __m128i, node: &Node, ray: &BoxRay, axis: usize) -> __m512 {
     unsafe {
@@ -59,13 +59,13 @@ unsafe fn crossings(bytes: __m128i, node: &Node, ray: &BoxRay, axis: usize) -> _
     }
 }
 
-/// The lower half in both halves exchanged: lanes 4–7, then 0–3.
+/// Exchanges the halves: lanes 4–7, then 0–3.
 #[inline(always)]
 unsafe fn swap_halves(v: __m256) -> __m256 {
     unsafe { _mm256_permute2f128_ps::<1>(v, v) }
 }
 
-/// The corners of a block along an axis against the ray's origin.
+/// The sixteen corners of a block along an axis relative to the ray's origin, mm.
 #[inline(always)]
 unsafe fn sieve_row(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512 {
     unsafe {
@@ -76,7 +76,7 @@ unsafe fn sieve_row(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m
     }
 }
 
-/// The corners of two facets along an axis.
+/// The four corners of one facet along an axis, then those of the other.
 #[inline(always)]
 unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
     unsafe {
@@ -153,7 +153,7 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
+    fn pair_edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
         // SAFETY: see the head of the file; eight numbers are stored to arrays of eight that start at multiples of 64 bytes.
         unsafe {
             let (x, y, z) = (load_pair(corners, 0), load_pair(corners, 1), load_pair(corners, 2));
@@ -181,8 +181,8 @@ impl Lanes for Avx512 {
 
     /// As with AVX2: one facet fills no wider register.
     #[inline(always)]
-    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
-        Avx2::quad(corners, ray)
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+        Avx2::quad_edges(corners, ray)
     }
 
     /// As with AVX2: loads of 64 bytes would wait for the entries written by halves.

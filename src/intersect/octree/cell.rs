@@ -2,7 +2,7 @@
 
 use super::clip::Box32;
 
-/// A facet in a cell, with the box around its part inside.
+/// A facet in a cell, with the box around its part inside, relative to the middle of the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClippedFacet {
     pub(super) facet: u32,
@@ -24,7 +24,7 @@ pub(super) enum Content {
     Cells(Vec<Cell>),
 }
 
-/// The box around all facets.
+/// The box around the parts of all facets; empty without facets.
 pub(super) fn bounds(facets: &[ClippedFacet]) -> Box32 {
     let mut all = Box32::EMPTY;
     for facet in facets {

@@ -2,7 +2,7 @@
 
 use crate::math::Point;
 
-/// A box in f32 about the middle of the mesh.
+/// A box in f32, in coordinates relative to the middle of the mesh, mm; empty where a low exceeds its high.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Box32 {
     pub(super) low: [f32; 3],
@@ -12,6 +12,7 @@ pub(super) struct Box32 {
 impl Box32 {
     pub(super) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
+    /// Grows the box to hold `other` too.
     pub(super) fn union(&mut self, other: &Self) {
         for a in 0..3 {
             // One instruction each: `f32::min` takes three for the sake of NaN, which boxes never hold.
@@ -26,7 +27,7 @@ impl Box32 {
         x * y + y * z + z * x
     }
 
-    /// Around points, rounded outward.
+    /// The box around points, rounded outward to f32; empty without points.
     pub(super) fn bounding(points: &[Point]) -> Self {
         let mut low = Point::INFINITY;
         let mut high = Point::NEG_INFINITY;
@@ -38,13 +39,13 @@ impl Box32 {
     }
 }
 
-/// The nearest f32 that is not larger.
+/// The largest f32 that is not above `x`.
 pub(super) fn round_down(x: f64) -> f32 {
     let y = x as f32;
     if f64::from(y) > x { y.next_down() } else { y }
 }
 
-/// The nearest f32 that is not smaller.
+/// The least f32 that is not below `x`.
 pub(super) fn round_up(x: f64) -> f32 {
     let y = x as f32;
     if f64::from(y) < x { y.next_up() } else { y }
@@ -58,7 +59,7 @@ struct Polygon {
 }
 
 impl Polygon {
-    /// Keeps what lies on the side `sign` of the plane `axis = position`.
+    /// Cuts off what lies below the plane `axis = position`, or above it where `sign` is −1; nothing may be left.
     fn cut(&mut self, axis: usize, position: f64, sign: f64) {
         let height = |p: &[f64; 3]| (p[axis] - position) * sign;
         let points = &self.points[..self.count];
@@ -85,7 +86,7 @@ impl Polygon {
         *self = kept;
     }
 
-    /// Adds a corner while there is room.
+    /// Adds a corner; drops it where there are ten.
     fn push(&mut self, p: [f64; 3]) {
         // Rounding could in principle add a corner to a sliver; the hull of the first ten is kept then.
         if self.count < self.points.len() {
@@ -95,7 +96,7 @@ impl Polygon {
     }
 }
 
-/// The box around the part of a facet inside `cell`, `None` when they do not meet.
+/// Finds the box around the part of a facet inside `cell`, grown by `pad` mm but not beyond `cell`; `None` when they do not meet.
 ///
 /// Corners are relative to the middle of the mesh. Cuts are computed in f64; their rounding is covered by `pad`.
 pub(super) fn clip(corners: &[Point; 4], cell: &Box32, pad: f64) -> Option<Box32> {

@@ -1,4 +1,4 @@
-//! The f64 edge functions of two facets at once, with the arithmetic of [`Line::quad`] step by step, so that they have the same bits.
+//! The f64 edge functions of two facets at once, with the arithmetic of [`Line::test_quad`] step by step, so that they have the same bits.
 
 use crate::intersect::facet::Line;
 
@@ -21,9 +21,9 @@ pub(super) struct Edges {
 }
 
 impl Edges {
-    /// In plain Rust.
+    /// Overwrites all with the edge functions of two facets, in plain Rust.
     #[inline(always)]
-    pub(super) fn set(&mut self, corners: [&Corners; 2], line: &Line) {
+    pub(super) fn compute(&mut self, corners: [&Corners; 2], line: &Line) {
         let ([ox, oy, oz], [sx, sy, _]) = (line.origin, line.shear);
         (self.below, self.above) = ([0; 2], [0; 2]);
         for (facet, c) in corners.into_iter().enumerate() {

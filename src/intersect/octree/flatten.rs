@@ -19,6 +19,7 @@ pub(super) struct Flat {
 #[derive(Default)]
 struct Draft {
     nodes: Vec<Node>,
+    /// Count and facets of each.
     blocks: Vec<(u8, [u32; 4])>,
     stats: Statistics,
 }
@@ -26,7 +27,7 @@ struct Draft {
 /// Levels from the top whose children are drafted in parallel.
 const PARALLEL_LEVELS: u32 = 2;
 
-/// Lays cells out as arrays of nodes and blocks, and counts them in `stats`.
+/// Lays cells out as arrays of nodes and blocks relative to `center`, and counts them in `stats`, of which only `left_out` is kept.
 pub(super) fn flatten(
     mesh: &FacetMesh,
     center: Point,
@@ -51,7 +52,7 @@ pub(super) fn flatten(
 }
 
 impl Draft {
-    /// Adds a cell, a node at the place reserved for it, and gives its link.
+    /// Adds a cell with all below it and returns its link. A node goes to the place `reserved`, or to the end where none is.
     fn add(&mut self, cell: Cell, collapse: bool, depth: u32, reserved: Option<usize>) -> Link {
         match cell.content {
             Content::Block(count, facets) => {
@@ -73,7 +74,7 @@ impl Draft {
                     self.add_in_turn(children, collapse, depth)
                 };
                 for ((bounds, link), slot) in boxes.iter().zip(links).zip(octant_slots(&boxes)) {
-                    node.set(slot, bounds, link);
+                    node.set_child(slot, bounds, link);
                 }
                 self.nodes[me] = node;
                 Link::node(me)
@@ -87,7 +88,7 @@ impl Draft {
         self.nodes.len() - count
     }
 
-    /// Sibling nodes and sibling blocks lie next to each other.
+    /// Adds children one after the other, sibling nodes next to each other and sibling blocks too, and returns the links to them.
     fn add_in_turn(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
         // Room for the nodes first, so that siblings lie side by side while whatever hangs below them goes behind.
         let inner = children.iter().filter(|c| matches!(c.content, Content::Cells(_))).count();
@@ -108,7 +109,7 @@ impl Draft {
         links
     }
 
-    /// Adds children, each from a thread of its own, and returns the links to them.
+    /// Adds children, drafted in parallel, in their order, and returns the links to them.
     fn add_parallel(&mut self, children: Vec<Cell>, collapse: bool, depth: u32) -> Vec<Link> {
         // Each child into arrays of its own, put together in the order of the children: the tree is the same for
         // any number of threads.
@@ -123,7 +124,7 @@ impl Draft {
         drafts.into_iter().map(|(draft, link)| self.append(draft, link)).collect()
     }
 
-    /// Puts a draft behind this one; returns its link as it now is.
+    /// Puts a draft behind this one, with its counts; `link`, which leads into it, is returned as it now is.
     fn append(&mut self, draft: Draft, link: Link) -> Link {
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
         self.blocks.extend(draft.blocks);
@@ -140,7 +141,7 @@ impl Draft {
     }
 }
 
-/// Opens the largest child that fits until eight places are full.
+/// Replaces the largest inner child by its own children, as long as no more than eight come of it.
 fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
     loop {
         let mut best: Option<(f32, usize)> = None;

@@ -16,7 +16,7 @@ pub(super) struct Frame {
     pub(super) reach: [f32; 4],
 }
 
-/// Where a ray enters and leaves the mesh, wide enough for the rounding.
+/// Where a ray enters and leaves the mesh, wide enough for the rounding; `near` beyond `far` where it passes the mesh by.
 pub(super) struct Passage {
     /// mm along the ray.
     pub(super) near: f64,
@@ -24,6 +24,7 @@ pub(super) struct Passage {
 }
 
 impl Frame {
+    /// Takes the middle and the box of the mesh, mm, the latter already grown.
     pub(super) fn new(center: Point, bounds: &Aabb) -> Self {
         let lanes = |p: Point, last: f64| [p.x, p.y, p.z, last];
         Self {
@@ -34,7 +35,7 @@ impl Frame {
         }
     }
 
-    /// Whether a ray with this origin starts inside the box around the mesh.
+    /// Whether a ray with this origin, in the mesh's coordinates, starts inside the box around the mesh.
     #[inline(always)]
     pub(super) fn holds(&self, origin: [f64; 4]) -> bool {
         let mut inside = true;
@@ -44,7 +45,8 @@ impl Frame {
         inside
     }
 
-    /// Where a ray with this origin and inverse direction, in four lanes, passes the mesh.
+    /// Where a ray with this origin and inverse direction, in four lanes of which the last does not count, passes the mesh within the range
+    /// of `ray`.
     #[inline(always)]
     pub(super) fn passage(&self, ray: &Ray, origin: [f64; 4], inverse: [f64; 4]) -> Passage {
         let mut enter = [0.0; 4];

@@ -5,10 +5,10 @@
 //! allocation are named.
 #![allow(unsafe_code)]
 
-/// Below this nothing is gained.
+/// Bytes below which nothing is gained.
 const SMALLEST: usize = 4 << 20;
 
-/// An empty vector with room for `count` elements, in huge pages if there is much of it.
+/// Allocates an empty vector with room for `count` elements; asks Linux to back 4 MiB and more with huge pages.
 pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
     let vector = Vec::<T>::with_capacity(count);
     let bytes = vector.capacity() * size_of::<T>();
@@ -18,7 +18,7 @@ pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
     vector
 }
 
-/// Asks for huge pages under the bytes from `start` on.
+/// Asks the system for huge pages under the `bytes` from the address `start` on; does nothing but on Linux.
 #[cfg(target_os = "linux")]
 fn advise(start: usize, bytes: usize) {
     const PAGE: usize = 4096;

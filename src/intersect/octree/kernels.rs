@@ -13,7 +13,7 @@ use crate::intersect::facet::FacetHit;
 use crate::math::Ray;
 use crate::math::simd::{Instructions, Kernel};
 
-/// Finds the nearest hit of each ray; `light_buffers` may answer some of them.
+/// Finds the nearest hit of each ray and overwrites `hits`, which is as long as `rays`; `light_buffers` may answer some of them.
 ///
 /// Hits are described by the caller: compiled into this for wider registers the batch took a tenth longer.
 pub(super) struct Walk<'a, 'm> {

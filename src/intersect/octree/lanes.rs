@@ -8,21 +8,22 @@ use crate::intersect::facet::Line;
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
-    /// Where the ray enters the children that it may meet before `t_max`, and their links, mostly the farthest first; what lies beyond
-    /// their number is of no meaning. Gives which they are: bit `k` for the child at `7 ^ k ^ octant`.
+    /// Writes where the ray enters the children that it may meet within its range, and their links, mostly the farthest first; what lies
+    /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child at `7 ^ k ^ octant`.
     fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32;
-    /// Which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second.
+    /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second. Lanes without a facet
+    /// have any bit.
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;
-    /// The edge functions of two facets, all with the same bits.
+    /// Overwrites `edges` with the edge functions of two facets; every implementation gives the same bits.
     #[inline(always)]
-    fn edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
-        edges.set(corners, line);
+    fn pair_edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
+        edges.compute(corners, line);
     }
-    /// The edge functions of a facet, all with the same bits.
+    /// Computes the edge functions of a facet with these corners, mm; every implementation gives the same bits.
     #[inline(always)]
-    fn quad(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
         QuadEdges::new(corners, ray)
     }
-    /// Which distances do not lie beyond `t_max`, one bit each.
+    /// Returns which distances do not lie beyond `t_max`, one bit each.
     fn open(enters: &[f32; 16], t_max: f32) -> u32;
 }

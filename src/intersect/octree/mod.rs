@@ -15,7 +15,7 @@
 //!
 //! Guarantee: the hit is the nearest of all facets, of equal ones that on the facet of lowest index; the same bits for a
 //! single ray and a batch, for any number of threads at build or query, with AVX-512, AVX2 or neither.
-//! Weakness: facets with corners that are no finite numbers are left out; building takes longer than Embree's.
+//! Weakness: facets with corners that are not finite or beyond 1e12 mm are left out; building takes longer than Embree's.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -83,7 +83,7 @@ pub struct Octree<'m> {
     settings: Settings,
     /// What [`Settings::instruction_set`] allows and the processor has.
     level: Level,
-    /// Of the facets that many rays leave, once a run pays for it.
+    /// Of the facets that many rays leave; empty until [`Intersector::prepare_for`] finds that they pay.
     horizons: OnceLock<Horizons>,
     /// Of the sources whose rays are expected.
     light_buffers: RwLock<Vec<LightBuffer>>,
@@ -92,7 +92,8 @@ pub struct Octree<'m> {
 }
 
 impl<'m> Octree<'m> {
-    /// Builds the tree with the threads of the current rayon pool; the tree does not depend on their number.
+    /// Builds the tree with the threads of the current rayon pool; the tree does not depend on their number. Facets with corners that are
+    /// not finite or beyond 1e12 mm are left out and counted; without facets every ray misses.
     pub fn build(mesh: &'m FacetMesh, settings: &Settings) -> Self {
         let started = Instant::now();
         let mut statistics = Statistics::default();
@@ -100,7 +101,7 @@ impl<'m> Octree<'m> {
         Self::with_tree(tree, settings, statistics, started)
     }
 
-    /// Writes the tree without its mesh.
+    /// Writes the tree and its statistics, without mesh, settings or preparation, for [`Self::read_arrays`].
     ///
     /// # Errors
     /// When `to` cannot be written.
@@ -108,10 +109,11 @@ impl<'m> Octree<'m> {
         self.tree.write_arrays(&self.statistics, to)
     }
 
-    /// Reads the tree of a mesh.
+    /// Reads a tree written by [`Self::write_arrays`]; `mesh` is the one it was built on. Of `settings` only what rays are walked with
+    /// counts.
     ///
     /// # Errors
-    /// When it cannot be read, or is no tree of this mesh.
+    /// When it cannot be read, or names what this mesh does not have.
     pub(crate) fn read_arrays(
         mesh: &'m FacetMesh,
         settings: &Settings,
@@ -122,7 +124,7 @@ impl<'m> Octree<'m> {
         Ok(Self::with_tree(tree, settings, statistics, started))
     }
 
-    /// A tree that has been made since `started`.
+    /// Makes an octree of a tree whose building began at `started`, without preparation.
     fn with_tree(mut tree: Tree<'m>, settings: &Settings, statistics: Statistics, started: Instant) -> Self {
         tree.surroundings = tree.surroundings.with_starts_as_far_as(settings.farthest_start);
         Self {
@@ -136,7 +138,7 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// The same tree without what it has worked out about expected rays.
+    /// Copies the tree without what it has worked out about expected rays.
     pub fn without_preparation(&self) -> Self {
         Self {
             tree: self.tree.clone(),
@@ -149,7 +151,8 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Distance and facet of the nearest hit of each ray, without normals: what other ray tracers' kernels report.
+    /// Finds distance (mm) and facet of the nearest hit of each ray, `None` for a miss, without normals: what other ray tracers' kernels
+    /// report. Overwrites `found`, which is as long as `rays`.
     pub fn closest(&self, rays: &[Ray], found: &mut [Option<(f64, u32)>], cost: &mut Cost) {
         let mut hits = [None; BATCH];
         let light_buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
@@ -166,13 +169,14 @@ impl<'m> Octree<'m> {
         &self.statistics
     }
 
-    /// The boxes of all nodes and blocks with their depth, for looking at; the root's children have depth 1.
+    /// Returns the boxes of all nodes and blocks, mm in the mesh's coordinates, each with its depth: 1 for the root's children. The root
+    /// has none.
     pub fn boxes(&self) -> Vec<(usize, Aabb)> {
         self.tree.boxes()
     }
 
-    /// Asks for what the hits after the `i`-th will be described with, but the corners, which were tested just now: without, describing
-    /// cost 40 % of the time at 200k facets.
+    /// Asks for the memory of what the hits after the `i`-th will be described with, but the corners, which were tested just now: without,
+    /// describing cost 40 % of the time at 200k facets.
     #[inline(always)]
     fn fetch_description(&self, found: &[Option<FacetHit>], i: usize) {
         let mesh = self.tree.surroundings.mesh;
@@ -187,7 +191,8 @@ impl<'m> Octree<'m> {
         }
     }
 
-    /// Finds the nearest hit of each ray with the instructions that were chosen; `light_buffers` may answer some of them.
+    /// Finds the nearest hit of each ray with the instructions that were chosen, and overwrites `hits`; `light_buffers`, which may be
+    /// empty, answer some of them.
     fn walk(&self, light_buffers: &[LightBuffer], rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
         self.level.run(kernels::Walk { tree: &self.tree, light_buffers, rays, hits, cost });
     }

@@ -40,10 +40,12 @@ impl Link {
         Self(index as u32)
     }
 
+    /// Names a block of `count` facets, one to four.
     pub(super) fn block(index: usize, count: u8) -> Self {
         Self(Self::BLOCK | (index as u32) << 2 | u32::from(count - 1))
     }
 
+    /// What the link points at.
     #[inline(always)]
     pub(super) fn target(self) -> Target {
         if self.0 & Self::BLOCK == 0 {
@@ -56,13 +58,13 @@ impl Link {
         }
     }
 
-    /// The index of a node, if it is one.
+    /// The index of a node; of other links it is of no meaning.
     #[inline(always)]
     pub(super) fn as_node(self) -> usize {
         self.0 as usize
     }
 
-    /// The index of a block and its number of facets, if it is one.
+    /// The index of a block and its number of facets; of other links they are of no meaning.
     #[inline(always)]
     pub(super) fn as_block(self) -> (usize, usize) {
         (((self.0 & !Self::BLOCK) >> 2) as usize, (self.0 & 3) as usize + 1)
@@ -106,7 +108,7 @@ impl Node {
         padding: [0; 3],
     };
 
-    /// A node around `all` without children.
+    /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.
     pub(super) fn bounding(all: &Box32) -> Self {
         let mut node = Self::EMPTY;
         for a in 0..3 {
@@ -119,8 +121,8 @@ impl Node {
         node
     }
 
-    /// Sets a child's box, rounded outward.
-    pub(super) fn set(&mut self, slot: usize, bounds: &Box32, link: Link) {
+    /// Fills a slot, below eight, with a child and its box, rounded outward to the node's grid; the box must lie within the node.
+    pub(super) fn set_child(&mut self, slot: usize, bounds: &Box32, link: Link) {
         for a in 0..3 {
             let (origin, step) = (f64::from(self.origin[a]), f64::from(self.step[a]));
             let low = (f64::from(bounds.low[a]) - origin) / step;
@@ -136,7 +138,7 @@ impl Node {
 }
 
 impl Node {
-    /// The box of a child about the middle of the mesh.
+    /// The box of a child relative to the middle of the mesh, mm; of a slot that is not used it is empty.
     pub(super) fn child(&self, slot: usize) -> Aabb {
         let corner = |row: usize| {
             Point::from_array(std::array::from_fn(|a| {
@@ -162,7 +164,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// A block of up to four facets, about `center`.
+    /// A block of these facets, one to four, with corners relative to `center`; further ones must not be given.
     pub(super) fn new(mesh: &FacetMesh, center: Point, facets: &[u32]) -> Self {
         let mut corners = [[Point::ZERO; 4]; 4];
         let (mut low, mut high) = (Point::INFINITY, Point::NEG_INFINITY);

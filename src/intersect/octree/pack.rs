@@ -17,19 +17,21 @@ struct Packing<'a> {
     orders: [Vec<u32>; 3],
     /// By place: whether the facet goes left.
     goes_left: Vec<bool>,
+    /// By place in a range: half the area of the box around it and all behind it.
     areas: Vec<f32>,
+    /// Room for the places that go right.
     spare: Vec<u32>,
 }
 
-/// A tree of blocks over the facets.
+/// Packs facets into blocks of up to four under binary cells; `facets` must not be empty.
 pub(super) fn pack(facets: Vec<ClippedFacet>) -> Cell {
     let n = facets.len();
     if n <= WIDTH {
-        return block(bounds(&facets), facets.iter());
+        return block_cell(bounds(&facets), facets.iter());
     }
     let mut packing = Packing {
         facets: &facets,
-        orders: std::array::from_fn(|axis| sorted(&facets, axis)),
+        orders: std::array::from_fn(|axis| places_by_middle(&facets, axis)),
         goes_left: vec![false; n],
         areas: vec![0.0; n],
         spare: vec![0; n],
@@ -37,8 +39,8 @@ pub(super) fn pack(facets: Vec<ClippedFacet>) -> Cell {
     packing.pack(0..n, 0)
 }
 
-/// Places of facets in the order of their middles along an axis; equal ones keep the order of the facets.
-fn sorted(facets: &[ClippedFacet], axis: usize) -> Vec<u32> {
+/// Lists the places of facets in the order of their middles along an axis; equal ones keep the order of the facets.
+fn places_by_middle(facets: &[ClippedFacet], axis: usize) -> Vec<u32> {
     let mut keys: Vec<u64> = (facets.iter().enumerate())
         .map(|(place, p)| {
             let bits = (p.bounds.low[axis] + p.bounds.high[axis]).to_bits();
@@ -51,8 +53,8 @@ fn sorted(facets: &[ClippedFacet], axis: usize) -> Vec<u32> {
     keys.into_iter().map(|key| key as u32).collect()
 }
 
-/// A block of up to eight facets; lanes that are left name none.
-fn block<'a>(bounds: Box32, facets: impl ExactSizeIterator<Item = &'a ClippedFacet>) -> Cell {
+/// A cell with one block of one to four facets; lanes that are left name none.
+fn block_cell<'a>(bounds: Box32, facets: impl ExactSizeIterator<Item = &'a ClippedFacet>) -> Cell {
     let count = facets.len() as u8;
     let mut lanes = [u32::MAX; WIDTH];
     for (lane, clipped) in lanes.iter_mut().zip(facets) {
@@ -61,12 +63,13 @@ fn block<'a>(bounds: Box32, facets: impl ExactSizeIterator<Item = &'a ClippedFac
     Cell { bounds, content: Content::Block(count, lanes) }
 }
 
+/// Blocks that `n` facets fill.
 fn block_count(n: usize) -> f32 {
     n.div_ceil(WIDTH) as f32
 }
 
 impl Packing<'_> {
-    /// Halves the facets of a range until a block holds what is left.
+    /// Splits the facets of a range in two until a block holds what is left; `depth` counts the splits above.
     fn pack(&mut self, range: Range<usize>, depth: u32) -> Cell {
         let mut bounds = Box32::EMPTY;
         for &place in &self.orders[0][range.clone()] {
@@ -74,7 +77,7 @@ impl Packing<'_> {
         }
         if range.len() <= WIDTH {
             let places = &self.orders[0][range];
-            return block(bounds, places.iter().map(|&place| &self.facets[place as usize]));
+            return block_cell(bounds, places.iter().map(|&place| &self.facets[place as usize]));
         }
         let (axis, left) = if depth >= BALANCED_FROM {
             let widest = (0..3).fold(0, |w, a| if extent(&bounds, a) > extent(&bounds, w) { a } else { w });
@@ -82,14 +85,14 @@ impl Packing<'_> {
         } else {
             self.best_split(range.clone())
         };
-        self.part(range.clone(), axis, left);
+        self.partition_orders(range.clone(), axis, left);
         let middle = range.start + left;
         let halves = vec![self.pack(range.start..middle, depth + 1), self.pack(middle..range.end, depth + 1)];
         Cell { bounds, content: Content::Cells(halves) }
     }
 
-    /// Moves the first so many places along an axis to the front of the other orders too.
-    fn part(&mut self, range: Range<usize>, axis: usize, left: usize) {
+    /// Moves the first `left` places of a range along `axis` to the front of it in the other orders too; each half keeps its order.
+    fn partition_orders(&mut self, range: Range<usize>, axis: usize, left: usize) {
         for (k, &place) in self.orders[axis][range.clone()].iter().enumerate() {
             self.goes_left[place as usize] = k < left;
         }
@@ -109,7 +112,7 @@ impl Packing<'_> {
         }
     }
 
-    /// The best axis, and the number of facets that go left along it.
+    /// The axis along which a range is best split by the surface-area heuristic, and the number of facets that go left.
     fn best_split(&mut self, range: Range<usize>) -> (usize, usize) {
         let n = range.len();
         let mut best = (f32::INFINITY, 2, n / 2);

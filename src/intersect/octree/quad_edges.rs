@@ -1,4 +1,4 @@
-//! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::quad`] step by step,
+//! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::test_quad`] step by step,
 //! so that all instruction sets have its bits, but without the branches and the copies that cost more than the arithmetic.
 
 use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Line, Nearest};
@@ -22,9 +22,9 @@ pub(super) struct QuadRay {
 }
 
 impl QuadRay {
-    /// The ray with these axes, the main one last.
+    /// Takes a ray with its axes, the main one last, its origin and the reach of starts, mm; overwrites all fields.
     #[inline(always)]
-    pub(super) fn set(&mut self, ray: &FacetRay, axes: [usize; 3], origin: [f64; 4], reach: f64) {
+    pub(super) fn take_ray(&mut self, ray: &FacetRay, axes: [usize; 3], origin: [f64; 4], reach: f64) {
         let [x, y, z] = axes;
         self.origin = origin;
         self.ordered_origin = [origin[x], origin[y], origin[z], 0.0];
@@ -34,7 +34,8 @@ impl QuadRay {
         self.reach = reach;
     }
 
-    /// Above which an edge function of a facet keeps its sign when the start is moved as [`LONGEST_NUDGE`] allows, mm².
+    /// The size, mm², above which an edge function of a facet of these corners keeps its sign when the start is moved as [`LONGEST_NUDGE`]
+    /// allows.
     ///
     /// A move of `δ` an axis shears to `2δ`, since no slope is above one, and changes an edge function by at most that times the sum of
     /// what its corners differ by in both sheared coordinates: each is below four times the farthest corner's distance from the start
@@ -51,7 +52,7 @@ impl QuadRay {
         2.0 * 2.0 * LONGEST_NUDGE * self.reach * (2.0 * 4.0 * farthest)
     }
 
-    /// The ray as the careful test wants it.
+    /// The ray as [`Line`] has it, in the order of its axes.
     fn line(&self) -> Line {
         let [x, y, z, _] = self.ordered_origin;
         Line { origin: [x, y, z], shear: self.shear, t_min: self.t_min }
@@ -79,7 +80,7 @@ pub(super) struct QuadEdges {
 }
 
 impl QuadEdges {
-    /// In plain Rust.
+    /// Computes the edge functions of a facet with these corners, mm in the order of x, y, z, in plain Rust.
     #[inline(always)]
     pub(super) fn new(corners: [&[f64; 3]; 4], ray: &QuadRay) -> Self {
         let [sx, sy, _] = ray.shear;
@@ -111,7 +112,8 @@ impl QuadEdges {
         edges
     }
 
-    /// Whether none of these triangles of a facet is met, wherever near its start the ray begins.
+    /// Whether none of these triangles (bits 0 and 1) of a facet is met, wherever within reach of its start the ray begins; `false`
+    /// says nothing.
     #[inline(always)]
     pub(super) fn misses_clearly(&self, triangles: u32, corners: [&[f64; 3]; 4], ray: &QuadRay) -> bool {
         let margin = ray.margin(corners);
@@ -121,7 +123,8 @@ impl QuadEdges {
         triangles & !(u32::from(first) | u32::from(second) << 1) == 0
     }
 
-    /// Keeps the nearest hit of these triangles of a facet; `false` where an edge function is zero and decides nothing.
+    /// Offers hits on these triangles (bits 0 and 1) of a facet to `best`. Returns `false`, and offers none, where an edge function of one
+    /// of them is zero: the exact test must decide.
     #[inline(always)]
     pub(super) fn keep_hits(&self, facet: u32, triangles: u32, ray: &QuadRay, best: &mut Nearest) -> bool {
         let left = u32::from(self.diagonal < 0.0);
@@ -156,7 +159,7 @@ fn any_edge(outline: u32, first: u32, second: u32) -> u32 {
     (outline | outline >> 1 | first) & 1 | (outline >> 1 | outline >> 2 | second << 1) & 2
 }
 
-/// Whether edge functions have opposite signs by more than a margin.
+/// Whether two of these edge functions have opposite signs and both are larger than a margin.
 #[inline(always)]
 fn has_both_signs([a, b, c]: [f64; 3], margin: f64) -> bool {
     ((a > margin) | (b > margin) | (c > margin)) & ((a < -margin) | (b < -margin) | (c < -margin))

@@ -14,7 +14,7 @@ pub(super) struct BoxRay {
     /// By axis the inverse direction eight times, then the same negated.
     pub(super) inverse: [[f32; 16]; 3],
     pub(super) origin: [f32; 4],
-    /// By how much a crossing may be wrong.
+    /// By how much the distance of a crossing may be wrong, by axis, mm along the ray.
     pub(super) slack: [f32; 4],
     pub(super) t_min: f32,
     pub(super) t_max: f32,
@@ -41,13 +41,13 @@ pub(super) struct SieveRay {
     pub(super) low: [f32; 4],
     /// Slopes against the main axis, and the inverse of the direction along it.
     pub(super) shear: [f32; 3],
-    /// By how much the start may be moved, mm.
+    /// By how much the start may be moved or wrong, mm.
     pub(super) slack: f32,
     /// Two lateral axes, then the main one.
     pub(super) axes: [u8; 3],
 }
 
-/// How wrong the position of a corner may be against the ray, mm.
+/// How wrong the position of a corner may be against the ray, mm, in a block whose farthest coordinate from the start is `far`.
 ///
 /// Corners are rounded to half a step an axis, to which sheared coordinates add the same along the main axis;
 /// f32 arithmetic on lengths up to `far + 65536 step` adds less than nine roundings.
@@ -56,7 +56,7 @@ pub(super) fn corner_error(step: f32, far: f32, slack: f32) -> f32 {
     1.1 * step + CORNER_ROUNDING * far + slack
 }
 
-/// How wrong the edge functions of a facet that is hit may be, from the error of a corner.
+/// How wrong the edge functions of a facet that is hit may be, mm², from the error of a corner, mm.
 ///
 /// The corners of a facet that is hit lie within its sheared diameter, at most 2·65535 steps, of the ray; a product of
 /// two of them is wrong by four times that and the error of one, and the rounding of the products is below a tenth of it.

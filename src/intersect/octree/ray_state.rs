@@ -60,7 +60,7 @@ pub(super) struct RayState {
 }
 
 impl RayState {
-    /// A state that no ray has yet.
+    /// A state without a ray, which is at its end.
     pub(super) fn idle() -> Self {
         let ray = Ray::new(Point::ZERO, Vector::Z);
         Self {
@@ -83,8 +83,8 @@ impl RayState {
         }
     }
 
-    /// Puts a ray on its way, at once to the end when it passes by the whole mesh. What differs from ray to ray is
-    /// chosen without branches.
+    /// Puts a ray, in the mesh's coordinates, on its way and replaces the one before: next is `root`, or the end when it passes by the
+    /// whole mesh. `index` tells whose hit it will be. What differs from ray to ray is chosen without branches.
     #[inline(always)]
     pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
         self.unmet_facet = tree.unmet_facet(ray);
@@ -130,7 +130,7 @@ impl RayState {
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
         self.facets = FacetRay::new(ray);
         let axes = self.facets.axes();
-        self.quads.set(&self.facets, axes, origin, tree.surroundings.reach);
+        self.quads.take_ray(&self.facets, axes, origin, tree.surroundings.reach);
         self.departed = ray.departure.map_or(u32::MAX, |departure| departure.primitive);
         self.sieve.shear = self.facets.shear().map(|s| s as f32);
         self.sieve.axes = axes.map(|a| a as u8);
@@ -143,8 +143,8 @@ impl RayState {
         self.index = index;
     }
 
-    /// Boxes that begin after the nearest hit are of no interest; rounded up, so that ties are seen, and never to zero, since the lowest
-    /// bits of a distance are not its own.
+    /// Ends box tests at the nearest hit so far, or at the end of the ray's range: rounded up, so that ties are seen, and never to zero,
+    /// since the lowest bits of a distance are not its own.
     #[inline(always)]
     pub(super) fn limit_to_hit(&mut self) {
         let t_max = (((self.best.t - self.shift) * (1.0 + LIMIT_ROOM)) as f32).max(LEAST_LIMIT);
@@ -152,7 +152,8 @@ impl RayState {
         self.boxes.negated_t_max = -t_max;
     }
 
-    /// Writes the children of a node that the ray may meet above the top of the stack.
+    /// Writes the children of a node that the ray may meet above the top of the stack, which stays where it is: [`Self::take_nearest`],
+    /// [`Self::keep_all`] or [`Self::advance`] takes them.
     #[inline(always)]
     pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> Children {
         let base = self.top.min(STACK - 8);
@@ -168,26 +169,27 @@ impl RayState {
         Children { count: met.count_ones() as usize, nearest }
     }
 
-    /// Goes to the nearest of the children that were just written and keeps the others.
+    /// Returns the nearest of the children that were just written, at least one, and keeps the others on the stack.
     #[inline(always)]
     pub(super) fn take_nearest(&mut self, children: Children) -> Link {
         self.top = (self.top + children.count - 1).min(STACK - 9);
         Link(children.nearest)
     }
 
-    /// Keeps all children that were just written.
+    /// Keeps all children that were just written on the stack.
     #[inline(always)]
     pub(super) fn keep_all(&mut self, children: Children) {
         self.top = (self.top + children.count).min(STACK - 9);
     }
 
-    /// The topmost entry.
+    /// The topmost entry of the stack, which keeps it; the end of the ray where it is empty.
     #[inline(always)]
     pub(super) fn peek(&self) -> Link {
         Link(self.links[(self.top - 1) % STACK])
     }
 
-    /// Takes the topmost entry if it is a node that is not beyond `t_max`.
+    /// Takes the topmost entry off the stack if it is a node that is not beyond the ray's limit, and returns the node's index; else `None`,
+    /// and the stack stays.
     #[inline(always)]
     pub(super) fn take_open_node(&mut self) -> Option<usize> {
         let (top, link) = ((self.top - 1) % STACK, self.peek());
@@ -198,7 +200,7 @@ impl RayState {
         is_open.then(|| link.as_node())
     }
 
-    /// Goes on with the topmost entry that is not beyond `t_max`.
+    /// Takes entries off the stack up to one that is not beyond `t_max`, and returns it; [`Link::END`] when there is none.
     #[inline(always)]
     pub(super) fn pop(&mut self, t_max: f32) -> Link {
         while self.top > GROUND {
@@ -210,8 +212,8 @@ impl RayState {
         Link::END
     }
 
-    /// The nearest of the children that were just written, else the topmost entry that is not beyond `t_max`: no branch
-    /// depends on which.
+    /// Returns the nearest of the children that were just written and keeps the others; where there are none, the topmost entry that is not
+    /// beyond the ray's limit, taken off the stack with all above it. No branch depends on which.
     #[inline(always)]
     pub(super) fn advance<L: Lanes>(&mut self, children: Children) -> Link {
         let mut top = self.top.clamp(GROUND, STACK - 8);
@@ -228,7 +230,7 @@ impl RayState {
         Link(select_unpredictable(children.count > 0, children.nearest, older))
     }
 
-    /// Which of the sixteen entries below `top` are not beyond `t_max`.
+    /// Which of the sixteen entries below `top` are not beyond the ray's limit, one bit each, the topmost highest.
     #[inline(always)]
     fn open_below<L: Lanes>(&self, top: usize) -> u32 {
         match self.enters[top - GROUND..].first_chunk() {
@@ -237,7 +239,7 @@ impl RayState {
         }
     }
 
-    /// Looks again at what was next, after `t_max` has come nearer.
+    /// Puts `next` back on the stack and takes the topmost entry that is not beyond the limit, which a hit has brought nearer.
     #[inline(always)]
     pub(super) fn recheck_next<L: Lanes>(&mut self) {
         self.top += usize::from(self.next != Link::END);
@@ -263,7 +265,7 @@ impl Children {
     pub(super) const NONE: Self = Self { count: 0, nearest: 0 };
 }
 
-/// As [`crate::intersect::facet::Surroundings::lifted`]; few rays graze the facet that they leave.
+/// Calls [`crate::intersect::facet::Surroundings::lifted`] out of line, for few rays graze the facet that they leave.
 #[cold]
 #[inline(never)]
 fn grazing(tree: &Tree, ray: &Ray) -> Ray {

@@ -9,7 +9,7 @@ pub struct Settings {
     /// T: a box is split while more facets than this meet it. 128 was fastest on lamps; 8 without `collapse` is the
     /// textbook tree, 64 suits scenes of long thin facets.
     pub threshold: usize,
-    /// Depth at which splitting ends, at most 32. Uneven scenes need 20 and more.
+    /// Depth at which splitting ends; more than 32 is taken as 32. Uneven scenes need 20 and more.
     pub max_depth: u32,
     /// Merge sparse octants into full eight-wide nodes.
     pub collapse: bool,
@@ -72,7 +72,7 @@ pub enum InstructionSet {
 }
 
 impl InstructionSet {
-    /// The widest of them that the processor has.
+    /// The widest of the allowed instructions that the processor has.
     pub(super) fn level(self) -> Level {
         match self {
             Self::Fastest => Level::widest(),

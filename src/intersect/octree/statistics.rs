@@ -11,7 +11,7 @@ pub struct Statistics {
     pub blocks: usize,
     /// Facets in blocks; more than the mesh has, since facets are listed in every cell they meet.
     pub references: usize,
-    /// Facets left out because a corner is no finite number.
+    /// Facets left out because a corner is not finite or beyond 1e12 mm.
     pub left_out: usize,
     /// Blocks by their depth in nodes.
     pub depths: Vec<usize>,
@@ -20,7 +20,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Counts a block of a leaf, up to four facets, so many nodes below the root.
+    /// Counts a block of one to four facets under `depth` nodes, in all fields but `nodes` and `left_out`.
     pub(super) fn count_block(&mut self, depth: u32, facets: u8) {
         let depth = depth as usize;
         if self.depths.len() <= depth {
@@ -32,7 +32,7 @@ impl Statistics {
         self.fill[usize::from(facets.clamp(1, 4)) - 1] += 1;
     }
 
-    /// Adds the counts of another part of the tree, depth by depth.
+    /// Adds the counts of another part of the tree, depth by depth, but not the facets left out.
     pub(super) fn add(&mut self, other: &Self) {
         self.nodes += other.nodes;
         self.blocks += other.blocks;
@@ -48,7 +48,7 @@ impl Statistics {
         }
     }
 
-    /// Levels of nodes above the deepest block.
+    /// Levels of nodes above the deepest block; 0 for an empty tree and for one block alone.
     pub fn depth(&self) -> usize {
         self.depths.len().saturating_sub(1)
     }

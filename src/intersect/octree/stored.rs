@@ -9,7 +9,7 @@ use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use std::io::{self, Write};
 
 impl<'m> Tree<'m> {
-    /// Writes the tree without its mesh.
+    /// Writes the tree and its statistics without the mesh.
     ///
     /// # Errors
     /// When `to` cannot be written.
@@ -24,10 +24,10 @@ impl<'m> Tree<'m> {
         write_array(to, &self.blocks)
     }
 
-    /// Reads the tree of a mesh.
+    /// Reads a tree of `mesh`, and its statistics.
     ///
     /// # Errors
-    /// When it cannot be read, or is no tree of this mesh.
+    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked.
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
         let statistics = read_statistics(from)?;
         let root = from.array::<u32>()?.first().map(|&link| Link(link));
@@ -41,6 +41,7 @@ impl<'m> Tree<'m> {
     }
 }
 
+/// Reads the statistics at the head of a tree; an error where their number is wrong.
 fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
     let counts: Vec<u64> = from.array()?;
     let depths: Vec<u64> = from.array()?;
@@ -50,7 +51,7 @@ fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
     Ok(Statistics { nodes, blocks, references, left_out, depths, fill })
 }
 
-/// Walks may meet the empty box of a child that is not in use: its link says so.
+/// Sets the links of children that are not in use to zero, by which walks that meet their empty boxes tell them.
 fn forget_unused(node: &mut Node) {
     for (slot, child) in node.children.iter_mut().enumerate() {
         if node.used >> slot & 1 == 0 {

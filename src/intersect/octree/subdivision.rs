@@ -19,7 +19,9 @@ const THIN: f32 = 0.125;
 /// What stays the same over the whole tree.
 struct Subdivision<'a> {
     mesh: &'a FacetMesh,
+    /// Middle of the mesh, which all boxes are relative to.
     center: Point,
+    /// As in [`Settings`].
     threshold: usize,
     max_depth: u32,
     max_duplication: f64,
@@ -32,7 +34,8 @@ const PARALLEL: usize = 2048;
 /// Facets a thread sorts into octants at a time.
 const CHUNK: usize = 16384;
 
-/// The tree of cells over all facets, `None` when there are none.
+/// Divides all usable facets into a tree of cells relative to `center`; `None` when there are none. Sets `stats.left_out` to the number
+/// of facets with a corner that is not finite or beyond 1e12 mm.
 pub(super) fn subdivide(
     mesh: &FacetMesh,
     center: Point,
@@ -62,18 +65,19 @@ pub(super) fn subdivide(
         max_duplication: settings.max_duplication,
         pad: f64::from(reach) * CUT_ERROR,
     };
-    Some(subdivision.grow(facets, cell, 0, 1.0))
+    Some(subdivision.make_cell(facets, cell, 0, 1.0))
 }
 
 impl Subdivision<'_> {
-    /// The cell of these facets: divided into octants as long as that parts them, else packed.
-    fn grow(&self, facets: Vec<ClippedFacet>, cell: Box32, depth: u32, duplication: f64) -> Cell {
+    /// Makes the cell of these facets, at least one: divided into octants as long as that parts them, else packed. `duplication` is how
+    /// often facets have been duplicated on the way here.
+    fn make_cell(&self, facets: Vec<ClippedFacet>, cell: Box32, depth: u32, duplication: f64) -> Cell {
         let n = facets.len();
         if n <= self.threshold || depth >= self.max_depth || duplication > self.max_duplication {
             return pack(facets);
         }
-        let middle = self.middle(&cell);
-        let octants = self.split(&facets, &middle);
+        let middle = self.split_point(&cell);
+        let octants = self.split_facets(&facets, &middle);
         let total: usize = octants.iter().map(Vec::len).sum();
         let largest = octants.iter().map(Vec::len).fold(0, usize::max);
         // No progress: one octant still meets all while others meet some too, or all meet nearly everything.
@@ -88,7 +92,7 @@ impl Subdivision<'_> {
             for a in 0..3 {
                 if octant >> a & 1 == 0 { cell.high[a] = middle[a] } else { cell.low[a] = middle[a] }
             }
-            (!facets.is_empty()).then(|| self.grow(facets, cell, depth + 1, duplication))
+            (!facets.is_empty()).then(|| self.make_cell(facets, cell, depth + 1, duplication))
         };
         let mut cells: Vec<Cell> = if n > PARALLEL {
             octants.into_par_iter().enumerate().filter_map(inner).collect()
@@ -103,9 +107,9 @@ impl Subdivision<'_> {
         Cell { bounds, content: Content::Cells(cells) }
     }
 
-    /// Where a cell is split. Along an axis where it is thin that is its end, so that all facets go to the lower side: halving the
-    /// thickness of flat scenes with each level cut the facets of an array of lenses into six pieces each.
-    fn middle(&self, cell: &Box32) -> [f32; 3] {
+    /// The point where a cell is split. Along an axis where it is thin that is its end, so that all facets go to the lower side: halving
+    /// the thickness of flat scenes with each level cut the facets of an array of lenses into six pieces each.
+    fn split_point(&self, cell: &Box32) -> [f32; 3] {
         let extent = |a: usize| cell.high[a] - cell.low[a];
         let longest = extent(0).max(extent(1)).max(extent(2));
         std::array::from_fn(|a| {
@@ -113,8 +117,9 @@ impl Subdivision<'_> {
         })
     }
 
-    /// The parts of facets in each octant about `middle`.
-    fn split(&self, facets: &[ClippedFacet], middle: &[f32; 3]) -> [Vec<ClippedFacet>; 8] {
+    /// The parts of facets in each octant about `middle`, in the order of the facets; bit `a` of an octant's index is its upper side
+    /// along axis `a`.
+    fn split_facets(&self, facets: &[ClippedFacet], middle: &[f32; 3]) -> [Vec<ClippedFacet>; 8] {
         if facets.len() <= CHUNK {
             // A surface mostly meets four octants of a cell.
             let mut octants: [Vec<ClippedFacet>; 8] = std::array::from_fn(|_| Vec::with_capacity(facets.len() / 4));
@@ -124,7 +129,7 @@ impl Subdivision<'_> {
             return octants;
         }
         let pieces: Vec<[Vec<ClippedFacet>; 8]> =
-            facets.par_chunks(CHUNK).map(|chunk| self.split(chunk, middle)).collect();
+            facets.par_chunks(CHUNK).map(|chunk| self.split_facets(chunk, middle)).collect();
         std::array::from_fn(|k| {
             let mut octant = Vec::with_capacity(pieces.iter().map(|p| p[k].len()).sum());
             for piece in &pieces {
@@ -134,7 +139,7 @@ impl Subdivision<'_> {
         })
     }
 
-    /// Puts a facet into the octants it meets; one that lies in a wall goes to the lower side alone.
+    /// Adds a facet, clipped, to the lists of the octants that it meets; one that lies in a wall goes to the lower side alone.
     fn distribute(&self, facet: &ClippedFacet, middle: &[f32; 3], octants: &mut [Vec<ClippedFacet>; 8]) {
         let Box32 { low, high } = facet.bounds;
         // Bit 0: meets the lower half, bit 1: the upper.

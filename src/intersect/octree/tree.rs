@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// By how much the box around the mesh is grown, in diagonals: far more than the rounding of where a ray enters it.
 const BOUNDS_ROOM: f64 = 1e-6;
 
-/// Nodes and blocks with the mesh that they are of.
+/// The nodes and blocks of an octree with the mesh that they are of.
 #[derive(Clone)]
 pub(super) struct Tree<'m> {
     pub(super) surroundings: Surroundings<'m>,
@@ -29,7 +29,7 @@ pub(super) struct Tree<'m> {
 }
 
 impl<'m> Tree<'m> {
-    /// Builds the tree with the threads of the current rayon pool.
+    /// Builds the tree with the threads of the current rayon pool and overwrites `statistics`.
     pub(super) fn build(mesh: &'m FacetMesh, settings: &Settings, statistics: &mut Statistics) -> Self {
         let center = middle(&Surroundings::new(mesh));
         let cell = subdivide(mesh, center, settings, statistics);
@@ -41,7 +41,7 @@ impl<'m> Tree<'m> {
         Self::new(mesh, nodes, blocks, root)
     }
 
-    /// Of nodes and blocks about the middle of the mesh.
+    /// Joins nodes and blocks, given relative to the middle of the mesh, with what walks need of `mesh`; checks nothing.
     pub(super) fn new(mesh: &'m FacetMesh, nodes: Vec<Node>, blocks: Vec<Block>, root: Option<Link>) -> Self {
         let surroundings = Surroundings::new(mesh);
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
@@ -52,7 +52,7 @@ impl<'m> Tree<'m> {
         Self { surroundings, center, frame, nodes, blocks, root, slopes }
     }
 
-    /// The facet that a ray leaves where it is known not to meet it again, else one that no block has.
+    /// The facet that a ray leaves where it is known not to meet it again, else `u32::MAX`, which no facet has.
     #[inline(always)]
     pub(super) fn unmet_facet(&self, ray: &Ray) -> u32 {
         let Some(from) = ray.departure else { return u32::MAX };
@@ -62,7 +62,7 @@ impl<'m> Tree<'m> {
         }
     }
 
-    /// The boxes of all nodes and blocks with their depth; the root's children have depth 1.
+    /// The boxes of all nodes and blocks but the root, mm in the mesh's coordinates, with their depth; the root's children have depth 1.
     pub(super) fn boxes(&self) -> Vec<(usize, Aabb)> {
         let mut boxes = Vec::new();
         let mut open: Vec<(Link, usize)> = self.root.iter().map(|&root| (root, 1)).collect();

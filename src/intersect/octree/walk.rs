@@ -41,6 +41,7 @@ struct StepQueues {
 }
 
 impl StepQueues {
+    /// Adds a ray, by its place among those under way, to the queue of a kind.
     #[inline(always)]
     fn put(&mut self, kind: usize, ray: u8) {
         let kind = kind & 7;
@@ -48,6 +49,7 @@ impl StepQueues {
         self.count[kind] += 1;
     }
 
+    /// Empties the queue of a kind and returns what was in it.
     #[inline(always)]
     fn take(&mut self, kind: usize) -> Queue {
         Queue { rays: self.rays[kind], count: std::mem::take(&mut self.count[kind]).min(WIDTH) }
@@ -74,7 +76,7 @@ thread_local! {
     static STATES: RefCell<Option<Box<States>>> = const { RefCell::new(None) };
 }
 
-/// Not inlined: its frame of 150 kB would be probed page by page at each walk.
+/// Allocates states without rays. Not inlined: its frame of 150 kB would be probed page by page at each walk.
 #[cold]
 #[inline(never)]
 fn idle_states() -> Box<States> {
@@ -85,7 +87,8 @@ fn idle_states() -> Box<States> {
     }
 }
 
-/// Finds the nearest hit of each ray.
+/// Finds the nearest hit of each ray and overwrites `hits`, which is as long as `rays`; `None` for a miss. `light_buffers`, which may be
+/// empty, answer batches only, never a single ray.
 #[inline(always)]
 pub(super) fn walk<L: Lanes>(
     tree: &Tree,
@@ -134,7 +137,7 @@ impl<'t> Arrays<'t> {
     }
 }
 
-/// One ray from its start to its end.
+/// Walks one ray that was started to its end; its hit is in `s.best`.
 #[inline(always)]
 fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
     let arrays = Arrays::new(tree);
@@ -158,7 +161,7 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
                 s.block = index as u32;
                 s.candidates = sift::<L>(&arrays.blocks[index], s) & used_lanes(count);
                 if s.candidates != 0 {
-                    test::<L>(tree, arrays, s);
+                    test_candidates::<L>(tree, arrays, s);
                 }
                 s.next = s.pop(s.boxes.t_max);
             }
@@ -167,7 +170,8 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
     }
 }
 
-/// Many rays, all steps of a kind in a row.
+/// Walks the rays of a batch whose places are in `order`, all steps of a kind in a row, and writes their hits; other entries of `hits`
+/// stay.
 #[inline(always)]
 fn walk_batch<L: Lanes>(
     tree: &Tree,
@@ -212,7 +216,7 @@ fn walk_batch<L: Lanes>(
         let queue = queues.take(EXACT);
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
-            test::<L>(tree, arrays, s);
+            test_candidates::<L>(tree, arrays, s);
             // What was next may lie beyond the new hit.
             s.recheck_next::<L>();
             prefetch_step(arrays, s.next);
@@ -244,7 +248,8 @@ fn walk_batch<L: Lanes>(
     }
 }
 
-/// The triangles of a block that are left without those of the facet that the ray leaves.
+/// Returns the triangles of a block that the ray may meet, bits as in [`Lanes::sift`], without those of the facet that it leaves and is
+/// known not to meet.
 #[inline(always)]
 fn sift<L: Lanes>(block: &Block, s: &RayState) -> u32 {
     let mut own = 0;
@@ -254,7 +259,7 @@ fn sift<L: Lanes>(block: &Block, s: &RayState) -> u32 {
     L::sift(block, &s.sieve, &s.boxes) & !(own * 0x11)
 }
 
-/// The lanes of a block that hold facets.
+/// The bits of both triangles of the first `count` lanes of a block.
 #[inline(always)]
 fn used_lanes(count: usize) -> u32 {
     ((1 << count) - 1) * 0x11
@@ -267,7 +272,7 @@ fn prefetch_step(arrays: Arrays, link: Link) {
     prefetch_either(link.kind() != NODE, (arrays.blocks, block), (arrays.nodes, link.as_node()));
 }
 
-/// Asks for the corners of the facets that the sieve left; nearly always it is one.
+/// Asks for the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.
 #[inline(always)]
 fn prefetch_corners(arrays: Arrays, s: &RayState) {
     let block = &arrays.blocks[s.block as usize];
@@ -284,9 +289,9 @@ fn prefetch_corners(arrays: Arrays, s: &RayState) {
     }
 }
 
-/// Tests the facets that the sieve left.
+/// Tests the triangles that the sieve left in f64, keeps the nearest hit and limits the boxes to it. There must be at least one.
 #[inline(always)]
-fn test<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
+fn test_candidates<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
     let block = &arrays.blocks[s.block as usize];
     let candidates = s.candidates;
     let mut mask = (candidates | candidates >> 4) & 15;
@@ -299,7 +304,7 @@ fn test<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
         let triangles = candidates >> k & 1 | candidates >> (k + 3) & (is_quad << 1);
         let facet = block.facets[k];
         let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
-        let edges = L::quad(arrays, &s.quads);
+        let edges = L::quad_edges(arrays, &s.quads);
         // Often the facet is the one that the ray leaves, or a neighbour of it, and passed by far from the start.
         if ((s.departed != u32::MAX) & edges.near) | (s.departed == facet) {
             if !edges.misses_clearly(triangles, arrays, &s.quads) {
@@ -315,7 +320,7 @@ fn test<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
     s.limit_to_hit();
 }
 
-/// The test of a facet where more than the signs of its edge functions decides.
+/// Tests a facet by [`crate::intersect::facet::FacetRay::test`], where more than the signs of its edge functions decides.
 #[cold]
 #[inline(never)]
 fn test_with_care(tree: &Tree, s: &mut RayState, facet: u32, triangles: u32, corners: [&Point; 4]) {

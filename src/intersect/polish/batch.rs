@@ -25,10 +25,12 @@ const MOST_BEHIND: usize = 3;
 /// Memory of a batch.
 #[derive(Default)]
 struct Workspace {
-    /// What the facets are asked, and which ray it comes from.
+    /// What the facets are asked, and the index of the ray that it comes from.
     asked: Vec<Ray>,
     places: Vec<u32>,
+    /// Of each asked ray.
     facet_hits: Vec<Option<Hit>>,
+    /// Of the facet hits that lie on a patch, and the point that each leads to.
     seeds: Vec<Seed>,
     points: Vec<Option<SurfacePoint>>,
     /// The rays that passed a facet, from where on they ask again.
@@ -42,13 +44,14 @@ thread_local! {
 /// What becomes of a ray in a batch.
 enum Decision {
     Answer(Option<Hit>),
-    /// The root of this facet hit is not ahead.
+    /// The root of this facet hit is not ahead: the facets are asked again behind it.
     Behind,
+    /// In doubt: [`Polished::intersect_alone`] decides.
     Alone,
 }
 
 impl Polished<'_> {
-    /// The nearest roots of many rays.
+    /// Answers many rays: overwrites `hits`, which is as long as `rays`, and counts each ray once.
     pub(super) fn polish_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let clear = self.clear_starts.read().unwrap_or_else(PoisonError::into_inner);
         // Taken, not borrowed: a call that came back here on this thread would find an empty workspace, not a
@@ -70,7 +73,8 @@ impl Polished<'_> {
         WORKSPACE.set(space);
     }
 
-    /// Takes up rays: with the range that the facets are asked about, or alone.
+    /// Sorts a batch: fills `space.asked` and `space.places` with the rays that the facets are asked about, their ranges widened by the
+    /// slack, and answers all others at once, each alone.
     fn start(
         &self,
         rays: &[Ray],
@@ -96,7 +100,7 @@ impl Polished<'_> {
         }
     }
 
-    /// Finds facet hits and the roots that they lead to.
+    /// Finds the facet hits of `space.asked`, seeds from them, and the roots that these converge to; rays are not counted.
     fn ask_facets(&self, space: &mut Workspace, cost: &mut Cost) {
         let Workspace { asked, facet_hits, seeds, points, .. } = space;
         facet_hits.clear();
@@ -121,7 +125,8 @@ impl Polished<'_> {
         self.exact.converge_batch(asked, seeds, points);
     }
 
-    /// Decides about all rays that were asked; those that ask again are left in the workspace.
+    /// Decides about all rays that were asked and writes their `hits`; those that ask again, from behind the facet they passed, are left in
+    /// `space.asked` and `space.places`.
     fn decide_all(&self, rays: &[Ray], hits: &mut [Option<Hit>], space: &mut Workspace, cost: &mut Cost) {
         let Workspace { asked, places, facet_hits, seeds, points, again } = space;
         again.clear();
@@ -149,7 +154,8 @@ impl Polished<'_> {
         }
     }
 
-    /// How far before and behind its range a ray looks for facets, mm; `None` for one that must be asked alone.
+    /// How far before and behind its range a ray looks for facets, mm: `None` for one that must be asked alone, as it leaves its facet
+    /// flat, names no facet of its face or is short.
     #[inline(always)]
     fn slack(&self, ray: &Ray, clear: &[ClearStart]) -> Option<[f64; 2]> {
         let slack = 2.0 * self.sag;
@@ -166,7 +172,8 @@ impl Polished<'_> {
         (ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag).then(|| [slack / sine; 2])
     }
 
-    /// The answer of a ray, where a facet hit and the root it leads to leave no doubt.
+    /// Decides about a ray from its facet hit, `None` for a miss, and the root that Newton's method found from there, `None` where it did
+    /// not converge.
     #[inline(always)]
     fn decide(&self, ray: &Ray, facet_hit: Option<&Hit>, point: Option<&SurfacePoint>) -> Decision {
         let left = ray.departure.map(|from| &self.records[from.primitive as usize]);

@@ -15,7 +15,7 @@ const PLANE_ROOM: f64 = 1e-9;
 pub(super) enum ClearStart {
     /// They start at a point.
     Point(Point),
-    /// They run in a direction, from this far along it or at most so much beside.
+    /// They run in a unit direction and start where the product of place and direction is `depth`, give or take `stray`, mm.
     Plane { direction: Vector, depth: f64, stray: f64 },
 }
 
@@ -38,7 +38,7 @@ impl ClearStart {
         (0..mesh.facets.len()).all(|f| start.is_clear_of(mesh.corners(f), reach)).then_some(start)
     }
 
-    /// Whether no ray comes from within `reach` mm before its start through the facet of these corners.
+    /// Whether no ray, taken back by `reach` mm behind its start, meets the facet of these corners there.
     fn is_clear_of(&self, corners: [Point; 4], reach: f64) -> bool {
         match self {
             // To the facet's box, which is no farther than the facet: an error here costs a look back, never a hit.
@@ -54,7 +54,7 @@ impl ClearStart {
         }
     }
 
-    /// Whether a ray that leaves no face starts here.
+    /// Whether a ray is of this source, by origin or by direction and plane; its departure is not looked at.
     #[inline(always)]
     pub(super) fn holds(&self, ray: &Ray) -> bool {
         match self {

@@ -17,7 +17,7 @@ const NO_PATCH: u32 = u32::MAX - 1;
 /// In [`FacetRecord::solid`]: its face is part of no closed shell.
 const NO_SOLID: u32 = u32::MAX;
 
-/// One facet.
+/// One facet with the face, patch and closed shell that it is of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FacetRecord {
     normal: [f32; 3],
@@ -31,7 +31,7 @@ pub(super) struct FacetRecord {
 }
 
 impl FacetRecord {
-    /// Of every facet; where no sag was proved it is `sag`.
+    /// Makes the records of all facets of `mesh`, in their order; where no sag was proved it is `sag`, mm.
     pub(super) fn of_mesh(mesh: &FacetMesh, exact: &Exact, sag: f64) -> Vec<Self> {
         let mut solids: FxHashMap<[u32; 2], u32> = FxHashMap::default();
         let mut solid_of = |face| {
@@ -74,7 +74,7 @@ impl FacetRecord {
         (sine.abs() > self.least_sine).then_some(sine)
     }
 
-    /// The patch that a place of the facet lies on; `None` where there is none.
+    /// The patch of `exact` that a place of the facet, in the surface's parameters, lies on; `None` where there is none.
     #[inline(always)]
     pub(super) fn patch(&self, exact: &Exact, uv: Uv) -> Option<u32> {
         match self.patch {
@@ -90,7 +90,7 @@ impl FacetRecord {
         self.solid != NO_SOLID
     }
 
-    /// Whether both are of one closed shell, or of none.
+    /// Whether both are of one closed shell, or each of none.
     #[inline(always)]
     pub(super) fn shares_solid(&self, other: &Self) -> bool {
         self.solid == other.solid

@@ -92,7 +92,7 @@ pub struct Polished<'a> {
     facets: &'a dyn Intersector,
     mesh: &'a FacetMesh,
     exact: &'a Exact,
-    /// Largest proved sag.
+    /// Largest sag of any facet, mm: at least [`UNPROVED_SAG`] where one was not proved.
     sag: f64,
     /// Of every facet.
     records: Vec<FacetRecord>,
@@ -110,7 +110,8 @@ enum Polishing {
 }
 
 impl<'a> Polished<'a> {
-    /// Wraps an intersector over `mesh`, which must be made of the model that `exact` was built from.
+    /// Wraps `facets`, an intersector over `mesh`, which must be made of the model that `exact` was built from: faces are told by their
+    /// number. Its normal mode counts for hits alone that fall back to the facet.
     pub fn new(facets: &'a dyn Intersector, mesh: &'a FacetMesh, exact: &'a Exact) -> Self {
         let proved = mesh.sag.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
         let sag = if mesh.sag.iter().any(|s| !s.is_finite()) || mesh.sag.is_empty() {
@@ -122,12 +123,13 @@ impl<'a> Polished<'a> {
         Self { facets, mesh, exact, sag, records, clear_starts: RwLock::default() }
     }
 
-    /// The proved sag of a facet, or the mesh's where there is none.
+    /// The proved sag of a facet, mm, or the largest of the mesh where there is none or no such facet.
     fn sag_of(&self, facet: u32) -> f64 {
         self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite()).unwrap_or(self.sag)
     }
 
-    /// The distance up to which the ray's next root may hide between the surface it leaves and the facets there.
+    /// The distance, mm, up to which the next root of a ray may hide between the surface it leaves and the facets there; `None` where the
+    /// ray rises too steeply for that, or the facet lies on the spline. `normal` is the spline's where it leaves.
     ///
     /// On a surface of curvature κ a ray at angle θ stays within `sin²θ / 2κ` of it; a facet of length L has sag κL²/8.
     fn hidden_range(&self, ray: &Ray, from: &Departure, normal: Vector) -> Option<f64> {
@@ -150,6 +152,8 @@ impl<'a> Polished<'a> {
         2.0 * a.distance(c).max(b.distance(d))
     }
 
+    /// Moves one facet hit to the spline: by Newton steps from its parameters, or where they do not find the root that the facet stands
+    /// for, by the exact model in a window around it.
     fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Polishing {
         let sag = self.sag_of(facet_hit.primitive).max(NO_SAG);
         let sine = facet_hit.geometric_normal.dot(ray.direction).abs();
@@ -199,7 +203,8 @@ impl<'a> Polished<'a> {
         }
     }
 
-    /// Whether an answer cannot be: a ray that goes into a closed solid comes out of it again, one that comes out goes into it.
+    /// Whether an answer cannot be: a ray that goes into a closed solid comes out of it again, one that comes out goes into it. Always
+    /// `false` for a ray that leaves no closed solid; no answer is impossible only for an endless ray that goes in.
     fn is_impossible(&self, ray: &Ray, (from, normal): (&Departure, Vector), answer: Option<&Hit>) -> bool {
         let Some(solid) = self.exact.solid_of(from.face) else { return false };
         let inward = normal.dot(ray.direction) < 0.0;
@@ -224,13 +229,14 @@ impl<'a> Polished<'a> {
         answer.is_some_and(other) || self.is_impossible(ray, left, answer)
     }
 
-    /// The nearest root of a ray that leaves no face, which the spline is asked for where it would come out of a closed solid first.
+    /// The nearest root of a ray that leaves no face. Where it would first come out of a closed solid the spline is asked, and then up to
+    /// [`MOST_OUTSIDE`] facets are passed; `None` for a miss or after these.
     fn search_from_outside(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let mut answer = self.search(ray, None, cost);
         if !self.comes_out(ray, answer.as_ref()) {
             return answer;
         }
-        if let Some(hit) = self.on_spline(ray) {
+        if let Some(hit) = self.ask_spline(ray) {
             return Some(hit);
         }
         // A facet where the spline is not; ready meshes may stand behind it.
@@ -245,20 +251,23 @@ impl<'a> Polished<'a> {
         None
     }
 
-    /// Whether a ray comes out of a closed solid by its answer: beside an edge it may have passed the facets of the side where it went in.
+    /// Whether a ray comes out of a closed solid by its answer, no answer being none: beside an edge it may have passed the facets of the
+    /// side where it went in.
     fn comes_out(&self, ray: &Ray, answer: Option<&Hit>) -> bool {
         answer.is_some_and(|hit| {
             hit.geometric_normal.dot(ray.direction) > 0.0 && self.exact.solid_of(hit.face).is_some()
         })
     }
 
-    /// What the exact model answers, as a hit of no facet: of one that is not there a ray which leaves it could not meet it again.
-    fn on_spline(&self, ray: &Ray) -> Option<Hit> {
+    /// Asks the exact model over the whole range of the ray, uncounted; `None` for a miss. The hit names no facet ([`NO_FACET`]) but its
+    /// face, for a ray that leaves a named facet could not meet it again.
+    fn ask_spline(&self, ray: &Ray) -> Option<Hit> {
         let hit = self.exact.first(ray, &mut Cost::default()).hit?;
         Some(Hit { primitive: NO_FACET, certainty: Certainty::Polished, ..hit })
     }
 
-    /// The nearest root that the facets lead to.
+    /// The nearest root that the facets lead to, or a facet hit where none is found, counted in [`Cost::fallbacks`]; `None` where at most
+    /// [`MOST_FACETS`] facets lead to nothing. `left` is what the ray leaves and the spline's normal there. Counts one ray.
     fn search(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
         let mut ray = *ray;
         // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden_range` may lead to a root behind it.
@@ -270,7 +279,7 @@ impl<'a> Polished<'a> {
             && let Some(reach) = self.hidden_range(&ray, from, normal)
         {
             let end = ray.t_max.min(ray.t_min.max(0.0) + reach);
-            if let Some(hit) = self.on_spline(&ray.with_range(ray.t_min, end)) {
+            if let Some(hit) = self.ask_spline(&ray.with_range(ray.t_min, end)) {
                 cost.rays += 1;
                 return Some(hit);
             }
@@ -293,7 +302,7 @@ impl<'a> Polished<'a> {
                     continue;
                 }
                 // A ready mesh has no spline to go to; that is no failure.
-                Polishing::Lost if !self.exact.traces(facet_hit.face) => answer = in_range(ray, facet_hit),
+                Polishing::Lost if !self.exact.traces(facet_hit.face) => answer = hit_in_range(ray, facet_hit),
                 // The exact model has no point there: a facet of the surface being left.
                 Polishing::Lost
                     if ray.departure.is_some_and(|f| {
@@ -301,7 +310,7 @@ impl<'a> Polished<'a> {
                     }) => {}
                 Polishing::Lost => {
                     cost.fallbacks += 1;
-                    answer = in_range(ray, facet_hit);
+                    answer = hit_in_range(ray, facet_hit);
                 }
             }
             if answer.is_some() {
@@ -315,7 +324,8 @@ impl<'a> Polished<'a> {
     }
 }
 
-/// Whether a root is the very point that the ray leaves: the same face, no distance along the ray, the same place.
+/// Whether a root on the face that the ray leaves is the very point it leaves: no distance along the ray, the same place. That the
+/// faces are the same is up to the caller.
 fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::SurfacePoint) -> bool {
     if point.t.abs() > OWN_POINT {
         return false;
@@ -326,20 +336,20 @@ fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::Surf
 }
 
 impl Polished<'_> {
-    /// The nearest root of a ray, with all that may be asked about it.
+    /// The nearest root of one ray, found by facets and, where their answer is doubtful or the ray short, by the exact model.
     fn intersect_alone(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let normal = |f: &Departure| self.exact.normal_at(f.face, f.uv);
         let Some(left) = ray.departure.as_ref().and_then(|f| Some((f, normal(f)?))) else {
             return self.search_from_outside(ray, cost);
         };
         let mut answer = self.search(ray, Some(left), cost);
-        let asked = (ray.t_max - ray.t_min <= SHORT_OF_SAGS * self.sag).then(|| self.on_spline(ray));
+        let asked = (ray.t_max - ray.t_min <= SHORT_OF_SAGS * self.sag).then(|| self.ask_spline(ray));
         answer = answer.into_iter().chain(asked.flatten()).min_by(|a, b| a.t.total_cmp(&b.t));
         if !self.is_doubtful(ray, left, answer.as_ref()) {
             return answer;
         }
         // Beside an edge a ray may start outside all facets and pass between them.
-        let exact = asked.unwrap_or_else(|| self.on_spline(ray));
+        let exact = asked.unwrap_or_else(|| self.ask_spline(ray));
         if self.is_impossible(ray, left, exact.as_ref()) { answer } else { exact }
     }
 }
@@ -373,6 +383,7 @@ impl Intersector for Polished<'_> {
     }
 }
 
-fn in_range(ray: &Ray, hit: Hit) -> Option<Hit> {
+/// The hit if it lies within the range of the ray, else `None`.
+fn hit_in_range(ray: &Ray, hit: Hit) -> Option<Hit> {
     (hit.t >= ray.t_min && hit.t <= ray.t_max).then_some(hit)
 }

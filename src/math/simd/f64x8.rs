@@ -14,9 +14,11 @@ pub(crate) const LANES: usize = 8;
 pub(crate) trait F64x8: Copy {
     /// The same in every lane.
     fn splat(x: f64) -> Self;
+    /// Lane `k` is `x[k]`.
     fn load(x: &[f64; LANES]) -> Self;
+    /// Overwrites `to` with the lanes, in order.
     fn store(self, to: &mut [f64; LANES]);
-    /// The four components of eight vectors, each in a register of its own.
+    /// Transposes eight vectors: their first components in one, then the second, third and fourth ones.
     fn transpose(rows: [&[f64; 4]; LANES]) -> [Self; 4];
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
@@ -231,7 +233,7 @@ mod registers {
         in_register!(max, _mm512_max_pd);
     }
 
-    /// All bits of the lanes of a mask's four lowest bits.
+    /// Sets all bits of each of four lanes whose bit is set in the four lowest of a mask, and none of the others.
     #[inline(always)]
     unsafe fn widen_mask(mask: u8) -> __m256d {
         unsafe {
@@ -241,7 +243,7 @@ mod registers {
         }
     }
 
-    /// The components of four vectors.
+    /// Transposes four vectors: the first components of all, then the second, third and fourth ones.
     #[inline(always)]
     unsafe fn transpose_four(a: &[f64; 4], b: &[f64; 4], c: &[f64; 4], d: &[f64; 4]) -> [__m256d; 4] {
         unsafe {

@@ -121,17 +121,17 @@ impl Level {
     /// What every processor has.
     pub(crate) const PORTABLE: Self = Self(Width::Portable);
 
-    /// AVX2 where the processor has it.
+    /// AVX2 and what came with it where the processor has them, else the baseline.
     pub(crate) fn avx2() -> Self {
         Self(if has_avx2() { Width::Avx2 } else { Width::Portable })
     }
 
-    /// AVX-512 with VBMI, else AVX2, where the processor has it.
+    /// AVX-512 with VBMI, else AVX2, where the processor has it, else the baseline.
     pub(crate) fn widest() -> Self {
         if has_avx512_vbmi() { Self(Width::Avx512Vbmi) } else { Self::avx2() }
     }
 
-    /// Runs a kernel.
+    /// Runs a kernel with the instructions of this level.
     #[inline(always)]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
@@ -146,7 +146,7 @@ impl Level {
     }
 }
 
-/// Runs a kernel with AVX2 where the processor has it.
+/// Runs a kernel with AVX2 where the processor has it, else with the baseline; it asks the processor at each call.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -157,7 +157,7 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     run_portable(kernel)
 }
 
-/// Runs a kernel with AVX-512, else AVX2, where the processor has it: for loops that gain by registers of 64 bytes.
+/// Runs a kernel with AVX-512 (without VBMI), else AVX2, where the processor has it: for loops that gain by registers of 64 bytes.
 #[inline]
 pub(crate) fn dispatch_widest<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]

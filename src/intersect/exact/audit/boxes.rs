@@ -28,6 +28,7 @@ enum Content {
 }
 
 impl Boxes {
+    /// Builds the tree of these boxes, each grown a little; there may be none.
     pub(super) fn new(boxes: &[Aabb]) -> Self {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut tree = Self { nodes: Vec::with_capacity(2 * boxes.len()) };
@@ -37,7 +38,8 @@ impl Boxes {
         tree
     }
 
-    /// Depth is the logarithm of the number of boxes, since each split is in the middle.
+    /// Adds a node over the boxes that `order`, not empty, lists, with all below it; `order` is sorted on the way. Depth is the logarithm
+    /// of the number of boxes, since each split is in the middle.
     fn add(&mut self, boxes: &[Aabb], order: &mut [u32]) {
         let bounds = order.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
         // The place in the list is taken before the children's: the first child is then the next node and needs no
@@ -62,7 +64,7 @@ impl Boxes {
         self.add(boxes, high);
     }
 
-    /// The boxes that a ray meets with where it enters them, in order.
+    /// Fills `met` with the boxes that a ray meets in its range, each with the distance, mm, where it enters them, the nearest first.
     pub(super) fn intersected(&self, ray: &Ray, met: &mut Vec<(f64, u32)>) {
         met.clear();
         let mut stack = vec![0u32];

@@ -11,6 +11,7 @@ use smallvec::SmallVec;
 /// A part of the patch, as the ray sees it, that may hold a root.
 struct Piece {
     net: Net,
+    /// How often it was cut or halved.
     depth: u32,
 }
 
@@ -21,7 +22,7 @@ pub(super) struct View {
 }
 
 impl View {
-    /// From the axes that the ray's direction avoids most.
+    /// Chooses two planes through the ray, from the axis that its direction avoids most.
     pub(super) fn new(ray: &Ray) -> Self {
         // The shortest component's axis is the farthest from parallel, so that the cross product is not a difference of
         // near equals.
@@ -72,11 +73,12 @@ pub(super) struct PatchClipping<'a> {
     whole: Net,
     /// Which ends of the patch are ends of the surface, in u and in v.
     ends: [[bool; 2]; 2],
+    /// Bound of the error of control points across the ray, mm.
     rounding: f64,
 }
 
 impl<'a> PatchClipping<'a> {
-    /// The patch as a ray sees it; `domain` is the whole surface's, by which the patch's sides that are borders are known.
+    /// Sees a patch along a ray; `domain` is the whole surface's, by which the patch's sides that are borders are known.
     pub(super) fn new(
         (ray, view): (&Ray, &View),
         face: FaceId,
@@ -96,7 +98,8 @@ impl<'a> PatchClipping<'a> {
         Self { face, patch, whole, ends, rounding }
     }
 
-    /// Adds the crossings; returns from which distance on some were not searched for, infinity when all were.
+    /// Adds the crossings of the whole line to `out`, some of them twice; returns the distance, mm, from which on some were not searched
+    /// for, infinity when all were.
     pub(super) fn search(&self, out: &mut SmallVec<[AuditHit; 8]>) -> f64 {
         if self.whole.misses(self.rounding) {
             return f64::INFINITY;
@@ -128,7 +131,7 @@ impl<'a> PatchClipping<'a> {
         exhausted
     }
 
-    /// Decides a small box when it can hold one root at most: takes that where it lies inside. Whether it was decided.
+    /// Decides a small box when it can hold one root at most, which it adds to `out` where it lies inside; `false` where it cannot decide.
     fn take_single_root(&self, net: &Net, out: &mut SmallVec<[AuditHit; 8]>) -> bool {
         // The box with as much again on all sides, as parts of the whole patch.
         let around = net.domain.map(|[lo, hi]| {
@@ -157,7 +160,7 @@ impl<'a> PatchClipping<'a> {
         true
     }
 
-    /// Decides a box that has come down to a point, or to a contact; whether it was one.
+    /// Decides a box that has come down to a point, or to a contact, which it adds to `out`; `false` where the box is neither.
     fn take_point(&self, piece: &Piece, size: f64, out: &mut SmallVec<[AuditHit; 8]>) -> bool {
         let net = &piece.net;
         let across = net.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
@@ -180,7 +183,7 @@ impl<'a> PatchClipping<'a> {
         out.push(AuditHit { t: m.z / m.w, face: self.face, uv: self.patch.surface_uv(Uv::from(local)), doubtful });
     }
 
-    /// Puts what the hull leaves of a box on the stack, or its halves where that is most of it.
+    /// Puts what the hull leaves of a box on the stack, its halves where that is most of it, or nothing where no root can lie in it.
     fn divide(&self, Piece { mut net, depth }: Piece, stack: &mut Vec<Piece>) {
         let mut longest = (0, 0.0);
         let mut shrunk = false;

@@ -74,7 +74,7 @@ const SMALLER: f64 = 0.8;
 const DEEPEST_TRIM: u32 = 48;
 
 impl Audit {
-    /// Prepares every face that has a surface.
+    /// Prepares every placed face that has a surface; ready meshes are left out. Surfaces must be finite and positive in weight.
     pub fn new(model: &Model) -> Self {
         let (mut faces, mut pieces) = (Vec::new(), Vec::new());
         for placed in model.placed_faces() {
@@ -94,7 +94,8 @@ impl Audit {
         Self { faces, pieces, boxes: Boxes::new(&boxes) }
     }
 
-    /// The first crossing in `[t_min, t_max]`; the point that the ray leaves is left out.
+    /// Finds the first crossing in `[t_min, t_max]`, in the model's coordinates; crossings of the face that the ray leaves within 1e-7 mm
+    /// of its origin are left out.
     pub fn first(&self, ray: &Ray) -> AuditAnswer {
         let mut met = Vec::new();
         self.boxes.intersected(ray, &mut met);
@@ -137,7 +138,7 @@ impl Audit {
     }
 }
 
-/// Halves a patch as long as its pieces fill boxes much smaller than its own.
+/// Halves a patch as long as its pieces fill boxes much smaller than its own, and adds the pieces to `out` with the index of their face.
 fn split(patch: BezierPatch, face: u32, out: &mut Vec<(u32, BezierPatch)>) {
     let mut stack = vec![(patch, 0)];
     while let Some((patch, depth)) = stack.pop() {
@@ -157,7 +158,8 @@ fn split(patch: BezierPatch, face: u32, out: &mut Vec<(u32, BezierPatch)>) {
 /// How often a patch is halved at most before any ray comes.
 const DEPTH: u32 = 6;
 
-/// The pieces of every loop; ends that do not meet are joined by straight pieces, so that parity has one meaning.
+/// The Bézier pieces of every loop, in homogeneous surface parameters; ends of uses are joined by straight pieces, so that parity has
+/// one meaning.
 fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
     let mut out = Vec::new();
     let mut add = |points: Vec<DVec3>| {
@@ -184,7 +186,7 @@ fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
     out
 }
 
-/// Area within the loops, positive where they run counterclockwise, from points along each curve.
+/// Signed area within the loops in surface parameters, positive where they run counterclockwise, from points along each curve.
 fn area(loops: &[TrimLoop]) -> f64 {
     // Independent of the tracer's own rule on purpose, which adds up chords of Bézier pieces.
     let uses = loops.iter().flat_map(|l| &l.uses);
@@ -198,7 +200,7 @@ fn area(loops: &[TrimLoop]) -> f64 {
     .sum()
 }
 
-/// Corners of the box around control points.
+/// Lower and upper corner of the box around homogeneous control points of a uv curve.
 fn hull_corners(points: &[DVec3]) -> (DVec2, DVec2) {
     points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| {
         let at = p.truncate() / p.z;
@@ -207,7 +209,8 @@ fn hull_corners(points: &[DVec3]) -> (DVec2, DVec2) {
 }
 
 impl AuditFace {
-    /// The first crossing of those found on the face within its trims.
+    /// The first crossing in the range of the ray of those found on the face, taking those for one that lie close to each other; which then
+    /// may be doubtful.
     fn first(&self, ray: &Ray, mut own: SmallVec<[AuditHit; 8]>) -> Option<AuditHit> {
         own.sort_by(|a, b| a.t.total_cmp(&b.t));
         // Boxes that share a border, and clusters around a tangency, find the same crossing several times.
@@ -230,19 +233,20 @@ impl AuditFace {
         })
     }
 
-    /// Whether a point of the domain lies inside: an odd number of crossings above it.
+    /// Whether a point of the domain lies inside the trims: an odd number of crossings above it, or an even one where there are holes
+    /// alone.
     fn holds(&self, q: Uv) -> bool {
         // Towards +v, where the tracer looks towards +u: a fault in one of the two does not hide in the other.
         if self.trims.is_empty() {
             return true;
         }
         let near = self.trims.iter().filter(|t| q.x >= t.lo.x && q.x < t.hi.x && q.y <= t.hi.y);
-        (near.map(|t| above(&t.points, q, 0)).sum::<u32>() % 2 == 1) != self.holes_alone
+        (near.map(|t| crossings_above(&t.points, q, 0)).sum::<u32>() % 2 == 1) != self.holes_alone
     }
 }
 
-/// How often a Bézier piece crosses the half-line from `q` towards +v.
-fn above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
+/// How often a Bézier piece of a uv curve crosses the half-line from `q` towards +v; `depth` counts the halvings so far.
+fn crossings_above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
     let at = |p: &DVec3| p.truncate() / p.z;
     let (first, last) = (at(&points[0]), at(&points[points.len() - 1]));
     let (lo, hi) = hull_corners(points);
@@ -270,7 +274,7 @@ fn above(points: &[DVec3], q: DVec2, depth: u32) -> u32 {
             w[k] = 0.5 * (w[k] + w[k + 1]);
         }
     }
-    above(&low, q, depth + 1) + above(&w, q, depth + 1)
+    crossings_above(&low, q, depth + 1) + crossings_above(&w, q, depth + 1)
 }
 
 #[cfg(test)]
@@ -281,8 +285,8 @@ mod tests {
     fn a_parabola_is_crossed_where_it_should_be() {
         // (t, t²) for t in [-1, 1].
         let points = [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(0.0, -1.0, 1.0), DVec3::new(1.0, 1.0, 1.0)];
-        assert_eq!(above(&points, DVec2::new(0.5, 0.2499999999), 0), 1);
-        assert_eq!(above(&points, DVec2::new(0.5, 0.2500000001), 0), 0);
-        assert_eq!(above(&points, DVec2::new(1.5, 0.0), 0), 0);
+        assert_eq!(crossings_above(&points, DVec2::new(0.5, 0.2499999999), 0), 1);
+        assert_eq!(crossings_above(&points, DVec2::new(0.5, 0.2500000001), 0), 0);
+        assert_eq!(crossings_above(&points, DVec2::new(1.5, 0.0), 0), 0);
     }
 }

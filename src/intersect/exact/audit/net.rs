@@ -16,7 +16,7 @@ pub(super) struct Net {
 }
 
 impl Net {
-    /// Whether all control points lie on one side of a plane through the ray.
+    /// Whether all control points lie on one side of a plane through the ray by more than `rounding`, so that there is no root.
     pub(super) fn misses(&self, rounding: f64) -> bool {
         let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for p in &self.points {
@@ -26,7 +26,7 @@ impl Net {
         lo.x > rounding || lo.y > rounding || hi.x < -rounding || hi.y < -rounding
     }
 
-    /// A distance before all of its points; none where a weight is not positive and the hull bounds nothing.
+    /// A distance along the ray, mm, before all of its points; minus infinity where a weight is not positive and the hull bounds nothing.
     pub(super) fn nearest(&self) -> f64 {
         let near = |p: &Homogeneous| if p.w > 0.0 { p.z / p.w } else { f64::NEG_INFINITY };
         self.points.iter().map(near).fold(f64::INFINITY, f64::min)
@@ -36,7 +36,7 @@ impl Net {
         self.points[i * (self.degree[1] + 1) + j]
     }
 
-    /// The homogeneous point at local parameters, by de Casteljau.
+    /// The homogeneous point at shares of the net, as the ray sees it, by de Casteljau.
     pub(super) fn point(&self, local: Uv) -> Homogeneous {
         let row = |i: usize| {
             let line = (0..=self.degree[1]).map(|j| self.control(i, j)).collect();
@@ -45,7 +45,7 @@ impl Net {
         blossom((0..=self.degree[0]).map(row).collect(), |_| local.x)
     }
 
-    /// Extent along a parameter as the ray sees it, in all three coordinates.
+    /// Longest distance between corresponding control points of the two sides that a parameter joins, mm.
     pub(super) fn edge_length(&self, direction: usize) -> f64 {
         let [p, q] = self.degree;
         let at = |i: usize, j: usize| self.control(i, j).project();
@@ -56,7 +56,8 @@ impl Net {
         }
     }
 
-    /// Range of one parameter that can hold a root, by the hull of its distances to the line that joins the patch's ends in it.
+    /// Range of one parameter, as shares of the net, that can hold a root, by the hull of distances to a line through the ray along the
+    /// other parameter; `None` where none can.
     pub(super) fn range(&self, direction: usize, rounding: f64) -> Option<[f64; 2]> {
         let [p, q] = self.degree;
         // A line through the origin roughly along the other parameter, so that distances grow with this one.
@@ -103,7 +104,7 @@ impl Net {
         (first <= last).then(|| [(first - RANGE_ROUNDING).max(0.0), (last + RANGE_ROUNDING).min(1.0)])
     }
 
-    /// The part over `[lo, hi]` of one local parameter.
+    /// The part over `[lo, hi]` of one parameter, as shares of the net, which may reach beyond it.
     pub(super) fn cut(&self, direction: usize, [lo, hi]: [f64; 2]) -> Self {
         let q = self.degree[1];
         let n = self.degree[direction];

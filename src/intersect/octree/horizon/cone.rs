@@ -19,8 +19,9 @@ const ANGLE_ROOM: f64 = 1e-3;
 /// By how much balls are made larger, for the rounding of distances in f64 and much more.
 const BALL_ROOM: f64 = 1e-9;
 
-/// The cosine of half the angle of a free cone of a facet, which is not made wider than half of `widest`; `None` where there is none.
-pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
+/// Returns the cosine of half the angle of a free cone of a facet around the unit vector `axis`: half the angle, in radians, is at most
+/// `widest`. `None` where the cone would be too narrow to be of use, or a triangle of the facet has no area.
+pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
     let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
     let first = Base::new([a, b, c], tree.surroundings.reach)?;
@@ -45,7 +46,7 @@ pub(super) fn cosine(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Op
     (angle > LEAST_HALF_ANGLE).then(|| (angle - ANGLE_ROOM).cos())
 }
 
-/// A cone that is made narrower.
+/// A cone about `axis`, a unit vector, that is made narrower.
 struct Limit {
     axis: Vector,
     /// Of half its angle.
@@ -59,7 +60,7 @@ impl Limit {
         Self { axis, sine, cosine }
     }
 
-    /// Narrows the cone to this sine.
+    /// Narrows the cone to this sine of half its angle; a larger one than it has changes nothing, a negative one counts as zero.
     fn lower(&mut self, sine: f64) {
         if sine < self.sine {
             self.sine = sine.max(0.0);
@@ -77,10 +78,12 @@ struct Base {
     /// Middle and radius of a ball around it.
     middle: Point,
     radius: f64,
+    /// How far off its triangle a start may lie, mm.
     reach: f64,
 }
 
 impl Base {
+    /// A triangle with the reach of its starts, mm; `None` without area.
     fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
         let [a, b, c] = corners;
         let (normal, lines) = lines_around(corners)?;
@@ -89,7 +92,7 @@ impl Base {
         Some(Self { corners, normal, lines, middle, radius, reach })
     }
 
-    /// Narrows the cone to what no facet of the tree but its own reaches.
+    /// Narrows `limit` until no ray within the cone meets a facet of the tree but `facet`, its own; ends early once the cone is of no use.
     fn search(&self, tree: &Tree, facet: usize, limit: &mut Limit) {
         let mesh = tree.surroundings.mesh;
         let mut open: Vec<Link> = tree.root.into_iter().collect();
@@ -120,7 +123,7 @@ impl Base {
         }
     }
 
-    /// Whether a ray within the cone may meet a box about `center`.
+    /// Whether a ray within the cone may meet a box that is given relative to `center`; `true` says nothing.
     fn may_meet(&self, b: &Aabb, center: Point, limit: &Limit) -> bool {
         let (middle, half) = (b.center() + center, 0.5 * b.size());
         let room = BOX_ROOM * half.max_element();
@@ -128,7 +131,7 @@ impl Base {
         height > self.reach && self.may_meet_ball(middle, half.length() + room, limit)
     }
 
-    /// Whether a ray within the cone may meet a ball.
+    /// Whether a ray within the cone may meet a ball, in the mesh's coordinates, mm.
     fn may_meet_ball(&self, middle: Point, radius: f64, limit: &Limit) -> bool {
         let (to, radius) = (middle - self.middle, (self.radius + radius) * (1.0 + BALL_ROOM));
         let (along, beside) = (to.dot(limit.axis), to.length_squared() - radius * radius);
@@ -150,7 +153,7 @@ impl Base {
         }
     }
 
-    /// Whether it is seen at once that no ray within the cone meets the hull of these points.
+    /// Whether a quick test shows that no ray within the cone meets the hull of these points; `false` says nothing.
     fn is_off(&self, points: &[Point], limit: &Limit) -> bool {
         let heights = |p: &Point| (*p - self.corners[0]).dot(self.normal);
         if points.iter().all(|p| heights(p) <= self.reach) {
@@ -184,7 +187,7 @@ impl Base {
         })
     }
 
-    /// The sine of the angle between the axis and the nearest direction from one triangle to the other.
+    /// The sine of half the widest cone about `axis` that keeps all rays from this triangle off the other; 0 where there is none.
     fn sine_to(&self, points: &[Point; 3], axis: Vector) -> f64 {
         let mut ways = [Vector::ZERO; 9];
         let mut count = 0;

@@ -45,7 +45,8 @@ const LINES: usize = 6;
 /// Lines in the plane of a triangle: the direction across each, away from the triangle, and where the line is, from its first corner.
 type Lines = [(Vector, f64); LINES];
 
-/// The normal of a triangle, and the lines through its sides and corners, which have it on one side; `None` without area.
+/// The unit normal of a triangle, and the lines in its plane through its sides and corners, which have it on one side; `None` without
+/// area.
 fn lines_around(corners: [Point; 3]) -> Option<(Vector, Lines)> {
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a).try_normalize()?;
@@ -65,12 +66,14 @@ fn lines_around(corners: [Point; 3]) -> Option<(Vector, Lines)> {
 
 /// The free cones and horizons of the facets that many rays have left.
 pub(super) struct Horizons {
+    /// By facet.
     cones: Vec<Cone>,
     facets: Vec<RayRecord>,
+    /// Rays beside its cone after which a facet's horizon is found.
     rays_before_search: u32,
 }
 
-/// Rays nearer to the axis than this cosine meet nothing.
+/// A cone within which rays that leave a facet meet nothing, shared by threads.
 struct Cone {
     /// At first the normal of the facet, and the cosine one that no ray has. Floats as their bits.
     axis: [AtomicU32; 3],
@@ -78,13 +81,13 @@ struct Cone {
 }
 
 impl Cone {
-    /// None yet.
+    /// A cone that holds no ray yet, about the normal of its facet.
     fn unknown(axis: Vector) -> Self {
         Self { axis: axis.to_array().map(|x| AtomicU32::new((x as f32).to_bits())), cosine: 2f32.to_bits().into() }
     }
 
-    /// Publishes the cone to other threads.
-    fn set(&self, axis: Vector, cosine: f64) {
+    /// Sets the unit axis and the cosine of half the angle, by which other threads then go.
+    fn publish(&self, axis: Vector, cosine: f64) {
         for (own, x) in self.axis.iter().zip(axis.to_array()) {
             own.store((x as f32).to_bits(), Ordering::Relaxed);
         }
@@ -92,7 +95,7 @@ impl Cone {
         self.cosine.store((cosine as f32 + COSINE_ROOM).to_bits(), Ordering::Release);
     }
 
-    /// The cosine of the angle of a ray to the axis, and that of the cone.
+    /// The cosine of the angle of a ray of this unit direction to the axis, and that of the cone, which no ray passes before there is one.
     #[inline(always)]
     fn cosines(&self, direction: Vector) -> (f32, f32) {
         let cosine = f32::from_bits(self.cosine.load(Ordering::Acquire));
@@ -118,6 +121,7 @@ struct RayRecord {
 }
 
 impl RayRecord {
+    /// A record of a facet that no ray has left.
     fn new() -> Self {
         Self {
             left: AtomicU32::new(0),
@@ -130,7 +134,8 @@ impl RayRecord {
         }
     }
 
-    /// Notes a ray; after enough of them one thread finds the cone or the horizon, the others walk on.
+    /// Notes a ray of this unit direction that left the facet beside its cone; after enough of them one thread finds the cone or the
+    /// horizon, the others walk on. A ray that goes into the body is not noted.
     #[cold]
     fn note(&self, tree: &Tree, facet: usize, cone: &Cone, direction: Vector, rays_before_search: u32) {
         let [a, b, c, _] = tree.surroundings.mesh.corners(facet);
@@ -159,7 +164,8 @@ impl RayRecord {
         }
     }
 
-    /// Takes the ray for one of those that the cone is laid around.
+    /// Widens the bounds of the directions that the cone is laid around by a ray's, a unit vector, and lays the cone once there are
+    /// [`RAYS_BEFORE_CONE`] and one more.
     fn gather(&self, tree: &Tree, facet: usize, cone: &Cone, normal: Vector, direction: Vector) {
         let direction = direction.to_array();
         for axis in 0..3 {
@@ -180,8 +186,8 @@ impl RayRecord {
         let axis = if widest < FRAC_PI_2 { low + high } else { normal };
         if let Some(axis) = axis.try_normalize() {
             let widest = widest.min(FRAC_PI_2);
-            match cone::cosine(tree, facet, axis, widest) {
-                Some(cosine) => cone.set(axis, cosine),
+            match cone::cosine_of_free_cone(tree, facet, axis, widest) {
+                Some(cosine) => cone.publish(axis, cosine),
                 // Something stands right ahead: what leaves is met. An axis of zero ends the watch of this facet.
                 None => cone.axis.iter().for_each(|x| x.store(0, Ordering::Relaxed)),
             }
@@ -190,7 +196,7 @@ impl RayRecord {
 }
 
 impl Horizons {
-    /// None yet, for a run of so many rays; `None` when they are too few for the search.
+    /// Starts without cones and horizons, for a run of `rays` rays; `None` when they are too few for the facets of the tree.
     pub(super) fn if_worth(rays: u64, tree: &Tree) -> Option<Self> {
         let mesh = tree.surroundings.mesh;
         let each = rays / mesh.facets.len().max(1) as u64;
@@ -207,7 +213,8 @@ impl Horizons {
         })
     }
 
-    /// Whether a ray that leaves this facet is known to meet nothing.
+    /// Whether a ray of this unit direction that leaves this facet is known to meet nothing; `false` says nothing. A ray that is not may be
+    /// noted, and now and then a cone or horizon worked out.
     #[inline(always)]
     pub(super) fn is_free(&self, tree: &Tree, facet: usize, direction: Vector) -> bool {
         let Some(cone) = self.cones.get(facet) else { return false };
@@ -216,7 +223,7 @@ impl Horizons {
         along > cosine || (along > 0.0 && self.is_above_horizon(tree, facet, direction))
     }
 
-    /// The same of a ray beside the cone of the facet.
+    /// As [`Self::is_free`] of a ray beside the cone of the facet, by its horizon; where there is none yet the ray is noted.
     #[inline(never)]
     fn is_above_horizon(&self, tree: &Tree, facet: usize, direction: Vector) -> bool {
         let record = &self.facets[facet];

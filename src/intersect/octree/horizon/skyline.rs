@@ -27,7 +27,7 @@ const UPRIGHT_ROOM: f64 = 1e-6;
 /// Sectors around a triangle: a ray is in one by the signs and the order of its two coordinates in the plane.
 pub(super) const SECTORS: usize = 8;
 
-/// The sector of a ray with these coordinates in the plane.
+/// The sector, below [`SECTORS`], of a ray with these coordinates in the plane.
 #[inline(always)]
 pub(super) fn sector(x: f32, y: f32) -> usize {
     usize::from(x < 0.0) | usize::from(y < 0.0) << 1 | usize::from(y.abs() > x.abs()) << 2
@@ -56,7 +56,7 @@ impl Skyline {
         Self { normal: zero, x: zero, y: zero, slope2: [never; SECTORS], steepest: never }
     };
 
-    /// Whether the skyline stays below a direction, so that nothing stands in its way.
+    /// Whether the skyline stays below a unit direction, so that nothing stands in its way; never where it is unknown.
     #[inline(always)]
     fn is_below(&self, d: [f32; 3]) -> bool {
         let dot = |a: [f32; 3]| a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
@@ -71,6 +71,7 @@ impl Skyline {
 }
 
 impl Horizon {
+    /// Whether a ray of this unit direction that leaves the facet, from either triangle, is known to meet nothing.
     #[inline(always)]
     pub(super) fn is_below(&self, d: Vector) -> bool {
         let d = d.to_array().map(|x| x as f32);
@@ -78,7 +79,8 @@ impl Horizon {
     }
 }
 
-/// The horizon of a facet, in each sector no lower than the slope `floor`.
+/// Finds the horizon of a facet, in each sector no lower than the slope `floor`, the tangent over its plane. A sector with an infinite
+/// floor is not searched and lets no ray be known as free.
 pub(super) fn of_facet(tree: &Tree, facet: usize, floor: &[f64; SECTORS]) -> Horizon {
     let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
@@ -111,7 +113,7 @@ struct Base {
 }
 
 impl Base {
-    /// `None` for a triangle without area.
+    /// A triangle with the reach of its starts, mm; `None` without area.
     fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
         let (normal, lines) = lines_around(corners)?;
         let (x, y) = orthonormal_pair(normal);
@@ -129,7 +131,7 @@ impl Base {
         Some(Self { normal, x, y, origin: corners[0], lines, toward, reach })
     }
 
-    /// How steeply anything stands over the plane, seen from the triangle, at least `slopes`.
+    /// Finds by sector how steeply anything in the tree but `facet` stands over the plane, seen from the triangle, at least `slopes`.
     fn skyline(&self, tree: &Tree, facet: usize, mut slopes: [f64; SECTORS]) -> Skyline {
         let mesh = tree.surroundings.mesh;
         let higher = |slopes: &[f64; SECTORS], rise: &[f64; SECTORS]| {
@@ -175,7 +177,7 @@ impl Base {
         Skyline { normal, x, y, slope2, steepest: slope2.into_iter().fold(0.0, f32::max) }
     }
 
-    /// No less than [`Self::rise`] of its corners, from the highest of them and those nearest to the lines.
+    /// An upper bound of [`Self::rise`] for what lies in a box, by sector; infinite where it may lie over the triangle.
     fn rise_of_box(&self, b: &Aabb) -> [f64; SECTORS] {
         let (middle, half) = (b.center() - self.origin, 0.5 * b.size());
         let room = BOX_ROOM * half.max_element();
@@ -195,7 +197,8 @@ impl Base {
         rise
     }
 
-    /// The steepest rays, by sector, that can meet the hull of these points.
+    /// The slopes, by sector, of the steepest rays that can meet the hull of these points: 0 where it lies in or below the plane, infinite
+    /// where it may lie over the triangle.
     fn rise(&self, points: &[Point]) -> [f64; SECTORS] {
         let (mut steepest, mut behind, mut above) = ([0.0f64; LINES], [false; LINES], false);
         for p in points {

@@ -19,7 +19,7 @@ pub(super) struct BufferFacet {
 }
 
 impl BufferFacet {
-    /// A facet as it is seen on one side of the buffer.
+    /// A facet as the rays on one side of the buffer ask it, of which it needs no more than their axes.
     fn new(mesh: &FacetMesh, facet: u32, view: &View, side: usize) -> Self {
         let axes = view.axes(side);
         let positions = mesh.corner_positions(facet as usize);
@@ -28,7 +28,7 @@ impl BufferFacet {
         Self { corners: axes.map(|a| corners.map(|p| p[a])), facet, triangles }
     }
 
-    /// Those of some facets on each side, side after side.
+    /// Makes one for each of the facets listed for each side, side after side.
     pub(super) fn on_all_sides(mesh: &FacetMesh, view: &View, facets: &[Vec<u32>]) -> Vec<Self> {
         let mut shown = huge_pages::with_capacity(facets.iter().map(Vec::len).sum());
         for (side, facets) in facets.iter().enumerate() {
@@ -37,22 +37,22 @@ impl BufferFacet {
         shown
     }
 
-    /// One bit for each triangle, two apart.
+    /// Bit 0 for the first triangle, bit 2 for the second where there is one.
     #[inline(always)]
     pub(super) fn triangle_bits(&self) -> u8 {
         // Two apart, so that shifts by one turn sides into triangles for both facets of a pair at once.
         (self.triangles & 1 | (self.triangles & 2) << 1) as u8
     }
 
-    /// Tests the facet and keeps the nearest hit.
+    /// Tests all triangles of the facet and offers hits to `best`; `line` must have the axes of the facet's side.
     #[inline(always)]
     pub(super) fn test(&self, line: &Line, best: &mut Nearest) {
-        line.quad((self.facet, self.triangles), &self.corners, best);
+        line.test_quad((self.facet, self.triangles), &self.corners, best);
     }
 }
 
 impl View {
-    /// The axes of the rays on a side of the buffer, the main one last.
+    /// The axes that [`FacetRay`] chooses for the rays on a side of the buffer, the main one last.
     pub(super) fn axes(&self, side: usize) -> [usize; 3] {
         match self {
             Self::Point(_) => [[1, 2, 0], [2, 0, 1], [0, 1, 2]][side / 2 % 3],

@@ -75,7 +75,7 @@ enum View {
 #[derive(Clone, Debug)]
 pub(super) struct LightBuffer {
     view: View,
-    /// Squares along each side of the buffer.
+    /// Squares along an edge of each grid.
     side: usize,
     /// Those of the buffer, side after side of the cube, then those of divided squares.
     squares: Vec<Square>,
@@ -114,7 +114,8 @@ impl Lookup {
 const LOOKUP_BATCH: usize = 32;
 
 impl View {
-    /// The view of a beam; `None` where it is no number, or so far off that rounding would not be small against a square.
+    /// The view of a beam; `None` where it is not finite, a direction is not of unit length, the mesh has no extent across it, or lies so
+    /// far off that rounding would not be small against a square.
     fn from_beam(beam: &Beam, tree: &Tree) -> Option<Self> {
         match beam {
             Beam::Point(origin) => origin.is_finite().then(|| Self::Point(origin.to_array())),
@@ -148,12 +149,12 @@ impl View {
         }
     }
 
-    /// Number of buffers.
+    /// Number of grids: the six sides of a cube, or one.
     fn sides(&self) -> usize {
         if matches!(self, Self::Point(_)) { 6 } else { 1 }
     }
 
-    /// Whether a ray that starts on no face is one of those that the buffer shows.
+    /// Whether a ray that starts on no face is one of those that the buffer shows, by origin or by direction and plane.
     #[inline(always)]
     fn shows(&self, ray: &Ray) -> bool {
         match self {
@@ -165,7 +166,8 @@ impl View {
     }
 }
 
-/// The buffers for these sources, as far as they pay; those of `kept` are not drawn again.
+/// Draws light buffers for the expected beams for which they pay, at most [`MOST_BUFFERS`]; takes those that `kept` has already, and
+/// drops the rest of it.
 pub(super) fn draw_expected(
     tree: &Tree,
     expected: &ExpectedRays<'_>,
@@ -187,8 +189,8 @@ pub(super) fn draw_expected(
 }
 
 impl LightBuffer {
-    /// Where a ray looks first; `false` when it passes all facets by. Without closures, which would be compiled without the caller's
-    /// instruction set.
+    /// Fills `lookup` with the square that a ray passes; returns `false` when it passes all facets by, with a square of no meaning.
+    /// Without closures, which would be compiled without the caller's instruction set.
     #[inline(always)]
     fn locate(&self, ray: &Ray, lookup: &mut Lookup) -> bool {
         let prepared = FacetRay::new(ray);
@@ -220,7 +222,7 @@ impl LightBuffer {
         inside
     }
 
-    /// The facets that a ray may meet.
+    /// The facets that the ray of a lookup may meet, the nearest first; empty where it meets none.
     #[inline(always)]
     fn entries(&self, lookup: &Lookup) -> &[Entry] {
         let mut square = self.squares[lookup.square as usize];
@@ -236,7 +238,8 @@ impl LightBuffer {
     }
 }
 
-/// The buffer that shows a ray; `last` is tried first.
+/// The index of the buffer that shows a ray, `last` tried first; `None` where it leaves a face, its range does not begin at 0, or no
+/// buffer has its source. `buffers` must not be empty.
 #[inline(always)]
 fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usize> {
     // A ray that leaves a face starts elsewhere, and one whose range begins later must not be told of facets
@@ -258,7 +261,8 @@ fn buffer_showing(buffers: &[LightBuffer], last: usize, ray: &Ray) -> Option<usi
     None
 }
 
-/// Answers the rays that are on a buffer; gives the number of the others, whose places come first in `rest`.
+/// Answers the rays that a buffer shows, and writes their `hits`; those that pass all facets by keep theirs. Returns the number of the
+/// other rays, whose places are then the first of `rest`. There must be a buffer; rays are not counted.
 #[inline(always)]
 pub(super) fn answer<L: Lanes>(
     buffers: &[LightBuffer],
@@ -321,7 +325,7 @@ pub(super) fn answer<L: Lanes>(
                 cost.tests += 1 + u64::from(other.is_some());
                 let one = &shown[entries[first].facet as usize];
                 let other = other.map(|e| &shown[e.facet as usize]);
-                pair::test::<L>(one, other, &lookup.line, &mut edges, &mut best);
+                pair::test_pair::<L>(one, other, &lookup.line, &mut edges, &mut best);
                 first += 2;
             }
             hits[index] = best.hit();

@@ -1,8 +1,8 @@
 //! Two facets of a light buffer asked at once.
 //!
 //! A square holds two facets where the buffer is not divided further, and which of them is met is a matter of chance: asked one after
-//! the other, what the processor guesses wrong costs more than the test of the second. The arithmetic is that of [`Line::quad`], step by
-//! step, so that the hits are the same; where an edge function is zero that decides.
+//! the other, what the processor guesses wrong costs more than the test of the second. The arithmetic is that of [`Line::test_quad`], step
+//! by step, so that the hits are the same; where an edge function is zero that decides.
 
 use super::BufferFacet;
 use crate::intersect::facet::{Line, Nearest};
@@ -10,9 +10,10 @@ use crate::intersect::octree::facet_pair::Edges;
 use crate::intersect::octree::lanes::Lanes;
 use std::hint::select_unpredictable;
 
-/// Tests two facets, or one if there is no other, and keeps the nearest hit. Bits of triangles are two apart, as their sides are.
+/// Tests two facets, or one if there is no other, and offers hits to `best`; `edges` is room to work in. Bits of triangles are two apart,
+/// as their sides are.
 #[inline(always)]
-pub(super) fn test<L: Lanes>(
+pub(super) fn test_pair<L: Lanes>(
     first: &BufferFacet,
     other: Option<&BufferFacet>,
     line: &Line,
@@ -22,7 +23,7 @@ pub(super) fn test<L: Lanes>(
     // A missing other repeats the first, and its bits are not present.
     let second = other.unwrap_or(first);
     let present = first.triangle_bits() | select_unpredictable(other.is_some(), second.triangle_bits() << 4, 0);
-    L::edges([&first.corners, &second.corners], line, edges);
+    L::pair_edges([&first.corners, &second.corners], line, edges);
     // Of each triangle: two edges of the outline, and the diagonal from this side or from the other.
     let sides = |outline: u8, diagonal: u8, against: u8| {
         (outline | outline >> 1) & 0x55 | (diagonal & 0x11) | (against & 0x44)

@@ -30,7 +30,7 @@ const SQUARES: usize = 16;
 /// Squares and entries for each facet at which dividing ends.
 const MOST_PER_FACET: usize = 64;
 
-/// A square of the buffer with the room around it.
+/// A square of the buffer with the room around it, in units of the half side of the buffer.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     low: [f64; 2],
@@ -40,6 +40,7 @@ struct Window {
 impl Window {
     const WHOLE: Self = Self { low: [-1.0 - ROOM; 2], high: [1.0 + ROOM; 2] };
 
+    /// Whether the two have no point in common.
     fn is_apart(&self, o: &Self) -> bool {
         (self.low[0] > o.high[0])
             | (self.low[1] > o.high[1])
@@ -47,7 +48,7 @@ impl Window {
             | (o.low[1] > self.high[1])
     }
 
-    /// One of `n` × `n` parts.
+    /// The part at column `i` and row `j` of `n` × `n`, with room of its own.
     fn part(&self, n: usize, [i, j]: [usize; 2]) -> Self {
         let edge = |a: usize, k: usize| {
             let (low, high) = (self.low[a] + ROOM, self.high[a] - ROOM);
@@ -64,19 +65,19 @@ struct Projection {
     facet: u32,
     /// Homogeneous places of the corners: `[x, y, w]` stands at `[x/w, y/w]`.
     corners: [[f64; 3]; 4],
-    /// Their places, for facets wholly in front.
+    /// Their places, for facets wholly in front of the source; else `None`.
     places: Option<[[f64; 2]; 4]>,
     /// A window around the places.
     bounds: Window,
     /// Depths between which it lies.
     near: f64,
     far: f64,
-    /// Whether all rays start before it.
+    /// Whether all rays start before it, so that it can hide what lies behind.
     whole: bool,
 }
 
 impl Projection {
-    /// A facet seen on one side of the view; `None` where no ray of that side can meet it.
+    /// Projects a facet of these corners, mm, to one side of the view; `None` where no ray of that side can meet it.
     fn new(facet: u32, corners: [Point; 4], view: &View, side: usize) -> Option<Self> {
         let mut depths = [0.0; 4];
         // Homogeneous: a corner beside the source or behind it has no place to divide for, but still lies on one
@@ -121,7 +122,7 @@ impl Projection {
         (far >= start && projection.overlaps(&Window::WHOLE)).then_some(projection)
     }
 
-    /// Whether a ray through the window may meet it.
+    /// Whether a ray through the window may meet it; `true` says nothing.
     fn overlaps(&self, window: &Window) -> bool {
         if self.bounds.is_apart(window) {
             return false;
@@ -139,7 +140,7 @@ impl Projection {
         !(out(0) || out(1) || beyond(&|c| c[2]))
     }
 
-    /// Whether every ray through the window meets it.
+    /// Whether every ray through the window surely meets it; `false` says nothing.
     fn fills(&self, window: &Window) -> bool {
         let Some(p) = self.places.filter(|_| self.whole) else { return false };
         let turn = |[a, b, c]: [usize; 3]| {
@@ -158,7 +159,7 @@ impl Projection {
     }
 }
 
-/// The least of the edge function of a line over the window, times `sign`.
+/// The least value, over the window, of `sign` times the edge function of the line from `p` to `q`, which is positive to its left.
 fn least_edge(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
     let [dx, dy] = [sign * (q[0] - p[0]), sign * (q[1] - p[1])];
     // A linear function is least at the corner that lies farthest against its gradient.
@@ -206,7 +207,7 @@ pub(super) fn draw(mesh: &FacetMesh, view: View, threads: usize) -> LightBuffer 
     buffer
 }
 
-/// The values of a function at 0 to `n`, worked out on so many threads.
+/// The values of a function at 0 to `n − 1`, in order, worked out on `threads` threads, at least this one.
 fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let values: Vec<OnceLock<T>> = (0..n).map(|_| OnceLock::new()).collect();
     let next = AtomicUsize::new(0);
@@ -224,7 +225,7 @@ fn in_parallel<T: Send + Sync>(n: usize, threads: usize, value: impl Fn(usize) -
     values.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
-/// All facets that a buffer shows, the nearest first.
+/// All usable facets that the side `face` of a buffer shows, the nearest first.
 fn projections(mesh: &FacetMesh, view: &View, face: usize) -> Vec<Projection> {
     let projection = |f: usize| {
         let corners = mesh.corners(f);
@@ -244,7 +245,7 @@ struct Tile {
 }
 
 impl Tile {
-    /// Draws a window of `side` × `side` squares; `room` bounds its entries.
+    /// Draws a window of `side` × `side` squares, a power of two; beyond `room` squares and entries none is divided any more.
     fn draw(projections: &[Projection], window: &Window, side: usize, room: usize) -> Self {
         let tile = Self { side, squares: vec![Square::default(); side * side], entries: Vec::new() };
         let mut rasterizer = Rasterizer { tile, written: FxHashMap::default(), projections, room };
@@ -253,7 +254,7 @@ impl Tile {
         rasterizer.tile
     }
 
-    /// Puts it into its place in the buffer.
+    /// Copies it into the buffer as tile `k`, counted face by face, row by row; its facets begin at `first_facet` in `buffer.facets`.
     fn copy_into(self, buffer: &mut LightBuffer, k: usize, first_facet: u32) {
         let (face, i, j) = (k / (TILES * TILES), k % TILES, k / TILES % TILES);
         let own = self.side * self.side;
@@ -285,7 +286,7 @@ struct Rasterizer<'a> {
 }
 
 impl Rasterizer<'_> {
-    /// Those of `list` that a ray through the window may meet first, in their order.
+    /// Those of `list`, indices of projections, that a ray through the window may meet first, in their order.
     fn visible(&self, list: &[u32], window: &Window) -> Vec<u32> {
         let mut visible = Vec::new();
         let mut end = f64::INFINITY;
@@ -307,7 +308,7 @@ impl Rasterizer<'_> {
         visible
     }
 
-    /// Goes down to the squares of the tile, `side` of which lie along a side of this window.
+    /// Writes all squares of this window, `side` × `side` from column and row `at` of the tile on; `list` holds what it may see.
     fn divide_tile(&mut self, list: Vec<u32>, window: &Window, at: [usize; 2], side: usize) {
         if list.is_empty() {
             return;
@@ -326,7 +327,7 @@ impl Rasterizer<'_> {
         }
     }
 
-    /// Writes the facets of a square, or divides it.
+    /// Writes the facets of the square at index `place`, or divides it where they are many; `depth` counts the divisions above.
     fn write_square(&mut self, list: Vec<u32>, window: &Window, place: usize, depth: u32) {
         let tile = &mut self.tile;
         if list.len() <= MOST_ENTRIES
